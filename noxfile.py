@@ -31,7 +31,7 @@ def tests(session: nox.Session) -> None:
 
 @nox.session
 def translations(session: nox.Session) -> None:
-    """The texts of the code into the catalogues, these compiled, and the page of all sentences."""
+    """The texts of the code into the catalogues, and these compiled."""
     catalogue, folder = "grader/locale/planmark.pot", "grader/locale"
     plain = ("--no-wrap",)
     words = ("-F", "grader/locale/babel.cfg", "-k", "N_", "--no-location", "--sort-output")
@@ -39,10 +39,15 @@ def translations(session: nox.Session) -> None:
     update = ("-D", "planmark", "-i", catalogue, "-d", folder, "--no-fuzzy-matching", "--ignore-obsolete")
     session.run("pybabel", "update", *update, *plain)
     session.run("pybabel", "compile", "-D", "planmark", "-d", folder)
-    session.run("python", "-m", "docs.make_sentences")
 
 
 @nox.session
 def bench(session: nox.Session) -> None:
     """The benchmarks of solver and reading."""
     session.run("python", "-m", "tests.bench", *session.posargs, env=ONE_THREAD)
+
+
+@nox.session
+def docs(session: nox.Session) -> None:
+    """The documentation as a site, in the folder `site`."""
+    session.run("mkdocs", "build", "--strict", *session.posargs)

@@ -1,11 +1,10 @@
-"""Measure and put the figures into benchmarks.md: `python -m docs.make_benchmarks`, some half an hour.
+"""Measure, print, and put the main tables into benchmarks.md: `python -m docs.make_benchmarks`, half an hour.
 
 With `solver`, `reading`, `paper`, `curve`, `lines`, `judging` or `settling` only that part is measured and
 replaced; a number is that of students: for each scene, for each kind, hand and mechanism, for each kind of
 sheet.
 """
 
-import re
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -70,23 +69,40 @@ PARTS: dict[str, Callable[[int | None], Iterable[Table]]] = {
     "judging": _judging,
     "settling": _settling,
 }
+SHOWN = (
+    "Solver: median microseconds per variant (pump; positions",
+    "Solver: largest error",
+    "Stability: largest error",
+    "Stability: branches",
+    "Reading: sheets and vectors",
+    "Reading: confidence against",
+    "Lines: time and error",
+    "Judging: verdicts",
+    "Judging: the first mistake named",
+    "Judging: single mistakes",
+    "Settling: a class of scans",
+)
+"""How the titles of the page's tables begin; those `by mechanism` are left out, too."""
 
 
 def main(wanted: list[str]) -> None:
-    """Measure, and replace what stands between the marks of each part."""
+    """Measure, print all tables of each part, and replace those of the page."""
     students = next((int(told) for told in wanted if told.isdigit()), None)
     parts = [told for told in wanted if not told.isdigit()]
     for part in parts or list(PARTS):
-        write(part, as_text(PARTS[part](students)))
+        tables = list(PARTS[part](students))
+        sys.stdout.write(as_text(tables) + "\n")
+        write(part, [one for one in tables if one[0].startswith(SHOWN) and "by mechanism" not in one[0]])
 
 
-def write(part: str, tables: str) -> None:
-    """Put a part's tables between its marks."""
-    figures = re.sub(r"(?m)^(Solver|Stability|Reading|Lines|Judging|Settling): (.*)$", r"### \1: \2", tables)
-    first, last = f"<!-- {part}: written by make_benchmarks.py -->\n", f"<!-- {part}: end -->"
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(first)
-    _, _, after = rest.partition(last)
-    PAGE.write_text(f"{before}{first}\n{figures.rstrip()}\n\n{last}{after}", encoding="utf-8")
+def write(part: str, tables: list[Table]) -> None:
+    """Put a part's tables between its marks, where the page has any of them."""
+    if tables:
+        first, last = f"<!-- {part}: written by make_benchmarks.py -->\n", f"<!-- {part}: end -->"
+        before, _, rest = PAGE.read_text(encoding="utf-8").partition(first)
+        _, _, after = rest.partition(last)
+        shown = as_text((f"### {title}", heads, rows) for title, heads, rows in tables)
+        PAGE.write_text(f"{before}{first}\n{shown.rstrip()}\n\n{last}{after}", encoding="utf-8")
 
 
 if __name__ == "__main__":

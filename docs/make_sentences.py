@@ -1,13 +1,14 @@
-"""Write every text that people read, side by side in all languages, into sentences.md.
+"""Write every text that people read, side by side in all languages: a page of the site.
 
-    python -m docs.make_sentences
+    python -m docs.make_sentences > sentences.md
 
-Texts stand in the order of the files that say them, each with an example: its parameters filled as a page
-would fill them. Below them stand the titles and tasks of the built-in assignments and rubrics. A native
-speaker can read it from top to bottom, about half an hour.
+`mkdocs build` puts it into the site (`site_hooks.py`). Texts stand in the order of the files that say them,
+each with an example: its parameters filled as a page would fill them. Below them stand the titles and tasks
+of the built-in assignments and rubrics. A native speaker can read it from top to bottom, about half an hour.
 """
 
 import re
+import sys
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -18,17 +19,15 @@ from babel.messages.frontend import parse_mapping_cfg
 from grader.language import LANGUAGES, Tongue, tongue
 from reference.authored.assignment import library
 
-HERE = Path(__file__).resolve().parent
-ROOT = HERE.parent
-PAGE = HERE / "sentences.md"
+ROOT = Path(__file__).resolve().parent.parent
 COUNTS = (1, 3, 20)
 """Numbers that take every form of a plural in all three languages."""
 PLACEHOLDER = re.compile(r"%\((\w+)\)[sd]|\{(\w+)\}")
 KEYWORDS = {"_": None, "gettext": None, "N_": None, "ngettext": (1, 2)}
 HEAD = """# Every sentence, in all languages
 
-Written by `python -m docs.make_sentences` from the catalogues ([translating.md](translating.md)); a test
-holds it complete. Names and numbers are examples. `/` stands between the forms for 1, 3 and 20.
+Written from the catalogues ([how to translate](translating.md)). Names and numbers are examples. `/` stands
+between the forms for 1, 3 and 20.
 """
 
 Row = tuple[str, ...]
@@ -53,7 +52,8 @@ EXAMPLES: Mapping[str, str] = {
     "written": "@45.0 mm", "x": "@60.0 mm", "x_direction": "@0°", "y": "@20.0 mm", "y_direction": "@90°",
     "cause": "normal component reversed", "done": "12", "minutes": "4", "open": "38", "total": "30",
     "verdict": "right", "who": "A. B.", "beyond": "@0.2 mm", "good_to": "@0.3 mm", "whose": "7",
-    "instead": "v_CA", "share": "62\u00a0%",
+    "instead": "v_CA", "share": "62\u00a0%", "file": "class.csv", "most": "1000", "names": "v_A, v_B", "error": "line 3", "fields": "5",
+    "columns": "4", "mark": ",", "point": "O1",
 }  # fmt: skip
 """Parameters by name: after ``@`` a number with its unit; other texts of the catalogues are translated."""
 OTHERWISE: Mapping[str, Mapping[str, str]] = {
@@ -184,4 +184,4 @@ def _cell(text: str) -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")
+    sys.stdout.write(page())

@@ -28,6 +28,9 @@ UNITS = (
 )  # fmt: skip
 """Units as people read them; each has its letters in every language."""
 
+SIDES = {"left": N_("on the left"), "right": N_("on the right"), "ahead": N_("ahead"), "behind": N_("behind")}
+"""Where a joint lies, as a datum of a variant."""
+
 _LANGUAGE_NAMES = {"en": "English", "ro": "română", "ru": "русский"}
 
 

@@ -71,6 +71,21 @@ def near_names(name: str, known: Iterable[str], *, most: int = 2, cutoff: float 
     return [by_lower[near] for near in difflib.get_close_matches(name.lower(), by_lower, most, cutoff)]
 
 
+def ranges_of(numbers: Sequence[int]) -> str:
+    """Whole numbers in rising order in words: ``from 1 to 30``, or with gaps ``= 1..9, 11, 13, 14``."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    if len(runs) == 1:
+        return f"from {numbers[0]} to {numbers[-1]}"
+    return "= " + ", ".join(
+        f"{run[0]}..{run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in runs
+    )
+
+
 class AuthoredFileError(PlanmarkError):
     """A mechanism, assignment or rubric file: all its faults at once."""
 

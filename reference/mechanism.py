@@ -6,7 +6,7 @@ left of the directed line between the group's pins (for a slider: ahead along it
 right (behind); an array where it differs between variants.
 """
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import NoneType
 from typing import Any
@@ -241,6 +241,17 @@ def translated(mechanism: Mechanism, by: ComplexArray) -> Mechanism:
         driver = replace(driver, guide_m=driver.guide_m + by)
     ground = {joint: place + by for joint, place in mechanism.ground_m.items()}
     return Mechanism(ground, driver, tuple(carried(group) for group in mechanism.groups))
+
+
+def driven_of(driver: Driver) -> FloatArray:
+    """The driven coordinate: a crank's angle (rad), a slider's displacement (m)."""
+    return driver.angle_rad if isinstance(driver, Crank) else driver.displacement_m
+
+
+def rows_of(mechanism: Mechanism, rows: Sequence[int] | np.ndarray) -> Mechanism:
+    """The mechanism of some of its variants."""
+    chosen: Mechanism = with_arrays(mechanism, lambda values: values[rows])
+    return chosen
 
 
 def guides_of(group: Group) -> tuple[Guide, ...]:

@@ -165,7 +165,7 @@ def make_class(assignment: Assignment, pupils: Iterable[Pupil], folder: Path, de
 
 def sheets_of(assignment: Assignment, pupil: Pupil) -> list[SimulatedSheet]:
     """The student's sheets, on printed paper where the student got some."""
-    by_position = assignment.file.variant.position is not None
+    by_position = assignment.numbers("position") is not None
     variant = assignment.variant(None, pupil.variant) if by_position else assignment.variant(pupil.variant)
     printed = None
     if "answer sheet" in pupil.hands_in:

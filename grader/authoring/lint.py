@@ -29,6 +29,7 @@ from grader.authoring.variant_checks import (
     LEAST_CROSSING_DEG,
     LEAST_TRANSMISSION,
     Conditions,
+    assembly_findings,
     broken_findings,
     broken_variants,
     condition_findings,
@@ -47,6 +48,8 @@ from grader.printed.layout import SCALE_OF
 from grader.rubric import RubricFile, check_rubric
 from reference.authored.assignment import TRADITIONS, Assignment, Variant
 from reference.authored.formula import Formula
+from reference.authored.toml_file import SideText
+from reference.authored.variant_table import KEYS
 from reference.construction.derive import image_name
 from reference.construction.graph import Construction, ancestors
 from reference.geometry import FloatArray
@@ -101,6 +104,7 @@ def lint(assignment: Assignment, rubric: RubricFile) -> Lint:
     rooms = {index: room_of(figures, extents) for index, figures in pages_of(assignment, plan)}
     scales = proposals(assignment, plan, extents, asked, rooms)
     findings += [
+        *assembly_findings(assignment, sound),
         *condition_findings(assignment, plan, conditions),
         *length_findings(rubric, plan, asked),
         *room_findings(assignment, plan, rooms),
@@ -204,6 +208,8 @@ def names_in(thing: object) -> set[str]:
     """The names that the formulas of an authored table need, however deep they stand."""
     if isinstance(thing, Formula):
         return set(thing.names)
+    if isinstance(thing, SideText):
+        return names_in(thing.side)
     inside: Iterable[object] = ()
     if isinstance(thing, BaseModel):
         inside = (getattr(thing, name) for name in type(thing).model_fields)
@@ -254,9 +260,14 @@ def _unused_values(assignment: Assignment) -> Iterator[LintFinding]:
         if name not in needed:
             path = f"$.variant.values.{name}"
             yield LintFinding("hint", "unused", "assignment", path, "no formula uses this value")
+    for name in assignment.rows.columns if assignment.rows else ():
+        if name not in needed:
+            message = f"no formula uses the column {name}"
+            yield LintFinding("hint", "unused", "assignment", "$.variant.table", message)
     drawn = _with_their_own(assignment, names_in(assignment.mechanism_file))
-    for name in ("n", "position"):
-        if getattr(file.variant, name) is not None and name not in drawn:
+    for name, in_table in zip(KEYS, assignment.rows.has if assignment.rows else (False, False), strict=True):
+        by_row = in_table and not drawn.isdisjoint(assignment.rows.columns if assignment.rows else ())
+        if assignment.numbers(name) is not None and name not in drawn and not by_row:
             message = f"the mechanism does not depend on {name}: every student has the same"
             yield LintFinding("warning", "same_for_all", "assignment", f"$.variant.{name}", message)
 

@@ -3,6 +3,7 @@
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from grader.authoring.findings import (
 from grader.authoring.round_scales import AskedVectors
 from grader.rubric import RubricFile
 from reference.authored.assignment import Assignment, Variant
+from reference.authored.flat_positions import other_assemblies
 from reference.errors import MechanismError
 from reference.geometry import FloatArray
 from reference.kinematics.motion import move_where_possible, reason_at
@@ -70,6 +72,27 @@ def broken_findings(assignment: Assignment, broken: Sequence[Broken]) -> Iterato
         message = error.message if same else template.replace("{gap}", f"{gaps[0]:.3g} to {gaps[-1]:.3g} m")
         place = group_place(assignment, error.group)
         yield LintFinding("fault", error.code, *place, message, tuple(one.variant for one in variants))
+
+
+def assembly_findings(assignment: Assignment, variants: Sequence[Variant]) -> Iterator[LintFinding]:
+    """Variants whose side means another assembly than their neighbours', by n or by position."""
+    mechanism = assignment.mechanism([*variants])
+    by_node: dict[str, set[int]] = defaultdict(set)
+    for of_one in (attrgetter("position"), attrgetter("n")):
+        chains: dict[int | None, list[int]] = defaultdict(list)
+        for row, variant in enumerate(variants):
+            chains[of_one(variant)].append(row)
+        for chain in chains.values():
+            for node, rows in other_assemblies(mechanism, chain).items():
+                by_node[node].update(rows)
+    for node, others in by_node.items():
+        file, path = group_place(assignment, node)
+        message = (
+            f"{node} is on the side that is given, yet in another assembly than in the neighbouring variants:"
+            " a flat position lies between them; give side by a column of a table or by a formula"
+        )
+        meant = tuple(variants[row] for row in sorted(others))
+        yield LintFinding("warning", "another_assembly", file, f"{path}.side", message, meant)
 
 
 # Conditioning: transmission angles, crossing angles, predicted error ------------------------------

@@ -104,15 +104,20 @@ def new(
     mechanism: Annotated[
         str | None,
         typer.Option(
-            "--mechanism", help="Start from a four-bar (default), slider-crank, ...; the rubric is made."
+            "--mechanism",
+            help="Start from a four-bar (default), slider-crank, ..., or from your own: a .toml file.",
         ),
+    ] = None,
+    table: Annotated[
+        Path | None,
+        typer.Option("--table", help="Of your own mechanism: a CSV with the data of each variant."),
     ] = None,
 ) -> None:
     """Write a commented assignment to start from: three files that lint and plan take as they are."""
     from grader.authoring.new import new_assignment
     from reference.authored.assignment import load_assignment
 
-    written = new_assignment(file, like=like, mechanism=mechanism)
+    written = new_assignment(file, like=like, mechanism=mechanism, table=table)
     first = load_assignment(written.assignment).variants()[0]
     numbers = (("n", first.n), ("position", first.position))
     chosen = "".join(f" --{name} {value}" for name, value in numbers if value is not None)
@@ -356,7 +361,14 @@ def bench(
 @app.command()
 def export(
     results: Annotated[Path, typer.Argument(metavar="OUT", help="The folder that `planmark grade` wrote.")],
-    to: Annotated[str, typer.Option("--to", help="csv, moodle, canvas, gradescope or lti.")],
+    to: Annotated[
+        str,
+        typer.Option(
+            "--to",
+            help="csv, moodle, canvas, canvas-api, openedx, google-classroom, ms-education, brightspace,"
+            " blackboard, ilias, gradescope or lti.",
+        ),
+    ],
     what: Annotated[
         str | None,
         typer.Option(
@@ -373,7 +385,10 @@ def export(
         typer.Option("--worksheet", help="Moodle's downloaded offline grading worksheet, to fill in."),
     ] = None,
     gradebook: Annotated[
-        Path | None, typer.Option("--gradebook", help="Canvas's exported gradebook, to fill in.")
+        Path | None,
+        typer.Option(
+            "--gradebook", help="The gradebook as the platform exports it (ILIAS: status.csv), to fill in."
+        ),
     ] = None,
     ids: Annotated[
         Path | None,
@@ -382,6 +397,10 @@ def export(
     criteria: Annotated[
         Path | None,
         typer.Option("--criteria", help="The platform's criteria: its JSON answer, or a CSV criterion,id."),
+    ] = None,
+    submissions: Annotated[
+        Path | None,
+        typer.Option("--submissions", help="The platform's answer that lists the students' submissions."),
     ] = None,
     identity: Annotated[
         str | None,
@@ -400,9 +419,11 @@ def export(
         str | None,
         typer.Option("--visibility", help="Gradescope: visible, hidden, after_due_date, after_published."),
     ] = None,
-    course_id: Annotated[int | None, typer.Option("--course-id", min=1, help="Canvas's.")] = None,
+    course_id: Annotated[
+        str | None, typer.Option("--course-id", help="The platform's own, of the course or class.")
+    ] = None,
     assignment_id: Annotated[
-        int | None, typer.Option("--assignment-id", min=1, help="Canvas's or Moodle's.")
+        str | None, typer.Option("--assignment-id", help="The platform's own, of the assignment.")
     ] = None,
     cmid: Annotated[
         int | None,
@@ -410,6 +431,13 @@ def export(
     ] = None,
     context_id: Annotated[
         int | None, typer.Option("--context-id", min=1, help="Moodle's number of the activity's context.")
+    ] = None,
+    replace_guide: Annotated[
+        Path | None,
+        typer.Option(
+            "--replace-guide",
+            help="Delete the guide there: Moodle's core_grading_get_gradingform_instances tells the points.",
+        ),
     ] = None,
     lang: LanguageOption = "en",
 ) -> None:
@@ -420,11 +448,13 @@ def export(
 
     if worksheet is not None and (gradebook is not None or to != "moodle"):
         raise CallError("option_unused", "--worksheet is Moodle's: give it with --to moodle alone")
-    if gradebook is not None and to != "canvas":
-        raise CallError("option_unused", "--gradebook is Canvas's: give it with --to canvas alone")
+    if gradebook is not None and to in {"moodle", "canvas-api"}:
+        raise CallError("option_unused", f"--gradebook has no meaning for {to}: leave it out")
     options = Options(
-        to=to, what=what, form=worksheet or gradebook, criteria=criteria, identity=identity, item=item,
+        to=to, what=what, form=worksheet or gradebook, criteria=criteria, submissions=submissions,
+        identity=identity, item=item,
         position=position, combine=combine, maximum=maximum, rescale=rescale, visibility=visibility,
-        course_id=course_id, assignment_id=assignment_id, cmid=cmid, context_id=context_id, lang=lang,
+        course_id=course_id, assignment_id=assignment_id, cmid=cmid, context_id=context_id,
+        replace_guide=replace_guide, lang=lang,
     )  # fmt: skip
     raise typer.Exit(1 if export_results(results, file, options, roster, ids) else 0)

@@ -19,7 +19,7 @@ from grader.documents import (
     ResultsDocument,
 )
 from grader.inputs.roster import read_roster
-from grader.lms.canvas import CanvasMarksDocument
+from grader.lms import api
 from grader.lms.export import export as deliver
 from grader.lms.export import read_results, usual_name
 from grader.lms.grades import Delivery, Options, Person
@@ -41,7 +41,17 @@ MODELS: dict[str, tuple[type[BaseModel], Literal["validation", "serialization"]]
     "calibration": (CalibrationDocument, "serialization"),
     "moodle-rubric": (MoodleRubricDocument, "serialization"),
     "moodle-marks": (MoodleMarksDocument, "serialization"),
-    "canvas-marks": (CanvasMarksDocument, "serialization"),
+    "canvas-rubric": (api.CanvasRubricBody, "serialization"),
+    "canvas-assessment": (api.CanvasBody, "serialization"),
+    "openedx-rubric": (api.EdxRubric, "serialization"),
+    "openedx-assessment": (api.EdxGrade, "serialization"),
+    "google-rubric": (api.GoogleRubric, "serialization"),
+    "google-grade": (api.GoogleGrade, "serialization"),
+    "ms-rubric": (api.GraphRubric, "serialization"),
+    "ms-rubric-outcome": (api.GraphRubricOutcome, "serialization"),
+    "ms-points-outcome": (api.GraphPointsOutcome, "serialization"),
+    "ms-feedback-outcome": (api.GraphFeedbackOutcome, "serialization"),
+    "api-plan": (api.PlanDocument, "serialization"),
     "gradescope": (GradescopeDocument, "serialization"),
     "lti": (LtiDocument, "serialization"),
     "mechanism": (MechanismFile, "validation"),
@@ -68,7 +78,7 @@ def export_results(
     """Write the export file and report who is not in it; whether anybody is missing."""
     check_language(options.lang)
     path = file or folder / usual_name(options)
-    for source in (folder / "results.json", options.form, options.criteria, roster, ids):
+    for source in (folder / "results.json", options.form, options.criteria, options.submissions, roster, ids):
         if source is not None and path.resolve() == source.resolve():
             raise CallError("file_exists", f"{path}: is read for this export; name another file (--file)")
     results = read_results(folder)

@@ -108,10 +108,9 @@ def _student_of(page: ScannedPage) -> str | None:
 
 def _variant(assignment: Assignment, n: int | None, position: int | None) -> Variant | None:
     """The variant, None where n or position is left open: any of them may then have been drawn."""
-    spec = assignment.file.variant
-    if (spec.n is not None and n is None) or (spec.position is not None and position is None):
-        if n is not None and spec.n is not None and n not in spec.n.values:
-            return assignment.variant(n, position)
+    numbers, positions = assignment.numbers("n"), assignment.numbers("position")
+    is_open = (numbers is not None and n is None) or (positions is not None and position is None)
+    if is_open and (n is None or numbers is None or n in numbers):
         return None
     return assignment.variant(n, position)
 

@@ -27,20 +27,17 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
-from filelock import FileLock, Timeout
-
 from grader.files import OutputError, make_folder, sync_folder, write_whole
 from grader.inputs.decision_texts import LARGEST, PageDecision, page_decision, place
 from grader.inputs.roster import (
     ScanRef,
-    delimiter_of,
     parse_scan,
     short,
     surplus_of,
-    table_lines,
     whole_number,
     why_no_id,
 )
+from reference.authored.variant_table import delimiter_of, table_lines
 from reference.errors import CallError, Finding, InputFileError, PlanmarkError, lines_of, near_names
 
 FILE_NAME = "decisions.csv"
@@ -438,6 +435,8 @@ class DecisionFile:
     @contextmanager
     def _open(self) -> Iterator[DecisionTable]:
         """The file's content, which nobody else changes meanwhile."""
+        from filelock import FileLock, Timeout  # noqa: PLC0415 - slow to import, and seldom needed
+
         make_folder(self.path.parent)
         lock = FileLock(self.path.with_name(f".{self.path.name}.lock"), timeout=_LOCK_S)
         try:

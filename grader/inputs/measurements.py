@@ -22,15 +22,7 @@ from typing import TypeGuard
 
 from grader.documents import MeasurementsDocument
 from grader.inputs.decisions import Decision
-from grader.inputs.roster import (
-    MAX_LINES,
-    delimiter_of,
-    short,
-    surplus_of,
-    table_lines,
-    whole_number,
-    why_no_id,
-)
+from grader.inputs.roster import MAX_LINES, short, surplus_of, whole_number, why_no_id
 from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
 from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
 from grader.records import (
@@ -45,6 +37,7 @@ from grader.records import (
 )
 from grader.rubric import RubricFile
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
+from reference.authored.variant_table import delimiter_of, table_lines
 from reference.construction.derive import construction_of
 from reference.construction.graph import Construction, coincident
 from reference.errors import MOST_FINDINGS, Finding, InputFileError, lines_of, near_names
@@ -414,7 +407,7 @@ _COMMENT = re.compile(r'^[ \t]*"?#[^\n]*', re.MULTILINE)
 def _parse_csv(text: str, source: _Source) -> Iterator[Measurements]:
     text = _COMMENT.sub("", text)
     delimiter = delimiter_of(text)
-    lines, faults = table_lines(text, delimiter, speaker=source.speaker)
+    lines, faults = table_lines(text, delimiter, MAX_LINES, source.speaker.gettext)
     if not lines and not faults:
         why = source.say(N_("the file is empty; its first line must name the columns"))
         faults = [Finding(source.line(1), why)]

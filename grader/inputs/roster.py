@@ -5,8 +5,6 @@ a student with several positions has a line for each. Comma or semicolon separat
 semicolon-separated file numbers have decimal commas, and a `scans` field of several files is quoted.
 """
 
-import csv
-import io
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,6 +15,7 @@ from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
 from grader.language import LANGUAGES, N_, ROOT_LANGUAGE, Tongue, tongue
 from grader.records import Problem
 from reference.authored.assignment import SCALE_NAMES
+from reference.authored.variant_table import delimiter_of, table_lines
 from reference.errors import MOST_FINDINGS, AuthoredFileError, Finding, near_names
 
 _STUDENT_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
@@ -125,7 +124,7 @@ def read_roster(path: Path | str) -> Roster:
 def parse_roster(text: str, file: str = "roster.csv") -> Roster:
     """The roster in a text; raises as `read_roster` does."""
     delimiter = delimiter_of(text)
-    lines, findings = table_lines(text, delimiter)
+    lines, findings = table_lines(text, delimiter, MAX_LINES)
     if not lines:
         findings = findings or [Finding("line 1", "the file is empty; its first line must name the columns")]
         raise AuthoredFileError(file, tuple(findings))
@@ -160,40 +159,13 @@ def _text_of(path: Path) -> str:
 # Tables, of a roster and of measurements ----------------------------------------------------------
 
 
-def delimiter_of(text: str) -> str:
-    """`;` or `,`, whichever the first line of a CSV text has more of."""
-    first = next((line for line in text.splitlines() if line.strip()), "")
-    return ";" if first.count(";") > first.count(",") else ","
-
-
 _ENGLISH = tongue(ROOT_LANGUAGE)
-
-
-def table_lines(
-    text: str, delimiter: str, most: int = MAX_LINES, speaker: Tongue = _ENGLISH
-) -> tuple[list[tuple[int, list[str]]], list[Finding]]:
-    """Lines of a CSV text that are not blank, and the fault that ends them before the text does.
-
-    A record of several lines has the number of its first, from 1. More than `most` lines are a fault.
-    """
-
-    def fault(number: int, text: str, **known: object) -> list[Finding]:
-        line = speaker.gettext(N_("line %(number)s")) % {"number": number}
-        return [Finding(line, speaker.gettext(text) % known)]
-
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
-    lines: list[tuple[int, list[str]]] = []
-    number = 1
-    try:
-        for cells in reader:
-            if number > most:
-                return lines, fault(number, N_("more than %(most)s lines are no class"), most=most)
-            if any(cell.strip() for cell in cells):
-                lines.append((number, cells))
-            number = reader.line_num + 1
-    except csv.Error as error:
-        return lines, fault(number, N_("is no CSV: %(error)s; check its quotes"), error=error)
-    return lines, []
+OF_TABLES = (
+    N_("line %(number)s"),
+    N_("more than %(most)s lines are no table"),
+    N_("is no CSV: %(error)s; check its quotes"),
+)
+"""What `table_lines` says, to be translated."""
 
 
 def surplus_of(

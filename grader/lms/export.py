@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -12,7 +13,7 @@ from pydantic import ValidationError
 
 from grader.documents import SCHEMA_VERSION, ResultsDocument
 from grader.files import create_whole, replacing, write_whole
-from grader.lms import canvas, moodle, moodle_guide, scores
+from grader.lms import api, gradebooks, moodle, moodle_guide, scores
 from grader.lms.grades import Content, Delivery, Grade, Options, grades_of, in_a_row, ready
 from grader.lms.marks import faults_of
 from grader.lms.table import criteria_text, not_as_meant, summary_text
@@ -72,16 +73,31 @@ KINDS: Mapping[tuple[str, str], _Kind] = {
     ("csv", "grades"): _Kind(".csv", of_results=summary_text),
     ("moodle", "grades"): _of_grades(".csv", moodle.grades_file, "maximum rescale form identity item"),
     ("moodle", "feedback"): _of_grades(".zip", moodle.feedback_files, "form"),
-    ("moodle", "rubric"): _of_grades(".json", moodle_guide.guide, "criteria cmid context_id item"),
+    ("moodle", "rubric"): _of_grades(
+        ".json", moodle_guide.guide, "criteria cmid context_id replace_guide item"
+    ),
     ("moodle", "marks"): _of_grades(".json", moodle_guide.fillings, "criteria assignment_id"),
-    ("canvas", "grades"): _of_grades(".csv", canvas.grades_file, "maximum rescale form item"),
-    ("canvas", "rubric"): _of_grades(".csv", canvas.rubric, "item"),
-    ("canvas", "marks"): _of_grades(".json", canvas.assessments, "criteria course_id assignment_id"),
+    ("canvas", "grades"): _of_grades(".csv", gradebooks.grades_file, "maximum rescale form item"),
+    ("canvas", "rubric"): _of_grades(".csv", api.rubric, "item"),
+    ("canvas-api", "marks"): _of_grades(".zip", api.canvas_api, "item criteria course_id assignment_id"),
+    ("openedx", "marks"): _of_grades(".zip", api.openedx, "submissions assignment_id"),
+    ("google-classroom", "marks"): _of_grades(
+        ".zip", api.google_classroom, "criteria submissions course_id assignment_id maximum rescale"
+    ),
+    ("ms-education", "marks"): _of_grades(
+        ".zip", api.ms_education, "item criteria submissions course_id assignment_id maximum rescale"
+    ),
+    ("brightspace", "grades"): _of_grades(".csv", gradebooks.grades_file, "maximum rescale form item"),
+    ("blackboard", "grades"): _of_grades(".csv", gradebooks.grades_file, "maximum rescale form item"),
+    ("ilias", "grades"): _of_grades(".csv", gradebooks.grades_file, "maximum rescale form"),
+    ("ilias", "feedback"): _of_grades(".zip", gradebooks.feedback_files, "form"),
     ("gradescope", "marks"): _of_grades(".zip", scores.results, "visibility"),
-    ("lti", "grades"): _of_grades(".json", scores.scores, "maximum rescale"),
+    ("lti", "grades"): _of_grades(".json", scores.scores, "maximum rescale item"),
 }
 """By platform and thing; the first thing of a platform is the default."""
 
+_NUMBERED = {"moodle", "canvas", "canvas-api"}
+"""Their ids are numbers; those of others are texts."""
 TARGETS = tuple(dict.fromkeys(to for to, _ in KINDS))
 _COMMON = frozenset({"to", "what", "out", "people", "titles", "lang", "now"})
 """Options of every export."""
@@ -117,6 +133,13 @@ def draft(results: ResultsDocument, options: Options) -> Delivery:
         if is_given and each.name not in kind.used | _COMMON:
             name = "a file to fill in" if each.name == "form" else "--" + each.name.replace("_", "-")
             raise CallError("option_unused", f"{name} has no meaning for {options.to} {what}: leave it out")
+    for name in ("course_id", "assignment_id"):
+        value = getattr(options, name)
+        if value is not None and options.to in _NUMBERED and not re.fullmatch("[1-9][0-9]*", str(value)):
+            option = "--" + name.replace("_", "-")
+            raise CallError(
+                "number", f"{option}: '{value}' is no number, as {options.to} has it in addresses"
+            )
     if options.maximum is not None and not (math.isfinite(options.maximum) and options.maximum > 0.0):
         raise CallError("maximum", f"a grade's maximum is a positive number, not {options.maximum:g}")
     students = tuple(dict.fromkeys(report.student_id for report in results.reports))
@@ -165,16 +188,18 @@ def export(results: ResultsDocument, path: Path, options: Options) -> Delivery:
     kind = options.to, what_of(options)
     is_again = kind == ("moodle", "grades") and options.form is not None and path.exists()
     if isinstance(delivery.content, Mapping):
-        if kind == ("moodle", "feedback") and path.suffix.lower() != ".zip":
-            raise CallError("archive_name", f"{path}: Moodle takes an archive; let its name end with .zip")
+        if kind[1] == "feedback" and path.suffix.lower() != ".zip":
+            raise CallError(
+                "archive_name", f"{path}: {options.to} takes an archive; let its name end with .zip"
+            )
         _write_files(path, delivery.content)
     else:
         write_whole(path, delivery.content)
     notes = [*delivery.notes, *([_AGAIN] if is_again else []), *_similar(results, delivery.written)]
-    if kind == ("moodle", "feedback"):
+    if kind[1] == "feedback":
         notes.insert(0, f"{path.stat().st_size / 1e6:.1f} MB: the site's upload limit must allow it")
-    if delivery.withheld and not delivery.written:
-        notes.insert(0, "nobody has a grade yet: there is nothing to upload")
+    if delivery.withheld and not delivery.written and not delivery.unplaced:
+        notes.insert(0, "nobody has a grade yet: there is none to upload")
     return replace(delivery, notes=tuple(notes))
 
 

@@ -46,7 +46,8 @@ class Options:
     out : the folder of results; only ``feedback`` needs it
     people : names, addresses and the platform's numbers by student_id
     titles : the criteria's, in the language of the class, by id; `export` takes them from the results
-    form : the platform's own file to fill in: Moodle's worksheet, Canvas's exported gradebook
+    form : the platform's own file to fill in: Moodle's worksheet, an exported gradebook
+    criteria, submissions : the platform's answers for its rubric and for the students' submissions
     item : the grade item's name; the assignment's id where empty
     now : time of the export; the clock's if None
     """
@@ -58,6 +59,7 @@ class Options:
     titles: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     form: Path | None = None
     criteria: Path | None = None
+    submissions: Path | None = None
     identity: str | None = None
     item: str = ""
     position: int | None = None
@@ -65,10 +67,11 @@ class Options:
     maximum: float | None = None
     rescale: bool = False
     visibility: str | None = None
-    course_id: int | None = None
-    assignment_id: int | None = None
+    course_id: str | None = None
+    assignment_id: str | None = None
     cmid: int | None = None
     context_id: int | None = None
+    replace_guide: Path | None = None
     lang: str = "en"
     now: datetime | None = None
 

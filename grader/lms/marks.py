@@ -60,7 +60,7 @@ def json_document(model: type[BaseModel], content: Mapping[str, object], name: s
     except ValidationError as error:
         message = f"{name} would not be what the platform takes; nothing was written\n{faults_of(error)}"
         raise InputFileError("export_refused", message) from error
-    text = document.model_dump_json(indent=2, exclude_none=True)
+    text = document.model_dump_json(indent=2, exclude_none=True, by_alias=True)
     if model.model_validate_json(text) != document:
         raise not_as_meant("the document")
     return text + "\n"
@@ -389,20 +389,26 @@ def read_answer(path: Path) -> Any:  # noqa: ANN401 - whatever a platform answer
         raise InputFileError("criteria", f"{path}: is not JSON ({error})") from error
 
 
-_LISTS = ("guide_criteria", "criteria", "data", "rubric")
+_LISTS = ("guide_criteria", "qualities", "criteria", "data", "rubric")
 _NESTS = ("areas", "definitions", "guide", "rubric")
+_OF_A_CRITERION = {"maxscore", "points", "levels", "qualityId"}
 
 
 def criteria_in(answer: object) -> Iterator[PlatformEntry]:
-    """Criteria in an answer: Moodle's of a marking guide, Canvas's of a rubric or of an assignment."""
+    """Criteria in an answer: of a Moodle guide, or of a rubric of Canvas, Classroom or Microsoft."""
     if isinstance(answer, list):
         for each in answer:
             yield from criteria_in(each)
     if not isinstance(answer, dict):
         return
-    name, number = answer.get("shortname", answer.get("description")), answer.get("id")
-    if isinstance(name, str) and isinstance(number, str | int) and {"maxscore", "points"} & set(answer):
-        points = answer.get("maxscore", answer.get("points"))
+    name = answer.get("shortname", answer.get("description" if "levels" not in answer else "title"))
+    name = name.get("content") if isinstance(name, dict) else name
+    number = answer.get("id", answer.get("qualityId"))
+    if isinstance(name, str) and isinstance(number, str | int) and _OF_A_CRITERION & set(answer):
+        levels = answer.get("levels") if isinstance(answer.get("levels"), list) else []
+        of_levels = [each.get("points") for each in levels if isinstance(each, dict)]
+        best = max((each for each in of_levels if isinstance(each, int | float)), default=None)
+        points = answer.get("maxscore", answer.get("points", best))
         yield str(number), name, float(points) if isinstance(points, int | float) else None
         return
     # A Canvas rubric has its criteria as `data` and again as `criteria`: the first that is there counts.

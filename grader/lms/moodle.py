@@ -14,12 +14,13 @@ its underscores, so a file's own name has none.
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Self
 
-from grader.lms.grades import Delivery, Grade, Options, Person, ready
+from grader.lms.grades import Delivery, Grade, Options, Person, in_a_row, ready
 from grader.lms.marks import comment
 from grader.lms.table import (
     NO_GRADE,
@@ -38,29 +39,43 @@ from reference.errors import CallError, InputFileError, lines_of
 # The worksheet ------------------------------------------------------------------------------------
 
 COLUMNS: dict[str, tuple[str, ...]] = {
-    "identifier": ("Identifier", "Identificator", "Идентификатор"),
-    "name": ("Full name", "Nume complet", "Nume / Prenume", "Полное имя", "ФИО", "Имя / Фамилия"),
-    "id": ("ID number", "Număr ID", "Cod numeric", "Индивидуальный номер"),
-    "username": ("Username", "Nume utilizator", "Логин"),
-    "email": ("Email address", "Adresă de email", "Adresa de email", "Адрес электронной почты"),
-    "grade": ("Grade", "Notă", "Nota", "Оценка"),
-    "maximum": ("Maximum grade", "Notă maximă", "Nota maximă", "Максимальная оценка"),
-    "scale": ("Scale", "Scală", "Scala", "Шкала"),
-    "changeable": ("Grade can be changed", "Nota poate fi schimbată", "Оценка может быть изменена"),
+    "identifier": ("identifier", "identificator", "идентификатор"),
+    "name": ("full name", "nume complet", "nume / prenume", "полное имя", "фио", "имя / фамилия"),
+    "id": ("id number", "număr id", "cod numeric", "индивидуальный номер"),
+    "username": ("username", "nume utilizator", "nume de utilizator", "логин"),
+    "email": (
+        "email address", "adresă de email", "adresa de email", "adresa de e-mail",
+        "адрес электронной почты",
+    ),
+    "group": (
+        "group", "grup", "группа", "группы", "gruppe", "groupe", "grupo", "gruppo", "groep", "grupp",
+        "skupina", "csoport", "група",
+    ),
+    "grade": ("grade", "notă", "nota", "оценка"),
+    "maximum": ("maximum grade", "notă maximă", "nota maximă", "максимальная оценка"),
+    "scale": ("scale", "scală", "scala", "шкала"),
+    "changeable": ("grade can be changed", "nota poate fi schimbată", "оценка может быть изменена"),
     "modified": (
-        "Last modified (grade)", "Ultima modificare (nota)", "Ultima modificare (notă)",
-        "Последнее изменение (оценка)",
+        "last modified (grade)", "ultima modificare (nota)", "ultima modificare (notă)",
+        "последнее изменение (оценка)",
     ),
     "feedback": (
-        "Feedback comments", "Comentarii de feedback", "Comentarii feedback",
-        "Feedback sub formă de comentarii", "Отзыв в виде комментария", "Отзыв в виде комментариев",
+        "feedback comments", "comentarii de feedback", "comentarii feedback",
+        "feedback sub formă de comentarii", "отзыв в виде комментария", "отзыв в виде комментариев",
     ),
 }  # fmt: skip
-"""Moodle's column names in the languages in which worksheets are likely to be downloaded."""
+"""Moodle's column names in the languages in which worksheets are likely to be downloaded, in small letters.
+
+Of other languages the columns are known by what stands in them.
+"""
 
 _REQUIRED = ("identifier", "grade", "modified")
 _NO = {"no", "nu", "нет"}
-_PARTICIPANT = re.compile(r"\s*\D*?(\d+)\s*")
+_PARTICIPANT = re.compile(r"(\D+?)(\d+)")
+"""The word for a participant in the site's language, in some with a space, and the number."""
+_AMOUNT = re.compile(r"\d+([.,]\d+)?")
+_ADDRESS = re.compile(r"[^@\s]+@[^@\s]+")
+_MOMENT = re.compile(r".*\d:\d\d.*")
 LOCKED = "Moodle says that this grade cannot be changed"
 
 
@@ -69,11 +84,13 @@ class Worksheet(Form):
     """A worksheet that Moodle would take."""
 
     name = "the worksheet"
-    platform = "Moodle"
+    platform: str = "Moodle"
     replaced = (
         ": it skips them unless the box for updating records is ticked at the upload, or the worksheet was"
         " downloaded afresh"
     )
+    keeps_others = False
+    # Moodle writes a comment without its links into the worksheet, and would take it for a changed one.
 
     @classmethod
     def opened(cls, data: bytes, file: str, item: str = "") -> Self:  # noqa: ARG003 - a worksheet is of one item
@@ -83,19 +100,29 @@ class Worksheet(Form):
             raise InputFileError(
                 "worksheet", f"{file}: the worksheet is empty; download it from Moodle again"
             )
-        columns, faults = _columns([table.value(0, column).strip() for column in range(len(table.rows[0]))])
+        columns = _columns(table)
+        header = ", ".join(table.value(0, place).strip() for place in range(len(table.rows[0])))
+        faults = [
+            f"row 1: there is no column '{COLUMNS[name][0].capitalize()}' (columns: {header})"
+            for name in _REQUIRED
+            if name not in columns
+        ]
+        if "scale" in columns:
+            faults.append(
+                "row 1: the assignment is graded by a scale, and Moodle would skip points: let it be points"
+            )
+        if columns.get("feedback") == 0:
+            faults.append("row 1: feedback comments stand in the first column, where Moodle drops them")
         faults += table.ragged()
-        sheet = cls(table, {**_unnamed(table, columns), **columns})
+        sheet = cls(table, columns)
         if not faults:
             faults += _row_faults(sheet)
         if faults:
             raise InputFileError(
                 "worksheet",
-                f"{file}: Moodle would not take this worksheet; download it again, with Moodle in English,"
-                f" Romanian or Russian, and do not resave it\n{lines_of(faults)}",
+                f"{file}: Moodle would not take this worksheet; download it again and do not resave it"
+                f"\n{lines_of(faults)}",
             )
-        if "maximum" not in columns:
-            sheet.notes.append("the worksheet does not state its maximum grade: taken to be the rubric's")
         return sheet
 
     @staticmethod
@@ -111,7 +138,37 @@ class Worksheet(Form):
     def participant(self, row: int) -> int | None:
         """The participant's number, by which Moodle knows the row."""
         match = _PARTICIPANT.fullmatch(self.value(row, "identifier"))
-        return None if match is None else int(match[1])
+        return None if match is None else int(match[2])
+
+    def decimals(self, row: int) -> int:
+        """As many as the maximum is written with."""
+        return len(self.value(row, "maximum").replace(",", ".").partition(".")[2]) or 2
+
+    def notes_on(self, changed: int, zeros: Sequence[str]) -> Sequence[str]:
+        """The worksheet does not say of which assignment it is; Moodle's count does."""
+        note = (
+            f"Moodle must tell {changed} updated grades (more only where it holds more decimals"
+            " than it shows): otherwise this is the worksheet of another assignment or course, or an old one"
+        )
+        zero = f"newer versions of Moodle pass over a grade of 0, enter it there: {in_a_row(zeros)}"
+        return [note, zero] if zeros else [note]
+
+    def date_by(self, downloaded: datetime) -> None:
+        """Write dates as ISO: of another language than English Moodle reads none, and updates nothing.
+
+        Every one becomes the worksheet's own: Moodle still skips what was graded after it.
+        """
+        column = self.columns["modified"]
+        if self.table.value(0, column).strip().casefold() == COLUMNS["modified"][0]:
+            return
+        rows = [row for row in self.people if self.value(row, "modified") not in NO_GRADE]
+        for row in rows:
+            self.table.put(row, column, downloaded.isoformat(timespec="seconds"))
+        if rows:
+            self.notes.append(
+                f"Moodle reads no date in this language: {len(rows)} are written as"
+                f" {downloaded.isoformat(sep=' ', timespec='minutes')}, when the worksheet was downloaded"
+            )
 
     def identity(self, row: int) -> Mapping[str, str]:
         """Participant's number, address, ID number, username and name."""
@@ -136,65 +193,94 @@ def grades_file(grades: Sequence[Grade], options: Options) -> Delivery:
         return gradebook(grades, options)
     comments = {grade.student_id: comment(grade) for grade in ready(grades)}
     data = bytes_of(options.form, "form_missing")
-    return fill_worksheet(data, options.form.name, grades, options, comments)
+    downloaded = datetime.fromtimestamp(int(options.form.stat().st_mtime), UTC)
+    return fill_worksheet(data, options.form.name, grades, options, comments, downloaded)
 
 
 def fill_worksheet(
-    data: bytes, file: str, grades: Sequence[Grade], options: Options, comments: Mapping[str, str]
+    data: bytes,
+    file: str,
+    grades: Sequence[Grade],
+    options: Options,
+    comments: Mapping[str, str],
+    downloaded: datetime,
 ) -> Delivery:
     """Fill in a worksheet; `comments` are HTML by student_id, not written where there is no column for them.
 
     Raises InputFileError with everything that is wrong with the worksheet, CallError for options that
     mean nothing here.
     """
-    for name in ("item", "identity", "maximum"):
+    for name in ("item", "identity"):
         if getattr(options, name):
             raise CallError("option_unused", f"--{name} has no meaning beside --worksheet: leave it out")
     sheet = Worksheet.opened(data, file)
+    if options.maximum is not None and "maximum" in sheet.columns:
+        raise CallError("option_unused", "--maximum has no meaning here: the worksheet states its own")
+    sheet.date_by(downloaded)
     if "feedback" not in sheet.columns:
         sheet.notes.append("the worksheet has no column for feedback comments: only grades are filled in")
     return fill_in(sheet, file, grades, options, comments)
 
 
-def _columns(header: list[str]) -> tuple[dict[str, int], list[str]]:
+def _columns(table: RawTable) -> dict[str, int]:
+    """Places of columns by our names: by their headings, else by what stands in them.
+
+    Their order is Moodle's own: identifier, full name, ..., grade, maximum, ..., date of the grade,
+    comments.
+
+    Raises InputFileError where a heading stands twice.
+    """
+    header = [table.value(0, place).strip().casefold() for place in range(len(table.rows[0]))]
     columns: dict[str, int] = {}
-    faults: list[str] = []
     for name, known in COLUMNS.items():
         places = [place for place, title in enumerate(header) if title in known]
         if len(places) > 1:
-            faults.append(f"row 1: there are {len(places)} columns '{header[places[0]]}'")
+            raise InputFileError(
+                "worksheet", f"row 1: there are {len(places)} columns '{table.value(0, places[0])}'"
+            )
         if places:
             columns[name] = places[0]
-        elif name in _REQUIRED:
-            faults.append(f"row 1: there is no column '{known[0]}' (columns: {', '.join(header)})")
-    if "scale" in columns:
-        faults.append(
-            "row 1: the assignment is graded by a scale, and Moodle would skip points: let it be points"
-        )
-    if columns.get("feedback") == 0:
-        faults.append("row 1: feedback comments stand in the first column, where Moodle drops them")
-    return columns, faults
+    free = [place for place in range(len(header)) if place not in columns.values()]
+    cells = {
+        place: {
+            table.value(row, place).strip()
+            for row in range(1, len(table.rows))
+            if place < len(table.rows[row])
+        }
+        for place in free
+    }
 
+    def fill(name: str, places: Iterable[int]) -> None:
+        place = next((place for place in places if place in cells), None)
+        if name not in columns and place is not None:
+            columns[name] = place
+            del cells[place]
 
-def _unnamed(table: RawTable, columns: Mapping[str, int]) -> dict[str, int]:
-    """Columns of names and addresses under unknown headings, recognised by their cells.
+    def all_are(shape: re.Pattern[str], place: int, but: Collection[str] = ()) -> bool:
+        """Whether a column has only such cells, besides those that are also allowed."""
+        texts = cells.get(place, set())
+        return bool(texts) and all(map(shape.fullmatch, texts - set(but)))
 
-    Full names follow the identifier, unless the worksheet is anonymous; addresses have an @.
-    """
-    others = [place for place in range(len(table.rows[0])) if place not in columns.values()]
-    after = columns.get("identifier", -2) + 1
-    unnamed = {"name": after} if after in others else {}
-    for place in others:
-        rows = [row for row in range(1, len(table.rows)) if place < len(table.rows[row])]
-        cells = {table.value(row, place).strip() for row in rows} - NO_GRADE
-        if cells and all(re.fullmatch(r"[^@\s]+@[^@\s]+", cell) for cell in cells):
-            unnamed.setdefault("email", place)
-    return unnamed
+    fill("identifier", [place for place in free if all_are(_PARTICIPANT, place)])
+    fill(
+        "email",
+        [place for place in free if all_are(_ADDRESS, place, NO_GRADE) and not cells[place] <= NO_GRADE],
+    )
+    fill("name", [columns.get("identifier", -2) + 1])
+    for place in free:
+        left = place - 1
+        if all_are(_AMOUNT, place) and (columns.get("grade") == left or all_are(_AMOUNT, left, NO_GRADE)):
+            fill("maximum", [place])
+    fill("grade", [columns.get("maximum", -2) - 1])
+    fill("modified", [place for place in reversed(free) if all_are(_MOMENT, place, {"-"})])
+    # Of several columns after it none is surely that of comments.
+    fill("feedback", {columns.get("modified", -2) + 1} & {len(header) - 1})
+    return columns
 
 
 def _row_faults(sheet: Worksheet) -> Iterator[str]:
     rows: dict[int, int] = {}
-    comma = sheet.value(0, "grade") != COLUMNS["grade"][0]
+    comma = sheet.value(0, "grade").casefold() != COLUMNS["grade"][0]
     for row in sheet.people:
         participant, maximum = sheet.participant(row), sheet.maximum(row)
         if participant is None:
@@ -262,7 +348,12 @@ def gradebook(grades: Sequence[Grade], options: Options) -> Delivery:
     scores = [grade.out_of(options.maximum, rescale=options.rescale) for grade in graded]
     users = [_user(grade, identity) for grade in graded]
     rows = zip(users, map(number, scores), comments, strict=True)
-    notes = []
+    maximum = options.maximum or max((grade.max_score for grade in graded), default=0.0)
+    new = "a new item is out of 100 and takes no feedback"
+    notes = [
+        "where there is an assignment, its grading worksheet is the better way (--worksheet)",
+        f"make the grade item in Moodle first, out of {maximum:g}, and map grade and feedback to it: {new}",
+    ]
     if len(graded) < len(grades):
         notes.append("who is withheld has no row: the import leaves their grade as it is")
     if any(score > _USUAL_LIMIT for score in scores):
@@ -314,7 +405,7 @@ def feedback_files(grades: Sequence[Grade], options: Options) -> Delivery:
     for grade in graded:
         if grade.student_id in numbers:
             folder = f"Participant_{numbers[grade.student_id]}_assignfeedback_file"
-            files.update(_pages(grade, options.out or Path(), folder, faults))
+            files.update(pages(grade, options.out or Path(), folder, faults))
     if faults:
         message = "not all feedback is there; grade again, nothing was written"
         raise InputFileError("feedback_missing", f"{message}\n{lines_of(faults)}")
@@ -341,6 +432,12 @@ def _participants(
         others = people.keys() - numbers.keys()
         return numbers, dict.fromkeys(others, "the table of ids has no participant"), []
     sheet = Worksheet.opened(bytes_of(options.form, "form_missing"), options.form.name)
+    if "group" in sheet.columns:
+        raise CallError(
+            "groups",
+            f"{options.form}: students hand in as groups, and Moodle takes a number in this archive for a"
+            " group's: others would get the page; export grades with comments (--worksheet without --what)",
+        )
     matches = sheet.match(grades, options)
     rows = {student: row for student, row in matches.rows.items() if student in people}
     locked = {student: why for student, row in rows.items() if (why := sheet.why_fixed(row))}
@@ -349,7 +446,7 @@ def _participants(
     return numbers, {**matches.missing, **locked}, doubtful
 
 
-def _pages(grade: Grade, out: Path, folder: str, faults: list[str]) -> Iterator[tuple[str, Path]]:
+def pages(grade: Grade, out: Path, folder: str, faults: list[str]) -> Iterator[tuple[str, Path]]:
     """A student's pages by their names in the archive; what is missing or of another run goes to `faults`."""
     for report, where in zip(grade.reports, grade.folders, strict=True):
         before = "" if len(grade.reports) == 1 else f"position-{where.rpartition('/')[2]}-"

@@ -6,6 +6,7 @@ are filled: both are checked here.
 
 from collections.abc import Mapping, Sequence
 from html import escape
+from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -24,6 +25,7 @@ from grader.lms.marks import (
     check_points,
     check_unique,
     class_criteria,
+    comment,
     criteria_in,
     json_document,
     platform_marks,
@@ -151,6 +153,22 @@ class MoodleAdvanced(Payload):
     guide: MoodleGuideFilled
 
 
+class MoodleEditor(Payload):
+    """The comment on the whole."""
+
+    text: str
+    format: Html = 1
+
+
+class MoodlePlugins(Payload):
+    """What feedback plugins take; Moodle aborts in the midst where the one for comments is given nothing.
+
+    So in mod/assign/feedback/comments/locallib.php, `is_feedback_modified`, where a comment exists.
+    """
+
+    assignfeedbackcomments_editor: MoodleEditor
+
+
 class MoodleGrade(Payload):
     """Arguments of the call.
 
@@ -166,6 +184,7 @@ class MoodleGrade(Payload):
     addattempt: Literal[0] = 0
     workflowstate: Literal[""] = ""
     applytoall: Literal[0] = 0
+    plugindata: MoodlePlugins
     advancedgradingdata: MoodleAdvanced
 
 
@@ -203,10 +222,11 @@ class MoodleMarksDocument(Payload):
 def guide(grades: Sequence[Grade], options: Options) -> Delivery:
     """The call that makes the rubric a marking guide of an assignment.
 
-    Raises CallError where nothing says which assignment, and where it has a guide already: saving
-    another would delete it with everybody's points.
+    Raises CallError where nothing says which assignment, and where it has or may have a guide: saving
+    another deletes it with everybody's points. `replace_guide` allows that, by Moodle's answer to
+    core_grading_get_gradingform_instances, which holds what goes.
     """
-    cmid, context_id = _free_place(options)
+    cmid, context_id = _place(options)
     moment = int(options.moment.timestamp())
     criteria = class_criteria(grades, options)
     definition = {
@@ -222,11 +242,16 @@ def guide(grades: Sequence[Grade], options: Options) -> Delivery:
         "assignment": grades[0].assignment,
         "arguments": {"areas": [{"cmid": cmid, "contextid": context_id, "definitions": [definition]}]},
     }
-    return Delivery(json_document(MoodleRubricDocument, content, "the marking guide"))
+    text = json_document(MoodleRubricDocument, content, "the marking guide")
+    if options.replace_guide is None:
+        return Delivery(text)
+    return Delivery(
+        text, notes=(f"saving this guide deletes the one there with {_fillings(options.replace_guide)}",)
+    )
 
 
-def _free_place(options: Options) -> tuple[int, int]:
-    """The numbers of an activity without a guide and of its context; CallError where there are none."""
+def _place(options: Options) -> tuple[int, int]:
+    """The numbers of an activity and of its context; CallError where there are none, or it has a guide."""
     area = _area(options)
     cmid = options.cmid or _number(area.get("cmid"))
     context_id = options.context_id or _number(area.get("contextid"))
@@ -243,13 +268,26 @@ def _free_place(options: Options) -> tuple[int, int]:
             f"{options.criteria}: the assignment is graded by '{method}', and saving a guide would put"
             " that aside; choose 'Marking guide' or 'Simple direct grading' in Moodle first",
         )
-    if any(criteria_in(area)):
+    if options.replace_guide is None and (not area or any(criteria_in(area))):
+        known = "has a guide already" if area else "may have a guide (Moodle's answer, --criteria, tells)"
         raise CallError(
             "guide_exists",
-            f"{options.criteria}: the assignment has a marking guide already, and saving another would"
-            " delete it with everybody's points; delete it in Moodle first if that is meant",
+            f"the assignment {known}, and saving another deletes it with everybody's points. If that is meant"
+            " give Moodle's answer to core_grading_get_gradingform_instances, which tells how many"
+            " (--replace-guide)",
         )
     return cmid, context_id
+
+
+def _fillings(path: Path) -> str:
+    """How many points of how many students a guide holds, by Moodle's answer; InputFileError for another."""
+    answer = read_answer(path)
+    try:
+        filled = [len(instance["guide"]["criteria"]) for instance in answer["instances"]]
+    except (LookupError, TypeError) as error:
+        message = "is not Moodle's answer to core_grading_get_gradingform_instances"
+        raise InputFileError("criteria", f"{path}: {message}") from error
+    return f"{sum(filled)} fillings of {len(filled)} students"
 
 
 def _area(options: Options) -> Mapping[str, object]:
@@ -301,6 +339,7 @@ def fillings(grades: Sequence[Grade], options: Options) -> Delivery:
         arguments = {
             "assignmentid": options.assignment_id,
             "userid": user,
+            "plugindata": {"assignfeedbackcomments_editor": {"text": comment(grade)}},
             "advancedgradingdata": {"guide": {"criteria": filled}},
         }
         calls.append({"student_id": grade.student_id, "arguments": arguments})

@@ -180,16 +180,31 @@ class LtiScore(Payload):
         return self
 
 
+class LtiLineItem(Payload):
+    """The line item that the Scores belong to, for a platform that has none yet; it cannot hold a rubric."""
+
+    label: Filled
+    scoreMaximum: Positive  # noqa: N815
+    resourceId: Filled  # noqa: N815
+    tag: Filled
+
+
 class LtiDocument(Payload):
-    """A class's Scores, each to be posted by itself."""
+    """A class's line item and Scores, each to be posted by itself."""
 
     schema_version: Version = 1
     assignment: str
+    lineItem: LtiLineItem | None = None  # noqa: N815
     scores: list[LtiScore]
 
     @model_validator(mode="after")
     def _is_whole(self) -> Self:
         check_unique((score.userId for score in self.scores), "userId")
+        if self.lineItem and {score.scoreMaximum for score in self.scores} - {
+            None,
+            self.lineItem.scoreMaximum,
+        }:
+            raise ValueError("a Score has another maximum than the line item")
         return self
 
 
@@ -217,7 +232,14 @@ def scores(grades: Sequence[Grade], options: Options) -> Delivery:
         notes.append("userId is the student_id: where the platform knows users otherwise, give --ids")
     if pending := sum("scoreGiven" not in score for score in posted):
         notes.append(f"{pending} of the withheld are told as PendingManual: the platform shows no grade")
-    content = {"assignment": grades[0].assignment, "scores": posted}
+    assignment = grades[0].assignment
+    line_item = {
+        "label": options.item.strip() or assignment,
+        "scoreMaximum": options.maximum or grades[0].max_score,
+        "resourceId": assignment,
+        "tag": "grade",
+    }
+    content = {"assignment": assignment, "lineItem": line_item, "scores": posted}
     return Delivery(json_document(LtiDocument, content, "the Scores"), unplaced=missing, notes=tuple(notes))
 
 

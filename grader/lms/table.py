@@ -1,12 +1,14 @@
 """Tables: CSV files that are written, platforms' own CSV files filled in, and the row of each student."""
 
 import csv
+import html
 import io
 import re
 import unicodedata
 from abc import ABC, abstractmethod
-from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from pathlib import Path
@@ -14,9 +16,9 @@ from typing import ClassVar, Self
 
 from grader.documents import CriterionDocument, ReportDocument, ResultsDocument
 from grader.files import OutputError, write_whole
-from grader.inputs.roster import delimiter_of
 from grader.lms.grades import Delivery, Grade, Options, Person, in_a_row, ready
-from reference.errors import InputFileError, lines_of
+from reference.authored.variant_table import delimiter_of
+from reference.errors import CallError, InputFileError, lines_of
 
 Cell = str | int | float | None
 
@@ -64,9 +66,10 @@ def is_formula(text: str) -> bool:
     return text.lstrip(" \u00a0\ufeff").startswith(FORMULA_STARTS)
 
 
-def number(value: float) -> str:
-    """A decimal dot, at most five decimals, no exponent, no grouping, no trailing zeros: 7.5, 10, 0.33333."""
-    text = f"{value:.5f}".rstrip("0").rstrip(".")
+def number(value: float, decimals: int = 5) -> str:
+    """A decimal dot, at most so many decimals, no exponent, no grouping, no trailing zeros: 7.5, 0.33333."""
+    text = f"{value:.{decimals}f}"
+    text = text.rstrip("0").rstrip(".") if decimals else text
     return "0" if text == "-0" else text
 
 
@@ -217,12 +220,18 @@ class RawTable:
     mark : a byte order mark, or nothing
     rows : raw cells
     ends : each row's line end; nothing after the last where the file has none
+    kept : the columns that are written; all where None
     """
 
     mark: str
     delimiter: str
     rows: list[list[str]] = field(default_factory=list)
     ends: list[str] = field(default_factory=list)
+    kept: Sequence[int] | None = None
+
+    def header(self) -> list[str]:
+        """The first row's cells; none of an empty file."""
+        return [self.value(0, column) for column in range(len(self.rows[0]))] if self.rows else []
 
     def value(self, row: int, column: int) -> str:
         """A cell's meaning."""
@@ -230,14 +239,22 @@ class RawTable:
         return cell[1:-1].replace('""', '"') if cell.startswith('"') else cell
 
     def put(self, row: int, column: int, text: str) -> None:
-        """Change one cell; one that already means this text stays as it is written."""
-        if self.value(row, column) != text:
-            self.rows[row][column] = quoted(text, self.delimiter)
+        """Change one cell; one that already means this text stays as it is written.
 
-    def text(self) -> str:
-        """The whole file."""
-        lines = (self.delimiter.join(row) + end for row, end in zip(self.rows, self.ends, strict=True))
-        return self.mark + "".join(lines)
+        It is quoted where it must be, and where the whole header is.
+        """
+        if self.value(row, column) != text:
+            is_quoted = all(cell.startswith('"') for cell in self.rows[0])
+            self.rows[row][column] = quoted(text, self.delimiter, always=is_quoted)
+
+    def text(self, rows: Iterable[int] | None = None) -> str:
+        """The file, or these of its rows, with the columns that are kept."""
+        chosen = range(len(self.rows)) if rows is None else rows
+        return self.mark + "".join(self.delimiter.join(self._kept(row)) + self.ends[row] for row in chosen)
+
+    def _kept(self, row: int) -> list[str]:
+        cells = self.rows[row]
+        return cells if self.kept is None or cells == [""] else [cells[column] for column in self.kept]
 
     def ragged(self) -> list[str]:
         """Faults of rows that have more or fewer cells than the first; empty lines are none."""
@@ -249,9 +266,9 @@ class RawTable:
         ]
 
 
-def quoted(text: str, delimiter: str) -> str:
+def quoted(text: str, delimiter: str, *, always: bool = False) -> str:
     """A raw cell that means this text."""
-    if any(mark in text for mark in (delimiter, '"', "\n", "\r")) or text != text.strip():
+    if always or any(mark in text for mark in (delimiter, '"', "\n", "\r")) or text != text.strip():
         return '"' + text.replace('"', '""') + '"'
     return text
 
@@ -295,8 +312,8 @@ def parse(data: bytes, file: str, delimiter: str | None = ",") -> RawTable:
 
 Evidence = Sequence[tuple[str, str]]
 """Columns and what would stand there, the strongest first; an empty text is no evidence."""
-NAMES = frozenset({"name", "name turned"})
-"""Columns that two people may share."""
+NAME = "name"
+"""The column that two people may share."""
 
 
 @dataclass(slots=True)
@@ -317,22 +334,24 @@ class Matches:
 def match_rows(
     rows: Mapping[int, Mapping[str, str]], students: Mapping[str, Evidence], table: str
 ) -> Matches:
-    """The row of each student in a table, without regard to case, spaces and ways to write an accent.
+    """The row of each student in a table, without regard to case and spaces.
+
+    Names also fit over accents, cedilla or comma below, the dots of ё, apostrophes, the order of their
+    parts, and where one has a part more, as a patronymic.
 
     The strongest evidence that fits decides, unless stronger evidence speaks against that row: a
     namesake with another address. Only columns that know anybody of these students can speak so.
 
     Arguments: `rows` has cells by row and column, `table` is the table's name in words.
     """
-    cells = {row: {column: _folded(text) for column, text in texts.items()} for row, texts in rows.items()}
-    rows_with: dict[tuple[str, str], list[int]] = defaultdict(list)
-    for row, texts in cells.items():
-        for cell in texts.items():
-            rows_with[cell].append(row)
+    cells = {
+        row: {column: _key(column, text) for column, text in texts.items()} for row, texts in rows.items()
+    }
     keys = {
-        student: [(column, _folded(text)) for column, text in evidence if text.strip()]
+        student: [(column, _key(column, text)) for column, text in evidence if text.strip()]
         for student, evidence in students.items()
     }
+    rows_with = _rows_with(cells, {key for evidence in keys.values() for key in evidence})
     speaking = {key[0] for evidence in keys.values() for key in evidence if key in rows_with}
     matches = Matches()
     claims: dict[int, dict[str, str]] = defaultdict(dict)
@@ -350,24 +369,67 @@ def match_rows(
             if column in speaking - {key[0]} and cells[row].get(column) not in (None, "", text)
         ]
         if others:
-            numbers = ", ".join(str(each + 1) for each in (row, *others))
-            matches.missing[student] = f"rows {numbers} of {table} all fit"
+            fitting = " and ".join(f"{each + 1} ({_who(rows[each])})" for each in (row, *others))
+            matches.missing[student] = f"rows {fitting} of {table} all have the {key[0]}"
         elif contrary:
             matches.missing[student] = f"row {row + 1} of {table} has the {key[0]}, but another {contrary[0]}"
         else:
             claims[row][student] = key[0]
     for row, claiming in claims.items():
         if len(claiming) > 1:
-            why = f"row {row + 1} of {table} fits {' and '.join(claiming)} alike"
+            both = " and ".join(f"{student} ({_who(dict(students[student]))})" for student in claiming)
+            why = f"row {row + 1} of {table} ({_who(rows[row])}) fits {both} alike"
             matches.missing.update(dict.fromkeys(claiming, why))
         else:
             matches.rows.update(dict.fromkeys(claiming, row))
-            matches.by_name += [student for student, column in claiming.items() if column in NAMES]
+            matches.by_name += [student for student, column in claiming.items() if column == NAME]
     return matches
 
 
-def _folded(text: str) -> str:
-    return " ".join(unicodedata.normalize("NFKC", text).casefold().split())
+def _who(cells: Mapping[str, str]) -> str:
+    """Name and address, or else all that is known."""
+    known = [text for column in (NAME, "email") if (text := cells.get(column))]
+    return ", ".join(known or filter(None, cells.values()))
+
+
+_CellKey = tuple[str, str]
+"""A column and what is compared of a cell in it."""
+
+
+def _rows_with(
+    cells: Mapping[int, Mapping[str, str]], wanted: AbstractSet[_CellKey]
+) -> dict[_CellKey, list[int]]:
+    """The rows of each cell; of a wanted name that no row has, those that have it in part."""
+    rows_with: dict[_CellKey, list[int]] = defaultdict(list)
+    parts: dict[str, set[int]] = defaultdict(set)
+    for row, texts in cells.items():
+        for cell in texts.items():
+            rows_with[cell].append(row)
+        for part in texts.get(NAME, "").split():
+            parts[part].add(row)
+    for column, name in wanted - rows_with.keys():
+        if column == NAME and (rows := _rows_in_part(set(name.split()), parts)):
+            rows_with[column, name] = rows
+    return rows_with
+
+
+def _rows_in_part(name: set[str], rows_with: Mapping[str, Collection[int]]) -> list[int]:
+    """The rows of names that have all parts of this one, or of which it has all, two at least."""
+    shared = Counter(row for part in name for row in rows_with.get(part, ()))
+    several = {row for row, count in shared.items() if count > 1}
+    longer = {
+        row for part, rows in rows_with.items() if part not in name for row in several.intersection(rows)
+    }
+    return sorted(row for row in several if row not in longer or shared[row] == len(name))
+
+
+def _key(column: str, text: str) -> str:
+    """What is compared of a cell; of a name its parts in the order of the alphabet, without marks."""
+    if column != NAME:
+        return " ".join(unicodedata.normalize("NFKC", text).casefold().split())
+    letters = unicodedata.normalize("NFKD", text).casefold()
+    plain = "".join(letter for letter in letters if letter.isalnum() or letter.isspace() or letter in ",-")
+    return " ".join(sorted(plain.replace(",", " ").replace("-", " ").split()))
 
 
 # A platform's own table, filled in ----------------------------------------------------------------
@@ -389,11 +451,13 @@ class Form(ABC):
     above: int = 0
     possible: float | None = None
     notes: list[str] = field(default_factory=list)
+    platform: str = ""
 
     name: ClassVar[str]
-    platform: ClassVar[str]
     replaced: ClassVar[str] = ""
     """What the platform does where grades that it holds already are changed."""
+    keeps_others: ClassVar[bool] = True
+    """Whether rows stay that are not filled in."""
 
     @classmethod
     @abstractmethod
@@ -423,6 +487,10 @@ class Form(ABC):
         column = self.columns.get(name)
         return "" if column is None else self.table.value(row, column).strip()
 
+    def decimals(self, row: int) -> int:  # noqa: ARG002 - of a platform that shows rows differently
+        """Decimals with which grades are written; fewer where the platform shows fewer."""
+        return 5
+
     def maximum(self, row: int) -> float | None:
         """The maximum grade of a row; None where the table does not state it."""
         return self.possible or self.amount(self.value(row, "maximum"))
@@ -442,14 +510,17 @@ class Form(ABC):
             self.name,
         )
 
+    def notes_on(self, changed: int, zeros: Sequence[str]) -> Sequence[str]:  # noqa: ARG002 - some platforms
+        """What to look at after the upload of so many changed grades; `zeros` are students who got 0."""
+        return ()
+
     def put_grade(self, row: int, text: str) -> bool:
-        """Put a grade into its cell; whether another one stood there."""
-        before = self.value(row, "grade")
-        amount = self.amount(before)
-        if amount is not None and number(amount) == text:
+        """Put a grade into its cell; whether that is another one for the platform."""
+        amount = self.amount(self.value(row, "grade"))
+        if amount is not None and number(amount, self.decimals(row)) == text:
             return False
         self.table.put(row, self.columns["grade"], text)
-        return before not in NO_GRADE
+        return True
 
     def put_comment(self, row: int, text: str) -> bool:
         """Put a comment into its cell, where the table has such a column; whether another one stood there."""
@@ -457,7 +528,12 @@ class Form(ABC):
             return False
         before = self.value(row, "feedback")
         self.table.put(row, self.columns["feedback"], text)
-        return before not in {"", text}
+        return bool(before) and _words(before) != _words(text)
+
+
+def _words(comment: str) -> str:
+    """What is compared of a comment: platforms leave out its tags and change its spaces."""
+    return "".join(html.unescape(re.sub(r"<[^>]*>", "", comment)).split())
 
 
 def fill_in(
@@ -465,13 +541,14 @@ def fill_in(
 ) -> Delivery:
     """Fill in grades, and comments by student_id; only cells of those who have a grade change.
 
-    Raises CallError where the form's maximum is not the rubric's and nobody asks for rescaling,
-    OutputError where the changed file, opened again, does not hold the grades that were meant.
+    Raises CallError where the form's maximum is not the rubric's and nobody asks for rescaling, and
+    where nothing states it; OutputError where the changed file, opened again, does not hold the grades
+    that were meant.
     """
     matches = form.match(grades, options)
     held = {row: cell for row in form.people if (cell := form.value(row, "grade")) not in NO_GRADE}
     filled, unplaced, texts = list[str](), dict[str, str](), dict[int, str]()
-    grades_replaced = comments_replaced = 0
+    changed, zeros, comments_replaced = list[int](), list[str](), 0
     for grade in ready(grades):
         student, row = grade.student_id, matches.rows.get(grade.student_id)
         if why := matches.missing[student] if row is None else form.why_fixed(row):
@@ -479,18 +556,29 @@ def fill_in(
         if row is None or why:
             continue
         filled.append(student)
-        texts[row] = number(grade.out_of(form.maximum(row), rescale=options.rescale))
-        grades_replaced += form.put_grade(row, texts[row])
+        maximum = form.maximum(row) or options.maximum
+        if maximum is None:
+            raise CallError(
+                "maximum_unknown",
+                f"{file}: states no maximum grade; look it up in {form.platform} and give it (--maximum)",
+            )
+        texts[row] = number(grade.out_of(maximum, rescale=options.rescale), form.decimals(row))
+        zeros += [student] if texts[row] == "0" else []
+        changed += [row] if form.put_grade(row, texts[row]) else []
         if student in comments:
             comments_replaced += form.put_comment(row, comments[student])
-    content = form.table.text().encode("utf-8")
+    rows = range(len(form.table.rows))
+    staying = [row for row in rows if form.keeps_others or row <= form.above or row in texts]
+    content = form.table.text(staying).encode("utf-8")
     again = form.opened(content, file, options.item)
-    if any(number(again.amount(again.value(row, "grade")) or 0.0) != text for row, text in texts.items()):
-        raise not_as_meant(form.name)
-    notes = [*form.notes]
-    if grades_replaced:
-        note = f"{grades_replaced} grade(s) that {form.platform} holds already are changed{form.replaced}"
-        notes.append(note)
+    for place, row in enumerate(staying):
+        written = again.amount(again.value(place, "grade")) if row in texts else None
+        if row in texts and (written is None or number(written) != texts[row]):
+            raise not_as_meant(form.name)
+    notes = [*form.notes, *form.notes_on(len(changed), zeros)]
+    replaced = sum(row in held for row in changed)
+    if replaced:
+        notes.append(f"{replaced} grade(s) that {form.platform} holds already are changed{form.replaced}")
     if comments_replaced:
         notes.append(f"{comments_replaced} comment(s) that {form.platform} holds already are replaced")
     notes += matches.notes_on(filled)

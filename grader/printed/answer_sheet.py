@@ -8,7 +8,7 @@ import segno
 from reportlab.lib.units import mm
 
 from grader.inputs.roster import RosterRow
-from grader.language import N_, Tongue, tongue
+from grader.language import N_, SIDES, Tongue, tongue
 from grader.printed.layout import (
     CALIBRATION,
     CODE_MM,
@@ -202,10 +202,10 @@ _SPACE_MM = 3.0
 
 def given_data(assignment: Assignment, variant: Variant, tongue: Tongue) -> list[tuple[Piece, ...]]:
     """The given data, each as label = value unit."""
-    values = assignment.values([variant])
     data = []
-    for datum in assignment.file.given:
-        value = number(float(np.ravel(datum.value(values))[0]), tongue.decimal_mark)
+    for datum, given in assignment.given(variant):
+        is_side = given if isinstance(given, str) else None
+        value = tongue.gettext(SIDES[is_side]) if is_side else number(float(given), tongue.decimal_mark)
         unit = tongue.unit(datum.unit)
         gap = "" if unit in {"", "°"} else "\N{NO-BREAK SPACE}"
         data.append((*pieces_of(datum.label), Piece(f" = {value}{gap}{unit}")))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup, escape
 
-from grader.language import N_, UNITS, Tongue
+from grader.language import N_, SIDES, UNITS, Tongue
 from reference import geometry
 from reference.construction.elements import (
     Along,
@@ -19,6 +19,7 @@ from reference.construction.elements import (
     Line,
     Scaled,
     View,
+    side_at,
 )
 from reference.construction.steps import (
     ArcAndLine,
@@ -77,6 +78,7 @@ def wording_of(tongue: Tongue) -> Wording:
         variant={name: _(word) for name, word in VARIANT.items()},
         columns=(first, second, third, fourth, fifth),
         too_large=_(TOO_LARGE),
+        sides={side: _(words) for side, words in SIDES.items()},
         units={unit: _(unit) for unit in (*UNITS, *OTHER_UNITS)},
     )
 
@@ -215,7 +217,8 @@ class Speaker:
             if kind == "guide":
                 return self.say(ALONG_GUIDE, joint=joint, angle=angle)
             return self.say(AT_ANGLE, angle=angle)
-        turns = (along.quarters + (2 if sign < 0.0 else 0)) % 4
+        turned = sign * side_at(along.side, self.view) < 0.0
+        turns = (along.quarters + (2 if turned else 0)) % 4
         ends = (along.head, along.tail) if turns == 2 else (along.tail, along.head)
         text = {0: TOWARDS, 1: TURNED_LEFT, 2: TOWARDS, 3: TURNED_RIGHT}[turns]
         return self.say(text, link=(along.tail, along.head), tail=ends[0], head=ends[1])
@@ -396,7 +399,7 @@ def _two_arcs(speaker: Speaker, step: TwoArcs) -> Markup:
         _radius(speaker, centre, step.node, _length(speaker, radius))
         for centre, radius in zip(step.centres, step.radii, strict=True)
     )
-    text = ARC_LEFT if _side(speaker, step.side) > 0 else ARC_RIGHT
+    text = ARC_LEFT if side_at(step.side, speaker.view) > 0 else ARC_RIGHT
     return speaker.say(text, node=step.node, p=p, q=q, p_radius=p_radius, q_radius=q_radius)
 
 
@@ -407,7 +410,10 @@ def _arc(speaker: Speaker, step: ArcAndLine | Tangent) -> Markup:
         left = (np.conj(way) * (speaker.place(step.node) - speaker.place(step.start))).imag > 0.0
         text = TANGENT_LEFT if left else TANGENT
         return speaker.say(text, node=step.node, centre=step.centre, radius=radius, start=step.start)
-    angle, line = _direction(speaker, step.guide) * _side(speaker, step.side), _line(speaker, step.guide)
+    angle, line = (
+        complex(_direction(speaker, step.guide) * side_at(step.side, speaker.view)),
+        _line(speaker, step.guide),
+    )
     return speaker.say(
         ARC_AND_LINE, node=step.node, centre=step.centre, radius=radius, line=line, angle=angle
     )
@@ -415,11 +421,6 @@ def _arc(speaker: Speaker, step: ArcAndLine | Tangent) -> Markup:
 
 def _radius(speaker: Speaker, centre: str, node: str, mm: float) -> Markup:
     return Markup("{} = {}").format(speaker.name(centre, node), speaker.mm(mm))
-
-
-def _side(speaker: Speaker, side: object) -> float:
-    """The variant's own side of a group."""
-    return speaker.subject.number(np.asarray(side, dtype=np.float64))
 
 
 def _divide(speaker: Speaker, step: Divide) -> Markup:

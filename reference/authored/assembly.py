@@ -21,7 +21,7 @@ from reference.authored.mechanism import (
     SliderTable,
     SlottedLinkTable,
 )
-from reference.authored.toml_file import LENGTH_UNITS_M
+from reference.authored.toml_file import LENGTH_UNITS_M, SideText
 from reference.geometry import ComplexArray, FloatArray
 from reference.kinematics import assur
 from reference.mechanism import (
@@ -38,6 +38,7 @@ from reference.mechanism import (
     MovingGuide,
     Plate,
     PointOnLine,
+    Side,
     Slider,
     SlotPoint,
     SlottedLink,
@@ -53,8 +54,6 @@ SHORTEST_M = 1e-9
 """No number of an authored file is larger, no length shorter: their squares then neither over- nor
 underflow."""
 
-SIDES = {"left": 1, "right": -1, "ahead": 1, "behind": -1}
-
 
 class _Numbers:
     """Formulas to arrays in SI, of shape (N,) or, where they do not depend on the variant, (1,)."""
@@ -65,16 +64,18 @@ class _Numbers:
     def number(self, formula: Formula) -> FloatArray:
         numbers = formula(self.values)
         if np.abs(numbers).max(initial=0.0) > LARGEST:
-            raise FormulaError(f"'{formula.text}' is larger than {LARGEST:g}: beyond any mechanism")
+            message = f"'{formula.text}' is larger than {LARGEST:g}: beyond any mechanism"
+            raise FormulaError(message, np.abs(numbers) > LARGEST)
         return numbers if numbers.ndim else numbers[None]
 
     def length(self, formula: Formula, what: str) -> FloatArray:
         lengths = self.distance(formula)
         least = lengths.min(initial=LARGEST)
         if least <= 0.0:
-            raise FormulaError(f"'{formula.text}' ({what}) must be a positive length")
+            raise FormulaError(f"'{formula.text}' ({what}) must be a positive length", lengths <= 0.0)
         if least < SHORTEST_M:
-            raise FormulaError(f"'{formula.text}' ({what}) is shorter than {SHORTEST_M:g} m")
+            message = f"'{formula.text}' ({what}) is shorter than {SHORTEST_M:g} m"
+            raise FormulaError(message, lengths < SHORTEST_M)
         return lengths
 
     def distance(self, formula: Formula) -> FloatArray:
@@ -85,6 +86,22 @@ class _Numbers:
     def angle(self, formula: Formula) -> FloatArray:
         """Degrees to radians."""
         return np.asarray(np.radians(self.number(formula)))
+
+    def side(self, text: SideText) -> Side:
+        """+1 or -1; of a formula an array, whether or not it differs between the variants at hand."""
+        if isinstance(text.side, int):
+            return text.side
+        first, second = text.words
+        unknown = text.side.names - self.values.keys()
+        if unknown:
+            raise FormulaError(
+                f"side = '{text.side.text}' is neither {first} nor {second}, nor data of a variant"
+            )
+        signs = np.sign(self.number(text.side))
+        if np.any(signs == 0.0):
+            detail = f"above zero is {first}, below {second}"
+            raise FormulaError(f"side = '{text.side.text}' is zero: {detail}", signs == 0.0)
+        return signs
 
     def point(self, point: list[Formula]) -> ComplexArray:
         x, y = (self.distance(formula) for formula in point)
@@ -145,7 +162,7 @@ def _located(index: int, table: AnyGroupTable, numbers: _Numbers, bodies: _LinkA
     try:
         return _group(table, numbers, bodies)
     except FormulaError as error:
-        raise FormulaError(f"group[{index}]: {error}") from error
+        raise FormulaError(f"group[{index}]: {error}", error.which) from error
 
 
 def _driver(file: MechanismFile, numbers: _Numbers) -> Driver:
@@ -209,12 +226,12 @@ def _group(table: AnyGroupTable, numbers: _Numbers, bodies: _LinkAxes) -> Group:
             first, second = (numbers.length(length, node) for length in table.lengths)
             bodies.carry(link_p, p, node, first)
             bodies.carry(link_q, q, node, second)
-            return Dyad(node, (p, q), (link_p, link_q), (first, second), SIDES[table.side])
+            return Dyad(node, (p, q), (link_p, link_q), (first, second), numbers.side(table.side))
         case SliderTable():
             length = numbers.length(table.length, node)
             guide = _guide(table.guide, numbers, bodies)
             bodies.carry(table.link, table.pin, node, length)
-            return Slider(node, table.pin, table.link, length, guide, SIDES[table.side])
+            return Slider(node, table.pin, table.link, length, guide, numbers.side(table.side))
         case SlottedLinkTable():
             return _slotted_link(table, numbers, bodies)
         case CrossSliderTable():
@@ -233,7 +250,7 @@ def _slotted_link(table: SlottedLinkTable, numbers: _Numbers, bodies: _LinkAxes)
             raise FormulaError(f"the offset of link {table.link} is zero: leave out offset and foot")
         bodies.axes[table.link][table.foot] = np.asarray(1j * offset)
     bodies.slots[table.link] = table.node
-    side = SIDES[table.side]
+    side = numbers.side(table.side)
     return SlottedLink(table.node, table.pin, table.pivot, table.link, offset, table.foot, side)
 
 
@@ -255,8 +272,8 @@ def _link_point(
             return PointOnLine(node, (p, q), link, ratio)
         case PlateTable():
             first, second = (numbers.length(length, node) for length in table.lengths)
-            side: int | FloatArray = SIDES[table.side or "left"]
-            shape = _shape(np.abs(base), first, second, SIDES[table.side or "left"])
+            side = numbers.side(table.side) if table.side else 1
+            shape = _shape(np.abs(base), first, second, side)
             if table.side is None and np.any(shape.imag != 0.0):
                 detail = f"{node} may lie to the left or to the right of {p} -> {q}; say which: side"
                 raise FormulaError(f"side of {node} is missing: {detail}")
@@ -267,13 +284,13 @@ def _link_point(
                 axes[node] = axes[p] + shape * base
                 return PointOnLine(node, (p, q), link, np.asarray(shape.real), np.asarray(local.real))
             sides = np.where(shape.imag < 0.0, -1, 1)
-            side = int(sides[0]) if np.all(sides == sides[0]) else sides
+            side = sides
             first, second = np.abs(shape * base), np.abs((1.0 - shape) * base)
     axes[node] = axes[p] + shape * base
     return Plate(node, (p, q), link, (first, second), side, shape, local)
 
 
-def _shape(base: FloatArray, first: FloatArray, second: FloatArray, side: int) -> ComplexArray:
+def _shape(base: FloatArray, first: FloatArray, second: FloatArray, side: Side) -> ComplexArray:
     """A plate's third point over its base, (C - A) / (B - A); exactly real where it is in line."""
     with np.errstate(all="ignore"):
         along, across, _ = assur.rrr_place(base + 0j, first, second, side)

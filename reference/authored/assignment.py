@@ -5,8 +5,8 @@ evaluated on arrays over variants.
 """
 
 import os
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -17,15 +17,23 @@ from pydantic import Field, model_validator
 
 from reference.authored import toml_file
 from reference.authored.assembly import LARGEST, build_driver, build_mechanism
+from reference.authored.flat_positions import signs_of, with_signs
 from reference.authored.formula import Formula, FormulaError, Value
 from reference.authored.mechanism import MechanismFile, check_mechanism
-from reference.authored.toml_file import Authored, FormulaText, Identifier, Text
-from reference.errors import AuthoredFileError, CallError, Finding
+from reference.authored.toml_file import LENGTH_UNITS_M, Authored, FormulaText, Identifier, Text
+from reference.authored.variant_table import (
+    KEYS,
+    MOST_VARIANTS,
+    DataTable,
+    VariantRows,
+    misused_columns,
+    or_its_file,
+    read_rows,
+)
+from reference.errors import AuthoredFileError, CallError, Finding, ranges_of
 from reference.geometry import FloatArray
+from reference.kinematics.motion import BoolArray
 from reference.mechanism import Crank, Driver, Mechanism
-
-MOST_VARIANTS = 10_000
-"""Of an assignment: more than any class has students, and all of them are computed before it is used."""
 
 
 class Range(Authored):
@@ -41,10 +49,11 @@ class Range(Authored):
 
 
 class VariantTable(Authored):
-    """What a student's number n (and a position) sets: formulas, each may use those above it."""
+    """What a student's number n (and a position) sets: a table's data, then formulas of those above."""
 
     n: Range | None = None
     position: Range | None = None
+    table: Annotated[DataTable | None, Field(json_schema_extra=or_its_file)] = None
     values: dict[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")], FormulaText] = Field(default={})
 
     @model_validator(mode="after")
@@ -162,6 +171,10 @@ class Assignment:
     file: AssignmentFile
     mechanism_file: MechanismFile
     path: Path
+    rows: VariantRows | None = None
+    """Of the table of variants, where there is one."""
+    signs: Mapping[str, Mapping[Variant, float]] = field(default_factory=dict)
+    """-1 for each group and variant that has passed a flat position on its way from the first position."""
 
     @property
     def id(self) -> str:
@@ -173,25 +186,36 @@ class Assignment:
         spec = self.file.variant
         numbers = list(spec.n.values) if spec.n else [None]
         positions = list(spec.position.values) if spec.position else [None]
-        return [Variant(n, position) for n in numbers for position in positions]
+        if self.rows is None:
+            return [Variant(n, position) for n in numbers for position in positions]
+        numbered, positioned = self.rows.has
+        keys = {
+            (key[0] if numbered else n, key[1] if positioned else position)
+            for key in self.rows.keys
+            for n in numbers
+            for position in positions
+        }
+        return [Variant(*key) for key in sorted(keys, key=lambda key: (key[0] or 0, key[1] or 0))]
+
+    def numbers(self, name: str) -> list[int] | None:
+        """The numbers that there are of `n` or `position`, ascending; None where the assignment has none."""
+        known = {getattr(variant, name) for variant in self.variants()}
+        return None if None in known else sorted(known)
 
     def variant(self, n: int | None, position: int | None = None) -> Variant:
         """The variant asked for; raises CallError that says what is missing or out of range."""
-        spec = self.file.variant
-        chosen: dict[str, int | None] = {}
-        for name, given, allowed in (("n", n, spec.n), ("position", position, spec.position)):
-            if allowed is None:
-                chosen[name] = None
+        variants = self.variants()
+        for name, given in (("n", n), ("position", position)):
+            known = sorted({getattr(variant, name) for variant in variants} - {None})
+            if not known:
                 continue
-            allowed_range = f"{name} from {allowed.first} to {allowed.last}"
+            said = f"{name} {ranges_of(known)}" + (f", by {self.rows.source}" if self.rows else "")
             if given is None:
-                raise CallError(f"{name}_needed", f"assignment {self.id} needs --{name} ({allowed_range})")
-            if given not in allowed.values:
-                raise CallError(
-                    f"{name}_range", f"{name} = {given}: assignment {self.id} has {allowed_range}"
-                )
-            chosen[name] = given
-        return Variant(**chosen)
+                raise CallError(f"{name}_needed", f"assignment {self.id} needs --{name} ({said})")
+            if given not in known:
+                raise CallError(f"{name}_range", f"{name} = {given}: assignment {self.id} has {said}")
+            variants = [variant for variant in variants if getattr(variant, name) == given]
+        return variants[0]
 
     def values(self, variants: list[Variant]) -> dict[str, Value]:
         """The variants' data by name, arrays of shape (N,)."""
@@ -200,13 +224,31 @@ class Assignment:
             numbers = [getattr(variant, name) for variant in variants]
             if numbers and numbers[0] is not None:
                 known[name] = np.array(numbers, dtype=np.float64)
+        if self.rows is not None:
+            known |= self.rows.data([(variant.n, variant.position) for variant in variants])
         for name, formula in self.file.variant.values.items():
             known[name] = formula(known)
         return known
 
+    def given(self, variant: Variant) -> Iterator[tuple[GivenTable, float | str]]:
+        """What a student is told: each datum with its number, or the side that the table has in words."""
+        values = self.values([variant])
+        for datum in self.file.given:
+            number = float(np.ravel(datum.value(values))[0])
+            column = self.rows.columns.get(datum.value.text) if self.rows else None
+            yield datum, column.words[number < 0.0] if column and column.words else number
+
     def mechanism(self, variants: list[Variant]) -> Mechanism:
-        """The mechanism of every variant, SI, arrays of shape (N,)."""
-        return build_mechanism(self.mechanism_file, self.values(variants), len(variants))
+        """The mechanism of every variant, SI, arrays of shape (N,).
+
+        The positions of one n are one motion: sides hold in the first of them that is not flat, and are
+        reversed by each flat position on the way.
+        """
+        mechanism = build_mechanism(self.mechanism_file, self.values(variants), len(variants))
+        return with_signs(
+            mechanism,
+            {node: np.array([sign[variant] for variant in variants]) for node, sign in self.signs.items()},
+        )
 
     def scales(
         self,
@@ -299,11 +341,39 @@ def _load(path: Path, _changed_ns: int) -> Assignment:
     faults = tuple(check_mechanism(mechanism))
     if faults:
         raise AuthoredFileError(str(source), faults)
-    assignment = Assignment(file, mechanism, path)
-    findings = _check_formulas(assignment)
+    rows = None
+    if file.variant.table is not None:
+        table, rows = read_rows(file.variant.table, path, LENGTH_UNITS_M[mechanism.length_unit])
+        file = file.model_copy(update={"variant": file.variant.model_copy(update={"table": table})})
+    assignment = Assignment(file, mechanism, path, rows)
+    findings = [*_check_table(assignment)] or _check_formulas(assignment)
     if findings:
         raise AuthoredFileError(str(path), tuple(findings))
-    return assignment
+    variants = assignment.variants()
+    if not assignment.numbers("position"):
+        return assignment
+    signs = signs_of(assignment.mechanism(variants), [variant.n for variant in variants])
+    by_variant = {node: dict(zip(variants, passed.tolist(), strict=True)) for node, passed in signs.items()}
+    return replace(assignment, signs=by_variant)
+
+
+def _check_table(assignment: Assignment) -> Iterator[Finding]:
+    """A table's columns against what stands beside it, and its units against the keys where they are used."""
+    spec, rows = assignment.file.variant, assignment.rows
+    if rows is None:
+        return
+    for name, has in zip(KEYS, rows.has, strict=True):
+        if has and getattr(spec, name) is not None:
+            yield Finding(f"$.variant.{name}", f"{rows.source} has a column {name}: leave one of them out")
+    if len(assignment.variants()) > MOST_VARIANTS:
+        yield Finding("$.variant", f"has {len(assignment.variants())} variants, more than {MOST_VARIANTS}")
+    for name in spec.values:
+        if name in rows.columns:
+            yield Finding(
+                f"$.variant.values.{name}", f"{rows.source} has a column {name}: rename one of them"
+            )
+    place = "$.mechanism" if isinstance(assignment.file.mechanism, MechanismFile) else "mechanism file, $"
+    yield from misused_columns(assignment.mechanism_file, rows, place)
 
 
 def _check_formulas(assignment: Assignment) -> list[Finding]:
@@ -334,6 +404,14 @@ def _check_formulas(assignment: Assignment) -> list[Finding]:
         try:
             what(variants)
         except FormulaError as error:
-            findings.append(Finding(path, str(error)))
+            findings.append(Finding(path, str(error) + _failing(variants, error.which)))
             break
     return findings
+
+
+def _failing(variants: list[Variant], which: BoolArray | None) -> str:
+    """The first variant where a formula fails, and how many more there are."""
+    if which is None or which.shape != (len(variants),) or len(variants) == 1:
+        return ""
+    more = int(which.sum()) - 1
+    return f" (for {variants[int(np.argmax(which))]}{f' and {more} more' if more else ''})"

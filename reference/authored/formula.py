@@ -9,10 +9,11 @@ import ast
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, reduce
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from reference.errors import near_names
 from reference.geometry import FloatArray
@@ -24,17 +25,34 @@ MAX_EXPONENT = 16
 Value = FloatArray | float
 
 CONSTANTS: Mapping[str, float] = {"pi": math.pi}
-FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
+ROUNDING = 1e-12
+"""A cosine this little above 1 is 1: at a dead point the law of cosines gives it with a rounding error."""
+
+
+def _within_one(ratio: Value) -> Value:
+    return np.where(np.abs(ratio) <= 1.0 + ROUNDING, np.clip(ratio, -1.0, 1.0), np.nan)
+
+
+FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "sqrt": np.sqrt,
     "sin": np.sin,
     "cos": np.cos,
     "tan": np.tan,
+    "asin": lambda ratio: np.arcsin(_within_one(ratio)),
+    "acos": lambda ratio: np.arccos(_within_one(ratio)),
+    "atan": np.arctan,
+    "atan2": np.arctan2,
     "abs": np.abs,
     "floor": np.floor,
     "ceil": np.ceil,
+    "min": lambda *values: reduce(np.minimum, values),
+    "max": lambda *values: reduce(np.maximum, values),
     "radians": np.radians,
     "degrees": np.degrees,
 }
+"""Angles are in radians, but for what `radians` takes and `degrees` gives."""
+ARGUMENTS: Mapping[str, tuple[int, int]] = {"atan2": (2, 2), "min": (2, 20), "max": (2, 20)}
+"""How many a function takes, at least and at most; one unless said. Twenty fill a formula."""
 _OPERATORS: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: lambda x, y: x + y,
     ast.Sub: lambda x, y: x - y,
@@ -46,7 +64,11 @@ _OPERATORS: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
 
 
 class FormulaError(ValueError):
-    """The formula cannot be understood, or gives no finite number."""
+    """The formula cannot be understood, or gives no number that can be used for the variants in `which`."""
+
+    def __init__(self, message: str, which: NDArray[np.bool_] | None = None) -> None:
+        super().__init__(message)
+        self.which = which
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +103,9 @@ def _finite(formula: Formula, values: Mapping[str, Value]) -> FloatArray:
     with np.errstate(all="ignore"):
         result = np.asarray(_evaluate(formula.tree, values), dtype=np.float64)
     if not np.isfinite(result).all():
-        raise FormulaError(f"'{formula.text}' does not give a finite number for these data")
+        raise FormulaError(
+            f"'{formula.text}' does not give a finite number for these data", ~np.isfinite(result)
+        )
     return result
 
 
@@ -119,14 +143,23 @@ def _check(node: ast.expr, names: set[str], text: str, depth: int) -> None:
                 _check_exponent(right, text)
             _check(left, names, text, depth + 1)
             _check(right, names, text, depth + 1)
-        case ast.Call(func=ast.Name(id=function), args=[argument], keywords=[]):
-            if function not in FUNCTIONS:
-                raise FormulaError(f"'{text}': {_unknown_name(function, FUNCTIONS)}")
-            _check(argument, names, text, depth + 1)
+        case ast.Call(func=ast.Name(id=function), args=arguments, keywords=[]):
+            _check_function(function, len(arguments), text)
+            for argument in arguments:
+                _check(argument, names, text, depth + 1)
         case _:
             raise FormulaError(
                 f"'{text}': only numbers, names, + - * / % ** and {', '.join(FUNCTIONS)} may be used"
             )
+
+
+def _check_function(function: str, count: int, text: str) -> None:
+    if function not in FUNCTIONS:
+        raise FormulaError(f"'{text}': {_unknown_name(function, FUNCTIONS)}")
+    least, most = ARGUMENTS.get(function, (1, 1))
+    if not least <= count <= most:
+        wanted = "one number" if most == 1 else f"{least} numbers{' or more' if most > least else ''}"
+        raise FormulaError(f"'{text}': {function} takes {wanted}")
 
 
 def _check_exponent(exponent: ast.expr, text: str) -> None:
@@ -151,8 +184,8 @@ def _evaluate(node: ast.expr, values: Mapping[str, Value]) -> Any:  # noqa: ANN4
             return -inner if isinstance(operator, ast.USub) else inner
         case ast.BinOp(left=left, op=operator, right=right):
             return _OPERATORS[type(operator)](_evaluate(left, values), _evaluate(right, values))
-        case ast.Call(func=ast.Name(id=function), args=[argument]):
-            return FUNCTIONS[function](_evaluate(argument, values))
+        case ast.Call(func=ast.Name(id=function), args=arguments):
+            return FUNCTIONS[function](*(_evaluate(argument, values) for argument in arguments))
     raise AssertionError(f"an unchecked node {node!r}")  # pragma: no cover - `parse` refuses all others
 
 

@@ -11,12 +11,16 @@ from typing import Annotated, Literal, Self, cast
 from pydantic import Field, model_validator
 
 from reference.authored.toml_file import (
+    AHEAD_BEHIND,
+    AheadBehind,
     Authored,
     FormulaText,
     Identifier,
     Joint,
+    LeftRight,
     LinkName,
     Point,
+    SideText,
     Text,
     TwoFormulas,
     TwoJoints,
@@ -100,7 +104,7 @@ class DyadTable(Authored):
     pins: TwoJoints
     links: Annotated[list[LinkName], Field(min_length=2, max_length=2)]
     lengths: TwoFormulas
-    side: Literal["left", "right"]
+    side: LeftRight
     """Of the directed line pins[0] -> pins[1]."""
 
 
@@ -113,7 +117,7 @@ class SliderTable(Authored):
     link: LinkName
     length: FormulaText
     guide: GuideTable
-    side: Literal["ahead", "behind"]
+    side: AheadBehind
     """Where the slider is, seen from the pin along the guide's direction."""
 
 
@@ -130,7 +134,7 @@ class SlottedLinkTable(Authored):
     """How far the pin lies to the left of the parallel to the guide through the pivot."""
     foot: Joint | None = None
     """The guide's nearest point to the pivot, where there is an offset."""
-    side: Literal["ahead", "behind"] = "ahead"
+    side: AheadBehind = SideText(AHEAD_BEHIND, 1)
     """Where the pin is, seen from the pivot along the guide's direction."""
 
     @model_validator(mode="after")
@@ -167,7 +171,7 @@ class PlateTable(Authored):
     base: TwoJoints
     link: LinkName
     lengths: TwoFormulas
-    side: Literal["left", "right"] | None = None
+    side: LeftRight | None = None
     """Of the directed line base[0] -> base[1]; needed unless the three are in line for every variant."""
 
 

@@ -3,6 +3,7 @@
 import re
 import tomllib
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -63,6 +64,50 @@ FormulaText = Annotated[
     PlainSerializer(lambda f: f.text),
     WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]}),
 ]
+LEFT_RIGHT, AHEAD_BEHIND = ("left", "right"), ("ahead", "behind")
+SIDES = {word: sign for pair in (LEFT_RIGHT, AHEAD_BEHIND) for word, sign in zip(pair, (1, -1), strict=True)}
+"""Words for a group's side."""
+
+NO_SIDES = {"above", "below", "up", "down", "over", "under", "front", "back", "open", "crossed"}
+"""Words that people write for a side, which say nothing of a line's two sides: never names of data."""
+
+
+@dataclass(frozen=True, slots=True)
+class SideText:
+    """A group's side: a word, or a formula of the variant's data (above zero: the first of the two words)."""
+
+    words: tuple[str, str]
+    side: int | Formula
+
+
+def _side_of(words: tuple[str, str]) -> BeforeValidator:
+    def read(value: object) -> SideText:
+        if value in words:
+            return SideText(words, SIDES[str(value)])
+        if str(value).lower() in NO_SIDES or (
+            isinstance(value, str) and near_names(value, SIDES, cutoff=0.75)
+        ):
+            raise ValueError(f"'{value}' is no side of this group: it must be '{words[0]}' or '{words[1]}'")
+        try:
+            return SideText(words, _read_formula(value))
+        except ValueError as error:
+            raise ValueError(f"must be {words[0]} or {words[1]}, or a formula: {error}") from error
+
+    return BeforeValidator(read)
+
+
+def _written_side(side: SideText) -> str:
+    return side.side.text if isinstance(side.side, Formula) else side.words[side.side < 0]
+
+
+def _schema_of(words: tuple[str, str]) -> WithJsonSchema:
+    return WithJsonSchema({"anyOf": [{"enum": list(words)}, {"type": "string"}, {"type": "number"}]})
+
+
+LeftRight = Annotated[SideText, _side_of(LEFT_RIGHT), PlainSerializer(_written_side), _schema_of(LEFT_RIGHT)]
+AheadBehind = Annotated[
+    SideText, _side_of(AHEAD_BEHIND), PlainSerializer(_written_side), _schema_of(AHEAD_BEHIND)
+]
 Joint = Annotated[str, Field(min_length=1, max_length=4), AfterValidator(_check_joint)]
 Identifier = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]
 LinkName = Annotated[str, Field(pattern=r"^[A-Za-z0-9]{1,4}$")]
@@ -89,13 +134,7 @@ def load(model: type[Model], path: Path) -> Model:
     Raises AuthoredFileError with every fault found, each with its path in the file.
     """
     try:
-        data = tomllib.loads(_content_of(path).decode("utf-8"))
-    except FileNotFoundError as error:
-        raise AuthoredFileError(str(path), (Finding("$", "there is no such file"),)) from error
-    except OSError as error:
-        raise AuthoredFileError(str(path), (Finding("$", f"cannot be read: {error.strerror}"),)) from error
-    except UnicodeDecodeError as error:
-        raise AuthoredFileError(str(path), (Finding("$", "is not UTF-8 text"),)) from error
+        data = tomllib.loads(text_of(path))
     except (ValueError, RecursionError) as error:
         # Besides TOMLDecodeError: numbers of thousands of digits, tables nested a thousand deep.
         raise AuthoredFileError(str(path), (Finding("$", f"is not TOML: {error}"),)) from error
@@ -103,6 +142,18 @@ def load(model: type[Model], path: Path) -> Model:
     if faults:
         raise AuthoredFileError(str(path), faults)
     return validate(model, data, str(path))
+
+
+def text_of(path: Path) -> str:
+    """The text of an authored file or of a table beside it; raises AuthoredFileError where it has none."""
+    try:
+        return _content_of(path).decode("utf-8-sig")
+    except FileNotFoundError as error:
+        raise AuthoredFileError(str(path), (Finding("$", "there is no such file"),)) from error
+    except OSError as error:
+        raise AuthoredFileError(str(path), (Finding("$", f"cannot be read: {error.strerror}"),)) from error
+    except UnicodeDecodeError as error:
+        raise AuthoredFileError(str(path), (Finding("$", "is not UTF-8 text; save it as UTF-8"),)) from error
 
 
 def _content_of(path: Path) -> bytes:

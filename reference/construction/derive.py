@@ -12,9 +12,17 @@ Coriolis component a_B3B_c in ``k_B3B``.
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
-from reference.construction.elements import Along, Coriolis, Fixed, FixedLine, Line, Normal, Scaled
+from reference.construction.elements import (
+    Along,
+    Coriolis,
+    Fixed,
+    FixedLine,
+    Line,
+    Normal,
+    Scaled,
+    Side,
+    VariantSide,
+)
 from reference.construction.graph import AngularRate, Construction, Part, Vector, pair
 from reference.construction.steps import (
     ArcAndLine,
@@ -259,18 +267,13 @@ def construction_of(
 
 
 def _form_of(mechanism: Mechanism) -> Hashable:
-    """Everything that the construction depends on: names, kinds, sides, and which points are in line."""
+    """Everything that the construction depends on: names, kinds, and which points are in line."""
     in_line = tuple(
         (group.is_ever_flat, group.line_ratio is None)
         for group in mechanism.groups
         if isinstance(group, Plate)
     )
-    sides = tuple(
-        side.tobytes()
-        for group in mechanism.groups
-        if isinstance(side := getattr(group, "side", 1), np.ndarray)
-    )
-    return (form_of(mechanism), in_line, sides)
+    return (form_of(mechanism), in_line)
 
 
 def _write_down(mechanism: Mechanism, accelerations: bool, plate_by_similarity: bool) -> Construction:
@@ -368,7 +371,7 @@ def _draw_group(draft: Draft, group: Group) -> None:
     match group:
         case Dyad(node=node, pins=(p, q), links=(link_p, link_q)):
             radii = (Scaled(pair(p, node), "kL"), Scaled(pair(q, node), "kL"))
-            draft.sketch.append(TwoArcs(node, (p, q), radii, group.side))
+            draft.sketch.append(TwoArcs(node, (p, q), radii, _side(group)))
             images_at(draft, node, rotations(draft, node, {p: link_p, q: link_q}))
         case Plate(node=node, base=(p, q), link=link):
             _draw_plate(draft, group)
@@ -392,7 +395,7 @@ def _draw_group(draft: Draft, group: Group) -> None:
             absolute(draft, node)
         case Slider(node=node, pin=pin, link=link, guide=guide):
             radius = Scaled(pair(pin, node), "kL")
-            draft.sketch.append(ArcAndLine(node, pin, radius, guide_line(node, guide), group.side))
+            draft.sketch.append(ArcAndLine(node, pin, radius, guide_line(node, guide), _side(group)))
             turns = rotations(draft, node, {pin: link})
             images_at(draft, node, turns + slides(draft, node, (guide,)))
         case CrossSlider(node=node, guides=guides):
@@ -408,26 +411,31 @@ def _draw_group(draft: Draft, group: Group) -> None:
             _draw_slot_point(draft, group)
 
 
+def _side(group: Dyad | Plate | Slider | SlottedLink) -> Side:
+    """The group's side; where it may differ between variants, the name of its parameter."""
+    return group.side if isinstance(group.side, int) else VariantSide(f"side {group.node}")
+
+
 def _draw_plate(draft: Draft, group: Plate) -> None:
     node, (p, q) = group.node, group.base
     if group.line_ratio is not None:
         draft.sketch.append(Divide(node, (p, q), f"ratio {node}"))
         return
     radii = (Scaled(pair(p, node), "kL"), Scaled(pair(q, node), "kL"))
-    draft.sketch.append(TwoArcs(node, (p, q), radii, group.side))
+    draft.sketch.append(TwoArcs(node, (p, q), radii, _side(group)))
 
 
 def _slot_axis(group: SlottedLink) -> Along:
     """The direction of a slotted link's guide on the sketch."""
-    behind = bool(np.ravel(group.side)[0] < 0)
-    return Along(group.foot or group.pivot, group.pin, 2 if behind else 0)
+    axis, side = Along(group.foot or group.pivot, group.pin), _side(group)
+    return replace(axis, quarters=1 - side) if isinstance(side, int) else replace(axis, side=side)
 
 
 def _draw_slotted_link(draft: Draft, group: SlottedLink) -> None:
     node, pin, pivot = group.node, group.pin, group.pivot
     if group.foot is not None:
         offset = Scaled(f"offset {node}", "kL")
-        draft.sketch.append(Tangent(group.foot, pivot, offset, pin, group.side))
+        draft.sketch.append(Tangent(group.foot, pivot, offset, pin, _side(group)))
     draft.sketch.append(Coincide(node, pin))
     length = Normal(draft.image(pivot), draft.image(node), pair(pivot, node), measured=(pivot, node))
     turn = (draft.image(pivot), draft.image(node))

@@ -64,22 +64,49 @@ def _nodes_in(value: object) -> tuple[str, ...]:
     return tuple([node for inner in value for node in _nodes_in(inner)]) if isinstance(value, tuple) else ()
 
 
+# Sides --------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class VariantSide:
+    """A side that is among the parameters, because it differs between variants: +1 or -1."""
+
+    parameter: str
+    sign: int = 1
+
+    def __neg__(self) -> "VariantSide":
+        return VariantSide(self.parameter, -self.sign)
+
+
+Side = int | VariantSide
+"""Of a group, the same for all variants or one of each."""
+
+
+def side_at(side: Side, view: View) -> int | FloatArray:
+    """+1 to the left (ahead), -1 to the right (behind)."""
+    return side.sign * view.parameters[side.parameter] if isinstance(side, VariantSide) else side
+
+
 # Directions ---------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class Along(FromNodes):
-    """The direction of a link as drawn, from joint `tail` to joint `head`, turned by quarters ccw."""
+    """The direction of a link as drawn, from joint `tail` to joint `head`, turned by quarters ccw.
+
+    On the other `side` it runs the opposite way.
+    """
 
     reads = ("tail", "head")
     tail: str
     head: str
     quarters: int = 0
+    side: Side = 1
 
     def at(self, view: View) -> ComplexArray:
         """The unit vector."""
         link = geometry.unit(view.nodes[self.head] - view.nodes[self.tail])
-        return np.asarray(link * 1j**self.quarters)
+        return np.asarray(link * 1j**self.quarters * side_at(self.side, view))
 
 
 @dataclass(frozen=True, slots=True)

@@ -104,6 +104,8 @@ def _guide_parameters(node: str, guide: Guide) -> dict[str, FloatArray]:
 
 def _group_parameters(group: Group) -> dict[str, FloatArray]:
     known: dict[str, FloatArray] = {}
+    if isinstance(side := getattr(group, "side", 1), np.ndarray):
+        known[f"side {group.node}"] = side
     for guide in guides_of(group):
         known.update(_guide_parameters(group.node, guide))
     match group:

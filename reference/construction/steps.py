@@ -15,13 +15,14 @@ from reference.construction.elements import (
     FixedLine,
     FromNodes,
     Length,
+    Side,
     View,
     drawn,
     fixed_point,
+    side_at,
 )
 from reference.geometry import ComplexArray
 from reference.kinematics import assur
-from reference.mechanism import Side
 
 
 class Step(Protocol):
@@ -130,7 +131,7 @@ class TwoArcs(FromNodes):
         r, s = (
             radius.at(view) + view.error(self.node, slot, "length") for slot, radius in enumerate(self.radii)
         )
-        return geometry.two_arcs(p, r, q, s, self.side)
+        return geometry.two_arcs(p, r, q, s, side_at(self.side, view))
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +149,7 @@ class ArcAndLine(FromNodes):
         """The meeting point."""
         foot, along = self.guide.at(view, self.node, 1)
         radius = self.radius.at(view) + view.error(self.node, 0, "length")
-        return geometry.arc_and_line(view.nodes[self.centre], radius, foot, along, self.side)
+        return geometry.arc_and_line(view.nodes[self.centre], radius, foot, along, side_at(self.side, view))
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +184,7 @@ class Tangent(FromNodes):
         """The touching point."""
         centre = view.nodes[self.centre]
         radius = self.radius.at(view) + view.error(self.node, 0, "length")
-        _, along, _ = assur.rpr_place(view.nodes[self.start] - centre, radius, self.side)
+        _, along, _ = assur.rpr_place(view.nodes[self.start] - centre, radius, side_at(self.side, view))
         return np.asarray(centre + 1j * along * radius)
 
 

@@ -38,6 +38,7 @@ class Wording:
     columns: tuple[str, str, str, str, str] = ("vector", "on paper", "mm", "real value", "direction")
     too_large: str = "does not fit A3 at these scales"
     units: Mapping[str, str] = field(default_factory=dict)
+    sides: Mapping[str, str] = field(default_factory=dict)
 
     def unit(self, unit: str) -> str:
         """A unit in the language's letters, `m/s^2` with a superscript."""

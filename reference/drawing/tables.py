@@ -90,9 +90,9 @@ def _heading(subject: Subject, at: tuple[float, float]) -> tuple[list[Shape], fl
 
 def given_data(subject: Subject) -> Iterator[tuple[Piece, ...]]:
     """The variant's data, each as label = value unit."""
-    values = subject.assignment.values([subject.plan.variants[subject.index]])
-    for datum in subject.assignment.file.given:
-        value = subject.wording.number(f"{float(np.ravel(datum.value(values))[0]):.6g}")
+    wording = subject.wording
+    for datum, given in subject.assignment.given(subject.plan.variants[subject.index]):
+        value = wording.sides.get(given, given) if isinstance(given, str) else wording.number(f"{given:.6g}")
         unit = subject.wording.unit(datum.unit)
         gap = "" if unit in {"", "°"} else "\N{NO-BREAK SPACE}"
         yield (*pieces_of(datum.label), Piece(f" = {value}{gap}{unit}"))

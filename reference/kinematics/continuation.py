@@ -17,7 +17,17 @@ from numpy.typing import NDArray
 from reference.geometry import FloatArray, cross, dot
 from reference.kinematics.motion import WHAT_IS_IN_LINE
 from reference.kinematics.solving import Joint, Rail, Solution, rail_of, solve
-from reference.mechanism import Crank, CrossSlider, DrivenSlider, Dyad, Group, Mechanism, Slider, SlottedLink
+from reference.mechanism import (
+    Crank,
+    CrossSlider,
+    DrivenSlider,
+    Dyad,
+    Group,
+    Mechanism,
+    Slider,
+    SlottedLink,
+    with_arrays,
+)
 from reference.numbers import Complex, Number
 
 SCANNED = 3001
@@ -26,6 +36,11 @@ ROUNDINGS = 32.0 * float(np.finfo(np.float64).eps)
 """A closure this small against the coordinates it comes from is zero."""
 LARGEST_AMPLIFICATION = 1e6
 """Of rounding errors, as they are counted in a closure's slack at most."""
+GLANCES = 73
+"""Samples of a quick look, 5 degrees apart on a turn."""
+NEARLY = 0.05
+"""A closure that falls below this share of its largest sample may touch zero between two samples: over the
+2.5 degrees to the nearest one a closure with a touch of zero grows by a tenth of that."""
 NEAR = 1e-4
 """Flat positions of two groups so near to each other are one: the second is located only roughly."""
 PARTS = 64
@@ -112,6 +127,40 @@ def follow(mechanism: Mechanism, start: float, low: float, high: float) -> Conti
     return Continuation(mechanism, start, ends[0], ends[1], (stops[0], stops[1]), inside)
 
 
+def signs_between(mechanism: Mechanism, start: float, ends: FloatArray) -> dict[str, FloatArray]:
+    """By node, -1 where a group has passed an odd number of flat positions on its way to an end, else +1.
+
+    Arguments: a mechanism of one variant, which assembles at `start`; driven coordinates, shape (N,). Only
+    groups that pass flat positions are told; ends that the driven link cannot reach have +1.
+    """
+    following = follow(mechanism, start, min(start, *ends), max(start, *ends))
+    reached = (ends >= following.low) & (ends <= following.high)
+    return {
+        node: np.where(reached, _sign(changes, ends, start), 1.0)
+        for node, changes in following.changes.items()
+        if changes
+    }
+
+
+def may_pass(mechanism: Mechanism, low: FloatArray, high: FloatArray) -> BoolArray:
+    """Whether some group comes near a flat position between two driven coordinates, shape (N,) each.
+
+    A quick look at many variants at once: where it says no, `follow` finds no flat position.
+    """
+    count = low.size
+    driven = np.linspace(low, high, GLANCES, axis=1).ravel()
+    wide = with_arrays(mechanism, lambda values: np.repeat(np.broadcast_to(values, (count,)), GLANCES))
+    near = np.zeros(count, dtype=np.bool_)
+    for index, group in enumerate(wide.groups):
+        before = _driven_at(replace(wide, groups=wide.groups[:index]), driven, 0.0, {})
+        for closure in closures_of(_unit_speed(before), group):
+            value = np.abs(closure.value.reshape(count, GLANCES))
+            with np.errstate(invalid="ignore"):
+                near |= ~(value.min(axis=1) > NEARLY * value.max(axis=1))
+            near |= np.any(np.diff(np.sign(closure.value.reshape(count, GLANCES)), axis=1) != 0.0, axis=1)
+    return near
+
+
 def _why(group: Group) -> str:
     return WHAT_IS_IN_LINE.get(type(group), "its base has no length")
 
@@ -133,8 +182,13 @@ def _on_its_side(group: Group, driven: FloatArray, start: float, changes: tuple[
     """The group on the side it is on after so many flat positions, counted from the start."""
     if not changes or not isinstance(group, Dyad | Slider | SlottedLink):
         return group
+    return replace(group, side=np.asarray(group.side * _sign(changes, driven, start)))
+
+
+def _sign(changes: tuple[float, ...], driven: FloatArray, start: float) -> FloatArray:
+    """-1 where the number of flat positions between the start and a driven coordinate is odd."""
     passed = np.searchsorted(changes, driven) - np.searchsorted(changes, start)
-    return replace(group, side=np.asarray(group.side * np.where(passed % 2 == 0, 1.0, -1.0)))
+    return np.where(passed % 2 == 0, 1.0, -1.0)
 
 
 def _unit_speed(mechanism: Mechanism) -> Solution:

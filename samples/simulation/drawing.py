@@ -20,6 +20,8 @@ from reference.construction.elements import (
     Normal,
     Parameters,
     Scaled,
+    Side,
+    VariantSide,
 )
 from reference.construction.graph import Construction
 from reference.construction.steps import (
@@ -105,10 +107,10 @@ class _Paper:
                 return tools.crossing(*self._line(first), *self._line(second))
             case TwoArcs(centres=(p, q), radii=(r, s), side=side):
                 radii = (self._computed(r), self._computed(s))
-                return tools.arcs((nodes[p], nodes[q]), radii, float(side))
+                return tools.arcs((nodes[p], nodes[q]), radii, self._side(side))
             case ArcAndLine(centre=centre, radius=radius, guide=guide, side=side):
                 size = self._computed(radius)
-                return tools.arc_on_line(nodes[centre], size, self._line(guide), float(side))
+                return tools.arc_on_line(nodes[centre], size, self._line(guide), self._side(side))
             case Tangent():
                 return self._tangent(step)
             case Local(origin=origin, axis=axis, x=x, y=y):
@@ -138,7 +140,8 @@ class _Paper:
     def _direction(self, along: Direction) -> complex:
         """A direction as it comes out on the paper."""
         if isinstance(along, Along):
-            return self.tools.carried(self.nodes[along.head] - self.nodes[along.tail], along.quarters)
+            link = self.nodes[along.head] - self.nodes[along.tail]
+            return self.tools.carried(link * self._side(along.side), along.quarters)
         return self.tools.protracted(self.known[along.angle]) * self._turned() * 1j**along.quarters
 
     def _line(self, line: AnyLine) -> tuple[complex, complex]:
@@ -151,12 +154,15 @@ class _Paper:
         along = self._direction(line.along)
         return self.tools.beside(self.nodes[line.through], along), along
 
+    def _side(self, side: Side) -> float:
+        return side.sign * self.known[side.parameter] if isinstance(side, VariantSide) else float(side)
+
     def _tangent(self, step: Tangent) -> complex:
         """Where the line from a point touches a circle."""
         radius = self.tools.length(self._computed(step.radius))
         reach = self.tools.dot(self.nodes[step.start]) - self.nodes[step.centre]
         beyond = math.sqrt(abs(reach) ** 2 - radius**2)
-        along = reach / complex(float(step.side) * beyond, radius)
+        along = reach / complex(self._side(step.side) * beyond, radius)
         return self.tools.dot(self.nodes[step.centre] + 1j * radius * along / abs(along))
 
     # Triangles ----------------------------------------------------------------------------------------

@@ -1,5 +1,6 @@
-"""The README's commands, run one after another in a folder prepared as the README supposes."""
+"""The commands of the README and of the walk, run in folders prepared as these pages suppose."""
 
+import csv
 import json
 import os
 import re
@@ -54,29 +55,48 @@ def _serves(command: list[str], desk: Path, environment: dict[str, str]) -> None
     assert "http://127.0.0.1:" in "".join(said)
 
 
+def _run(command: str, desk: Path, statuses: set[int]) -> None:
+    """A command of a page ends with one of these statuses, and says something; a server serves."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+    arguments = shlex.split(command)[1:]
+    if arguments[0] == "review":
+        _serves([sys.executable, "-m", "grader", *arguments], desk, environment)
+        return
+    ran = subprocess.run(  # noqa: S603 - our own program
+        [sys.executable, "-m", "grader", *arguments],
+        cwd=desk,
+        env=environment,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        timeout=300,
+        check=False,
+    )
+    assert ran.returncode in statuses, f"{command}\n{ran.stdout}\n{ran.stderr}"
+    assert ran.stdout
+
+
 def test_every_command_of_the_readme_does_what_it_says(desk):
     assert len(COMMANDS) > 8
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
     for command in COMMANDS:
-        arguments = shlex.split(command)[1:]
-        if arguments[0] == "review":
-            _serves([sys.executable, "-m", "grader", *arguments], desk, environment)
-            continue
-        ran = subprocess.run(  # noqa: S603 - our own program
-            [sys.executable, "-m", "grader", *arguments],
-            cwd=desk,
-            env=environment,
-            capture_output=True,
-            text=True,
-            encoding="utf-8",
-            timeout=300,
-            check=False,
-        )
         # Lint and reading find things that need a person: that is status 1; all else here is right.
-        expected = {0, 1} if arguments[0] in {"lint", "read", "match"} else {0}
-        assert ran.returncode in expected, f"{command}\n{ran.stdout}\n{ran.stderr}"
-        assert ran.stdout
+        _run(command, desk, {0, 1} if command.split()[1] in {"lint", "read", "match"} else {0})
     written = {path.name for path in desk.iterdir()}
     assert {"plan.svg", "sheets.pdf", "marks", "draft.csv"} <= written
     assert (desk / "marks" / "index.html").is_file()
     assert (desk / "marks" / "s07" / "feedback.html").is_file()
+
+
+def test_the_walk_from_scans_to_moodle_ends_with_a_worksheet_of_grades(tmp_path):
+    shutil.copytree(ROOT / "samples" / "pump", tmp_path / "samples" / "pump")
+    shutil.copytree(ROOT / "docs" / "assets", tmp_path / "docs" / "assets")
+    walk = re.findall(r"(?m)^    (planmark .+)$", (ROOT / "docs" / "index.md").read_text(encoding="utf-8"))
+    assert [command.split()[1] for command in walk] == ["grade", "review", "export", "export"]
+    for command in walk:
+        # One student waits and one has handed in nothing: a person must look, status 1.
+        _run(command, tmp_path, {1})
+    with (tmp_path / "marks" / "export-moodle.csv").open(encoding="utf-8-sig", newline="") as file:
+        grades = {row["ID number"]: row["Grade"] for row in csv.DictReader(file)}
+    assert {student for student, grade in grades.items() if not grade} == {"s02", "s10"}
+    assert float(grades["s05"]) < 43
+    assert (tmp_path / "marks" / "export-moodle-feedback.zip").is_file()

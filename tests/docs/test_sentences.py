@@ -1,4 +1,4 @@
-"""Every text that people read stands in sentences.md, in all languages, with an example."""
+"""Every text that people read stands on the page of all sentences, in all languages, with an example."""
 
 import re
 
@@ -14,10 +14,6 @@ CATALOGUE = sentences.ROOT / "grader/locale/planmark.pot"
 def messages():
     with CATALOGUE.open("rb") as file:
         return [message.id for message in read_po(file) if message.id]
-
-
-def test_the_page_is_that_of_the_catalogues():
-    assert sentences.PAGE.read_text(encoding="utf-8") == sentences.page()
 
 
 def test_every_text_of_the_catalogues_is_on_it_in_every_language():

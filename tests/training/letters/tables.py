@@ -1,16 +1,13 @@
-"""The recogniser's figures as tables, put into `docs/letters.md`."""
+"""The recogniser's figures as tables."""
 
 import sys
 from collections.abc import Mapping
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 
 from grader.scan.handwriting.model import COLUMN, JUNK, Model, features
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "letters.md"
-_FIRST, _LAST = "<!-- written by letters/train.py -->\n", "<!-- end -->"
 _PLAN = "oabcdpABCDπ"
 _LEVELS = (0.0, 0.5, 0.8, 0.9, 0.95, 0.99, 1.0)
 
@@ -22,8 +19,8 @@ _HEAD = (
 )
 
 
-def written_tables(model: Model, tests: Mapping[str, Mapping[str, Pictures]], trained_on: str) -> None:
-    """Measure a model on test pictures by trouble and font; print the tables and put them into the page."""
+def print_tables(model: Model, tests: Mapping[str, Mapping[str, Pictures]], trained_on: str) -> None:
+    """Measure a model on test pictures by trouble and font; print the tables."""
     text = f"Trained on {trained_on}; the fonts and digits below were left out.\n"
     for how, test in tests.items():
         rows, sure, hit = list(_HEAD), [], []
@@ -36,9 +33,6 @@ def written_tables(model: Model, tests: Mapping[str, Mapping[str, Pictures]], tr
         table = _calibration(np.concatenate(sure), np.concatenate(hit))
         text += f"\n{how.capitalize()}:\n\n" + "\n".join(rows) + f"\n\n{table}"
     sys.stdout.write(text)
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(_FIRST)
-    after = rest.partition(_LAST)[2]
-    PAGE.write_text(f"{before}{_FIRST}\n{text}\n{_LAST}{after}", encoding="utf-8")
 
 
 def _row(name: str, named: np.ndarray, labels: np.ndarray) -> str:

@@ -4,7 +4,7 @@
 
 FOLDER holds the packages `@fontsource/NAME` of the families below and `mnist`, unpacked, each in a
 folder of its name; `npm pack @fontsource/NAME` gives them. scikit-learn, scikit-image and fonttools
-are needed. Writes `grader/scan/handwriting/letters.npz` and the table in `docs/letters.md`.
+are needed. Writes `grader/scan/handwriting/letters.npz` and prints how well it does.
 """
 
 import sys
@@ -17,7 +17,7 @@ from grader.scan.handwriting.model import JUNK, MODEL, SIGNS, Model, features
 from tests.training.letters.glyphs import LEFT_OUT, TRAINED_ON, Glyph, digits, glyphs_of
 from tests.training.letters.junk import junk
 from tests.training.letters.scans import CLEAR, HARD, Trouble, scanned
-from tests.training.letters.tables import written_tables
+from tests.training.letters.tables import print_tables
 
 CALIBRATED_ON = ("architects-daughter", "handlee", "mansalva", "patrick-hand", "shadows-into-light", "caveat")
 PER_SIGN, JUNK_SHARE, DIGITS = 1500, 0.12, 6000
@@ -122,7 +122,7 @@ def main(folder: Path) -> None:
     for how, trouble in (("clear", CLEAR), ("hard", HARD)):
         made = {name: pictures(fonts[name], 60, rng, (trouble,)) for name in LEFT_OUT}
         tests[how] = made | {"real digits": digit_data(held, trouble)}
-    written_tables(Model.load(MODEL), tests, f"{len(TRAINED_ON)} handwriting fonts and {DIGITS} real digits")
+    print_tables(Model.load(MODEL), tests, f"{len(TRAINED_ON)} handwriting fonts and {DIGITS} real digits")
 
 
 if __name__ == "__main__":

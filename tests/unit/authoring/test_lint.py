@@ -281,3 +281,21 @@ def test_a_singular_variant_among_sound_ones_is_left_out_and_told(tmp_path):
     assert "group of B" in fault.message
     assert [variant.n for variant in fault.variants] == [10]
     assert len(found.plan.variants) == 29
+
+
+@pytest.mark.parametrize(("side", "told"), [("left", "n = 16..30"), ("15.5 - n", None)])
+def test_variants_behind_a_flat_position_are_told(tmp_path, side, told):
+    starts = library() / "starts"
+    for kind, old, new in (
+        ("assignment", "220 + 2*n", "12*n - 6"),
+        ("mechanism", "lengths = [40, 30]", "lengths = [50, 20]"),
+        ("mechanism", 'side = "left"', f'side = "{side}"'),
+        ("rubric", "", ""),
+    ):
+        path = tmp_path / f"four-bar.{kind}.toml"
+        text = (path if path.exists() else starts / path.name).read_text(encoding="utf-8")
+        assert old in text
+        path.write_text(text.replace(old, new) if old else text, encoding="utf-8")
+    found = findings_of(tmp_path / "four-bar.assignment.toml", "another_assembly")
+    assert [named(one.variants) for one in found] == ([told] if told else [])
+    assert {one.path for one in found} <= {"$.group[0].side"}

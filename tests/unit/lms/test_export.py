@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from grader.documents import AlikeDocument
 from grader.files import OutputError
 from grader.lms import table
-from grader.lms.canvas import CanvasMarksDocument
+from grader.lms.api import CanvasBody
 from grader.lms.export import KINDS, export, usual_name
 from grader.lms.grades import Options, Person
 from grader.lms.marks import PlatformCriterion
@@ -22,19 +22,41 @@ from tests.unit.lms.classroom import a_class, marked, report, results
 
 NEEDED = {
     ("moodle", "feedback"): {"people": {"s09": Person(participant=1)}},
-    ("moodle", "rubric"): {"cmid": 1, "context_id": 2},
     ("moodle", "marks"): {"criteria": "c1,11", "assignment_id": 17},
-    ("canvas", "marks"): {"criteria": "c1,11"},
+    ("canvas-api", "marks"): {"course_id": "1", "assignment_id": "2"},
+    ("google-classroom", "marks"): {"course_id": "1", "assignment_id": "2"},
+    ("ms-education", "marks"): {"course_id": "a", "assignment_id": "b"},
+    ("blackboard", "grades"): {"form": "Last Name,Username,Pump [Total Pts: 5 Score] |7\nPopescu,s01,\n"},
+    ("ilias", "grades"): {
+        "form": "update,usr_id,login,status,mark,comment\n0,7,s01,notgraded,,\n",
+        "maximum": 5.0,
+    },
+    ("ilias", "feedback"): {"form": {"multi_feedback_Pump_3/Popescu_Ion_s01_7/": b""}},
 }
+
+
+def filled_in_there(path, content):
+    if isinstance(content, str):
+        path.write_text(content, encoding="utf-8")
+        return path
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, data in content.items():
+            archive.writestr(name, data)
+    return path
 
 
 @pytest.mark.parametrize("key", KINDS)
 def test_where_nobody_has_a_grade_the_file_has_nobody_and_everybody_is_told(key, tmp_path):
     options = dict(NEEDED.get(key, {}))
-    if "criteria" in options:
+    if key == ("moodle", "rubric"):
+        options["criteria"] = tmp_path / "definitions.json"
+        options["criteria"].write_text('{"areas": [{"cmid": 1, "contextid": 2}]}')
+    elif "criteria" in options:
         table = tmp_path / "criteria.csv"
         table.write_text(f"criterion,id\n{options['criteria']}\n")
         options["criteria"] = table
+    if "form" in options:
+        options["form"] = filled_in_there(tmp_path / "form", options["form"])
     options = Options(to=key[0], what=key[1], **options)
     path = tmp_path / usual_name(options)
     waiting = marked("s01", 5.0, status="needs_review")
@@ -53,7 +75,7 @@ def test_where_nobody_has_a_grade_the_file_has_nobody_and_everybody_is_told(key,
         (Options(to="csv", what="grades"), "export-csv-grades.csv"),
         (Options(to="moodle"), "export-moodle.csv"),
         (Options(to="moodle", what="feedback"), "export-moodle-feedback.zip"),
-        (Options(to="canvas", what="marks"), "export-canvas-marks.json"),
+        (Options(to="canvas-api"), "export-canvas-api.zip"),
         (Options(to="gradescope"), "export-gradescope.zip"),
         (Options(to="lti"), "export-lti.json"),
     ],
@@ -65,10 +87,10 @@ def test_files_are_called_by_platform_and_thing(options, name):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (Options(to="lti", item="x"), "--item has no meaning for lti grades"),
+        (Options(to="lti", identity="x"), "--identity has no meaning for lti grades"),
         (Options(to="csv", position=1), "--position has no meaning for csv marks"),
         (Options(to="canvas", identity="email"), "--identity has no meaning"),
-        (Options(to="canvas", what="marks", rescale=True), "--rescale has no meaning"),
+        (Options(to="canvas-api", rescale=True), "--rescale has no meaning"),
         (Options(to="gradescope", maximum=5.0), "--maximum has no meaning"),
         (Options(to="moodle", cmid=5), "--cmid has no meaning"),
         (Options(to="moodle", what="rubric", assignment_id=5), "--assignment-id has no meaning"),
@@ -79,10 +101,10 @@ def test_an_option_without_meaning_is_refused_not_passed_over(options, message, 
         export(results(marked("s01", 5.0)), tmp_path / "x", options)
 
 
-@pytest.mark.parametrize("option", [{"item": "Pump"}, {"identity": "email"}, {"maximum": 10.0}])
+@pytest.mark.parametrize("option", [{"item": "Pump"}, {"identity": "email"}])
 def test_a_worksheet_says_itself_what_options_would(option, tmp_path):
     form = tmp_path / "w.csv"
-    form.write_text("Identifier,Grade,Last modified (grade)\nParticipant 1,,-\n")
+    form.write_text("Identifier,Grade,Maximum grade,Last modified (grade)\nParticipant 1,,10.00,-\n")
     with pytest.raises(CallError, match="no meaning beside --worksheet"):
         export(results(marked("s01", 5.0)), tmp_path / "x", Options(to="moodle", form=form, **option))
 
@@ -107,7 +129,7 @@ def test_sheets_that_look_alike_are_told_before_their_grades_are_out(tmp_path):
 
 def test_a_worksheet_filled_in_again_is_told_to_be_skipped_by_moodle(tmp_path):
     form = tmp_path / "w.csv"
-    form.write_text("Identifier,Grade,Last modified (grade)\nParticipant 1,,-\n")
+    form.write_text("Identifier,Grade,Maximum grade,Last modified (grade)\nParticipant 1,,5.00,-\n")
     options = Options(to="moodle", form=form, people={"s01": Person(participant=1)})
     one = results(marked("s01", 5.0))
     assert not any("made before" in note for note in export(one, tmp_path / "o.csv", options).notes)
@@ -128,7 +150,7 @@ def test_two_students_with_a_row_between_them_have_none_even_if_one_is_withheld(
     both = results(marked("s01", 5.0), marked("s02", 5.0, status="needs_review"))
     delivery = export(both, tmp_path / "o.csv", Options(to="moodle", form=form, people=people))
     assert delivery.written == ()
-    assert "fits s01 and s02 alike" in delivery.unplaced["s01"]
+    assert "fits s01 (Ion) and s02 (Ion) alike" in delivery.unplaced["s01"]
     assert set(delivery.withheld) == {"s02"}
 
 
@@ -144,7 +166,7 @@ def test_export_writes_one_file_and_says_who_is_in_it(tmp_path):
 
 # What is rendered is read back, and a difference stops it ------------------------------------------
 ONE = results(marked("s01", 5.0, 2.5))
-WORKSHEET = "Identifier,Grade,Last modified (grade)\nParticipant 1,,-\n"
+WORKSHEET = "Identifier,Grade,Maximum grade,Last modified (grade)\nParticipant 1,,10.00,-\n"
 GRADEBOOK = (
     "LastName,FirstName,ID,SIS User ID,SIS Login ID,Section,Pump (1)\n"
     "    Points Possible,,,,,,10\nPopescu,Ion,1,s01,,1,\n"
@@ -171,7 +193,7 @@ def test_a_table_that_reads_otherwise_is_not_written(tmp_path, monkeypatch):
 
 def test_a_filled_in_file_that_reads_otherwise_is_not_written(tmp_path, monkeypatch):
     whole = RawTable.text
-    monkeypatch.setattr(RawTable, "text", lambda self: whole(self).replace("7.5", "75"))
+    monkeypatch.setattr(RawTable, "text", lambda *rows: whole(*rows).replace("7.5", "5.5"))
     people = {"s01": Person(participant=1)}
     refused(tmp_path, Options(to="moodle", form=form(tmp_path, WORKSHEET), people=people))
     refused(tmp_path, Options(to="canvas", form=form(tmp_path, GRADEBOOK)))
@@ -234,31 +256,7 @@ GUIDED = {"shortname": "a", "description": "", "descriptionmarkers": "", "maxsco
             },
             "criterion a stands twice",
         ),
-        (
-            CanvasMarksDocument,
-            {
-                "assignment": "pump", "criteria": [CRITERION], "calls": [CALL],
-                "bulk": {"path": "/b", "body": {"grade_data": {}}},
-            },
-            "different students",
-        ),
-        (
-            CanvasMarksDocument,
-            {
-                "assignment": "pump", "criteria": [{**CRITERION, "id": "_2"}], "calls": [CALL],
-                "bulk": {"path": "/b", "body": {"grade_data": {"1": BULK}}},
-            },
-            r"criteria \['_1'\] are filled, \['_2'\] are there",
-        ),
-        (
-            CanvasMarksDocument,
-            {
-                "assignment": "pump", "criteria": [CRITERION],
-                "calls": [{**CALL, "body": {**CALL["body"], "submission": {"posted_grade": "4"}}}],
-                "bulk": {"path": "/b", "body": {"grade_data": {"1": BULK}}},
-            },
-            "s01: the criteria give 5 together",
-        ),
+        (CanvasBody, {**CALL["body"], "submission": {"posted_grade": "4"}}, "the criteria give 5 together"),
         (PlatformCriterion, {**CRITERION, "more": 1}, "more"),
     ],
 )  # fmt: skip

@@ -3,6 +3,7 @@
 import csv
 import io
 import zipfile
+from datetime import UTC, datetime
 
 import pytest
 
@@ -18,6 +19,7 @@ HEADER = (
     "Identifier,Full name,Email address,Status,Grade,Maximum grade,Grade can be changed,"
     "Last modified (submission),Online text,Last modified (grade),Feedback comments"
 )
+DOWNLOADED = datetime(2026, 3, 2, 10, 30, tzinfo=UTC)
 PEOPLE = {
     "s01": Person(name="Ion Popescu", email="ion@x.ro"),
     "s02": Person(name="Ana Ionescu", email="ana@x.ro"),
@@ -38,7 +40,7 @@ def worksheet(*lines, header=HEADER, end="\r\n"):
 def filled_in(data, *reports, people=PEOPLE, comments=None, **how):
     options = Options(to="moodle", people=people, **how)
     grades = grades_of(results(*reports), options)
-    return fill_worksheet(data, "grades.csv", grades, options, comments or {}).among(grades)
+    return fill_worksheet(data, "grades.csv", grades, options, comments or {}, DOWNLOADED).among(grades)
 
 
 def rows(data):
@@ -51,42 +53,47 @@ def test_only_grade_and_feedback_change_and_the_rest_stays_to_the_byte():
     delivery = filled_in(data, report("s01", 7.5), comments={"s01": "<p>Good, mostly</p>"})
     expected = data.decode().replace(',,10.00,Yes,-,"a', ',7.5,10.00,Yes,-,"a')
     expected = expected.replace('""b"", c",-,', '""b"", c",-,"<p>Good, mostly</p>"', 1)
+    expected = expected[: expected.index("Participant 102")]
     assert delivery.content.decode() == expected
     assert delivery.written == ("s01",)
 
 
-def test_a_worksheet_without_changes_comes_back_as_it_was():
-    data = worksheet(line(101), line(102, "Ana Ionescu", "ana@x.ro", grade='"3.00"'))
-    assert filled_in(data, report("s01", None, status="needs_review")).content == data
+def test_rows_of_who_is_withheld_are_left_out_since_moodle_would_take_their_comments_for_changed():
+    data = worksheet(line(101) + "see the page", line(102, "Ana Ionescu", "ana@x.ro", grade='"3.00"'))
+    filled = filled_in(data, report("s01", None, status="needs_review"), report("s02", 3.0)).content
+    assert filled.decode().splitlines() == [HEADER, data.decode().splitlines()[2]]
 
 
 def test_grades_that_moodle_holds_already_are_changed_and_told():
     delivery = filled_in(worksheet(line(101, grade="3.00")), report("s01", 5.0))
     assert rows(delivery.content)[0]["Grade"] == "5"
-    assert delivery.notes[0].startswith("1 grade(s) that Moodle holds already")
+    assert delivery.notes[1].startswith("1 grade(s) that Moodle holds already")
 
 
 def test_a_grade_that_moodle_holds_already_stays_as_it_is_written():
     data = worksheet(line(101, grade="5.00"))
     delivery = filled_in(data, report("s01", 5.0))
-    assert (delivery.content, delivery.written, delivery.notes) == (data, ("s01",), ())
+    assert (delivery.content, delivery.written) == (data, ("s01",))
+    assert [note.partition(" (")[0] for note in delivery.notes] == ["Moodle must tell 0 updated grades"]
 
 
 def test_a_grade_that_moodle_holds_for_a_withheld_student_stays_and_is_told():
     data = worksheet(line(101, grade="3.00"), line(102, "Ana Ionescu", "ana@x.ro"))
     waiting = report("s01", None, status="needs_review"), report("s02", None, status="missing")
     delivery = filled_in(data, *waiting)
-    assert delivery.content == data
-    assert delivery.notes == ("withheld, and a grade is there already, which stays: s01 (3.00)",)
+    assert rows(delivery.content) == []
+    assert delivery.notes[1:] == ("withheld, and a grade is there already, which stays: s01 (3.00)",)
 
 
 def test_comments_that_moodle_holds_already_are_replaced_and_told():
     data = worksheet(line(101) + "well done", line(102, "Ana Ionescu", "ana@x.ro"))
     comments = {"s01": "<p>a</p>", "s02": "<p>b</p>"}
     delivery = filled_in(data, report("s01", 5.0), report("s02", 5.0), comments=comments)
-    assert delivery.notes == ("1 comment(s) that Moodle holds already are replaced",)
-    again = filled_in(delivery.content, report("s01", 5.0), report("s02", 5.0), comments=comments)
-    assert again.notes == ()
+    assert delivery.notes[1:] == ("1 comment(s) that Moodle holds already are replaced",)
+    # Moodle shows a comment without its tags.
+    shown = delivery.content.replace(b"<p>a</p>", b"a ")
+    again = filled_in(shown, report("s01", 5.0), report("s02", 5.0), comments=comments)
+    assert again.notes[1:] == ()
 
 
 def test_students_are_found_by_address_before_name():
@@ -99,13 +106,34 @@ def test_names_that_two_rows_bear_are_nobodys_and_told():
     data = worksheet(line(101, email="a@x.ro"), line(102, email="b@x.ro"))
     delivery = filled_in(data, report("s01", 5.0), people={"s01": Person(name="ion  popescu")})
     assert delivery.written == ()
-    assert "rows 2, 3" in delivery.unplaced["s01"]
+    assert "rows 2 (Ion Popescu, a@x.ro) and 3 (Ion Popescu, b@x.ro)" in delivery.unplaced["s01"]
+
+
+@pytest.mark.parametrize(
+    ("roster", "there"),
+    [
+        ("Ștefan Țurcanu", "Ştefan Ţurcanu"), ("Соловьёв Пётр", "Петр Соловьев"),
+        ("O’Brien Seán", "Sean O'Brien"), ("POPESCU, Ion", "Ion Popescu"),
+        ("Иванова Мария Петровна", "Мария Иванова"), ("Ana-Maria Ciobanu", "Ciobanu Ana Maria"),
+    ],
+)  # fmt: skip
+def test_names_fit_over_accents_order_and_apostrophes(roster, there):
+    data = worksheet(line(101, there), line(102, "Ana Ionescu", "ana@x.ro"))
+    delivery = filled_in(data, report("s01", 5.0), people={"s01": Person(name=roster)})
+    assert [row["Grade"] for row in rows(delivery.content)] == ["5"]
+    assert "found by name alone" in delivery.notes[-1]
+
+
+def test_a_name_that_fits_two_rows_in_part_is_nobodys():
+    data = worksheet(line(101, "Мария Иванова"), line(102, "Мария Петровна", "ana@x.ro"))
+    people = {"s01": Person(name="Иванова Мария Петровна")}
+    assert filled_in(data, report("s01", 5.0), people=people).unplaced.keys() == {"s01"}
 
 
 def test_a_locked_grade_is_left_and_told():
     data = worksheet(line(101, changeable="No"))
     delivery = filled_in(data, report("s01", 5.0))
-    assert (delivery.content, delivery.unplaced) == (data, {"s01": LOCKED})
+    assert (rows(delivery.content), delivery.unplaced) == ([], {"s01": LOCKED})
 
 
 def test_another_maximum_is_refused_unless_rescaling_is_asked_for():
@@ -124,7 +152,61 @@ def test_a_worksheet_downloaded_in_romanian_or_russian_is_understood():
     assert b",8.5," in filled_in(data, report("s01", 8.5)).content
     russian = "Идентификатор,Полное имя,Адрес электронной почты,Оценка,Последнее изменение (оценка)"
     data = worksheet("Участник 7,Ion Popescu,ion@x.ro,,-", header=russian)
-    assert b",8.5,-" in filled_in(data, report("s01", 8.5)).content
+    with pytest.raises(CallError, match="states no maximum"):
+        filled_in(data, report("s01", 8.5))
+    assert b",8.5,-" in filled_in(data, report("s01", 8.5), maximum=10.0).content
+    with pytest.raises(CallError, match="maximum there is 100"):
+        filled_in(data, report("s01", 8.5), maximum=100.0)
+
+
+def test_headings_are_compared_without_case():
+    data = worksheet(line(101, maximum="100.00"), header=HEADER.replace("Maximum grade", "Maximum Grade"))
+    with pytest.raises(CallError, match="maximum there is 100"):
+        filled_in(data, report("s01", 7.5))
+
+
+GERMAN = (
+    "ID,Vollständiger Name,E-Mail-Adresse,Status,Bewertung,Bestwertung,Bewertung kann geändert werden,"
+    "Zuletzt geändert (Abgabe),Texteingabe online,Zuletzt geändert (Bewertung),Feedback als Kommentar"
+)
+
+
+@pytest.mark.parametrize("graded", [True, False])
+def test_columns_of_any_language_are_known_by_what_stands_in_them(graded):
+    old = '"4,00"' if graded else ""
+    moment = '"Montag, 2. März 2026, 09:15"' if graded else "-"
+    data = worksheet(
+        f'"Teilnehmer/in7","Ion Popescu",ion@x.ro,Keine,{old},"10,00",Ja,-,,{moment},',
+        f'"Teilnehmer/in8","Ana Ionescu",ana@x.ro,Keine,{old},"10,00",Ja,-,,{moment},',
+        header=GERMAN,
+    )
+    delivery = filled_in(data, report("s01", 8.5), report("s02", 4.0), comments={"s01": "<p>a</p>"})
+    first, second = (row.split(",") for row in delivery.content.decode().replace('"', "").splitlines()[1:])
+    assert (first[4], second[4], first[-1]) == ("8.5", "4", "<p>a</p>")
+    assert (first[-2] == "2026-03-02T10:30:00+00:00") == graded
+    with pytest.raises(CallError, match="maximum there is 10"):
+        filled_in(data, report("s01", 8.5, max_score=20.0))
+
+
+def test_dates_that_moodle_cannot_read_become_the_worksheets_own_so_that_a_regrade_is_stored():
+    """PHP's strtotime knows English: importgradeslib.php, assignfeedback_offline_grade_importer::next."""
+    header = "Identificator,Nume complet,Adresa de e-mail,Notă,Notă maximă,Ultima modificare (nota)"
+    row = 'Participant7,Ion Popescu,ion@x.ro,"3,00","10,00","luni, 2 martie 2026, 10:15"'
+    delivery = filled_in(worksheet(row, header=header), report("s01", 5.0))
+    assert delivery.content.decode().splitlines()[1].endswith(',5,"10,00",2026-03-02T10:30:00+00:00')
+    assert "Moodle reads no date in this language: 1 are written" in delivery.notes[0]
+
+
+def test_a_grade_is_rounded_as_moodle_shows_it_and_the_same_grade_is_no_change():
+    data = worksheet(line(101, grade="6.67", maximum="10.00"), line(102, "Ana", "ana@x.ro", maximum="10.0"))
+    delivery = filled_in(data, report("s01", 20.0 / 3.0), report("s02", 20.0 / 3.0))
+    assert [row["Grade"] for row in rows(delivery.content)] == ["6.67", "6.7"]
+    assert delivery.notes[0].startswith("Moodle must tell 1 updated grades")
+
+
+def test_a_grade_of_nothing_is_told_since_newer_versions_pass_over_it():
+    delivery = filled_in(worksheet(line(101)), report("s01", 0.0))
+    assert delivery.notes[1].endswith("enter it there: s01")
 
 
 @pytest.mark.parametrize("feedback", ["Comentarii de feedback", "Comentarii feedback", "Feedback comments"])
@@ -147,12 +229,13 @@ def test_columns_of_people_are_known_by_what_stands_in_them_where_their_names_ar
     ("data", "why"),
     [
         (b"", "empty"),
-        (worksheet(line(101), header=HEADER.replace("Identifier", "Id")), "no column 'Identifier'"),
-        (worksheet(line(101), header=HEADER.replace("Grade,Max", "Mark,Max")), "no column 'Grade'"),
-        (worksheet(line(101), header=HEADER.replace("Last modified (grade)", "x")), "Last modified"),
+        (worksheet(line("x"), header=HEADER.replace("Identifier", "Id")), "no column 'Identifier'"),
+        (worksheet("Participant 7,x", header="Identifier,Mark"), "no column 'Grade'"),
+        (worksheet("Participant 7,7.0,10.0", header="Identifier,Grade,Maximum grade"), "Last modified"),
         (worksheet(line(101) + ",extra"), "row 2: has 12 cells"),
         (worksheet(line(101), line(101, email="b@x.ro")), "same participant"),
         (worksheet(line("x")), "is not 'Participant' and a number"),
+        (worksheet(line(101)).replace(b"Participant ", b""), "'101' is not 'Participant' and a number"),
         (worksheet(line(101, maximum="ten")), "maximum grade 'ten'"),
         (worksheet(line(101, maximum="0.00")), "maximum grade '0.00' is no positive"),
         (worksheet(line(101), line(102, grade='"7,5"')), "row 3: the grade '7,5' has a comma.*would store 7"),
@@ -241,7 +324,9 @@ def test_a_grade_item_is_called_as_the_assignment_where_nothing_is_said_and_neve
 def test_grades_above_a_hundred_are_told_to_be_more_than_most_sites_allow():
     options = Options(to="moodle")
     draft = drafted(grades_of(results(report("s01", 150.0, max_score=200.0)), options), options)
-    assert "above 100" in draft.notes[0]
+    assert "worksheet is the better way" in draft.notes[0]
+    assert "out of 200" in draft.notes[1]
+    assert "above 100" in draft.notes[2]
 
 
 def test_a_comment_longer_than_moodle_stores_is_refused():
@@ -304,6 +389,15 @@ def test_moodle_finds_everybodys_pages_in_the_archive(tmp_path):
     assert set(delivery.unplaced) == {"s02", "s09"}
     with zipfile.ZipFile(path) as opened:
         assert all("_" not in name.partition("/")[2] for name in opened.namelist())
+
+
+def test_pages_of_groups_are_refused_since_moodle_takes_the_number_for_a_groups(tmp_path):
+    """importziplib.php, assignfeedback_file_zip_importer::is_valid_filename_for_import."""
+    one = marked("s01", 5.0)
+    pages(tmp_path / "marks", one)
+    sheet = WORKSHEET.replace("Email address,", "Email address,Group,").replace("@x.ro,", "@x.ro,Team 1,")
+    with pytest.raises(CallError, match="students hand in as groups"):
+        archive(tmp_path, one, worksheet=sheet)
 
 
 def test_the_same_pages_make_the_same_archive(tmp_path):

@@ -79,9 +79,22 @@ def test_names_have_nothing_that_moodle_takes_for_a_tag(tmp_path, answer):
     assert definition["name"] == "‹Pump›"
 
 
-def test_the_activity_may_be_told_by_its_numbers(tmp_path):
-    _, path = moodle(tmp_path, "rubric", marked("s01", 5.0), cmid=1, context_id=2)
+@pytest.fixture
+def points(tmp_path):
+    path = tmp_path / "instances.json"
+    filled = [{"id": at, "guide": {"criteria": [{"id": 1}, {"id": 2}]}} for at in range(3)]
+    path.write_text(json.dumps({"instances": filled, "warnings": []}))
+    return path
+
+
+def test_an_activity_told_by_its_numbers_alone_may_have_a_guide(tmp_path, points):
+    with pytest.raises(CallError, match=r"may have a guide .*another deletes it"):
+        moodle(tmp_path, "rubric", marked("s01", 5.0), cmid=1, context_id=2)
+    delivery, path = moodle(
+        tmp_path, "rubric", marked("s01", 5.0), cmid=1, context_id=2, replace_guide=points
+    )
     assert json.loads(path.read_bytes())["arguments"]["areas"][0]["contextid"] == 2
+    assert "6 fillings of 3 students" in delivery.notes[0]
 
 
 def test_an_activity_that_nobody_tells_is_asked_for(tmp_path, answer):
@@ -92,9 +105,17 @@ def test_an_activity_that_nobody_tells_is_asked_for(tmp_path, answer):
 
 
 def test_a_guide_is_never_written_over_another(tmp_path, answer):
-    with pytest.raises(CallError, match="has a marking guide already"):
+    with pytest.raises(CallError, match="has a guide already"):
         moodle(tmp_path, "rubric", marked("s01", 5.0), criteria=answer(GUIDE))
     assert not (tmp_path / "out.json").exists()
+
+
+def test_a_guide_is_replaced_only_with_a_count_of_the_points_that_go(tmp_path, answer, points):
+    with_guide = answer(GUIDE)
+    delivery, _ = moodle(tmp_path, "rubric", marked("s01", 5.0), criteria=with_guide, replace_guide=points)
+    assert "deletes the one there with 6 fillings of 3 students" in delivery.notes[0]
+    with pytest.raises(InputFileError, match="core_grading_get_gradingform_instances"):
+        moodle(tmp_path, "rubric", marked("s01", 5.0), criteria=with_guide, replace_guide=with_guide)
 
 
 def test_another_way_of_grading_is_never_put_aside(tmp_path, answer):
@@ -124,6 +145,10 @@ def test_points_fill_every_criterion_of_the_guide(tmp_path, answer):
     assert first["wsfunction"] == "mod_assign_save_grade"
     arguments = first["arguments"]
     assert (arguments["assignmentid"], arguments["userid"], arguments["grade"]) == (17, 101, -1)
+    # Moodle reads this where a comment exists: feedback/comments/locallib.php, is_feedback_modified.
+    assert arguments["plugindata"]["assignfeedbackcomments_editor"] == {
+        "text": "<ul><li>~ <b>Vector 2</b>: Told &lt;why&gt; &amp; how.</li></ul>", "format": 1,
+    }  # fmt: skip
     assert arguments["advancedgradingdata"]["guide"]["criteria"][1] == {
         "criterionid": 12,
         "fillings": [

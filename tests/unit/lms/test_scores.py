@@ -13,7 +13,7 @@ from grader.cli.exporting import schema
 from grader.lms.export import export
 from grader.lms.grades import Options, Person
 from grader.lms.marks import json_document
-from grader.lms.scores import GradescopeDocument, LtiScore
+from grader.lms.scores import GradescopeDocument, LtiDocument, LtiScore
 from reference.errors import CallError, InputFileError
 from tests.unit.lms.classroom import marked, report, results
 
@@ -234,3 +234,18 @@ def test_a_good_score_is_taken():
 def test_a_score_that_a_platform_would_misread_is_none(wrong):
     with pytest.raises(ValidationError):
         LtiScore.model_validate({**GOOD, **wrong})
+
+
+def test_the_line_item_of_the_scores_is_there_to_be_posted_first(tmp_path):
+    out = tmp_path / "scores.json"
+    options = Options(to="lti", item="Pump", maximum=100.0, rescale=True)
+    export(results(marked("s01", 5.0, 2.5)), out, options)
+    document = json.loads(out.read_bytes())
+    jsonschema.validate(document, schema("lti"))
+    assert document["lineItem"] == {
+        "label": "Pump", "scoreMaximum": 100.0, "resourceId": "pump", "tag": "grade",
+    }  # fmt: skip
+    assert document["scores"][0]["scoreMaximum"] == 100.0
+    document["lineItem"]["scoreMaximum"] = 10.0
+    with pytest.raises(ValidationError, match="another maximum than the line item"):
+        LtiDocument.model_validate(document)

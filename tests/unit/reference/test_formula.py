@@ -41,6 +41,11 @@ HOSTILE = [
     "await n",
     "*n",
     "sqrt(2, 3)",
+    "atan2(1)",
+    "atan2(1, 2, 3)",
+    "min(1)",
+    "max()",
+    "max(*n)",
     "sqrt(x=2)",
     "sqrt(*n)",
     "sqrt",
@@ -94,6 +99,13 @@ def test_a_hostile_formula_is_refused_with_a_reason_and_at_once(text):
         ("sin(radians(30))", 0.5),
         ("abs(-3)", 3.0),
         ("degrees(pi)", 180.0),
+        ("asin(0.5)", math.pi / 6),
+        ("acos((3**2 + 4**2 - 5**2) / (2*3*4))", math.pi / 2),
+        ("acos(1 + 1/10**15)", 0.0),
+        ("atan(1)", math.pi / 4),
+        ("atan2(-1, -1)", -0.75 * math.pi),
+        ("min(n, 5, 9)", 5.0),
+        ("max(2*n, 5)", 14.0),
         (30, 30.0),
         (0.1, 0.1),
     ],
@@ -107,6 +119,20 @@ def test_a_formula_works_on_whole_classes():
     np.testing.assert_array_equal(parse("300 + 10*n")({"n": numbers}), 300 + 10 * numbers)
 
 
+def test_functions_of_several_numbers_work_on_whole_classes():
+    numbers = np.arange(1.0, 31.0)
+    np.testing.assert_array_equal(
+        parse("min(n, 31 - n, 10)")({"n": numbers}), np.clip(numbers, 0, 10).clip(max=31 - numbers)
+    )
+
+
+def test_a_wrong_count_of_numbers_is_told():
+    with pytest.raises(FormulaError, match="atan2 takes 2 numbers"):
+        parse("atan2(1)")
+    with pytest.raises(FormulaError, match="min takes 2 numbers or more"):
+        parse("min(3)")
+
+
 def test_an_unknown_name_is_told_with_the_near_ones():
     with pytest.raises(FormulaError, match="unknown name phi_dge; did you mean phi_deg"):
         parse("phi_dge")({"phi_deg": 1.0})
@@ -114,7 +140,9 @@ def test_an_unknown_name_is_told_with_the_near_ones():
         parse("sqr(2)")
 
 
-@pytest.mark.parametrize("text", ["1/n", "sqrt(-1-n)", "0*(1/n)", "tan(pi/2)/n", "1e200*1e200"])
+@pytest.mark.parametrize(
+    "text", ["1/n", "sqrt(-1-n)", "acos(1.1+n)", "asin(-2-n)", "0*(1/n)", "tan(pi/2)/n", "1e200*1e200"]
+)
 def test_a_result_that_is_no_number_is_an_error_and_never_nan(text):
     with pytest.raises(FormulaError, match="does not give a finite number"):
         parse(text)({"n": 0.0})

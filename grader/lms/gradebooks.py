@@ -1,0 +1,394 @@
+"""Gradebooks of Canvas, Brightspace, Blackboard and ILIAS: filled in, or made anew.
+
+Only the columns that say who a row is, and the one that is asked for, are written: an import changes every
+column that it finds, and others may have been graded since the download.
+
+Canvas finds columns by their places: Student, ID, SIS User ID, SIS Login ID, Section, then assignments as
+`title (number)`; below the header are the points possible, which become the assignment's. It reads `1,234`
+as 1.234, and a blank takes a grade back: only the cells of students with a grade change, and a new file has
+no other students.
+
+Brightspace (community.d2l.com, article 3538, Importing grades): OrgDefinedId or Username or both, the item
+as `title Points Grade`, in a download with `<Numeric MaxPoints:10 ...>`, and a last column of `#`. It caps a
+grade above the maximum without a word.
+
+Blackboard (its help on working offline with grade data): columns as `title [Total Pts: 10 Score] |number`,
+with tabs in UTF-16 or with commas in UTF-8. A column without its number becomes a text column of no points.
+
+ILIAS: the status file of an exercise (class ilExAssignmentStatusFile), whose rows count where `update` is 1;
+its columns are read by their places, so all stay.
+"""
+
+import re
+import zipfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Self
+
+from grader.lms.grades import Delivery, Grade, Options, Person, ready
+from grader.lms.marks import plain_comment
+from grader.lms.moodle import pages
+from grader.lms.table import (
+    Evidence,
+    Form,
+    bytes_of,
+    csv_text,
+    fill_in,
+    is_formula,
+    match_rows,
+    number,
+    parse,
+)
+from reference.errors import CallError, InputFileError, lines_of
+
+HEADER = ("Student", "ID", "SIS User ID", "SIS Login ID", "Section")
+_ABOUT = (*HEADER, "Integration ID", "Root Account", "LastName", "FirstName")
+_NUMBERED = re.compile(r"(?P<title>.*\S)\s*\((?P<id>\d+)\)\s*", re.DOTALL)
+_POINTS = "Points Possible"
+_MANUAL = re.compile(r"\s*(Muted|Manual Posting.*)?\s*", re.IGNORECASE)
+_MANGLED = re.compile(r"-?[0-9.,]*[.,][0-9.,]*%?")
+"""What Canvas takes for a number and writes anew, in any column."""
+_END = "End-of-Line Indicator"
+_NO_TITLE = re.compile(r'[/"*<>+=|,%]')
+"""Characters that the name of a grade item in Brightspace cannot have."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layout:
+    """A platform's gradebook as it is downloaded.
+
+    Attributes
+    ----------
+    key : the platform's name as an option
+    required : columns by which the file is known; of alternatives one, after `|`
+    who : what each column says of a student: `id`, `student`, `login`, `email`
+    kept : columns that are written too
+    item : a gradebook's column of grades; its groups are `title`, `id` and `maximum`
+    is_whole : whether all columns are written
+    has_points : whether the maxima stand in a row below the header
+    """
+
+    key: str
+    platform: str
+    required: tuple[str, ...]
+    who: Mapping[str, str]
+    item: re.Pattern[str]
+    kept: tuple[str, ...] = ()
+    is_whole: bool = False
+    has_points: bool = False
+
+
+LAYOUTS = (
+    Layout(
+        key="canvas", platform="Canvas", required=("ID", "Section", "Student|LastName"), kept=_ABOUT,
+        who={"ID": "ID", "SIS User ID": "student_id", "SIS Login ID": "login"},
+        item=_NUMBERED, has_points=True,
+    ),
+    Layout(
+        key="brightspace", platform="Brightspace", required=("OrgDefinedId|Username", _END), kept=(_END,),
+        who={"OrgDefinedId": "student_id", "Username": "login", "Email": "email"},
+        item=re.compile(r"(?P<title>.+) Points Grade(?P<id>)(\s*<.*?MaxPoints:(?P<maximum>[\d.,]+).*>)?"),
+    ),
+    Layout(
+        key="ilias", platform="ILIAS", is_whole=True,
+        required=("update", "usr_id", "login", "status", "mark", "comment"),
+        who={"usr_id": "ID", "login": "login"}, item=re.compile("(?P<title>mark)(?P<id>)(?P<maximum>)"),
+    ),
+    Layout(
+        key="blackboard", platform="Blackboard", required=("Username", "Last Name"),
+        kept=("Last Name", "First Name"), who={"Student ID": "student_id", "Username": "login"},
+        # Of text columns, and of those that Blackboard computes from others, the kind is another.
+        item=re.compile(r"(?P<title>.*\S)\s*\[[^\]\d]*(?P<maximum>[\d.,]+)(?: Score)?\]\s*\|(?P<id>\d+)"),
+    ),
+)  # fmt: skip
+"""By what only its own files have, the plainest last."""
+
+_LAST_NAMES, _FIRST_NAMES = ("LastName", "Last Name", "lastname"), ("FirstName", "First Name", "firstname")
+
+
+# A new gradebook ----------------------------------------------------------------------------------
+
+
+def gradebook(grades: Sequence[Grade], options: Options) -> Delivery:
+    """A gradebook file made anew, with those who have a grade.
+
+    Raises CallError with every student whom the platform would not find, and where it takes no new file.
+    """
+    if options.to == "brightspace":
+        return _new_for_brightspace(ready(grades), options)
+    if options.to != "canvas":
+        name = next(layout.platform for layout in LAYOUTS if layout.key == options.to)
+        message = f"{name} takes grades only in its own file: download it there and give it (--gradebook)"
+        raise CallError("gradebook_needed", message)
+    item = options.item.strip() or grades[0].assignment
+    faults = list(_faults(ready(grades)))
+    if is_formula(item) or item in _ABOUT:
+        faults.append(f"'{item}' is no title of an assignment")
+    if faults:
+        raise CallError("gradebook", f"Canvas would misread this; nothing was written\n{lines_of(faults)}")
+    table = [["    " + _POINTS, "", "", "", "", number(options.maximum or grades[0].max_score)]]
+    for grade in ready(grades):
+        person = grade.person
+        score = grade.out_of(options.maximum, rescale=options.rescale)
+        name = person.name or grade.student_id
+        table.append([name, person.platform_id, grade.student_id, person.username, "", number(score)])
+    notes = ["Canvas sets the assignment's points possible to those of the file's second row"]
+    if not _NUMBERED.fullmatch(item):
+        notes.append(
+            f"Canvas takes '{item}' for a new assignment: give --item as it stands in an exported gradebook,"
+            " 'title (number)', or that file itself (--gradebook)"
+        )
+    return Delivery(csv_text([*HEADER, item], table), notes=tuple(notes))
+
+
+def _new_for_brightspace(grades: Sequence[Grade], options: Options) -> Delivery:
+    """Users by the student_id as OrgDefinedId and by the username, each after a `#` as in a download."""
+    item = options.item.strip() or (grades[0].assignment if grades else "planmark")
+    if found := _NO_TITLE.search(item):
+        raise CallError("item", f"'{item}': a grade item's name in Brightspace cannot have '{found[0]}'")
+    maximum = number(options.maximum or (grades[0].max_score if grades else 1.0))
+    header = ("OrgDefinedId", "Username", f"{item} Points Grade <Numeric MaxPoints:{maximum}>", _END)
+    rows = [
+        (
+            f"#{grade.student_id}",
+            f"#{grade.person.username}" if grade.person.username else "",
+            number(grade.out_of(options.maximum, rescale=options.rescale)),
+            "#",
+        )
+        for grade in grades
+    ]
+    notes = (
+        "OrgDefinedId is the student_id: where it is another number, give Brightspace's export (--gradebook)",
+        f"an item '{item}' that is there must be out of {maximum}: Brightspace cuts what is above",
+    )
+    return Delivery(csv_text(header, rows), notes=notes)
+
+
+def _faults(grades: Sequence[Grade]) -> Iterator[str]:
+    owner: dict[str, str] = {}
+    for grade in grades:
+        person = grade.person
+        if _MANGLED.fullmatch(grade.student_id) and not person.platform_id:
+            yield f"{grade.student_id}: Canvas takes this for a number; give Canvas's own (--ids)"
+        if person.platform_id and not re.fullmatch(r"[1-9][0-9]*", person.platform_id):
+            yield f"{grade.student_id}: '{person.platform_id}' is no number of a Canvas user"
+        if _POINTS in person.name:
+            yield f"{grade.student_id}: '{person.name}' would be read as the row of points"
+        for text in (person.name, person.username):
+            if is_formula(text):
+                yield f"{grade.student_id}: '{text}' would be run as a formula by a spreadsheet"
+        if person.platform_id and owner.setdefault(person.platform_id, grade.student_id) != grade.student_id:
+            yield f"{grade.student_id}: the same number as {owner[person.platform_id]}"
+
+
+# The teacher's own gradebook ----------------------------------------------------------------------
+
+
+@dataclass(slots=True)
+class Gradebook(Form):
+    """A downloaded gradebook."""
+
+    names: tuple[int | None, int | None] = (None, None)
+    """Columns of last and first names."""
+
+    name = "the gradebook"
+    keeps_others = False
+
+    @classmethod
+    def opened(cls, data: bytes, file: str, item: str) -> Self:
+        """A gradebook as its platform exports it, and the column of an assignment in it."""
+        table = parse(data, file, delimiter="\t" if b"\t" in data.partition(b"\n")[0] else None)
+        header = [cell.strip() for cell in table.header()]
+        layout = _layout(header, file)
+        faults = table.ragged()
+        points = next((row for row in range(1, min(len(table.rows), 4)) if _POINTS in table.value(row, 0)), 0)
+        if layout.has_points and not points:
+            faults.append(f"there is no row '{_POINTS}' below the first")
+        if faults:
+            raise _refused(file, layout.platform, faults)
+        about = {kind: header.index(name) for name, kind in layout.who.items() if name in header}
+        others = [header.index(name) for name in layout.kept if name in header]
+        first = max(others) + 1 if layout.has_points else 0
+        assignment = _assignment(header, first, layout, item.strip(), file)
+        match = layout.item.fullmatch(header[assignment])
+        stated = table.value(points, assignment).strip() if points else match and match["maximum"]
+        possible = cls.amount(stated or "")
+        if stated and not possible:
+            fault = f"row {points + 1}: '{header[assignment]}' has '{stated}' points possible"
+            raise _refused(file, layout.platform, [fault])
+        columns = {**about, "grade": assignment}
+        if layout.is_whole:
+            columns |= {"update": header.index("update"), "feedback": header.index("comment")}
+        else:
+            table.kept = sorted({*about.values(), *others, assignment})
+        last, first_name = (
+            next((header.index(name) for name in known if name in header), None)
+            for known in (_LAST_NAMES, _FIRST_NAMES)
+        )
+        if "Student" in header:
+            columns["name"] = header.index("Student")
+        notes = ["its cells are apart by tabs: let its name end with .xls, or choose Tab at the upload"]
+        notes = notes if table.delimiter == "\t" else []
+        return cls(
+            table, columns, points, possible, notes, platform=layout.platform, names=(last, first_name)
+        )
+
+    @staticmethod
+    def amount(text: str) -> float | None:
+        """A number as Canvas reads it: the last comma or dot is the decimal mark, the others group."""
+        if not re.fullmatch(r"[0-9.,]*[0-9]", text):
+            return None
+        *whole, last = re.split("[.,]", text)
+        return float("".join(whole) + "." + last) if whole else float(last)
+
+    def why_fixed(self, row: int) -> str:
+        """Whether the platform wants no grade here."""
+        grade = self.value(row, "grade")
+        is_out = grade.casefold() in {"ex", "n/a", "exempt"}
+        return f"{self.platform} says '{grade}': excused, or not given this assignment" if is_out else ""
+
+    def identity(self, row: int) -> Mapping[str, str]:
+        """The platform's numbers of the student, and the name.
+
+        Brightspace puts a `#` before numbers and names of users.
+        """
+        kinds = ("ID", "student_id", "login", "email")
+        cells = {kind: self.value(row, kind).removeprefix("#") for kind in kinds if kind in self.columns}
+        name = self.value(row, "name")
+        if None not in self.names:
+            name = ", ".join(self.table.value(row, column or 0).strip() for column in self.names)
+        if all(_MANUAL.fullmatch(cell) for cell in (*cells.values(), name.strip(", "))):
+            return {}
+        return {**cells, "name": name}
+
+    @staticmethod
+    def evidence(student_id: str, person: Person) -> Evidence:
+        """Names are the weakest."""
+        return (
+            ("ID", person.platform_id),
+            ("student_id", student_id),
+            ("login", person.username or student_id),
+            ("login", person.email),
+            ("email", person.email),
+            ("name", person.name),
+        )
+
+    def put_grade(self, row: int, text: str) -> bool:
+        """Put a grade into its cell; in a status file of ILIAS the row must say that it is to be read."""
+        if "update" in self.columns:
+            self.table.put(row, self.columns["update"], "1")
+        return Form.put_grade(self, row, text)
+
+
+def grades_file(grades: Sequence[Grade], options: Options) -> Delivery:
+    """The exported gradebook filled in where there is one, else one made anew."""
+    if options.form is None:
+        return gradebook(grades, options)
+    return fill_gradebook(bytes_of(options.form, "form_missing"), options.form.name, grades, options)
+
+
+_UTF_16 = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
+
+
+def fill_gradebook(data: bytes, file: str, grades: Sequence[Grade], options: Options) -> Delivery:
+    """Fill in an exported gradebook; one of Blackboard's in UTF-16 stays so.
+
+    Raises InputFileError for a file that is none, CallError where the assignment is not named or its
+    maximum is another, or not stated.
+    """
+    encoding = _UTF_16.get(data[:2], "utf-8") if options.to == "blackboard" else "utf-8"
+    if encoding != "utf-8":
+        data = data.decode(encoding, errors="replace").encode("utf-8")
+    form = Gradebook.opened(data, file, options.item)
+    asked = next(layout.platform for layout in LAYOUTS if layout.key == options.to)
+    if not form.people:
+        raise _refused(file, asked, ["it has no students"])
+    if form.platform != asked:
+        raise _refused(file, asked, [f"it is one of {form.platform}'s"])
+    if form.possible and options.maximum is not None:
+        raise CallError("option_unused", "--maximum has no meaning beside --gradebook: it states its own")
+    comments = {grade.student_id: plain_comment(grade) for grade in ready(grades)}
+    delivery = fill_in(form, file, grades, options, comments if "feedback" in form.columns else {})
+    if encoding == "utf-8" or not isinstance(delivery.content, bytes):
+        return delivery
+    return replace(delivery, content=delivery.content.decode("utf-8").encode(encoding))
+
+
+def _layout(header: Sequence[str], file: str) -> Layout:
+    """The platform whose columns these are."""
+    for layout in LAYOUTS:
+        if all(any(name in header for name in each.split("|")) for each in layout.required):
+            return layout
+    known = ", ".join(layout.platform for layout in LAYOUTS)
+    found = ", ".join(header[:8])
+    raise _refused(file, "its platform", [f"row 1: not the columns of {known} (found: {found})"])
+
+
+def _refused(file: str, platform: str, faults: Sequence[str]) -> InputFileError:
+    message = f"{file}: is no gradebook as {platform} exports it; export it again and do not resave it"
+    return InputFileError("gradebook", f"{message}\n{lines_of(faults)}")
+
+
+def _assignment(header: Sequence[str], first: int, layout: Layout, wanted: str, file: str) -> int:
+    """The assignment's column from `first` on: named by its header, title or number, or the only one."""
+    known = {
+        place: match
+        for place, title in enumerate(header)
+        if place >= first and (match := layout.item.fullmatch(title))
+    }
+    fitting = [place for place in known if not wanted or header[place] == wanted]
+    if wanted and not fitting:
+        fitting = [place for place, match in known.items() if wanted in (match["title"], match["id"])]
+    if len(fitting) == 1:
+        return fitting[0]
+    choices = ", ".join(f"'{header[place]}'" for place in known) or "none"
+    raise CallError(
+        "item",
+        f"{file}: {len(fitting)} assignments fit '{wanted}': name one with --item out of {choices}"
+        if wanted
+        else f"{file}: which assignment? Name it with --item: {choices}",
+    )
+
+
+# Feedback files of ILIAS --------------------------------------------------------------------------
+
+_FOLDER = re.compile(r"(multi_feedback[^/]*/[^/]*?_(?P<login>[^/_]+)_(?P<id>\d+))/.*")
+"""Last name, first name, login and number in ILIAS (ilExAssignment::sendMultiFeedbackStructureFile)."""
+
+
+def feedback_files(grades: Sequence[Grade], options: Options) -> Delivery:
+    """The pages of those who have a grade, in the folders of ILIAS's downloaded archive for multi-feedback.
+
+    Raises CallError where the archive is not given, InputFileError for another one, and for missing pages.
+    """
+    if options.form is None:
+        message = "ILIAS's archive is needed: Multi-Feedback, Download (--gradebook multi_feedback_....zip)"
+        raise CallError("gradebook_needed", message)
+    try:
+        with zipfile.ZipFile(options.form) as archive:
+            found = {match[1]: match for name in archive.namelist() if (match := _FOLDER.fullmatch(name))}
+    except (OSError, zipfile.BadZipFile) as error:
+        raise InputFileError("gradebook", f"{options.form}: is no archive of ILIAS ({error})") from error
+    if not found:
+        message = (
+            f"{options.form}: has no folders multi_feedback.../Last_First_login_number; download it again"
+        )
+        raise InputFileError("gradebook", message)
+    folders = list(found)
+    students = {**options.people, **{grade.student_id: grade.person for grade in grades}}
+    matches = match_rows(
+        {row: {"ID": match["id"], "login": match["login"]} for row, match in enumerate(found.values())},
+        {student: Gradebook.evidence(student, person) for student, person in students.items()},
+        options.form.name,
+    )
+    files: dict[str, Path] = {}
+    faults: list[str] = []
+    for grade in ready(grades):
+        if (row := matches.rows.get(grade.student_id)) is not None:
+            files.update(pages(grade, options.out or Path(), folders[row], faults))
+    if faults:
+        message = "not all feedback is there; grade again, nothing was written"
+        raise InputFileError("feedback_missing", f"{message}\n{lines_of(faults)}")
+    missing = {grade.student_id: matches.missing.get(grade.student_id, "") for grade in ready(grades)}
+    return Delivery(files, unplaced={student: why for student, why in missing.items() if why})

@@ -1,0 +1,441 @@
+"""Tables of variants: a row of data for each n or position, in the assignment's file or in a CSV beside it.
+
+Every cell is checked; a fault names the row and the column. A column's unit stands in its heading,
+``a [cm]``; without one the numbers are in the units of the mechanism's keys in which they are used.
+"""
+
+import csv
+import io
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from pydantic import BaseModel, model_validator
+
+from reference.authored.formula import CONSTANTS, FUNCTIONS, Formula
+from reference.authored.toml_file import (
+    AHEAD_BEHIND,
+    LEFT_RIGHT,
+    LENGTH_UNITS_M,
+    SIDES,
+    Authored,
+    SideText,
+    text_of,
+)
+from reference.errors import AuthoredFileError, Finding
+from reference.geometry import FloatArray
+
+MEASURES = {
+    **dict.fromkeys(("length", "lengths", "offset", "through", "at", "ground", "displacement"), "a length"),
+    **dict.fromkeys(("angle_deg", "slot_deg"), "an angle"),
+    "rpm": "revolutions per minute",
+    "omega": "an angular velocity",
+    "epsilon": "an angular acceleration",
+    "speed": "a speed",
+    "acceleration": "an acceleration",
+}
+"""What a key of a mechanism is, in the words of `UNITS`."""
+MOST_VARIANTS = 10_000
+"""Of an assignment: more than any class has students, and all of them are computed before it is used."""
+LARGEST_KEY = 1e9
+"""A roster's numbers have nine digits at most."""
+KEYS = ("n", "position")
+"""Columns that say which variant a row is of."""
+
+UNITS = {
+    **{unit: ("a length", unit) for unit in LENGTH_UNITS_M},
+    **{f"{unit}/s": ("a speed", unit) for unit in LENGTH_UNITS_M},
+    **{f"{unit}/s^2": ("an acceleration", unit) for unit in LENGTH_UNITS_M},
+    **dict.fromkeys(("deg", "°", "rad"), ("an angle", "")),
+    **dict.fromkeys(("rpm", "rev/min"), ("revolutions per minute", "")),
+    "rad/s": ("an angular velocity", ""),
+    "rad/s^2": ("an angular acceleration", ""),
+}
+"""What a unit in a heading measures, and the unit of length in it."""
+_LETTERS = str.maketrans({"м": "m", "с": "s", "²": "^2", "р": "r", "а": "a", "д": "d"})
+"""Cyrillic letters of units, which look like or stand for the Latin ones."""
+_SPELT = {"об/мин": "rpm", "rot/min": "rpm", "min^-1": "rpm", "1/min": "rpm", "град": "deg", "1/s": "rad/s"}
+"""Other spellings."""
+
+_HEADING = re.compile(r"\s*([^\s\[\](),]+)\s*(?:[\[(]\s*([^\[\]()]*?)\s*[\])]|,\s*(\S+))?\s*")
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
+
+
+VariantKey = tuple[int | None, int | None]
+"""n and position, None where there is none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column of numbers, one for each row.
+
+    Attributes
+    ----------
+    unit : as the heading has it, empty where it has none
+    numbers : in degrees, and in the mechanism's unit of length, where the unit is one of these
+    words : the sides that stand in it, in place of +1 and -1
+    """
+
+    name: str
+    unit: str
+    numbers: tuple[float, ...] = ()
+    words: tuple[str, ...] = ()
+
+
+class DataTable(Authored):
+    """Data of the variants, row by row: `columns` and `rows` here, or the `file` of a CSV beside this one.
+
+    Columns by their names (`a = [40, 45]`), and rows as tables of their own, are read as well.
+    """
+
+    file: str | None = None
+    columns: list[str] | None = None
+    rows: list[list[float | int | str]] | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _by_rows(cls, data: Any) -> Any:  # noqa: ANN401 - not yet validated
+        if isinstance(data, str):
+            return {"file": data}
+        if isinstance(data, list) and data and all(isinstance(row, dict) for row in data):
+            columns = [*dict.fromkeys(name for row in data for name in row)]
+            return {"columns": columns, "rows": [[row.get(name, "") for name in columns] for row in data]}
+        if isinstance(data, dict) and data and cls.model_fields.keys().isdisjoint(data):
+            if not all(isinstance(cells, list) for cells in data.values()):
+                return data
+            rows = zip_longest(*data.values(), fillvalue="")
+            return {"columns": [*data], "rows": [[*cells] for cells in rows]}
+        return data
+
+    @model_validator(mode="after")
+    def _has_rows_once(self) -> Self:
+        inside = (self.columns is not None, self.rows is not None)
+        if (self.file is None) != all(inside) or (self.file is not None and any(inside)):
+            raise ValueError(
+                'needs either file = "NAME.csv" (a table beside this file), or columns and rows, such as'
+                ' columns = ["n", "a [mm]"] and rows = [[1, 40], [2, 45]]'
+            )
+        return self
+
+
+def or_its_file(schema: dict[str, Any]) -> None:
+    """In the schema of a table: a CSV's name, a list of rows, or lists by column may stand in its place."""
+    cell = {"type": ["number", "string"]}
+    lists = {"type": "object", "additionalProperties": {"type": "array", "items": cell}, "minProperties": 1}
+    rows = {"type": "array", "items": {"type": "object", "additionalProperties": cell}, "minItems": 1}
+    schema["anyOf"] += [{"type": "string"}, lists, rows]
+
+
+@dataclass(frozen=True, slots=True)
+class VariantRows:
+    """A table that was read: which variant each row is of, and its columns.
+
+    Attributes
+    ----------
+    source : what messages call it
+    keys : of each row n and position, None where the table has no such column; ascending
+    places : of each row where it stands, in words
+    columns : by name, in the order of the rows
+    """
+
+    source: str
+    keys: tuple[VariantKey, ...]
+    columns: dict[str, Column]
+    places: tuple[str, ...]
+
+    @property
+    def has(self) -> tuple[bool, bool]:
+        """Whether it has a column n, and a column position."""
+        n, position = self.keys[0]
+        return n is not None, position is not None
+
+    def data(self, variants: Sequence[VariantKey]) -> dict[str, FloatArray]:
+        """The columns' numbers for some variants, shape (N,) each."""
+        row_of = {key: row for row, key in enumerate(self.keys)}
+        n, position = self.has
+        rows = [row_of[key[0] if n else None, key[1] if position else None] for key in variants]
+        return {name: np.array(column.numbers)[rows] for name, column in self.columns.items()}
+
+
+def delimiter_of(text: str) -> str:
+    """`,`, `;` or a tab, whichever the first line of a CSV text has most of."""
+    first = next((line for line in text.splitlines() if line.strip()), "")
+    return max(",;\t", key=first.count)
+
+
+AT_LINE = "line %(number)s"
+TOO_MANY = "more than %(most)s lines are no table"
+NO_CSV = "is no CSV: %(error)s; check its quotes"
+
+
+def table_lines(
+    text: str, delimiter: str, most: int, say: Callable[[str], str] = str
+) -> tuple[list[tuple[int, list[str]]], list[Finding]]:
+    """Lines of a CSV text that are not blank, and the fault that ends them before the text does.
+
+    A record of several lines has the number of its first, from 1. More than `most` lines are a fault.
+
+    Arguments: `say` translates `AT_LINE`, `TOO_MANY` and `NO_CSV`.
+    """
+
+    def fault(why: str, **known: object) -> list[Finding]:
+        return [Finding(say(AT_LINE) % {"number": number}, say(why) % known)]
+
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
+    lines: list[tuple[int, list[str]]] = []
+    number = 1
+    try:
+        for cells in reader:
+            if number > most:
+                return lines, fault(TOO_MANY, most=most)
+            if any(cell.strip() for cell in cells):
+                lines.append((number, cells))
+            number = reader.line_num + 1
+    except csv.Error as error:
+        return lines, fault(NO_CSV, error=error)
+    return lines, []
+
+
+Cell = float | int | str
+
+
+def read_rows(table: DataTable, beside: Path, length_unit_m: float) -> tuple[DataTable, VariantRows]:
+    """An assignment's table with its rows inside, and the data in them.
+
+    Arguments: the assignment's file; the mechanism's unit of length. Raises AuthoredFileError with every
+    fault, each with its row and column.
+    """
+    if table.file is None:
+        lines: list[tuple[int, list[Cell]]] = [(0, [*(table.columns or ())])]
+        lines += enumerate(table.rows or (), 1)
+        reader = _Reader("$.variant.table", "$.variant.table, row {}", "", length_unit_m, [])
+        source, name = str(beside), "the table"
+    else:
+        path = beside.parent / table.file
+        text = text_of(path)
+        delimiter = delimiter_of(text)
+        split, findings = table_lines(text, delimiter, MOST_VARIANTS)
+        lines = [(number, [cell.strip() for cell in cells]) for number, cells in split]
+        reader = _Reader("line 1", "line {}", delimiter, length_unit_m, findings)
+        source, name = str(path), path.name
+    keys, columns, places = reader.read(lines)
+    if reader.findings:
+        raise AuthoredFileError(source, tuple(reader.findings))
+    cells = [cells for _, cells in lines]
+    whole = table.model_copy(update={"columns": [str(cell) for cell in cells[0]], "rows": cells[1:]})
+    if table.file is not None:
+        places = tuple(f"{name} {place}" for place in places)
+    return whole, VariantRows(name, keys, columns, places)
+
+
+@dataclass(slots=True)
+class _Reader:
+    """Reads the lines of a table and notes what is wrong with them.
+
+    Attributes
+    ----------
+    head, row : what the heading is called, and a row by its number
+    delimiter : of a CSV; beside semicolons or tabs 4,5 is a number
+    """
+
+    head: str
+    row: str
+    delimiter: str
+    length_unit_m: float
+    findings: list[Finding]
+
+    def fault(self, where: str, message: str) -> None:
+        """Note a fault."""
+        self.findings.append(Finding(where, message))
+
+    def read(
+        self, lines: Sequence[tuple[int, Sequence[Cell]]]
+    ) -> tuple[tuple[VariantKey, ...], dict[str, Column], tuple[str, ...]]:
+        """The variant of each row, the columns, and where each row stands, in the order of the variants."""
+        headings = self._headings(lines[0][1] if lines else ())
+        rows = lines[1:]
+        if not self.findings and not rows:
+            self.fault(self.head, "there are no rows below the names of the columns")
+        for number, cells in rows:
+            if any(cell != "" for cell in cells[len(headings) :]):
+                message = f"has {len(cells)} cells, the heading names {len(headings)} columns"
+                self.fault(
+                    self.row.format(number), f"{message}; a decimal comma needs semicolons between cells"
+                )
+        if self.findings:
+            return (), {}, ()
+        columns = {
+            heading.name: self._column(
+                heading, [(number, cells[k] if k < len(cells) else "") for number, cells in rows]
+            )
+            for k, heading in enumerate(headings)
+        }
+        keys = self._keys(columns, [number for number, _ in rows])
+        if self.findings:
+            return (), {}, ()
+        order = sorted(range(len(keys)), key=lambda row: [number or 0 for number in keys[row]])
+        in_order = {
+            name: replace(column, numbers=tuple(column.numbers[row] for row in order))
+            for name, column in columns.items()
+            if name not in KEYS
+        }
+        places = tuple(self.row.format(rows[row][0]) for row in order)
+        return tuple(keys[row] for row in order), in_order, places
+
+    def _headings(self, cells: Sequence[Cell]) -> list[Column]:
+        """The columns as their headings name them, without numbers."""
+        headings: list[Column] = []
+        texts = [str(cell).strip() for cell in cells]
+        while texts and not texts[-1]:
+            texts.pop()
+        for place, text in enumerate(texts, 1):
+            where = f"{self.head}, column {place}"
+            parts = _HEADING.fullmatch(text)
+            name = parts[1] if parts else text
+            if parts is None or not _NAME.fullmatch(name):
+                example = "a name and its unit are expected, such as l_AB [mm]: letters A-Z a-z, digits and _"
+                self.fault(where, f"'{text}' is no heading: {example}" if text else "has no heading")
+            elif name in CONSTANTS or name in FUNCTIONS:
+                self.fault(where, f"{name} has a meaning in formulas already: choose another name")
+            elif name in {heading.name for heading in headings}:
+                self.fault(where, f"there are two columns {name}")
+            else:
+                headings.append(Column(name, self._unit(where, parts[2] or parts[3] or "")))
+        if not self.findings and not {heading.name for heading in headings} & {*KEYS}:
+            message = "there is no column n (or position), which says whose row it is"
+            self.fault(self.head, message)
+        return headings
+
+    def _unit(self, where: str, text: str) -> str:
+        """A unit of a heading in one spelling; empty where there is none."""
+        unit = _unit_of(text)
+        if unit and unit not in UNITS:
+            self.fault(where, f"'{text}' is no unit known here: there are {', '.join(UNITS)}, or none")
+            return ""
+        return unit
+
+    def _column(self, heading: Column, cells: Sequence[tuple[int, Cell]]) -> Column:
+        """A column with its numbers, in degrees and in the mechanism's unit of length."""
+        sides = [word for _, cell in cells if (word := str(cell).lower()) in SIDES]
+        words = max((LEFT_RIGHT, AHEAD_BEHIND), key=lambda pair: sum(map(sides.count, pair))) if sides else ()
+        numbers: list[float] = []
+        for number, cell in cells:
+            try:
+                value = (
+                    _side_in(cell, words)
+                    if words
+                    else _number_in(cell, heading.name, decimal_comma=self.delimiter in {";", "\t"})
+                )
+            except ValueError as error:
+                self.fault(f"{self.row.format(number)}, column {heading.name}", str(error))
+                value = math.nan
+            numbers.append(self._in_file_units(value, heading.unit))
+        return replace(heading, numbers=tuple(numbers), words=words)
+
+    def _in_file_units(self, number: float, unit: str) -> float:
+        """Degrees from radians; lengths in the mechanism's unit."""
+        if unit == "rad":
+            return math.degrees(number)
+        length = UNITS.get(unit, ("", ""))[1]
+        if not length:
+            return number
+        # Whole numbers of parts of a metre: 3 cm are then exactly 30 mm.
+        return number * round(1.0 / self.length_unit_m) / round(1.0 / LENGTH_UNITS_M[length])
+
+    def _keys(self, columns: Mapping[str, Column], lines: Sequence[int]) -> list[VariantKey]:
+        """The variant of each row; two rows of one variant are a fault."""
+        keys: list[VariantKey] = []
+        first: dict[VariantKey, int] = {}
+        named = [name for name in KEYS if name in columns]
+        for row, line in enumerate(lines):
+            numbers = {name: columns[name].numbers[row] for name in named}
+            if any(map(math.isnan, numbers.values())):
+                continue
+            broken = [name for name in named if numbers[name] % 1.0 or abs(numbers[name]) > LARGEST_KEY]
+            for name in broken:
+                self.fault(f"{self.row.format(line)}, column {name}", f"{numbers[name]:g} is no whole number")
+            if broken:
+                continue
+            n, position = (int(numbers[name]) if name in numbers else None for name in KEYS)
+            if (n, position) in first:
+                whose, before = ", ".join(f"{name} = {numbers[name]:g}" for name in named), first[n, position]
+                message = f"{whose} has a row already ({self.row.format(before)})"
+                self.fault(self.row.format(line), message)
+            first.setdefault((n, position), line)
+            keys.append((n, position))
+        return keys
+
+
+def _unit_of(text: str) -> str:
+    """A unit in the spelling of `UNITS`, where it is one of them."""
+    plain = text.lower().replace(" ", "")
+    return _SPELT.get(plain, plain.translate(_LETTERS))
+
+
+def _side_in(cell: Cell, words: tuple[str, ...]) -> float:
+    """+1 or -1 from a word."""
+    if str(cell).lower() not in words:
+        raise ValueError(f"'{cell}' is neither {' nor '.join(words)}" if cell != "" else "is empty")
+    return float(SIDES[str(cell).lower()])
+
+
+def _number_in(cell: Cell, name: str, *, decimal_comma: bool) -> float:
+    if not isinstance(cell, str):
+        return float(cell)
+    if not cell:
+        raise ValueError("is empty")
+    plain = cell.replace("\N{MINUS SIGN}", "-")
+    number = plain.replace(",", ".", 1) if decimal_comma else plain
+    if _NUMBER.fullmatch(number):
+        return float(number)
+    if "," in cell:
+        raise ValueError(f"'{cell}' is no number: write a decimal point")
+    parts = re.fullmatch(r"([-+0-9.,]+)\s*(\D.*)", plain)
+    if parts is not None and (unit := _unit_of(parts[2])) in UNITS:
+        raise ValueError(f"'{cell}' is no number: the unit stands in the heading, as {name} [{unit}]")
+    raise ValueError(f"'{cell}' is no number" + (", and no side" if cell.isalpha() else ""))
+
+
+def misused_columns(thing: object, rows: VariantRows, path: str, key: str = "") -> Iterator[Finding]:
+    """Columns that stand alone in a key of the mechanism and are of another kind; lengths not above zero."""
+    if isinstance(thing, BaseModel):
+        inside = [(f"{path}.{name}", name, getattr(thing, name)) for name in type(thing).model_fields]
+    elif isinstance(thing, dict):
+        inside = [(f"{path}.{name}", key, part) for name, part in thing.items()]
+    elif isinstance(thing, list):
+        inside = [(f"{path}[{index}]", key, part) for index, part in enumerate(thing)]
+    else:
+        inside = []
+        formula = thing.side if isinstance(thing, SideText) else thing
+        column = rows.columns.get(formula.text) if isinstance(formula, Formula) else None
+        if column is not None:
+            message = _misuse(column, key, thing.words if isinstance(thing, SideText) else ())
+            if message:
+                yield Finding(path, f"column {column.name} of {rows.source} {message}")
+            elif key in {"length", "lengths"}:
+                for place, number in zip(rows.places, column.numbers, strict=True):
+                    if number <= 0.0:
+                        where = f"{place}, column {column.name}"
+                        yield Finding(where, f"{number:g}: a length must be above zero ({path})")
+    for where, name, part in inside:
+        yield from misused_columns(part, rows, where, name)
+
+
+def _misuse(column: Column, key: str, words: tuple[str, ...]) -> str | None:
+    """What is wrong with a column in a key; None where nothing is."""
+    if words:
+        if not {*column.words} <= {*words}:
+            return f"holds {' and '.join(column.words)}; {' or '.join(words)} is needed here"
+        return f"is in {column.unit}, not a side" if column.unit else None
+    if column.words:
+        return f"holds {' and '.join(column.words)}, a number is needed here"
+    measures, needed = UNITS.get(column.unit, ("", ""))[0], MEASURES.get(key)
+    if column.unit and measures != needed:
+        return f"is in {column.unit}, {measures}; {needed or 'a number without a unit'} is needed here"
+    return None

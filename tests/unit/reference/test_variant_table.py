@@ -1,0 +1,301 @@
+"""Tables of variants: what a row means, and that a fault names file, row and column."""
+
+import numpy as np
+import pytest
+
+from reference.authored.assignment import Variant, load_assignment
+from reference.construction.graph import evaluate
+from reference.errors import AuthoredFileError, CallError, ranges_of
+from reference.plan import exact_plan
+
+MECHANISM = """
+schema_version = 1
+id = "six"
+length_unit = "mm"
+title = { en = "Crank-rocker with a slider" }
+[ground]
+O1 = [0, 0]
+O2 = ["d", 0]
+[crank]
+pivot = "O1"
+pin = "A"
+length = "a"
+angle_deg = "phi"
+rpm = "n1"
+[[group]]
+type = "RRR"
+node = "B"
+pins = ["A", "O2"]
+links = ["2", "3"]
+lengths = ["b", "c"]
+side = "side_B"
+[[group]]
+type = "RRP"
+node = "C"
+pin = "B"
+link = "4"
+length = "e"
+guide = { through = ["d", "h"], angle_deg = 0 }
+side = "side_C"
+"""
+ASSIGNMENT = """
+schema_version = 1
+id = "six"
+mechanism = "six"
+rubric = "four-bar"
+title = { en = "Crank-rocker with a slider" }
+task = { en = "Draw." }
+[scales]
+kL = 0.002
+kv = 0.02
+ka = 0.2
+[[page]]
+kind = "all"
+figures = ["mechanism", "velocity_plan", "acceleration_plan"]
+[variant]
+"""
+HEADING = "n;a [mm];b;c;d;e [cm];h;phi [°];n1 [rpm];side_B;side_C"
+ROWS = (
+    "9;50;130;90;140;18;90;120;90;left;ahead",
+    "1;40;120;80;130;16;80;30;120;left;ahead",
+    "2;42,5;120;80;130;16;80;45;120;right;ahead",
+    "4;45;125;85;135;17;85;60;150;left;behind",
+)
+
+
+@pytest.fixture
+def course(tmp_path):
+    """Writes a course whose data stand in six.csv, with lines of that and keys of [variant] replaced."""
+
+    def write(*lines: str, variant: str = 'table = "six.csv"', mechanism=(), encoding="utf-8"):
+        text = MECHANISM
+        for old, new in mechanism:
+            assert old in text
+            text = text.replace(old, new)
+        (tmp_path / "six.mechanism.toml").write_text(text, encoding="utf-8")
+        (tmp_path / "six.csv").write_text("\n".join(lines or (HEADING, *ROWS)) + "\n", encoding=encoding)
+        path = tmp_path / "six.assignment.toml"
+        path.write_text(ASSIGNMENT + variant + "\n", encoding="utf-8")
+        return path
+
+    return write
+
+
+def faults(path) -> tuple[str, dict[str, str]]:
+    with pytest.raises(AuthoredFileError) as error:
+        load_assignment(path)
+    return error.value.file, {finding.path: finding.message for finding in error.value.findings}
+
+
+def test_rows_are_variants_in_the_order_of_n_with_gaps(course):
+    assignment = load_assignment(course())
+    assert assignment.variants() == [Variant(1), Variant(2), Variant(4), Variant(9)]
+    data = assignment.values(assignment.variants())
+    np.testing.assert_array_equal(data["a"], [40, 42.5, 45, 50])
+    np.testing.assert_array_equal(data["side_B"], [1, -1, 1, 1])
+
+
+def test_a_unit_in_the_heading_becomes_the_files_unit(course):
+    assignment = load_assignment(course())
+    np.testing.assert_array_equal(assignment.values([Variant(9), Variant(1)])["e"], [180.0, 160.0])
+    turned = load_assignment(
+        course(
+            "n,x [rad],y [m],z",
+            "1,3.141592653589793,0.07,5",
+            variant='table = "six.csv"\n[variant.values]\n'
+            + "\n".join(f"{name} = 50" for name in ("a", "c", "d", "e", "h", "phi", "n1"))
+            + "\nb = 60\nside_B = 1\nside_C = 1",
+        )
+    ).values([Variant(1)])
+    assert [float(turned[name][0]) for name in "xyz"] == [180.0, 70.0, 5.0]
+
+
+def test_each_variant_is_in_the_assembly_of_its_row(course):
+    plan = exact_plan(assignment := load_assignment(course()), assignment.variants())
+    place = plan.motion.position
+    turned = np.imag(np.conj(place["O2"] - place["A"]) * (place["B"] - place["A"]))
+    np.testing.assert_array_equal(np.sign(turned), [1, -1, 1, 1])
+    np.testing.assert_array_equal(np.sign(np.real(place["C"] - place["B"])), [1, 1, -1, 1])
+
+
+def test_plans_of_all_are_those_of_each_and_the_construction_agrees(course):
+    assignment = load_assignment(course())
+    together = exact_plan(assignment, assignment.variants())
+    nodes = evaluate(together.construction, together.drawing.parameters)
+    for figure in together.nodes_mm.values():
+        for name, place in figure.items():
+            np.testing.assert_allclose(nodes[name], place, atol=1e-9)
+    for index, variant in enumerate(assignment.variants()):
+        alone = exact_plan(assignment, [variant])
+        assert alone.construction is together.construction
+        for name, vector in together.vectors_si.items():
+            assert vector[index] == pytest.approx(alone.vectors_si[name][0], rel=1e-12)
+
+
+def test_the_same_table_stands_in_the_file_itself(course):
+    columns = '["n", "a [mm]", "b", "c", "d", "e [cm]", "h", "phi [deg]", "n1 [rpm]", "side_B", "side_C"]'
+    one = '[1, 40, 120, 80, 130, 16, 80, 30, 120, "left", "ahead"]'
+    rows = f'[[2, 42.5, 120, 80, 130, 16, 80, 45, 120, "right", "ahead"], {one}]'
+    inside = load_assignment(course(variant=f"[variant.table]\ncolumns = {columns}\nrows = {rows}"))
+    own = exact_plan(inside, inside.variants())
+    beside = exact_plan(load_assignment(course()), [Variant(1), Variant(2)])
+    for name, vector in own.vectors_si.items():
+        np.testing.assert_allclose(vector, beside.vectors_si[name], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        "[variant.table]\nn = [2, 1]\na = [41, 40]\nside_B = ['right', 'left']",
+        (
+            "[[variant.table]]\nn = 2\na = 41\nside_B = 'right'\n"
+            "[[variant.table]]\nn = 1\nside_B = 'left'\na = 40"
+        ),
+        "table.columns = ['n', 'a', 'side_B']\ntable.rows = [[2, 41, 'right'], [1, 40, 'left']]",
+    ],
+)
+def test_columns_by_name_and_rows_as_tables_are_the_same_table(course, table):
+    rest = "\n[variant.values]\nb = 120\nc = 80\nd = 130\ne = 160\nh = 80\nphi = 30\nn1 = 120\nside_C = 1"
+    data = load_assignment(course(variant=table + rest)).values([Variant(1), Variant(2)])
+    np.testing.assert_array_equal([data["a"], data["side_B"]], [[40, 41], [1, -1]])
+
+
+def test_columns_of_unequal_length_and_rows_that_lack_a_cell_are_told(course):
+    _, told = faults(course(variant="[variant.table]\nn = [2, 1]\na = [41]"))
+    assert told == {"$.variant.table, row 2, column a": "is empty"}
+    _, told = faults(course(variant="[[variant.table]]\nn = 2\na = 41\n[[variant.table]]\nn = 1"))
+    assert told == {"$.variant.table, row 2, column a": "is empty"}
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
+@pytest.mark.parametrize("mark", [";", ",", "\t"])
+def test_csv_as_spreadsheets_write_it(course, mark, encoding):
+    lines = [line.replace(",", "." if mark == "," else ",").replace(";", mark) for line in (HEADING, *ROWS)]
+    path = course(*lines, "", mark * 10, encoding=encoding)
+    assert float(load_assignment(path).values([Variant(2)])["a"][0]) == 42.5
+
+
+def test_every_faulty_cell_is_told_at_once_with_row_and_column(course):
+    path = course(
+        HEADING,
+        "1;40 mm;120;80;130;16;80;30;120;left;ahead",
+        "2;;120;8o;130;16;80;45;120;up;ahead",
+        "2;42;1.2.3;80;130;16;80;45;120;left;left",
+        "2.5;42;120;80;130;16;80;45;120;left;behind",
+        "x;42;120;80;130;16;80;45;120;left;behind",
+    )
+    file, told = faults(path)
+    assert file.endswith("six.csv")
+    assert set(told) == {
+        "line 2, column a", "line 3, column a", "line 3, column c", "line 3, column side_B",
+        "line 4", "line 4, column b", "line 4, column side_C", "line 5, column n", "line 6, column n",
+    }  # fmt: skip
+    assert "heading, as a [mm]" in told["line 2, column a"]
+    assert told["line 3, column a"] == "is empty"
+    assert "neither left nor right" in told["line 3, column side_B"]
+    assert told["line 4"] == "n = 2 has a row already (line 3)"
+    assert told["line 5, column n"] == "2.5 is no whole number"
+
+
+@pytest.mark.parametrize(
+    ("heading", "where", "words"),
+    [
+        ("n;a, mm;b (stone)", "line 1, column 3", "'stone' is no unit"),
+        ("n;a [inch]", "line 1, column 2", "'inch' is no unit known here"),
+        ("n;l AB", "line 1, column 2", "is no heading"),
+        ("n;;a", "line 1, column 2", "has no heading"),
+        ("n;a;a", "line 1, column 3", "two columns a"),
+        ("n;pi", "line 1, column 2", "has a meaning in formulas already"),
+        ("number;a", "line 1", "no column n"),
+        ("n;\u0430", "line 1, column 2", "is no heading"),
+    ],
+)
+def test_a_heading_that_is_none_is_told(course, heading, where, words):
+    _, told = faults(course(heading, "1;2;3"))
+    assert words in told[where]
+
+
+def test_too_many_cells_an_empty_table_and_no_table_are_told(course):
+    assert "12 cells" in faults(course(HEADING, ROWS[1] + ";7"))[1]["line 2"]
+    assert "no rows" in faults(course(HEADING))[1]["line 1"]
+    assert faults(course(variant='table = "seven.csv"'))[1] == {"$": "there is no such file"}
+    assert "either file" in faults(course(variant="[variant.table]\nrows = [[1]]"))[1]["$.variant.table"]
+
+
+def test_a_faulty_row_in_the_file_itself_is_told_with_its_path(course):
+    table = '[variant.table]\ncolumns = ["n", "a"]\nrows = [[1, 40], [2, "4O"]]'
+    file, told = faults(course(variant=table))
+    assert file.endswith("six.assignment.toml")
+    assert told == {"$.variant.table, row 2, column a": "'4O' is no number"}
+
+
+def test_a_table_and_a_range_of_one_number_contradict_each_other(course):
+    _, told = faults(course(variant='n = { from = 1, to = 4 }\ntable = "six.csv"\n[variant.values]\na = 3'))
+    assert set(told) == {"$.variant.n", "$.variant.values.a"}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('rpm = "n1"', 'omega = "n1"', "in rpm, revolutions per minute; an angular velocity is needed"),
+        ('length = "a"', 'length = "phi"', "in °, an angle; a length is needed here"),
+        ('side = "side_B"', 'side = "side_C"', "holds ahead and behind; left or right is needed"),
+        ('length = "a"', 'length = "side_B"', "holds left and right, a number is needed"),
+    ],
+)
+def test_a_column_in_a_key_of_another_kind_is_told(course, old, new, words):
+    _, told = faults(course(mechanism=[(old, new)]))
+    assert any(words in message for message in told.values())
+
+
+def test_lengths_that_are_none_are_told_row_by_row(course):
+    lines = [line.replace(";45;125;", ";-45;0;").replace(";50;130;", ";50;-1;") for line in (HEADING, *ROWS)]
+    _, told = faults(course(*lines))
+    assert set(told) == {"six.csv line 2, column b", "six.csv line 5, column a", "six.csv line 5, column b"}
+    assert "above zero (mechanism file, $.crank.length)" in told["six.csv line 5, column a"]
+
+
+def test_a_formula_that_fails_names_the_first_row_where_it_does(course):
+    _, told = faults(course(mechanism=[('length = "a"', 'length = "a - 42"')]))
+    assert told["$.mechanism"] == "'a - 42' (crank) must be a positive length (for n = 1)"
+    _, told = faults(course(mechanism=[('length = "e"', 'length = "sqrt(42 - a)"')]))
+    assert told["$.mechanism"].endswith("(for n = 2 and 2 more)")
+
+
+def test_a_number_that_is_not_in_the_table_is_refused_with_those_that_are(course):
+    assignment = load_assignment(course())
+    with pytest.raises(CallError, match=r"n = 3: assignment six has n = 1, 2, 4, 9, by six.csv"):
+        assignment.variant(3)
+    with pytest.raises(CallError, match=r"needs --n \(n = 1, 2, 4, 9, by six.csv\)"):
+        assignment.variant(None)
+
+
+def test_a_table_by_position_and_a_table_by_both(course):
+    lines = [line.replace("n;", "position;", 1) for line in (HEADING, *ROWS)]
+    both = load_assignment(course(*lines, variant='n = { from = 7, to = 8 }\ntable = "six.csv"'))
+    assert both.variants()[:5] == [*(Variant(7, k) for k in (1, 2, 4, 9)), Variant(8, 1)]
+    pairs = load_assignment(
+        course(
+            HEADING.replace("n;", "n;position;", 1),
+            *(f"{n};{row}" for n, row in zip("1122", ROWS, strict=True)),
+        )
+    )
+    assert pairs.variants() == [Variant(1, 1), Variant(1, 9), Variant(2, 2), Variant(2, 4)]
+    with pytest.raises(CallError, match="position = 9: assignment six has position = 2, 4"):
+        pairs.variant(2, 9)
+
+
+def test_a_side_is_a_formula_of_the_data(course):
+    assignment = load_assignment(course(mechanism=[('side = "side_B"', 'side = "3 - n"')]))
+    mechanism = assignment.mechanism(assignment.variants())
+    np.testing.assert_array_equal(mechanism.groups[0].side, [1, 1, -1, -1])
+    _, told = faults(course(mechanism=[('side = "side_B"', 'side = "2 - n"')]))
+    assert "is zero: above zero is left, below right (for n = 2)" in told["$.mechanism"]
+    _, told = faults(course(mechanism=[('side = "side_B"', 'side = "side_D"')]))
+    assert "neither left nor right, nor data of a variant" in told["$.mechanism"]
+
+
+def test_numbers_in_words():
+    assert ranges_of([4]) == "from 4 to 4"
+    assert ranges_of([1, 2, 3]) == "from 1 to 3"
+    assert ranges_of([1, 2, 3, 5, 6, 9]) == "= 1..3, 5, 6, 9"
