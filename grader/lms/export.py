@@ -111,9 +111,10 @@ def what_of(options: Options) -> str:
             "unknown_target", f"'{options.to}' is no export target: known are {', '.join(TARGETS)}"
         )
     if options.what is not None and options.what not in known:
-        raise CallError(
-            "unknown_target", f"{options.to} is given no '{options.what}': known are {', '.join(known)}"
-        )
+        others = [to for to, what in KINDS if what == options.what and to.startswith(options.to)]
+        hint = f" (or --to {others[0]})" if others else ""
+        message = f"{options.to} is given no '{options.what}': known are {', '.join(known)}{hint}"
+        raise CallError("unknown_target", message)
     return options.what or known[0]
 
 

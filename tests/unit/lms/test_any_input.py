@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from grader.lms.api import submissions_in
 from grader.lms.export import draft, export, read_results
 from grader.lms.gradebooks import fill_gradebook
 from grader.lms.grades import Options, Person, grades_of
@@ -99,6 +100,7 @@ def test_a_file_of_any_content_is_used_or_refused(tmp_path, data):
         fill_gradebook(data, "g.csv", graded, CANVAS_OPTIONS)
     with suppress(PlanmarkError):
         with_ids({}, path)
+    assert all(one.user for one in submissions_in(document))
     with suppress(PlanmarkError):
         numbered([], path)
 
