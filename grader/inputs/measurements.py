@@ -599,7 +599,10 @@ def _parse_json(text: str, source: _Source) -> Measurements:
             parse_constant=lambda name: _NoValue(name, NOT_FINITE),
         )
     except (ValueError, RecursionError) as error:
-        why = source.say(N_("is not JSON: %(error)s"), error=error)
+        line, column = getattr(error, "lineno", 1), getattr(error, "colno", 1)
+        why = source.say(
+            N_("is not JSON: look at line %(line)s, column %(column)s"), line=line, column=column
+        )
         raise source.refuse([Finding("$", why)]) from error
     if not isinstance(data, dict):
         why = source.say(N_("is no table: a file of measurements begins with a brace"))
