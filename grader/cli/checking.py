@@ -2,12 +2,11 @@
 
 import csv
 import io
+import shutil
+import textwrap
 from pathlib import Path
 
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
 from grader.cli.app import check_language
 from grader.comparison.evidence import Submission
@@ -82,18 +81,17 @@ def check_measured(
         if template is None:
             raise _refused(speaker, "measured_needed", NO_MEASUREMENTS)
         return False
-    console = Console()
     all_right = True
     students = read_measurements(file, names_of(assignment), lang=lang, is_own=True)
     if page is not None and len(students) != 1:
         raise _refused(speaker, "page_students", PAGE_STUDENTS, file=file, count=len(students))
     if not students:
-        console.print(speaker.gettext(NOTHING), style="yellow")
+        typer.secho(speaker.gettext(NOTHING), fg="yellow")
     driven = assignment.mechanism_file.driver.pin
     names = assignment.file.names
     for entered in students:
         variant = _variant(assignment, entered, n, position, speaker)
-        _tell_head(console, entered, variant, speaker)
+        _tell_head(entered, variant, speaker)
         submission = Submission(measured=entered.reading, values=entered.values, declared=entered.scales)
         try:
             judgement = judge(task_of(assignment, rubric, variant), submission)
@@ -101,11 +99,11 @@ def check_measured(
             known = speaker.gettext(ASSEMBLY[error.code]) if error.code in ASSEMBLY else error.message
             raise CallError(error.code, f"{variant}: {known}") from error
         lines = checked_lines(judgement, wanted, speaker, names, driven)
-        _tell(console, lines, wanted, speaker)
+        _tell(lines, wanted, speaker)
         likely = likely_mistakes(judgement, wanted)
         mistakes = [mistake_feedback(mistake, lang, "full", names) for mistake in likely]
         for mistake, sentences in zip(likely, mistakes, strict=True):
-            console.print(f"  {mistake.code}: {sentences}", highlight=False, markup=False)
+            _print(f"{mistake.code}: {sentences}", "  ")
         if page is not None:
             _write_page(page, assignment, rubric, variant, entered, lang, wanted, lines, mistakes)
         is_right = is_all_right(tuple(line.checked for line in lines))
@@ -194,30 +192,37 @@ def _variant(
     return assignment.variant(chosen["n"], chosen["position"])
 
 
-def _tell_head(console: Console, entered: Measurements, variant: Variant, speaker: Tongue) -> None:
+def _tell_head(entered: Measurements, variant: Variant, speaker: Tongue) -> None:
     who = [entered.student_id] if entered.student_id else []
     known = (("n", variant.n), (speaker.gettext("position"), variant.position))
     parts = [*who, *(f"{name} = {value}" for name, value in known if value is not None)]
     if parts:
-        console.print(", ".join(parts), style="bold", highlight=False, markup=False)
+        typer.secho(", ".join(parts), bold=True)
     for problem in (*entered.problems, *entered.reading.problems):
-        console.print(f"  {problem.message}", style="yellow", highlight=False, markup=False)
+        _print(problem.message, "  ", "yellow")
 
 
-def _tell(console: Console, lines: list[CheckedLine], level: Level, speaker: Tongue) -> None:
+def _tell(lines: list[CheckedLine], level: Level, speaker: Tongue) -> None:
     if not lines:
-        console.print(f"  {speaker.gettext(NOTHING)}", style="yellow")
+        typer.secho(f"  {speaker.gettext(NOTHING)}", fg="yellow")
         return
-    table = Table(box=None, show_header=False)
+    wide = max(len(line.name) for line in lines)
     for line in lines:
-        one, numbers = line.checked, ""
+        one, hint = line.checked, line.hint
         if level == "full" and one.measured and one.expected:
-            numbers = f"{_number(one.measured)} / {_number(one.expected)}"
-        mark, style = RESULTS[line.result][0], STYLES[line.result]
-        table.add_row(f"[{style}]{mark}[/{style}]", line.name, numbers, escape(line.hint))
+            hint = f"{_number(one.measured)} / {_number(one.expected)}  {hint}"
+        mark = typer.style(RESULTS[line.result][0], fg=STYLES[line.result])
+        typer.echo(f" {mark}  {line.name:{wide}}  ", nl=False)
+        _print(hint, " " * (wide + 6), is_begun=True)
         if line.advice:
-            table.add_row("", "", "", f"[dim]→ {escape(line.advice)}[/dim]")
-    console.print(table, highlight=False)
+            _print(f"→ {line.advice}", " " * (wide + 6))
+
+
+def _print(text: str, indent: str, colour: str | None = None, *, is_begun: bool = False) -> None:
+    """Print a text wrapped to the terminal, every line but one that is begun already behind an indent."""
+    wide = max(shutil.get_terminal_size().columns - 1, len(indent) + 30)
+    lines = textwrap.wrap(text, wide, initial_indent=indent, subsequent_indent=indent) or [indent]
+    typer.secho("\n".join(lines).removeprefix(indent if is_begun else ""), fg=colour)
 
 
 def _number(quantity: Quantity) -> str:

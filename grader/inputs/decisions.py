@@ -27,8 +27,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
-from filelock import FileLock, Timeout
-
 from grader.files import OutputError, make_folder, sync_folder, write_whole
 from grader.inputs.decision_texts import LARGEST, PageDecision, page_decision, place
 from grader.inputs.roster import (
@@ -437,6 +435,8 @@ class DecisionFile:
     @contextmanager
     def _open(self) -> Iterator[DecisionTable]:
         """The file's content, which nobody else changes meanwhile."""
+        from filelock import FileLock, Timeout  # noqa: PLC0415 - slow to import, and seldom needed
+
         make_folder(self.path.parent)
         lock = FileLock(self.path.with_name(f".{self.path.name}.lock"), timeout=_LOCK_S)
         try:

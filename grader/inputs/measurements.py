@@ -18,10 +18,9 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TypeGuard
+from typing import TYPE_CHECKING, TypeGuard
 
 from grader.documents import MeasurementsDocument
-from grader.inputs.decisions import Decision
 from grader.inputs.roster import MAX_LINES, short, surplus_of, whole_number, why_no_id
 from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
 from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
@@ -41,6 +40,9 @@ from reference.authored.variant_table import delimiter_of, table_lines
 from reference.construction.derive import construction_of
 from reference.construction.graph import Construction, coincident
 from reference.errors import MOST_FINDINGS, Finding, InputFileError, lines_of, near_names
+
+if TYPE_CHECKING:
+    from grader.inputs.decisions import Decision
 
 KEYS = ("student_id", "n", "position")
 TABLES = {"segments_mm": "", "directions_deg": "_deg", "values": "_value"}
@@ -123,7 +125,7 @@ class StudentSubmission:
     name: str = ""
     problems: tuple[Problem, ...] = ()
     has_unusable: bool = False
-    decided: tuple[Decision, ...] = ()
+    decided: "tuple[Decision, ...]" = ()
 
     @property
     def position(self) -> int | None:
@@ -597,7 +599,10 @@ def _parse_json(text: str, source: _Source) -> Measurements:
             parse_constant=lambda name: _NoValue(name, NOT_FINITE),
         )
     except (ValueError, RecursionError) as error:
-        why = source.say(N_("is not JSON: %(error)s"), error=error)
+        line, column = getattr(error, "lineno", 1), getattr(error, "colno", 1)
+        why = source.say(
+            N_("is not JSON: look at line %(line)s, column %(column)s"), line=line, column=column
+        )
         raise source.refuse([Finding("$", why)]) from error
     if not isinstance(data, dict):
         why = source.say(N_("is no table: a file of measurements begins with a brace"))

@@ -119,7 +119,7 @@ def _sheet(
 
 def _whose(row: RosterRow, variant: Variant, speaker: Tongue) -> str:
     """The student and the variant; lines to write on where there is no student."""
-    blank = "_" * 22
+    blank = "_" * 14
     parts = [
         f"{speaker.gettext(NUMBER[name])} {value}"
         for name, value in (("n", variant.n), ("position", variant.position))
@@ -276,14 +276,15 @@ def _rate_cell(shown: str, rate: str, speaker: Tongue) -> Markup:
 
 
 def _empty(head: list[str], rows: Iterable[Sequence[str]], wide_mm: float) -> Table:
-    first = 0.4 if len(head) == 2 else 0.2
+    first = 0.4 if len(head) == 2 else 0.16
     rest = (1.0 - first) / (len(head) - 1)
     widths = [share * wide_mm * mm for share in (first, *[rest] * (len(head) - 1))]
-    cells = [[_text(word, 8) for word in head], *([_markup(cell, 10) for cell in row] for row in rows)]
+    cells = [[_text(word, 6.5) for word in head], *([_markup(cell, 10) for cell in row] for row in rows)]
     style = [
         ("GRID", (0, 0), (-1, -1), 0.4, grey), ("BACKGROUND", (0, 0), (-1, 0), whitesmoke),
         ("VALIGN", (0, 0), (-1, -1), "MIDDLE"), ("TOPPADDING", (0, 0), (-1, -1), 0),
-        ("BOTTOMPADDING", (0, 0), (-1, -1), 0),
+        ("BOTTOMPADDING", (0, 0), (-1, -1), 0), ("LEFTPADDING", (0, 0), (-1, -1), 3),
+        ("RIGHTPADDING", (0, 0), (-1, -1), 1),
     ]  # fmt: skip
     return Table(cells, colWidths=widths, rowHeights=[ROW_MM * mm] * len(cells), style=style, repeatRows=1)
 
