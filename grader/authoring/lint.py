@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from grader.authoring.findings import SEVERITIES, LintFinding, mechanism_place
+from grader.authoring.findings import SEVERITIES, File, LintFinding, mechanism_place
 from grader.authoring.round_scales import (
     WELL_READ_MM,
     AskedVectors,
@@ -44,11 +44,12 @@ from grader.documents import (
     LintVariant,
     LintWorst,
 )
+from grader.language import LANGUAGES
 from grader.printed.layout import SCALE_OF
 from grader.rubric import RubricFile, check_rubric
 from reference.authored.assignment import TRADITIONS, Assignment, Variant
 from reference.authored.formula import Formula
-from reference.authored.toml_file import SideText
+from reference.authored.toml_file import SideText, Text
 from reference.authored.variant_table import KEYS
 from reference.construction.derive import image_name
 from reference.construction.graph import Construction, ancestors
@@ -227,6 +228,35 @@ def data_findings(
     yield from _not_told(assignment)
     yield from _unknown_names(assignment, construction)
     yield from _unneeded(assignment, rubric, construction)
+    yield from _untranslated(assignment, rubric)
+
+
+def texts_in(thing: object, path: str) -> Iterator[tuple[str, Text]]:
+    """The texts of an authored table, however deep they stand, each with its path in the file."""
+    inside: Iterable[tuple[str, object]] = ()
+    if isinstance(thing, Text):
+        yield path, thing
+    elif isinstance(thing, BaseModel):
+        inside = ((f".{name}", getattr(thing, name)) for name in type(thing).model_fields)
+    elif isinstance(thing, list):
+        inside = ((f"[{index}]", one) for index, one in enumerate(thing))
+    for key, one in inside:
+        yield from texts_in(one, path + key)
+
+
+def _untranslated(assignment: Assignment, rubric: RubricFile) -> Iterator[LintFinding]:
+    """Texts that students of one language would read in English: one finding for each file and language."""
+    file = assignment.file
+    files: dict[File, BaseModel] = {"assignment": file, "rubric": rubric}
+    if isinstance(file.mechanism, str):
+        files["mechanism"] = assignment.mechanism_file
+    for name, authored in files.items():
+        for language in LANGUAGES[1:]:  # the first is English, which is required
+            missing = [path for path, text in texts_in(authored, "$") if not getattr(text, language)]
+            if missing:
+                more = f", nor have {len(missing) - 1} texts below it" if len(missing) > 1 else ""
+                message = f"has no text in {language}{more}: students who read {language} see the English one"
+                yield LintFinding("hint", "not_translated", name, missing[0], message)
 
 
 def _rubric_faults(rubric: RubricFile, construction: Construction) -> Iterator[LintFinding]:

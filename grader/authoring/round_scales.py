@@ -27,10 +27,9 @@ Size = tuple[FloatArray, FloatArray]
 Extents = Mapping[str, Size]
 """The size of each figure."""
 IntArray = NDArray[np.intp]
-LENGTH_STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
-"""Of 1 : 10^k. ISO 5455 has 1, 2, 5; GOST 2.302 and SR EN practice add 2.5."""
-RATE_STEPS = (1.0, 2.0, 2.5, 4.0, 5.0, 10.0)
-"""Of 10^k (m/s)/mm and (m/s^2)/mm: factors by which a ruler's millimetres are easily multiplied."""
+STEPS = (1.0, 2.0, 2.5, 4.0, 5.0, 10.0)
+"""Of 10^k. Lengths: ISO 5455 has 1, 2, 5, and GOST 2.302 adds 2.5 and 4 (1:4, 1:40, 1:400). The same for
+(m/s)/mm and (m/s^2)/mm: factors by which a ruler's millimetres are easily multiplied."""
 LEAST_LINK_MM = 20.0
 """The plans' directions are read off the sketch: a shorter link tells them less well than a hand draws."""
 _SLACK = 1e-9
@@ -258,10 +257,10 @@ class Proposal:
     still_short: tuple[str, ...]
 
 
-def round_up(values: FloatArray, steps: Sequence[float]) -> FloatArray:
-    """The least of the steps times a power of ten that is not below each value (positive, any shape)."""
+def round_up(values: FloatArray) -> FloatArray:
+    """The least round number that is not below each value (positive, any shape)."""
     decade = 10.0 ** np.floor(np.log10(values) + _SLACK)
-    ladder = decade[..., None] * np.asarray(steps)
+    ladder = decade[..., None] * np.asarray(STEPS)
     reached = ladder >= values[..., None] * (1.0 - _SLACK)
     return np.asarray(np.take_along_axis(ladder, np.argmax(reached, axis=-1)[..., None], axis=-1)[..., 0])
 
@@ -312,7 +311,7 @@ def _best_template(figures: Sequence[str], plan: Plan, extents: Extents, links_m
 
     def worth(template: Template) -> tuple[float, ...]:
         scales = {
-            figure: float(round_up(np.asarray(np.max(values)), steps_of(SCALE_OF[figure])))
+            figure: float(round_up(np.asarray(np.max(values))))
             for figure, values in _needed(template, plan, extents).items()
         }
         sketch = scales.pop(MECHANISM, None)
@@ -321,11 +320,6 @@ def _best_template(figures: Sequence[str], plan: Plan, extents: Extents, links_m
         return (min(link_mm, LEAST_LINK_MM), float(plans), link_mm)
 
     return max((each for each in TEMPLATES if each.figures == set(figures)), key=worth)
-
-
-def steps_of(scale: str) -> tuple[float, ...]:
-    """The round steps of kL, kv or ka."""
-    return LENGTH_STEPS if scale == "kL" else RATE_STEPS
 
 
 def _round_scales(templates: Sequence[Template], plan: Plan, extents: Extents, *, together: bool) -> Scales:
@@ -338,7 +332,7 @@ def _round_scales(templates: Sequence[Template], plan: Plan, extents: Extents, *
             finest[name] = np.maximum(finest[name], values) if name in finest else values
     for name, values in finest.items():
         common = np.full_like(values, np.max(values)) if together else values
-        scales[name] = round_up(common, steps_of(name))
+        scales[name] = round_up(common)
     return Scales(scales["kL"], scales["kv"], scales["ka"])
 
 
@@ -391,9 +385,7 @@ def scale_findings(assignment: Assignment, plan: Plan, proposed: Sequence[Propos
     names = [name for figure, name in SCALE_OF.items() if figure in drawn]
     own, round_, each = (proposal.over_all for proposal in proposed)
     values = {name: np.asarray(getattr(plan.scales, name)) for name in names}
-    is_round = all(
-        np.allclose(round_up(scale, steps_of(name)), scale, rtol=1e-6) for name, scale in values.items()
-    )
+    is_round = all(np.allclose(round_up(scale), scale, rtol=1e-6) for name, scale in values.items())
     if own.room < 1.0 or not is_round:
         why = "do not fit" if own.room < 1.0 else "are not round"
         round_text = written(proposed[1].scales, names)

@@ -9,8 +9,7 @@ import pytest
 
 from grader.authoring.lint import lint
 from grader.authoring.round_scales import (
-    LENGTH_STEPS,
-    RATE_STEPS,
+    STEPS,
     _frame_growth,
     extents_of,
     growth,
@@ -27,22 +26,26 @@ from reference.plan import exact_plan
 ROUNDING = 1e-9
 
 
-@pytest.mark.parametrize("steps", [LENGTH_STEPS, RATE_STEPS])
-def test_rounding_up_gives_the_least_round_number_that_is_not_below(steps):
+def test_rounding_up_gives_the_least_round_number_that_is_not_below():
     values = np.geomspace(1e-6, 1e6, 2001)
-    rounded = round_up(values, steps)
+    rounded = round_up(values)
     assert np.all(rounded >= values * (1 - ROUNDING))
     mantissa = rounded / 10.0 ** np.floor(np.log10(rounded) + ROUNDING)
-    assert np.all(np.min(np.abs(mantissa[:, None] - np.array(steps)), axis=1) < 1e-6)
-    np.testing.assert_allclose(round_up(rounded, steps), rounded, rtol=ROUNDING)
+    assert np.all(np.min(np.abs(mantissa[:, None] - np.array(STEPS)), axis=1) < 1e-6)
+    np.testing.assert_allclose(round_up(rounded), rounded, rtol=ROUNDING)
     # The next step down is below the value.
-    ladder = np.sort(np.unique(np.outer(10.0 ** np.arange(-8, 8), steps).ravel().round(12)))
+    ladder = np.sort(np.unique(np.outer(10.0 ** np.arange(-8, 8), STEPS).ravel().round(12)))
     below = ladder[np.searchsorted(ladder, rounded * (1 - 1e-6)) - 1]
     assert np.all(below < values)
 
 
+@pytest.mark.parametrize("scale", [0.004, 0.0004, 0.04, 0.02, 0.2, 2.0, 0.0025, 0.005, 0.1 * 0.2])
+def test_scales_as_courses_use_them_are_round(scale):
+    np.testing.assert_allclose(round_up(np.array([scale])), [scale], rtol=ROUNDING)
+
+
 @pytest.mark.parametrize(
-    ("scale", "told"), [(0.005, "1:5"), (0.0025, "1:2.5"), (0.001, "1:1"), (1e-4, "10:1")]
+    ("scale", "told"), [(0.005, "1:5"), (0.004, "1:4"), (0.0025, "1:2.5"), (0.001, "1:1"), (1e-4, "10:1")]
 )
 def test_a_scale_of_lengths_is_told_as_a_ratio(scale, told):
     assert ratio_text(scale) == told
