@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from grader.authoring.from_mechanism import texts_for
 from grader.files import create_whole
 from grader.rubric import load_rubric
 from reference.authored.assignment import SUFFIXES, Assignment, library, load_assignment, locate
@@ -38,14 +39,18 @@ class New:
     rubric: Path
 
 
-def new_assignment(file: Path, *, like: str | None = None, mechanism: str | None = None) -> New:
+def new_assignment(
+    file: Path, *, like: str | None = None, mechanism: str | None = None, table: Path | None = None
+) -> New:
     """Write a commented assignment, its mechanism and its rubric.
 
     Arguments
     ---------
     file : NAME, or a path that ends in NAME.toml or NAME.assignment.toml
     like : an assignment (a built-in name or a path) whose mechanism, data and rubric are taken
-    mechanism : one of `starts`; the four-bar where neither is given
+    mechanism : one of `starts`, or the path of a mechanism's file, for which scales and rubric are made;
+        the four-bar where neither is given
+    table : the data of the variants, a CSV, for a mechanism's file
 
     Raises CallError where one of the files exists already, or a name is not known; AuthoredFileError
     where the files of `like` have faults.
@@ -53,6 +58,10 @@ def new_assignment(file: Path, *, like: str | None = None, mechanism: str | None
     if like is not None and mechanism is not None:
         raise CallError("like_or_mechanism", "--like and --mechanism both say what to start from: give one")
     path, name = _path_and_name(file)
+    if mechanism is not None and mechanism.endswith(".toml"):
+        return _of_own_mechanism(path, name, Path(mechanism), table)
+    if table is not None:
+        raise CallError("option_unused", "--table goes with a mechanism of your own: --mechanism FILE.toml")
     if like is not None:
         source = load_assignment(like)
         what = f"An assignment like {source.id}."
@@ -66,6 +75,23 @@ def new_assignment(file: Path, *, like: str | None = None, mechanism: str | None
     beside = {kind: path.with_name(f"{name}{SUFFIXES[kind]}") for kind in ("mechanism", "rubric")}
     written = New(path, **beside)
     create_whole({getattr(written, kind): text for kind, text in texts.items()} | _table(source, path))
+    return written
+
+
+def _of_own_mechanism(path: Path, name: str, mechanism: Path, table: Path | None) -> New:
+    """An assignment of a mechanism's file; it and the table are copied where they lie elsewhere."""
+    start = load_start("four-bar")
+    made = texts_for(mechanism, name, _renamed_texts(start, name), table)
+    what = f"An assignment of {mechanism.name}, at the largest round scales that fit every variant."
+    heads = {kind: head.format(what=what, file=path.name, name=name) for kind, head in HEADS.items()}
+    written = New(path, *(path.with_name(f"{name}{SUFFIXES[kind]}") for kind in ("mechanism", "rubric")))
+    texts = {getattr(written, kind): heads[kind] + text for kind, text in made.items()}
+    copied = {} if table is None else {path.parent / table.name: table}
+    for target, source in ({written.mechanism: mechanism} | copied).items():
+        if target.resolve() != source.resolve():
+            text = text_of(source)
+            texts[target] = _renamed(text, {"id": name}) if target == written.mechanism else text
+    create_whole(texts)
     return written
 
 
@@ -144,6 +170,6 @@ def load_start(name: str) -> Assignment:
     if name not in starts():
         raise CallError(
             "unknown_mechanism",
-            f"--mechanism {name}: there are {', '.join(starts())}; or --like an assignment",
+            f"--mechanism {name}: there are {', '.join(starts())}, or a .toml file; or --like an assignment",
         )
     return load_assignment(starts_folder() / f"{name}{SUFFIXES['assignment']}")

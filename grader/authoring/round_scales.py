@@ -28,8 +28,8 @@ Extents = Mapping[str, Size]
 """The size of each figure."""
 IntArray = NDArray[np.intp]
 STEPS = (1.0, 2.0, 2.5, 4.0, 5.0, 10.0)
-"""Of 10^k. Lengths: ISO 5455 has 1, 2, 5, and GOST 2.302 adds 2.5 and 4 (1:4, 1:40, 1:400). The same for
-(m/s)/mm and (m/s^2)/mm: factors by which a ruler's millimetres are easily multiplied."""
+"""Of 10^k: factors by which a ruler's millimetres are easily multiplied. ISO 5455 has 1, 2, 5 for lengths;
+GOST 2.302 adds 2.5 and 4."""
 LEAST_LINK_MM = 20.0
 """The plans' directions are read off the sketch: a shorter link tells them less well than a hand draws."""
 _SLACK = 1e-9
@@ -258,7 +258,7 @@ class Proposal:
 
 
 def round_up(values: FloatArray) -> FloatArray:
-    """The least round number that is not below each value (positive, any shape)."""
+    """The least of `STEPS` times a power of ten that is not below each value (positive, any shape)."""
     decade = 10.0 ** np.floor(np.log10(values) + _SLACK)
     ladder = decade[..., None] * np.asarray(STEPS)
     reached = ladder >= values[..., None] * (1.0 - _SLACK)

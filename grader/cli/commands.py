@@ -104,15 +104,20 @@ def new(
     mechanism: Annotated[
         str | None,
         typer.Option(
-            "--mechanism", help="Start from a four-bar (default), slider-crank, ...; the rubric is made."
+            "--mechanism",
+            help="Start from a four-bar (default), slider-crank, ..., or from your own: a .toml file.",
         ),
+    ] = None,
+    table: Annotated[
+        Path | None,
+        typer.Option("--table", help="Of your own mechanism: a CSV with the data of each variant."),
     ] = None,
 ) -> None:
     """Write a commented assignment to start from: three files that lint and plan take as they are."""
     from grader.authoring.new import new_assignment
     from reference.authored.assignment import load_assignment
 
-    written = new_assignment(file, like=like, mechanism=mechanism)
+    written = new_assignment(file, like=like, mechanism=mechanism, table=table)
     first = load_assignment(written.assignment).variants()[0]
     numbers = (("n", first.n), ("position", first.position))
     chosen = "".join(f" --{name} {value}" for name, value in numbers if value is not None)

@@ -1,0 +1,330 @@
+"""The assignment and the rubric of a mechanism of one's own: made from its file and its construction.
+
+They are the four-bar's commented files with other titles, data, scales and criteria.
+"""
+
+import json
+import re
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from grader.authoring.lint import lint, names_in
+from grader.authoring.round_scales import asked_vectors
+from grader.language import LANGUAGES, N_, tongue
+from grader.rubric import RubricFile, load_rubric
+from reference.authored.assignment import SUFFIXES, Assignment, load_assignment
+from reference.authored.formula import Formula
+from reference.authored.mechanism import (
+    CrankTable,
+    DrivenSliderTable,
+    DyadTable,
+    MechanismFile,
+    PlateTable,
+    SliderTable,
+    SlottedLinkTable,
+)
+from reference.authored.toml_file import SideText, Text, load
+from reference.authored.variant_table import KEYS, MEASURES
+from reference.construction.graph import Construction
+from reference.errors import CallError
+from reference.plan import construction_for
+
+Texts = Mapping[str, str]
+"""The assignment's and the rubric's, by their kind."""
+RANGES = {"n": "{ from = 1, to = 30 }", "position": "{ from = 0, to = 7 }"}
+"""Students and positions of a mechanism whose formulas use their numbers."""
+_UNITS = {
+    "a length": "{length}", "an angle": "°", "revolutions per minute": "rev/min",
+    "an angular velocity": "rad/s", "an angular acceleration": "rad/s²", "a speed": "{length}/s",
+    "an acceleration": "{length}/s²",
+}  # fmt: skip
+"""Of the keys of a mechanism, by what they measure."""
+
+TITLE = N_("%(mechanism)s: velocities and accelerations")
+TASK = N_(
+    "Draw the mechanism, the velocity plan and the acceleration plan of your variant. Declare kL, kv and ka."
+)
+SCALES = {
+    "kL": N_("Scale of lengths"), "kv": N_("Scale of velocities"), "ka": N_("Scale of accelerations"),
+}  # fmt: skip
+LINK = N_("Link %(name)s on the sketch")
+RATES = {
+    "omega": N_("Angular velocity of link %(name)s"),
+    "epsilon": N_("Angular acceleration of link %(name)s"),
+}
+ABSOLUTE = {
+    "v": N_("Velocity of %(point)s"), "a": N_("Acceleration of %(point)s"),
+    "a_n": N_("Normal acceleration of %(point)s"), "a_t": N_("Tangential acceleration of %(point)s"),
+}  # fmt: skip
+RELATIVE = {
+    "v": N_("Velocity of %(point)s about %(other)s"),
+    "a": N_("Acceleration of %(point)s about %(other)s"),
+    "a_n": N_("Normal acceleration of %(point)s about %(other)s"),
+    "a_t": N_("Tangential acceleration of %(point)s about %(other)s"),
+    "a_c": N_("Coriolis acceleration of %(point)s about %(other)s"),
+    "a_r": N_("Acceleration of %(point)s about %(other)s along the guide"),
+}
+"""Titles of vectors, by their letter and part."""
+_POINTS = {"scale": 1.0, "link": 0.5, "vector": 2.0, "angular": 0.5}
+_OPTIONAL = {"scale", "link", "angular"}
+"""What a student may leave out without losing points."""
+_PLANS_MM = 60.0
+"""The first vector of a plan at the scales with which the round ones are sought."""
+
+
+def texts_for(mechanism: Path, name: str, start: Texts, table: Path | None) -> dict[str, str]:
+    """The assignment and the rubric of a mechanism's file, at round scales that fit the answer sheets.
+
+    Arguments
+    ---------
+    mechanism : the file, NAME.mechanism.toml
+    name : of the new assignment
+    start : commented files of which all but titles, data, scales and criteria is taken
+    table : the variants' data, where the mechanism has formulas of other names than `n` and `position`
+
+    Raises AuthoredFileError with the faults of the mechanism or of the table, CallError where the
+    mechanism needs a table and none is given, or no variant of it assembles.
+    """
+    file = load(MechanismFile, mechanism)
+    needed = names_in(file) - {*KEYS}
+    if needed and table is None:
+        raise CallError(
+            "table_needed",
+            f"{mechanism}: give the values of {', '.join(sorted(needed))} by a CSV with a row for each"
+            " student, which names them in its first line beside n (--table)",
+        )
+    first: dict[str, float | str] = {
+        "kL": 0.001,
+        "kv": f"{_first_speed(file)} / {_PLANS_MM:g}",
+        "ka": "kv**2 / kL",
+    }
+    with TemporaryDirectory() as folder:
+        beside = Path(folder)
+        paths = {kind: beside / f"{name}{SUFFIXES[kind]}" for kind in SUFFIXES}
+        paths["mechanism"].write_bytes(mechanism.read_bytes())
+        if table is not None:
+            (beside / table.name).write_bytes(table.read_bytes())
+        assignment = _assignment(file, name, start["assignment"], first, table)
+        paths["assignment"].write_text(assignment, encoding="utf-8")
+        loaded = load_assignment(paths["assignment"])
+        rubric = _rubric(file, name, start["rubric"], loaded)
+        paths["rubric"].write_text(rubric, encoding="utf-8")
+        proposed = lint(loaded, load_rubric(paths["rubric"])).scales
+        if not proposed:
+            message = "no variant of it assembles: its lengths and sides do not fit"
+            raise CallError("no_variant", f"{mechanism}: {message}")
+        scales = {scale: float(f"{np.max(getattr(proposed[1].scales, scale)):.6g}") for scale in SCALES}
+        paths["assignment"].write_text(
+            _assignment(file, name, start["assignment"], scales, table), encoding="utf-8"
+        )
+        fitting = load_assignment(paths["assignment"])
+        rubric = _rubric(
+            file, name, start["rubric"], fitting, _too_short(fitting, load_rubric(paths["rubric"]))
+        )
+        return {"assignment": paths["assignment"].read_text(encoding="utf-8"), "rubric": rubric}
+
+
+def _too_short(assignment: Assignment, rubric: RubricFile) -> set[str]:
+    """The vectors of which some variant's are too short to be judged on their direction."""
+    plan = lint(assignment, rubric).plan
+    asked = asked_vectors(rubric, plan) if plan is not None else None
+    if asked is None:
+        return set()
+    short = np.any(asked.short(asked.least_mm[:, None]), axis=1)
+    return {name for name, is_short in zip(asked.names, short, strict=True) if is_short}
+
+
+def _first_speed(file: MechanismFile) -> str:
+    return "speed" if file.crank is None else "omega * crank_m"
+
+
+# The assignment -----------------------------------------------------------------------------------
+
+
+def _assignment(
+    file: MechanismFile, name: str, start: str, scales: Mapping[str, float | str], table: Path | None
+) -> str:
+    """The start's text with other keys in its tables."""
+    used = names_in(file)
+    variant = [f"{key} = {RANGES[key]}" for key in KEYS if key in used and not (key == "n" and table)]
+    variant += [f"table = {_text(table.name)}"] if table else []
+    given = [
+        [f"label = {_text(label)}", f"value = {_value(value)}", *([f"unit = {_text(unit)}"] if unit else [])]
+        for label, value, unit in _given(file)
+    ]
+    blocks = {_heading(block): block for block in reversed(start.split("\n\n"))}
+    head = blocks[""]
+    for key in ("id", "mechanism", "rubric"):
+        head = re.sub(rf'(?m)^{key} = "[^"]*"', f"{key} = {_text(name)}", head)
+    pages = [block for block in start.split("\n\n") if _heading(block) == "page"]
+    body = [
+        head,
+        _with(blocks["title"], _titles(file.title, TITLE)),
+        _with(blocks["task"], _titles(Text(en="", ro="", ru=""), TASK)),
+        _with(blocks["variant"], variant),
+        _with(blocks["scales"], [f"{scale} = {json.dumps(value)}" for scale, value in scales.items()]),
+        *pages,
+        *("\n".join(["[[given]]", *lines]) for lines in given),
+    ]
+    return "\n\n".join(body).rstrip("\n") + "\n"
+
+
+def _heading(block: str) -> str:
+    """The name of the table that a block of lines is."""
+    found = re.search(r"(?m)^\[+([a-z.]+)\]", block)
+    return found[1] if found else ""
+
+
+def _with(block: str, keys: Iterable[str]) -> str:
+    """A table's comments and heading, with other keys."""
+    lines = block.split("\n")
+    at = next(place for place, line in enumerate(lines) if line.startswith("[")) + 1
+    return "\n".join([*lines[:at], *keys, *(line for line in lines[at:] if line.startswith("#"))])
+
+
+def _value(formula: str) -> str:
+    """A number as it is, any other formula as text."""
+    try:
+        return f"{float(formula):.15g}"
+    except ValueError:
+        return _text(formula)
+
+
+def _text(value: object) -> str:
+    """A TOML string: of these texts it is JSON's."""
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _titles(title: Text, phrase: str) -> list[str]:
+    """A phrase in the languages that the mechanism's title has."""
+    known = {lang: getattr(title, lang) for lang in LANGUAGES}
+    return [
+        f"{lang} = {_text(tongue(lang).gettext(phrase) % {'mechanism': text})}"
+        for lang, text in known.items()
+        if text is not None
+    ]
+
+
+def _given(file: MechanismFile) -> Iterator[tuple[str, str, str]]:
+    """Label, value and unit of what the student needs to draw the mechanism."""
+    tables: list[Any] = [file.driver, *file.group]
+    for joint, at in file.ground.items():
+        yield from _point(joint, at, file.length_unit)
+    for table in tables:
+        labels = _labels(table)
+        for key, value in table:
+            if isinstance(value, SideText) and isinstance(value.side, Formula):
+                yield (
+                    labels.get(key, f"{table.node}, {key}"),
+                    value.side.text,
+                    "",
+                )
+        for key, measure in MEASURES.items():
+            values = getattr(table, key, None)
+            unit = _UNITS[measure].format(length=file.length_unit)
+            if key in ("through", "at") or values is None:
+                continue
+            for index, one in enumerate(values if isinstance(values, list) else [values]):
+                yield labels.get((key, index), labels.get(key, key)), one.text, unit
+        guides = getattr(table, "guides", None) or [getattr(table, "guide", None)]
+        node = getattr(table, "node", None) or table.pin
+        for guide in guides:
+            if guide is not None and guide.angle_deg is not None:
+                yield from _point(f"guide {node}", guide.through, file.length_unit)
+                yield f"φ(guide {node})", guide.angle_deg.text, "°"
+        if getattr(table, "at", None) is not None:
+            yield from _point(node, table.at, file.length_unit)
+        if getattr(table, "ratio", None) is not None:
+            yield f"{table.base[0]}{node} : {table.base[0]}{table.base[1]}", table.ratio.text, ""
+        if getattr(table, "gear_ratio", None) is not None:
+            yield "i", table.gear_ratio.text, ""
+
+
+def _point(name: str, at: Any, unit: str) -> Iterator[tuple[str, str, str]]:  # noqa: ANN401 - two formulas
+    for axis, value in zip("xy", at, strict=True):
+        if value.text not in ("0", "0.0"):
+            yield f"{axis}({name})", value.text, unit
+
+
+def _labels(table: object) -> dict[Any, str]:
+    """What the data of a table are called, by key, or by key and place in a list."""
+    match table:
+        case CrankTable():
+            link = table.link
+            return {
+                "length": table.pivot + table.pin, "angle_deg": f"φ{link}", "omega": f"ω{link}", "rpm": "n",
+                "epsilon": f"ε{link}",
+            }  # fmt: skip
+        case DrivenSliderTable():
+            return {"displacement": "s", "speed": "v", "acceleration": "a"}
+        case DyadTable():
+            side = f"{table.node}, {table.pins[0]}→{table.pins[1]}"
+            return {("lengths", index): pin + table.node for index, pin in enumerate(table.pins)} | {
+                "side": side
+            }
+        case SliderTable():
+            return {"length": table.pin + table.node, "side": f"{table.node}, {table.pin}"}
+        case PlateTable():
+            side = f"{table.node}, {table.base[0]}→{table.base[1]}"
+            return {("lengths", index): pin + table.node for index, pin in enumerate(table.base)} | {
+                "side": side
+            }
+        case SlottedLinkTable():
+            return {"offset": f"{table.pivot}{table.foot}"}
+    return {}
+
+
+# The rubric ---------------------------------------------------------------------------------------
+
+
+def _rubric(
+    file: MechanismFile, name: str, start: str, assignment: Assignment, unasked: Collection[str] = ()
+) -> str:
+    """The start's rubric with a criterion for each scale, link, vector and angular quantity."""
+    construction = construction_for(assignment)
+    blocks = [block for block in start.split("\n\n") if "[[criterion]]" not in block]
+    titles = _titles(file.title, TITLE)
+    blocks = [_with(block, titles) if _heading(block) == "title" else block.rstrip("\n") for block in blocks]
+    blocks[0] = re.sub(r'(?m)^id = "[^"]*"', f"id = {_text(name)}", blocks[0])
+    if unasked:
+        blocks.append(
+            f"# Not asked for, in some variant too short to be measured: {', '.join(sorted(unasked))}."
+        )
+    criteria = [
+        *(("scale", name, phrase, {}) for name, phrase in SCALES.items()),
+        *(("link", name, LINK, {"name": name}) for name in construction.links),
+        *(
+            ("vector", name, *titled(name, construction))
+            for name in construction.vectors
+            if name not in unasked
+        ),
+        *(
+            ("angular", name, RATES[name.partition("_")[0]], {"name": name.partition("_")[2]})
+            for name in construction.rates
+        ),
+    ]
+    return "\n\n".join([*blocks, *(_criterion(*one) for one in criteria)]) + "\n"
+
+
+def _criterion(kind: str, name: str, phrase: str, known: Mapping[str, str]) -> str:
+    title = ", ".join(f"{lang} = {_text(tongue(lang).gettext(phrase) % known)}" for lang in LANGUAGES)
+    lines = ["[[criterion]]", f"id = {_text(name)}", f"title = {{ {title} }}", f"points = {_POINTS[kind]}"]
+    lines += [f"{kind} = {_text(name)}", *(["optional = true"] if kind in _OPTIONAL else [])]
+    return "\n".join(lines)
+
+
+def titled(name: str, construction: Construction) -> tuple[str, dict[str, str]]:
+    """The phrase for a vector, and the points that stand in it: ``a_BA_n`` is of B about A."""
+    letter, body, *part = name.split("_")
+    joints = {joint for vector in construction.vectors.values() for joint in vector.link or ()}
+    joints |= {joint for link in construction.links.values() for joint in link}
+    kind = "_".join([letter, *part])
+    pairs = [(body[:at], body[at:]) for at in range(1, len(body)) if {body[:at], body[at:]} <= joints]
+    if body not in joints and pairs:
+        point, other = pairs[0]
+        return RELATIVE[kind], {"point": point, "other": other}
+    return ABSOLUTE[kind], {"point": body}

@@ -1,0 +1,117 @@
+"""Assignments made from a mechanism's own file."""
+
+from pathlib import Path
+
+import pytest
+
+from grader.authoring.lint import lint
+from grader.authoring.new import new_assignment, starts, starts_folder
+from grader.rubric import rubric_of
+from reference.authored.assignment import load_assignment
+from reference.errors import AuthoredFileError, CallError
+
+SIX_BAR = """
+schema_version = 1
+id = "other"
+length_unit = "mm"
+title = { en = "Six-bar", ro = "Mecanism cu șase elemente" }
+[ground]
+O1 = [0, 0]
+O2 = ["d", 0]
+[crank]
+pivot = "O1"
+pin = "A"
+length = "a"
+angle_deg = "phi"
+rpm = "n1"
+[[group]]
+type = "RRR"
+node = "B"
+pins = ["A", "O2"]
+links = ["2", "3"]
+lengths = [210, 165]
+side = "side_B"
+[[group]]
+type = "RRP"
+node = "C"
+pin = "B"
+link = "4"
+length = 320
+guide = { through = [0, 150], angle_deg = 0 }
+side = "ahead"
+"""
+TABLE = "n,a [mm],d [mm],phi [deg],n1 [rpm],side_B\n1,85,260,290,120,left\n4,90,240,165,150,left\n"
+
+
+def written(folder: Path, text: str = SIX_BAR, table: str | None = TABLE) -> tuple[Path, Path | None]:
+    path = folder / "mine.mechanism.toml"
+    path.write_text(text, encoding="utf-8")
+    if table is None:
+        return path, None
+    (folder / "data.csv").write_text(table, encoding="utf-8")
+    return path, folder / "data.csv"
+
+
+def test_an_assignment_of_a_mechanism_and_a_table_has_no_fault_and_no_warning(tmp_path):
+    mechanism, table = written(tmp_path)
+    new = new_assignment(tmp_path / "course" / "six", mechanism=str(mechanism), table=table)
+    assignment = load_assignment(new.assignment)
+    assert [variant.n for variant in assignment.variants()] == [1, 4]
+    result = lint(assignment, rubric_of(assignment))
+    assert {finding.severity for finding in result.findings} <= {"hint"}
+    assert "round_scales" not in {finding.code for finding in result.findings}
+    assert assignment.mechanism_file.id == "six"
+    given = {datum.label: value for datum, value in assignment.given(assignment.variants()[0])}
+    assert {"O1A": 85.0, "AB": 210.0, "O2B": 165.0, "BC": 320.0, "x(O2)": 260.0, "n": 120.0}.items() <= given.items()
+
+
+def test_titles_are_those_of_the_mechanism_in_its_languages(tmp_path):
+    mechanism, table = written(tmp_path)
+    new = new_assignment(tmp_path / "course" / "six", mechanism=str(mechanism), table=table)
+    title = load_assignment(new.assignment).file.title
+    assert (title.ro, title.ru) == ("Mecanism cu șase elemente: viteze și accelerații", None)
+    rubric = rubric_of(load_assignment(new.assignment))
+    titles = {criterion.id: criterion.title for criterion in rubric.criterion}
+    assert titles["a_CB_t"].en == "Tangential acceleration of C about B"
+    assert titles["a_B_n"].ru == "Нормальное ускорение точки B"
+
+
+def test_a_file_that_lies_there_under_its_name_stays(tmp_path):
+    mechanism, table = written(tmp_path)
+    before = mechanism.read_bytes()
+    new_assignment(tmp_path / "mine", mechanism=str(mechanism), table=table)
+    assert mechanism.read_bytes() == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "data.csv", "mine.assignment.toml", "mine.mechanism.toml", "mine.rubric.toml",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", starts())
+def test_every_kind_of_group_is_titled_given_and_fits(name, tmp_path):
+    """The starts' mechanisms, their formulas as numbers of one variant."""
+    source = load_assignment(starts_folder() / f"{name}.assignment.toml")
+    text = (starts_folder() / f"{name}.mechanism.toml").read_text(encoding="utf-8")
+    values = source.values([source.variants()[9]])
+    for key in sorted(values, key=len, reverse=True):
+        text = text.replace(f'"{key}"', str(float(values[key][0])))
+    (tmp_path / "own.mechanism.toml").write_text(text, encoding="utf-8")
+    new = new_assignment(tmp_path / "own", mechanism=str(tmp_path / "own.mechanism.toml"))
+    assignment = load_assignment(new.assignment)
+    result = lint(assignment, rubric_of(assignment))
+    assert {finding.severity for finding in result.findings} <= {"hint"}, result.findings
+
+
+@pytest.mark.parametrize(
+    ("text", "table", "error", "message"),
+    [
+        (SIX_BAR, None, CallError, "give the values of a, d, n1, phi, side_B by a CSV"),
+        (SIX_BAR.replace('"RRR"', '"RRX"'), TABLE, AuthoredFileError, "RRX"),
+        (SIX_BAR, "n,a [mm]\n1,85\n", AuthoredFileError, "'d' is not known"),
+        (SIX_BAR.replace("210, 165", "21, 16"), TABLE, CallError, "no variant of it assembles"),
+    ],
+)
+def test_what_cannot_be_made_is_told_and_nothing_is_written(text, table, error, message, tmp_path):
+    mechanism, beside = written(tmp_path, text, table)
+    with pytest.raises(error, match=message):
+        new_assignment(tmp_path / "course" / "six", mechanism=str(mechanism), table=beside)
+    assert not (tmp_path / "course").exists()
