@@ -1,6 +1,7 @@
 """Files written whole or not at all, folders of results, and the folder of bundled samples."""
 
 import contextlib
+import logging
 import os
 import secrets
 from collections import Counter
@@ -46,6 +47,24 @@ def write_whole(path: Path, data: bytes | str) -> None:
     """
     with replacing(path) as temporary:
         _write_new(temporary, data)
+
+
+def log_to(path: Path) -> None:
+    """Add what is logged to a file, from now on; raises OutputError with the system's reason."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handler = logging.FileHandler(path, encoding="utf-8")
+    except OSError as error:
+        why = f"{error.strerror or error}; choose another place"
+        raise OutputError("cannot_write", f"{path}: the log cannot be written ({why})") from error
+    handler.setFormatter(logging.Formatter("%(asctime)s %(process)d %(message)s"))
+    logging.getLogger("planmark").addHandler(handler)
+
+
+def remove_parts(folder: Path) -> None:
+    """Remove the temporary files that killed processes left at any depth of a folder."""
+    for path in folder.rglob(".*.part"):
+        _remove(path)
 
 
 def make_folder(path: Path) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from grader.authoring.findings import SEVERITIES, File, LintFinding, mechanism_place
+from grader.authoring.findings import NAMED, SEVERITIES, File, LintFinding, mechanism_place
 from grader.authoring.round_scales import (
     WELL_READ_MM,
     AskedVectors,
@@ -245,18 +245,23 @@ def texts_in(thing: object, path: str) -> Iterator[tuple[str, Text]]:
 
 
 def _untranslated(assignment: Assignment, rubric: RubricFile) -> Iterator[LintFinding]:
-    """Texts that students of one language would read in English: one finding for each file and language."""
+    """Texts that some students would read in English: one finding for each file."""
     file = assignment.file
     files: dict[File, BaseModel] = {"assignment": file, "rubric": rubric}
     if isinstance(file.mechanism, str):
         files["mechanism"] = assignment.mechanism_file
     for name, authored in files.items():
-        for language in LANGUAGES[1:]:  # the first is English, which is required
-            missing = [path for path, text in texts_in(authored, "$") if not getattr(text, language)]
-            if missing:
-                more = f", nor have {len(missing) - 1} texts below it" if len(missing) > 1 else ""
-                message = f"has no text in {language}{more}: students who read {language} see the English one"
-                yield LintFinding("hint", "not_translated", name, missing[0], message)
+        # The first language is English, which is required.
+        missing = [
+            f"{path}.{language}"
+            for path, text in texts_in(authored, "$")
+            for language in LANGUAGES[1:]
+            if not getattr(text, language)
+        ]
+        if missing:
+            more = f" and {len(missing) - NAMED} more" if len(missing) > NAMED else ""
+            message = f"students read English in place of {', '.join(missing[:NAMED])}{more}"
+            yield LintFinding("hint", "not_translated", name, missing[0], message)
 
 
 def _rubric_faults(rubric: RubricFile, construction: Construction) -> Iterator[LintFinding]:

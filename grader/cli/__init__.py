@@ -2,9 +2,11 @@
 
 import gc
 import os
+import sys
 
 from grader.cli import commands  # noqa: F401 - registers the commands on the application
 from grader.cli.app import app
+from grader.cli.terminal import INTERRUPTED, set_encoding
 
 COLLECT_FROM = 50_000
 """New objects before Python looks for cycles: imports make many that all stay, and each look costs time."""
@@ -15,4 +17,13 @@ def main() -> None:
     gc.set_threshold(COLLECT_FROM)
     # planmark has no plugins of pydantic; a search for them reads the metadata of every installed package.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    app()
+    set_encoding()
+    try:
+        app(prog_name="planmark")
+    except SystemExit as end:
+        if end.code == INTERRUPTED:
+            # At once and with this status: Python ends by a signal where exec() was interrupted.
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(INTERRUPTED)
+        raise

@@ -4,16 +4,21 @@ Exit status: 0 all done; 1 done, but something needs a person; 2 the call or an 
 wrong; 3 a mechanism does not assemble or is singular; 5 a file cannot be written; 130 interrupted.
 """
 
-import sys
+import inspect
+import shutil
+import signal
+import time
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from grader import __version__
+from grader.cli import class_folder, terminal
 from reference.errors import CallError, PlanmarkError
 
 if TYPE_CHECKING:
@@ -30,14 +35,25 @@ def new_table(*headings: str, left: Collection[str] = ()) -> "Table":
     return table
 
 
+STEP_S = 5.0
+"""A file or a pipe gets a line of progress at most so often, besides the last one of each kind of work."""
+
+
 @contextmanager
 def progress() -> Iterator[Callable[[str, int, int], None]]:
-    """A progress bar; what it gives is called with a kind of work, how much is done, and of how much."""
+    """Show progress; what it gives is called with a kind of work, how much is done, and of how much.
+
+    A bar on a terminal, lines in a pipe or a file, nothing with `--quiet`.
+    """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
+    console = Console(stderr=True, quiet=terminal.is_quiet())
+    if not console.is_terminal or console.is_dumb_terminal:
+        yield terminal.StepLines(STEP_S)
+        return
     columns = (TextColumn("{task.description:>8}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with Progress(*columns, console=console, transient=True) as bar:
         tasks: dict[str, TaskID] = {}
 
         def tell(what: str, done: int, total: int) -> None:
@@ -50,9 +66,33 @@ def progress() -> Iterator[Callable[[str, int, int], None]]:
 
 LONGEST = 500
 """Letters of a command's first sentence in the list of commands: no sentence is cut."""
+WIDEST, NARROWEST = 100, 30
+"""Columns of the help: longer lines are hard to read, and no word of it is longer than the least."""
+UNBROKEN = "\N{NON-BREAKING HYPHEN}"
+"""Stands for a hyphen while lines are broken: an option's name stays in one piece."""
 
 
-class Commands(TyperGroup):
+class _Help:
+    """Help that keeps options in one piece, and descriptions wide in a narrow terminal."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401 - click's own signature
+        """Write the help as click does, with room for descriptions and unbroken options."""
+        write_dl, write_text, widest = formatter.write_dl, formatter.write_text, formatter.width // 3
+
+        def write_rows(rows: Collection[tuple[str, str]]) -> None:
+            write_dl([(name, text.replace("-", UNBROKEN)) for name, text in rows], col_max=widest)
+
+        formatter.write_dl = write_rows
+        formatter.write_text = lambda text: write_text(text.replace("-", UNBROKEN))
+        super().format_help(ctx, formatter)  # type: ignore[misc]
+        formatter.buffer = [text.replace(UNBROKEN, "-") for text in formatter.buffer]
+
+
+class Command(_Help, TyperCommand):
+    """A command."""
+
+
+class Commands(_Help, TyperGroup):
     """The group of commands; errors of planmark end in one message and their exit status."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401 - click's own signature
@@ -66,18 +106,85 @@ class Commands(TyperGroup):
         try:
             return super().invoke(ctx)
         except PlanmarkError as error:
-            typer.secho(f"planmark: {error.message}", err=True, fg="red")
-            ctx.exit(error.exit_status)
+            terminal.LOG.debug("%s", error.code, exc_info=error)
+            self._end(ctx, error.message, error.exit_status)
         except KeyboardInterrupt:
-            typer.secho("planmark: interrupted; every file that was written is whole", err=True, fg="red")
-            ctx.exit(130)
+            # A second Ctrl+C would only break the end of this one.
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+            told = "interrupted; every file that was written is whole; the same command goes on"
+            self._end(ctx, told, terminal.INTERRUPTED)
+
+    @staticmethod
+    def _end(ctx: Any, message: str, status: int) -> None:  # noqa: ANN401 - as above
+        typer.secho(f"planmark: {message}", err=True, fg="red", color=terminal.color())
+        terminal.LOG.debug("exit status %d: %s", status, message)
+        ctx.exit(status)
 
 
-app = typer.Typer(
+QuietOption = Annotated[
+    bool, typer.Option("--quiet", "-q", help="Only results and what needs a person; no progress.")
+]
+VerboseOption = Annotated[bool, typer.Option("--verbose", "-v", help="Print what the log holds, too.")]
+LogOption = Annotated[
+    Path | None,
+    typer.Option("--log", help="Add to this file: times, versions, each submission's outcome, tracebacks."),
+]
+
+
+def _common(*, quiet: QuietOption = False, verbose: VerboseOption = False, log: LogOption = None) -> None:
+    """The options of every command."""
+    terminal.set_up(quiet=quiet, verbose=verbose, log=log)
+
+
+class _Application(typer.Typer):
+    """An application in which every command has the common options."""
+
+    def command(  # type: ignore[override]
+        self, name: str | None = None
+    ) -> Callable[[Callable[..., None]], Callable[..., None]]:
+        register = super().command(name, cls=Command)
+
+        def add(function: Callable[..., None]) -> Callable[..., None]:
+            own, common = (inspect.signature(one, eval_str=True).parameters for one in (function, _common))
+
+            @wraps(function)
+            def run(context: typer.Context, **values: Any) -> None:  # noqa: ANN401 - the commands' options
+                _common(**{option: values.pop(option) for option in common})
+                terminal.note_call()
+                class_folder.tell_used(context)
+                start = time.monotonic()
+                try:
+                    function(**values)
+                except (typer.Exit, PlanmarkError):
+                    raise
+                except Exception:
+                    terminal.LOG.debug("a fault of planmark", exc_info=True)
+                    raise
+                finally:
+                    terminal.LOG.debug("ended after %.1f s", time.monotonic() - start)
+
+            parameters = [*own.values(), *common.values()]
+            first = inspect.signature(run, follow_wrapped=False).parameters["context"]
+            first = first.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)
+            parameters = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in parameters]
+            run.__signature__ = inspect.Signature([*parameters, first])  # type: ignore[attr-defined]
+            run.__annotations__ = {one.name: one.annotation for one in (*parameters, first)}
+            register(run)
+            return function
+
+        return add
+
+
+def _width() -> int:
+    """Columns of the help: the terminal's, within what can be read."""
+    return max(min(shutil.get_terminal_size().columns, WIDEST) - 2, NARROWEST)
+
+
+app = _Application(
     cls=Commands,
     no_args_is_help=True,
     rich_markup_mode=None,  # frames around the help cost more time than all else that --help does
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"], "terminal_width": _width()},
     pretty_exceptions_enable=False,
     help="Marks velocity and acceleration plans of planar mechanisms drawn on A3 sheets.",
 )
@@ -96,25 +203,68 @@ def _options(
         typer.Option("--version", callback=_tell_version, is_eager=True, help="Tell the version and end."),
     ] = False,
 ) -> None:
-    for stream in (sys.stdout, sys.stderr):
-        reconfigure = getattr(stream, "reconfigure", None)
-        if reconfigure:
-            reconfigure(encoding="utf-8", errors="replace")
+    """Options of the program itself."""
+
+
+def _assignments() -> list[str]:
+    """The built-in names, for a shell that completes them."""
+    from reference.authored.assignment import built_in
+
+    return built_in()
+
+
+def _languages() -> list[str]:
+    """The languages, for a shell that completes them."""
+    from grader.language import LANGUAGES
+
+    return list(LANGUAGES)
 
 
 AssignmentArgument = Annotated[
-    str, typer.Argument(metavar="ASSIGNMENT", help="A built-in name (pump, press, ...) or a .toml file.")
+    str,
+    typer.Argument(
+        metavar="ASSIGNMENT",
+        help="A built-in name (pump, press, ...) or a .toml file.",
+        autocompletion=_assignments,
+    ),
 ]
 NumberOption = Annotated[
     int | None, typer.Option("--n", help="The student's number, where data depend on it.")
 ]
 PositionOption = Annotated[int | None, typer.Option("--position", help="The position, where there are some.")]
-AssignmentOption = Annotated[str, typer.Option("--assignment", help="A built-in name or a .toml file.")]
-FolderArgument = Annotated[Path, typer.Argument(help="The folder with what was handed in.")]
-OutOption = Annotated[Path, typer.Option("--out", help="The folder for the results.")]
+AssignmentOption = Annotated[
+    str,
+    typer.Option("--assignment", help="A built-in name or a .toml file.", autocompletion=_assignments),
+]
+FolderArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="FOLDER",
+        help="The folder with what was handed in; the working folder if it has a planmark.toml.",
+        default_factory=lambda: None,
+        is_eager=True,  # its planmark.toml gives the options that are absent
+        callback=class_folder.class_folder,
+        show_default=False,
+    ),
+]
+ResultsArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="OUT",
+        help="The folder that `planmark grade` wrote, or the class's folder; the working folder if it has"
+        " a planmark.toml.",
+        default_factory=lambda: None,
+        is_eager=True,  # as above
+        callback=class_folder.class_results,
+        show_default=False,
+    ),
+]
+OutOption = Annotated[Path, typer.Option("--out", "-o", help="The folder for the results.")]
 RosterOption = Annotated[Path | None, typer.Option("--roster", help="The class: roster.csv.")]
 JobsOption = Annotated[int | None, typer.Option("--jobs", min=1, help="Processes; all processors if absent.")]
-LanguageOption = Annotated[str, typer.Option("--lang", help="Language of feedback: en, ro or ru.")]
+LanguageOption = Annotated[
+    str, typer.Option("--lang", help="Language of feedback: en, ro or ru.", autocompletion=_languages)
+]
 
 
 def check_language(lang: str) -> None:

@@ -1,74 +1,151 @@
 """``planmark check``."""
 
+import csv
+import io
 from pathlib import Path
 
+import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from grader.cli.app import check_language
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
-from grader.documents import Quantity
-from grader.feedback.sentences import mistake_feedback, reason_sentence
+from grader.documents import ProblemDocument, Quantity
+from grader.feedback.advice import RESULTS, CheckedLine, checked_lines
+from grader.feedback.sentences import mistake_feedback
 from grader.files import write_whole
-from grader.inputs.measurements import Measurements, names_of, read_measurements
-from grader.language import Tongue, tongue
+from grader.inputs.measurements import Measurements, columns_of, names_of, read_measurements
+from grader.language import N_, Tongue, tongue
 from grader.marking.mark import judge
-from grader.marking.self_check import LEVELS, Checked, Level, checked_values, is_all_right, likely_mistakes
+from grader.marking.self_check import LEVELS, Level, is_all_right, likely_mistakes
 from grader.rubric import RubricFile, rubric_of
-from reference.authored.assignment import Assignment, Variant, load_assignment
-from reference.errors import CallError
+from reference.authored.assignment import Assignment, Variant, built_in, load_assignment
+from reference.errors import CallError, MechanismError
 
-MARKS = {"right": ("✓", "green"), "off": ("✗", "red"), "open": ("?", "magenta")}
+STYLES = {"right": "green", "off": "red", "open": "magenta"}
+NOTHING = N_("nothing that this assignment asks for was measured")
+NO_MEASUREMENTS = N_("--measured FILE is needed: your measurements; --template FILE writes a file to fill in")
+PAGE_NAME = N_("--page %(file)s: the name must end in .html; print the page for paper")
+PAGE_STUDENTS = N_("--page is one student's: %(file)s holds %(count)s")
+TEMPLATE_NAME = N_("--template %(file)s: the name must end in .csv")
+TEMPLATE_EXISTS = N_(
+    "--template %(file)s: there is such a file already, perhaps filled in: choose another name"
+)
+WRITTEN = N_("%(file)s: fill in its last line, then check it by --measured %(file)s")
+LEVEL = N_("--level %(level)s: known are %(names)s")
+NO_ASSIGNMENT = N_(
+    "there is no assignment '%(name)s'; built in are %(names)s; or give the path of a .toml file"
+)
+NEEDED = N_("--%(what)s is needed: this assignment has %(what)s from %(first)s to %(last)s")
+RANGE = N_("%(what)s = %(value)s: this assignment has %(what)s from %(first)s to %(last)s")
+DISAGREES = N_("--%(what)s %(called)s, but %(file)s says %(what)s %(filed)s: which is right?")
+ASSEMBLY = {
+    "does_not_assemble": N_("The mechanism does not assemble with these data."),
+    "singular": N_("The velocities are not determined in this position of the mechanism."),
+}
+HOW_TO_FILL_IN = N_(
+    "# Drawn lengths in mm; _deg: directions counter-clockwise from the horizontal to the right; _value:"
+    " computed values, counter-clockwise positive; scales with their units. What is blank is not checked;"
+    " lines that begin with # are passed over."
+)
 
 
 def check_measured(
     name: str,
     n: int | None,
     position: int | None,
-    file: Path,
+    file: Path | None,
     lang: str,
     level: str,
     page: Path | None = None,
+    template: Path | None = None,
 ) -> bool:
     """Print right or off for every value of a measurement file; whether anything is off.
 
-    With a `page`, one student's values are drawn and told in that file, too.
+    With a `page`, one student's values are drawn and told in that file, too. With a `template`, the file
+    to fill in is written.
     """
     check_language(lang)
+    speaker = tongue(lang)
     if page is not None and page.suffix.lower() != ".html":
-        raise CallError("page_file", f"--page {page}: the name must end in .html; print the page for paper")
-    wanted = checked_level(level)
+        raise _refused(speaker, "page_file", PAGE_NAME, file=page)
+    wanted = checked_level(level, speaker)
+    if name not in built_in() and not name.endswith(".toml"):
+        raise _refused(speaker, "unknown_assignment", NO_ASSIGNMENT, name=name, names=", ".join(built_in()))
     assignment = load_assignment(name)
     rubric = rubric_of(assignment)
-    words = tongue(lang)
+    if template is not None:
+        _write_template(template, rubric, _variant(assignment, None, n, position, speaker), speaker)
+    if file is None:
+        if template is None:
+            raise _refused(speaker, "measured_needed", NO_MEASUREMENTS)
+        return False
     console = Console()
     all_right = True
-    students = read_measurements(file, names_of(assignment))
+    students = read_measurements(file, names_of(assignment), lang=lang, is_own=True)
     if page is not None and len(students) != 1:
-        raise CallError("page_students", f"--page is one student's: {file} holds {len(students)}")
+        raise _refused(speaker, "page_students", PAGE_STUDENTS, file=file, count=len(students))
+    if not students:
+        console.print(speaker.gettext(NOTHING), style="yellow")
+    driven = assignment.mechanism_file.driver.pin
+    names = assignment.file.names
     for entered in students:
-        variant = _variant(assignment, entered, n, position)
-        _tell_head(console, entered, variant)
-        if page is not None:
-            _write_page(page, assignment, rubric, variant, entered, lang, wanted)
+        variant = _variant(assignment, entered, n, position, speaker)
+        _tell_head(console, entered, variant, speaker)
         submission = Submission(measured=entered.reading, values=entered.values, declared=entered.scales)
-        judgement = judge(task_of(assignment, rubric, variant), submission)
-        checked = checked_values(judgement, wanted)
-        _tell(console, checked, wanted, words, assignment)
-        for mistake in likely_mistakes(judgement, wanted):
-            sentences = mistake_feedback(mistake, lang, "full", assignment.file.names)
+        try:
+            judgement = judge(task_of(assignment, rubric, variant), submission)
+        except MechanismError as error:
+            known = speaker.gettext(ASSEMBLY[error.code]) if error.code in ASSEMBLY else error.message
+            raise CallError(error.code, f"{variant}: {known}") from error
+        lines = checked_lines(judgement, wanted, speaker, names, driven)
+        _tell(console, lines, wanted, speaker)
+        likely = likely_mistakes(judgement, wanted)
+        mistakes = [mistake_feedback(mistake, lang, "full", names) for mistake in likely]
+        for mistake, sentences in zip(likely, mistakes, strict=True):
             console.print(f"  {mistake.code}: {sentences}", highlight=False, markup=False)
-        all_right = all_right and is_all_right(checked) and bool(checked) and not entered.problems
-    return not all_right
+        if page is not None:
+            _write_page(page, assignment, rubric, variant, entered, lang, wanted, lines, mistakes)
+        is_right = is_all_right(tuple(line.checked for line in lines))
+        all_right = all_right and is_right and bool(lines) and not entered.problems
+    return not (all_right and students)
 
 
-def checked_level(level: str) -> Level:
+def _refused(speaker: Tongue, code: str, text: str, **known: object) -> CallError:
+    """The error of a call, in the student's language."""
+    return CallError(code, speaker.gettext(text) % known if known else speaker.gettext(text))
+
+
+def checked_level(level: str, speaker: Tongue | None = None) -> Level:
     """A level of feedback; raises CallError for another word."""
     wanted = next((known for known in LEVELS if known == level), None)
     if wanted is None:
-        raise CallError("unknown_level", f"--level {level}: known are {', '.join(LEVELS)}")
+        known = {"level": level, "names": ", ".join(LEVELS)}
+        raise _refused(speaker or tongue("en"), "unknown_level", LEVEL, **known)
     return wanted
+
+
+def _write_template(file: Path, rubric: RubricFile, variant: Variant, speaker: Tongue) -> None:
+    """Write the file that a student fills in: columns, a comment with units, a line for the values."""
+    if file.suffix.lower() != ".csv":
+        raise _refused(speaker, "template_file", TEMPLATE_NAME, file=file)
+    if file.exists():
+        raise _refused(speaker, "template_exists", TEMPLATE_EXISTS, file=file)
+    known = {"n": variant.n, "position": variant.position}
+    columns = {name: "" for name, value in known.items() if value is not None} | columns_of(rubric)
+    units = [speaker.unit(unit) for unit in columns.values()]
+    text = io.StringIO()
+    # Spreadsheets of languages with decimal commas separate fields by semicolons.
+    writer = csv.writer(text, delimiter="," if speaker.decimal_mark == "." else ";", lineterminator="\r\n")
+    writer.writerows(
+        [list(columns), [f"# {units[0]}".strip(), *units[1:]], [speaker.gettext(HOW_TO_FILL_IN)]]
+    )
+    writer.writerow([known.get(name, "") for name in columns])
+    # With a byte order mark: spreadsheets take the file for UTF-8.
+    write_whole(file, text.getvalue().encode("utf-8-sig"))
+    typer.echo(speaker.gettext(WRITTEN) % {"file": file})
 
 
 def _write_page(
@@ -79,55 +156,67 @@ def _write_page(
     entered: Measurements,
     lang: str,
     level: Level,
+    lines: list[CheckedLine],
+    mistakes: list[str],
 ) -> None:
     """The same as a page, with the plans drawn as measured."""
-    from grader.feedback.student_page import About, feedback_page
+    from grader.feedback.check_page import check_page
+    from grader.feedback.student_page import About
     from grader.inputs.measurements import StudentSubmission
     from grader.pipeline import mark
 
     submission = StudentSubmission(entered.student_id or "", variant, measured=entered, lang=lang)
     report, pictures = mark(submission, (), assignment, rubric, level)
+    problems = [*entered.problems, *entered.reading.problems]
+    told = [ProblemDocument(code=one.code, message=one.message, file=one.file) for one in problems]
     about = About(assignment.file.title.in_language(lang), "", assignment.file.names)
-    write_whole(page, feedback_page(report, pictures, lang, level, about))
+    report = report.model_copy(update={"problems": told})
+    write_whole(page, check_page(report, pictures, lines, mistakes, lang, about))
 
 
-def _variant(assignment: Assignment, entered: Measurements, n: int | None, position: int | None) -> Variant:
+def _variant(
+    assignment: Assignment, entered: Measurements | None, n: int | None, position: int | None, speaker: Tongue
+) -> Variant:
     """The variant of the call or the file; raises CallError where they contradict each other."""
-    chosen = []
-    for what, called, filed in (("n", n, entered.n), ("position", position, entered.position)):
-        if called is not None and filed is not None and called != filed:
-            raise CallError(
-                f"{what}_disagrees",
-                f"--{what} {called}, but {entered.source} says {what} {filed}: which is right?",
-            )
-        chosen.append(filed if called is None else called)
-    return assignment.variant(*chosen)
+    chosen: dict[str, int | None] = {}
+    spec = assignment.file.variant
+    for what, called, allowed in (("n", n, spec.n), ("position", position, spec.position)):
+        filed = None if entered is None else getattr(entered, what)
+        if entered is not None and called is not None and filed is not None and called != filed:
+            known = {"what": what, "called": called, "filed": filed, "file": entered.source}
+            raise _refused(speaker, f"{what}_disagrees", DISAGREES, **known)
+        value = chosen[what] = filed if called is None else called
+        if allowed is not None and (value is None or value not in allowed.values):
+            limits = {"what": what, "first": allowed.first, "last": allowed.last}
+            if value is None:
+                raise _refused(speaker, f"{what}_needed", NEEDED, **limits)
+            raise _refused(speaker, f"{what}_range", RANGE, value=value, **limits)
+    return assignment.variant(chosen["n"], chosen["position"])
 
 
-def _tell_head(console: Console, entered: Measurements, variant: Variant) -> None:
-    who = f"{entered.student_id}, " if entered.student_id else ""
-    console.print(f"{who}{variant}", style="bold", highlight=False, markup=False)
+def _tell_head(console: Console, entered: Measurements, variant: Variant, speaker: Tongue) -> None:
+    who = [entered.student_id] if entered.student_id else []
+    known = (("n", variant.n), (speaker.gettext("position"), variant.position))
+    parts = [*who, *(f"{name} = {value}" for name, value in known if value is not None)]
+    if parts:
+        console.print(", ".join(parts), style="bold", highlight=False, markup=False)
     for problem in (*entered.problems, *entered.reading.problems):
         console.print(f"  {problem.message}", style="yellow", highlight=False, markup=False)
 
 
-def _tell(
-    console: Console, checked: tuple[Checked, ...], level: Level, words: Tongue, assignment: Assignment
-) -> None:
-    if not checked:
-        console.print("  nothing that this assignment asks for was measured", style="yellow")
+def _tell(console: Console, lines: list[CheckedLine], level: Level, speaker: Tongue) -> None:
+    if not lines:
+        console.print(f"  {speaker.gettext(NOTHING)}", style="yellow")
         return
     table = Table(box=None, show_header=False)
-    names = assignment.file.names
-    for value in checked:
-        mark, style = MARKS[value.result]
-        # What is right needs one reason: the others say what would be off, had it not been accepted.
-        shown = value.reasons[:1] if value.result == "right" else value.reasons
-        sentence = " ".join(reason_sentence(reason, words, level, names) for reason in shown)
-        numbers = ""
-        if level == "full" and value.measured and value.expected:
-            numbers = f"{_number(value.measured)} / {_number(value.expected)}"
-        table.add_row(f"[{style}]{mark}[/{style}]", names.get(value.name, value.name), numbers, sentence)
+    for line in lines:
+        one, numbers = line.checked, ""
+        if level == "full" and one.measured and one.expected:
+            numbers = f"{_number(one.measured)} / {_number(one.expected)}"
+        mark, style = RESULTS[line.result][0], STYLES[line.result]
+        table.add_row(f"[{style}]{mark}[/{style}]", line.name, numbers, escape(line.hint))
+        if line.advice:
+            table.add_row("", "", "", f"[dim]→ {escape(line.advice)}[/dim]")
     console.print(table, highlight=False)
 
 

@@ -1,5 +1,6 @@
 """The commands and their options; each imports its work when it runs."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -14,9 +15,11 @@ from grader.cli.app import (
     NumberOption,
     OutOption,
     PositionOption,
+    ResultsArgument,
     RosterOption,
     app,
 )
+from grader.cli.terminal import note, shown_command, tell_next
 
 
 @app.command()
@@ -89,7 +92,10 @@ def lint(
     """Hold an assignment and its rubric against every variant: all findings at once."""
     from grader.cli.linting import lint_assignment
 
-    raise typer.Exit(1 if lint_assignment(assignment, as_json=as_json, svg=svg) else 0)
+    if lint_assignment(assignment, as_json=as_json, svg=svg):
+        raise typer.Exit(1)
+    if not as_json:
+        tell_next("sheet", assignment, "--roster", "roster.csv", "-o", "sheets.pdf")
 
 
 @app.command()
@@ -119,13 +125,11 @@ def new(
 
     written = new_assignment(file, like=like, mechanism=mechanism, table=table)
     first = load_assignment(written.assignment).variants()[0]
-    numbers = (("n", first.n), ("position", first.position))
-    chosen = "".join(f" --{name} {value}" for name, value in numbers if value is not None)
+    chosen = [f"--{name}={value}" for name, value in asdict(first).items() if value is not None]
     for path in (written.assignment, written.mechanism, written.rubric):
-        typer.echo(f"written: {path}")
-    typer.echo("next: change them, then")
-    typer.echo(f"  planmark plan {written.assignment}{chosen} --svg plan.svg")
-    typer.echo(f"  planmark lint {written.assignment}")
+        note(f"written: {path}")
+    note(f"see it: {shown_command('planmark', 'plan', written.assignment, *chosen, '--svg', 'plan.svg')}")
+    tell_next("lint", written.assignment, before="change them, then ")
 
 
 @app.command()
@@ -195,25 +199,27 @@ def grade(
     memory_limit: Annotated[
         int, typer.Option("--memory-limit", min=300, help="Megabytes that a file or a sheet may take.")
     ] = 1500,
+    to: Annotated[
+        str | None, typer.Option("--to", hidden=True, help="The platform, for the line on what is next.")
+    ] = None,
 ) -> None:
     """Grade a folder of scans (JPEG, PNG, TIFF, PDF) and measurement files (CSV, JSON)."""
-    from grader.cli.grading import grade_folder
+    from grader.cli.grading import grade_folder, tell_next_of_class
+    from grader.folder.batch import needs_person
     from grader.folder.workers import Limits
 
-    open_ends = grade_folder(
+    graded = grade_folder(
         folder, assignment, out, roster=roster, pages_per_student=pages_per_student, jobs=jobs, lang=lang,
         limits=Limits(time_limit, memory_limit), level=level, with_ghosts=ghosts,
         decisions=decisions,
     )  # fmt: skip
-    raise typer.Exit(1 if open_ends else 0)
+    tell_next_of_class(graded, out, to)
+    raise typer.Exit(1 if needs_person(graded) else 0)
 
 
 @app.command()
 def review(
-    results: Annotated[
-        Path,
-        typer.Argument(metavar="OUT", help="The folder that `planmark grade` wrote, or the submissions'."),
-    ],
+    results: ResultsArgument,
     host: Annotated[
         str, typer.Option("--host", help="Address to listen on; other machines need the --token, too.")
     ] = "127.0.0.1",
@@ -235,7 +241,9 @@ def review(
 @app.command()
 def check(
     assignment: AssignmentArgument,
-    measured: Annotated[Path, typer.Option("--measured", help="Measurement file, CSV or JSON.")],
+    measured: Annotated[
+        Path | None, typer.Option("--measured", help="Measurement file, CSV or JSON.")
+    ] = None,
     n: NumberOption = None,
     position: PositionOption = None,
     lang: LanguageOption = "en",
@@ -245,11 +253,15 @@ def check(
     page: Annotated[
         Path | None, typer.Option("--page", help="Draw and tell it in this HTML file, too.")
     ] = None,
+    template: Annotated[
+        Path | None, typer.Option("--template", help="Write the CSV file to fill in.")
+    ] = None,
 ) -> None:
     """Check measured values: right, or off and in which way, without giving the answer away."""
     from grader.cli.checking import check_measured
 
-    raise typer.Exit(1 if check_measured(assignment, n, position, measured, lang, level, page) else 0)
+    is_off = check_measured(assignment, n, position, measured, lang, level, page, template)
+    raise typer.Exit(1 if is_off else 0)
 
 
 @app.command()
@@ -281,7 +293,7 @@ def read(
 @app.command()
 def sheet(
     assignment: AssignmentArgument,
-    out: Annotated[Path, typer.Option("--out", help="The PDF file to write.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The PDF file to write.")],
     roster: RosterOption = None,
     layout: Annotated[
         Path | None, typer.Option("--layout", help="Write where everything is, as JSON.")
@@ -295,12 +307,17 @@ def sheet(
     from grader.cli.sheets import print_sheets
 
     print_sheets(assignment, roster, out, layout, lang, calibration=calibration)
+    if calibration:
+        tell_next("calibrate", "SCAN", before="print it, scan it, then ")
+    else:
+        handed_in = ("--assignment", assignment, "--roster", roster, "-o", "results")
+        tell_next("grade", "SCANS", *handed_in, before="print them, let them be drawn on, scan, then ")
 
 
 @app.command()
 def handout(
     assignment: AssignmentArgument,
-    out: Annotated[Path, typer.Option("--out", help="The PDF file to write.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The PDF file to write.")],
     roster: RosterOption = None,
     n: NumberOption = None,
     position: PositionOption = None,
@@ -331,14 +348,17 @@ def match(
     folder: FolderArgument,
     assignment: AssignmentOption,
     roster: Annotated[Path, typer.Option("--roster", help="The class: roster.csv.")],
-    out: Annotated[Path, typer.Option("--out", help="The draft of the roster to write, a CSV file.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The draft of the roster to write, a CSV file.")],
     pages_per_student: Annotated[int | None, typer.Option("--pages-per-student")] = None,
     lang: LanguageOption = "en",
 ) -> None:
     """Draft the roster's `scans` where nothing says whose page is whose, with a contact sheet."""
     from grader.cli.sheets import draft_matches
 
-    raise typer.Exit(1 if draft_matches(folder, assignment, roster, out, pages_per_student, lang) else 0)
+    open_ends = draft_matches(folder, assignment, roster, out, pages_per_student, lang)
+    known = ("--assignment", assignment, "--roster", out, "-o", "results")
+    tell_next("grade", folder, *known, before="correct the column `scans`, then ")
+    raise typer.Exit(1 if open_ends else 0)
 
 
 @app.command()
@@ -352,15 +372,23 @@ def bench(
     show_benchmark(quick=quick, as_json=as_json)
 
 
+def _platforms() -> list[str]:
+    """What there are exports for, for a shell that completes it."""
+    from grader.lms.export import TARGETS
+
+    return list(TARGETS)
+
+
 @app.command()
 def export(
-    results: Annotated[Path, typer.Argument(metavar="OUT", help="The folder that `planmark grade` wrote.")],
+    results: ResultsArgument,
     to: Annotated[
         str,
         typer.Option(
             "--to",
             help="csv, moodle, canvas, canvas-api, openedx, google-classroom, ms-education, brightspace,"
             " blackboard, ilias, gradescope or lti.",
+            autocompletion=_platforms,
         ),
     ],
     what: Annotated[
@@ -371,7 +399,7 @@ def export(
         ),
     ] = None,
     file: Annotated[
-        Path | None, typer.Option("--file", help="The file to write; OUT/export-... if absent.")
+        Path | None, typer.Option("--file", "-o", help="The file to write; OUT/export-... if absent.")
     ] = None,
     roster: RosterOption = None,
     worksheet: Annotated[
@@ -433,6 +461,9 @@ def export(
             help="Delete the guide there: Moodle's core_grading_get_gradingform_instances tells the points.",
         ),
     ] = None,
+    groups: Annotated[
+        bool | None, typer.Option("--groups/--no-groups", help="Whether students hand in as groups.")
+    ] = None,
     lang: LanguageOption = "en",
 ) -> None:
     """Write the results for a learning platform, validated before anything is written."""
@@ -449,6 +480,9 @@ def export(
         identity=identity, item=item,
         position=position, combine=combine, maximum=maximum, rescale=rescale, visibility=visibility,
         course_id=course_id, assignment_id=assignment_id, cmid=cmid, context_id=context_id,
-        replace_guide=replace_guide, lang=lang,
+        replace_guide=replace_guide, groups=groups, lang=lang,
     )  # fmt: skip
-    raise typer.Exit(1 if export_results(results, file, options, roster, ids) else 0)
+    is_open, path = export_results(results, file, options, roster, ids)
+    where = "" if to == "csv" else f" to {to}; the documentation of exports says how"
+    note(f"next: {'upload' if where else 'open'} {path}{where}")
+    raise typer.Exit(1 if is_open else 0)

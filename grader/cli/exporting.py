@@ -7,6 +7,7 @@ from typing import Any, Literal
 import typer
 from pydantic import BaseModel
 
+from grader.cli import terminal
 from grader.cli.app import check_language
 from grader.documents import (
     SCHEMA_VERSION,
@@ -74,8 +75,8 @@ def schema(name: str) -> dict[str, Any]:
 
 def export_results(
     folder: Path, file: Path | None, options: Options, roster: Path | None, ids: Path | None
-) -> bool:
-    """Write the export file and report who is not in it; whether anybody is missing."""
+) -> tuple[bool, Path]:
+    """Write the export file and report who is not in it; whether anybody is missing, and the file."""
     check_language(options.lang)
     path = file or folder / usual_name(options)
     for source in (folder / "results.json", options.form, options.criteria, options.submissions, roster, ids):
@@ -92,13 +93,13 @@ def export_results(
         people = with_ids(people, ids)
     delivery = deliver(results, path, replace(options, people=people, out=folder))
     _report(delivery, path)
-    return not delivery.is_complete
+    return not delivery.is_complete, path
 
 
 def _report(delivery: Delivery, path: Path) -> None:
     is_of_students = delivery.written or delivery.withheld or delivery.unplaced
     who = f"{len(delivery.written)} students " if is_of_students else ""
-    typer.echo(f"{who}written to {path}")
+    terminal.note(f"{who}written to {path}")
     for reason, students in (("withheld", delivery.withheld), ("no place in the file", delivery.unplaced)):
         for student, why in students.items():
             typer.echo(f"  {student}: {reason}: {why}")

@@ -12,11 +12,12 @@ import typer
 
 from grader.cli.app import check_language, new_table, progress
 from grader.cli.checking import checked_level
+from grader.cli.terminal import note, tell_next
 from grader.documents import AlikeDocument, MovedDocument, ReadingDocument, ResultsDocument
 from grader.feedback.class_page import CAUSES, SIGNS, write_demo_page
 from grader.feedback.class_statistics import waiting
 from grader.files import samples_folder
-from grader.folder.batch import Batch, grade, needs_person
+from grader.folder.batch import Batch, grade
 from grader.folder.changes import standing_text
 from grader.folder.workers import Limits, Workers, result_of
 from grader.marking.report import reading_document
@@ -41,8 +42,8 @@ def grade_folder(
     level: str = "full",
     with_ghosts: bool = True,
     decisions: Path | None = None,
-) -> bool:
-    """Grade a folder and print the outcome; whether anything is left for a person."""
+) -> ResultsDocument:
+    """Grade a folder and print the outcome."""
     check_language(lang)
     wanted = checked_level(level)
     if pages_per_student is not None and pages_per_student < 1:
@@ -58,23 +59,25 @@ def grade_folder(
     with progress() as tell:
         results = grade(batch, tell)
     tell_class(results, out)
-    return needs_person(results)
+    return results
 
 
 def demo(out: Path, lang: str, jobs: int | None) -> None:
     """Grade the bundled samples, and write the page that leads to their classes."""
     classes = {}
     for name in ("pump", "press"):
-        typer.echo(f"Grading the {name} class of the samples")
+        note(f"Grading the {name} class of the samples")
         # A copy: what is decided on it lies beside it.
         folder = out / "handed-in" / name
         shutil.copytree(samples_folder() / name, folder, dirs_exist_ok=True)
-        grade_folder(folder, name, out / name, roster=None, pages_per_student=None, jobs=jobs, lang=lang)
+        results = grade_folder(
+            folder, name, out / name, roster=None, pages_per_student=None, jobs=jobs, lang=lang
+        )
         title = load_assignment(name).file.title.in_language(lang)
-        results = ResultsDocument.model_validate_json((out / name / "results.json").read_bytes())
         classes[name] = (title, results)
     write_demo_page(classes, out, lang)
-    typer.echo(f"Begin at {out / 'index.html'}; settle or change marks with: planmark review {out / 'pump'}")
+    note(f"Begin at {out / 'index.html'}")
+    tell_next("review", out / "pump", before="settle or change marks with ")
 
 
 def read_scans(
@@ -162,8 +165,8 @@ def tell_class(results: ResultsDocument, out: Path) -> None:
     """Print states, changes, similar sheets, what waits for a person, and the paths of the results."""
     states = Counter(report.status for report in results.reports)
     told = ", ".join(f"{count} {state.replace('_', ' ')}" for state, count in states.most_common())
-    typer.echo(f"{len(results.reports)} submissions: {told or 'none'}")
-    typer.echo(_left(results))
+    note(f"{len(results.reports)} submissions: {told or 'none'}")
+    note(_left(results))
     page = out / "index.html"
     changes = [_change_line(change) for change in results.moved]
     _list(f"Moved since the last run: {len(results.moved)}", changes, page)
@@ -175,7 +178,15 @@ def tell_class(results: ResultsDocument, out: Path) -> None:
     ]
     _list("Decisions that are out of date, and were not applied; decide again or remove them:", stale, page)
     _list("A person must look at:", list(_waiting(results)), page)
-    typer.echo(f"Look at {page}; for programs there is {out / 'results.json'}")
+    note(f"Look at {page}; for programs there is {out / 'results.json'}")
+
+
+def tell_next_of_class(results: ResultsDocument, out: Path, platform: str | None = None) -> None:
+    """Print what comes after grading: the review while anything waits for it, else the export."""
+    if waiting(results) or results.unmatched or results.stale:
+        tell_next("review", out)
+    else:
+        tell_next("export", out, "--to", platform or "PLATFORM")
 
 
 SECONDS_A_LOOK = 6.0

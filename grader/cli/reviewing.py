@@ -10,7 +10,7 @@ import typer
 import uvicorn
 
 from grader.cli.app import check_language, progress
-from grader.cli.grading import tell_class
+from grader.cli.grading import tell_class, tell_next_of_class
 from grader.folder.batch import noted_batch
 from grader.review.server import LOOPBACK, application
 from grader.review.session import Session
@@ -47,7 +47,9 @@ def review_class(
     _serve(listener, session, lang or batch.lang, token)
     if session.made:
         with progress() as tell:
-            tell_class(session.bring_up_to_date(tell).results, batch.out)
+            results = session.bring_up_to_date(tell).results
+        tell_class(results, batch.out)
+        tell_next_of_class(results, batch.out)
 
 
 def _listener(host: str, port: int) -> socket.socket:

@@ -11,6 +11,7 @@ import typer
 from grader.authoring.lint import lint
 from grader.authoring.round_scales import suggestions
 from grader.cli.app import check_language, progress
+from grader.cli.terminal import note
 from grader.documents import CalibrationDocument
 from grader.files import write_whole
 from grader.folder.cache import PageCache
@@ -98,10 +99,10 @@ def print_sheets(
         rubric = rubric_of(assignment)
         sheets = make_sheets(assignment, students.rows, lang, roster=students.file, asked=rubric.vectors)
     write_whole(out, sheets.pdf)
-    typer.echo(f"{out}: to be printed on A3 at 100 %, not fitted to the page")
+    note(f"{out}: to be printed on A3 at 100 %, not fitted to the page")
     if layout is not None:
         write_whole(layout, sheets.layout.model_dump_json(indent=2))
-        typer.echo(f"{layout}: where markers, zones and boxes are")
+        note(f"{layout}: where markers, zones and boxes are")
     for problem in sheets.problems:
         typer.echo(f"note: {problem.message}", err=True)
     if not calibration and roster is not None:
@@ -155,7 +156,7 @@ def print_handout(
         rows = read_roster(roster).rows
     file = "" if roster is None else roster.name
     write_whole(out, make_handout(assignment, rubric_of(assignment), rows, lang, roster=file))
-    typer.echo(f"{out}: {len(rows)} task sheet(s) on A4, without the solution")
+    note(f"{out}: {len(rows)} task sheet(s) on A4, without the solution")
 
 
 # match --------------------------------------------------------------------------------------------
@@ -206,7 +207,7 @@ def draft_matches(
     typer.echo(
         f"{out}: a draft, {open_ends} of {len(draft.suggestions)} pages to be checked ({SURE} = certain)"
     )
-    typer.echo(f"Look at {sheet}, correct the column `scans`, then grade with --roster {out}")
+    note(f"Look at {sheet}")
     return open_ends > 0
 
 

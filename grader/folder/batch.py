@@ -1,5 +1,6 @@
 """A folder of submissions: inventory, owners, marking in parallel, results. One bad file stops nothing."""
 
+import logging
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
@@ -12,7 +13,7 @@ from grader.documents import AlikeDocument, ReportDocument, ResultsDocument, Unm
 from grader.feedback.class_page import write_index
 from grader.feedback.sentences import Level
 from grader.feedback.student_page import About, write_feedback
-from grader.files import make_folder, result_folders, write_whole
+from grader.files import make_folder, remove_parts, result_folders, write_whole
 from grader.folder.cache import (
     CELL_STAGE,
     CELLS_OF,
@@ -55,6 +56,7 @@ from grader.similarity.submission import compared_submission
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, PlanmarkError
 
+LOG = logging.getLogger("planmark")
 _PASSING = "file_changed"
 """A problem that the next run need not have: nothing that has it is cached."""
 
@@ -138,13 +140,17 @@ def graded(batch: Batch, progress: Progress, workers: Pool | None = None) -> Gra
     notes = batch.out / CACHE_FOLDER
     names, cache = names_of(batch.assignment), _page_cache(batch)
     before = earlier(batch.out / "results.json", batch.assignment.id)
-    with Workers(batch.jobs, batch.limits, __name__) if workers is None else nullcontext(workers) as pool:
-        contents = take_inventory(files, batch.folder, names, pool, progress, cache, decisions.place)
-        students, unmatched = _submissions(batch, (roster, decisions), contents, cache, pool)
-        if not students and not unmatched:
-            raise _nothing(batch)
-        jobs = _jobs(batch, cache, students)
-        reports = _marked(batch, cache, jobs, progress, pool)
+    try:
+        with Workers(batch.jobs, batch.limits, __name__) if workers is None else nullcontext(workers) as pool:
+            contents = take_inventory(files, batch.folder, names, pool, progress, cache, decisions.place)
+            students, unmatched = _submissions(batch, (roster, decisions), contents, cache, pool)
+            if not students and not unmatched:
+                raise _nothing(batch)
+            jobs = _jobs(batch, cache, students)
+            reports = _marked(batch, cache, jobs, progress, pool)
+    except (KeyboardInterrupt, InterruptedRunError):
+        remove_parts(batch.out)
+        raise
     pages = tuple(page for content in contents for page in content.pages)
     authored = {
         "assignment": repr(_authored(batch.assignment)),
@@ -358,11 +364,15 @@ def _marked(
 ) -> list[ReportDocument]:
     """Reports in the order of the jobs; each with its files written."""
     reports = {index: known for index, job in enumerate(jobs) if (known := _known(batch, job)) is not None}
+    for index, report in reports.items():
+        LOG.debug("%s: %s, as in the last run", jobs[index].folder, report.status)
     progress("marking", len(reports), len(jobs))
     waiting = [(index, job) for index, job in enumerate(jobs) if index not in reports]
     try:
         for index, report in _marked_anew(batch, cache, waiting, workers):
             reports[index] = report
+            points = "no score" if report.score is None else f"{report.score:g} of {report.max_score:g}"
+            LOG.debug("%s: %s, %s", jobs[index].folder, report.status, points)
             progress("marking", len(reports), len(jobs))
     except KeyboardInterrupt as error:
         done = f"{len(reports)} of {len(jobs)} submissions are marked and kept in {batch.out}"

@@ -33,10 +33,11 @@ _TOOL_NAMES = frozenset(
         "index.html",
         "truth.jsonl",
         "decisions.csv",
+        "planmark.toml",
     }
 )
 _TOOL_STARTS = (".", "~$", "__MACOSX")
-_TOOL_ENDS = (".part", ".tmp", ".bak", ".crdownload", "~")
+_TOOL_ENDS = (".part", ".tmp", ".bak", ".crdownload", ".log", "~")
 _FILE_TYPES = frozenset({".jpg", ".jpeg", ".png", ".tif", ".tiff", ".pdf", ".csv", ".json"})
 _DIGITS = re.compile(r"(\d+)")
 

@@ -2,14 +2,17 @@
 
 import contextlib
 import importlib
+import logging
 import multiprocessing
 import os
 import threading
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from multiprocessing.process import BaseProcess
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol, Self, TypeVar
 
@@ -17,15 +20,19 @@ import psutil
 from pebble import ProcessExpired, ProcessPool
 from pebble.pool.process import WORKERS_NAME
 
+from grader.files import log_to
 from grader.records import Problem
 from reference.errors import InputFileError, PlanmarkError
 
 Result = TypeVar("Result")
+LOG = logging.getLogger("planmark")
 
 ENDED = frozenset({"crashed", "too_slow", "too_much_memory"})
 """Problems for which a call is tried once more, alone: another sheet may have taken time or memory."""
 _WATCH_S = 0.05
 """The workers' memory is measured at this interval: a worker fills at most some 100 MB in this time."""
+_LOOK_S = 0.5
+"""Windows tells an interrupt only between waits: Ctrl+C ends a run within this time."""
 _STALLED_S = 30.0
 """Past every time limit without any result: a worker was killed while it took its task, which is lost."""
 _ROUNDS = 3
@@ -121,7 +128,7 @@ class Workers:
             }
             longest = max(seconds[index] for index in left)
             while futures:
-                ended, _ = wait(futures, longest + _STALLED_S, FIRST_COMPLETED)
+                ended = _ended(futures, longest + _STALLED_S)
                 if not ended:
                     break
                 for future in ended:
@@ -162,9 +169,8 @@ class Workers:
     def _started_pool(self) -> ProcessPool:
         if self._pool is None:
             context = multiprocessing.get_context("spawn")
-            self._pool = ProcessPool(
-                self._jobs, initializer=_start, initargs=(self._module,), context=context
-            )
+            prepared = (self._module, _log_file(), LOG.isEnabledFor(logging.DEBUG))
+            self._pool = ProcessPool(self._jobs, initializer=_start, initargs=prepared, context=context)
         return self._pool
 
     def _end_pool(self) -> None:
@@ -186,13 +192,32 @@ class Workers:
                         worker.kill()
 
 
+def _ended(futures: Iterable[Future[Any]], seconds: float) -> set[Future[Any]]:
+    """The futures that have ended as soon as there are any; none after so many seconds."""
+    deadline = time.monotonic() + seconds
+    while not (ended := wait(futures, _LOOK_S, FIRST_COMPLETED).done) and time.monotonic() < deadline:
+        pass
+    return ended
+
+
 def _workers() -> list[BaseProcess]:
     """The pool's processes that live."""
     return [child for child in multiprocessing.active_children() if child.name == WORKERS_NAME]
 
 
-def _start(module: str) -> None:
-    """Prepare a worker: end with the parent, one thread for OpenCV, the work's module imported."""
+def _log_file() -> Path | None:
+    """The file that is logged to."""
+    files = (one.baseFilename for one in LOG.handlers if isinstance(one, logging.FileHandler))
+    return next(map(Path, files), None)
+
+
+def _start(module: str, log: Path | None, is_verbose: bool) -> None:
+    """Prepare a worker: end with the parent, the same log, one thread for OpenCV, the module imported."""
+    if log is not None:
+        log_to(log)
+    elif is_verbose:
+        LOG.addHandler(logging.StreamHandler())
+    LOG.setLevel(logging.DEBUG)
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
@@ -215,5 +240,6 @@ def guarded(function: Callable[..., Result], *call: object) -> Result | Problem:
         raise
     except PlanmarkError as error:
         return Problem(error.code, error.message)
-    except Exception as error:  # noqa: BLE001 - whatever a hostile file brings about stays with that file
+    except Exception as error:
+        LOG.debug("internal_error in %s", function.__name__, exc_info=True)
         return Problem("internal_error", f"could not be processed ({type(error).__name__}: {error})")

@@ -35,6 +35,7 @@ from grader.records import (
     ReadVector,
     Unread,
 )
+from grader.rubric import RubricFile
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.authored.variant_table import delimiter_of, table_lines
 from reference.construction.derive import construction_of
@@ -161,6 +162,23 @@ def names_of(assignment: Assignment) -> Names:
     unused = frozenset(possible) - construction.vectors.keys()
     vectors = {name: plans[name[0]] for name in (*construction.vectors, *sorted(unused))}
     return Names(vectors, tuple(construction.rates), unused)
+
+
+UNITS_OF_SCALES = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s²)/mm"}
+
+
+def columns_of(rubric: RubricFile) -> dict[str, str]:
+    """The columns of a file with all that a rubric asks for, each with its unit."""
+    columns = {
+        name: unit for name, unit in UNITS_OF_SCALES.items() if name != "ka" or rubric.needs_accelerations
+    }
+    for criterion in rubric.criterion:
+        if criterion.vector:
+            columns[criterion.vector] = "mm"
+            columns |= {f"{criterion.vector}_deg": "°"} if criterion.direction else {}
+        elif criterion.angular:
+            columns[f"{criterion.angular}_value"] = "rad/s" if criterion.angular[0] == "o" else "rad/s²"
+    return columns
 
 
 @dataclass(frozen=True, slots=True)
@@ -421,9 +439,12 @@ def _check_header(
             yield Finding(line, source.say(why, name=short(name), count=count))
 
 
+DID_YOU_MEAN, OR = N_("did you mean %(names)s?"), N_("or")
+
+
 def _did_you_mean(near: Sequence[str], source: _Source) -> str:
-    either = f" {source.say(N_('or'))} ".join(near)
-    return f"; {source.say(N_('did you mean %(names)s?'), names=either)}" if near else ""
+    either = f" {source.say(OR)} ".join(near)
+    return f"; {source.say(DID_YOU_MEAN, names=either)}" if near else ""
 
 
 def _line(

@@ -237,7 +237,10 @@ class CanvasMark(Payload):
 
 
 class CanvasBody(Payload):
-    """What is put to a submission: the grade, the comment beside it, and the points in the rubric."""
+    """Grade, comment and points in the rubric, as put to a submission.
+
+    Source: canvas.instructure.com/doc/api/submissions.html, Grade or comment on a submission.
+    """
 
     submission: Annotated[dict[Literal["posted_grade"], Number], _ONE]
     comment: Annotated[dict[Literal["text_comment"], Filled], _ONE]
@@ -320,7 +323,10 @@ class CanvasAssociation(Payload):
 
 
 class CanvasRubricBody(Payload):
-    """The body of ``POST /api/v1/courses/:course_id/rubrics``."""
+    """The body of ``POST /api/v1/courses/:course_id/rubrics``.
+
+    Source: canvas.instructure.com/doc/api/rubrics.html, Create a single rubric.
+    """
 
     rubric: CanvasRubric
     rubric_association: CanvasAssociation
@@ -357,8 +363,8 @@ def canvas_api(grades: Sequence[Grade], options: Options) -> Delivery:
                 for index, each in enumerate(_canvas_criteria(grades, options))
             },
         }
-        body = {"rubric": rubric_body, "rubric_association": {"association_id": assignment}}
-        plan.add(f"POST /api/v1/courses/{course}/rubrics", CanvasRubricBody, body, "rubric")
+        made = {"rubric": rubric_body, "rubric_association": {"association_id": assignment}}
+        plan.add(f"POST /api/v1/courses/{course}/rubrics", CanvasRubricBody, made, "rubric")
         marked = [
             (grade, {mark.criterion: mark for mark in _marks(grade, options)}) for grade in ready(grades)
         ]
@@ -408,7 +414,7 @@ class EdxCriterion(Payload):
 
 
 class EdxRubric(Payload):
-    """The rubric's keys of what Studio's editor sends (EDITOR_UPDATE_SCHEMA)."""
+    """The rubric's keys of what Studio's editor sends (edx-ora2, xblock/schema.py, EDITOR_UPDATE_SCHEMA)."""
 
     criteria: Annotated[list[EdxCriterion], _ONE]
     feedback_prompt: str = ""
@@ -424,7 +430,7 @@ class EdxMark(Payload):
 
 
 class EdxGrade(Payload):
-    """A staff assessment."""
+    """A staff assessment (edx-platform, ora_staff_grader/serializers.py, StaffAssessSerializer)."""
 
     overallFeedback: str  # noqa: N815
     criteria: Annotated[list[EdxMark], _ONE]
@@ -558,13 +564,19 @@ class GoogleCriterion(Payload):
 
 
 class GoogleRubric(Payload):
-    """The body of ``courses.courseWork.rubrics.create``."""
+    """The body of ``courses.courseWork.rubrics.create``.
+
+    Source: developers.google.com/workspace/classroom, Rubrics structure and known limitations.
+    """
 
     criteria: Annotated[list[GoogleCriterion], Field(min_length=1, max_length=50)]
 
 
 class GoogleGrade(Payload):
-    """The body of ``studentSubmissions.patch``: points by criterion are read-only there."""
+    """The body of ``studentSubmissions.patch``: points by criterion are read-only there.
+
+    Source: developers.google.com/workspace/classroom, REST reference.
+    """
 
     draftGrade: NotNegative  # noqa: N815 - the platform's own names
     assignedGrade: NotNegative  # noqa: N815
@@ -652,7 +664,7 @@ class GraphQuality(Payload):
 
 
 class GraphRubric(Payload):
-    """The body of ``POST /education/me/rubrics`` (educationRubric)."""
+    """The body of ``POST /education/me/rubrics`` (learn.microsoft.com/graph, educationuser-post-rubrics)."""
 
     displayName: Filled  # noqa: N815
     description: GraphText
@@ -671,7 +683,7 @@ class GraphRubric(Payload):
 
 
 class GraphReference(Payload):
-    """The body of ``PUT .../rubric/$ref``."""
+    """The body of ``PUT .../rubric/$ref`` (learn.microsoft.com/graph/api/educationassignment-put-rubric)."""
 
     id: Annotated[str, Field(alias="@odata.id", pattern=r"^https://graph\.microsoft\.com/v1\.0/\S+$")]
 
@@ -691,7 +703,7 @@ class GraphSelected(Payload):
 
 
 class GraphRubricOutcome(Payload):
-    """A student's levels."""
+    """A student's levels (learn.microsoft.com/graph/api/educationoutcome-update, as the next two)."""
 
     type: Literal["#microsoft.graph.educationRubricOutcome"] = Field(
         "#microsoft.graph.educationRubricOutcome", alias="@odata.type"

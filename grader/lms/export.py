@@ -72,7 +72,7 @@ KINDS: Mapping[tuple[str, str], _Kind] = {
     ("csv", "marks"): _Kind(".csv", of_results=criteria_text),
     ("csv", "grades"): _Kind(".csv", of_results=summary_text),
     ("moodle", "grades"): _of_grades(".csv", moodle.grades_file, "maximum rescale form identity item"),
-    ("moodle", "feedback"): _of_grades(".zip", moodle.feedback_files, "form"),
+    ("moodle", "feedback"): _of_grades(".zip", moodle.feedback_files, "form groups"),
     ("moodle", "rubric"): _of_grades(
         ".json", moodle_guide.guide, "criteria cmid context_id replace_guide item"
     ),
@@ -111,9 +111,10 @@ def what_of(options: Options) -> str:
             "unknown_target", f"'{options.to}' is no export target: known are {', '.join(TARGETS)}"
         )
     if options.what is not None and options.what not in known:
-        raise CallError(
-            "unknown_target", f"{options.to} is given no '{options.what}': known are {', '.join(known)}"
-        )
+        others = [to for to, what in KINDS if what == options.what and to.startswith(options.to)]
+        hint = f" (or --to {others[0]})" if others else ""
+        message = f"{options.to} is given no '{options.what}': known are {', '.join(known)}{hint}"
+        raise CallError("unknown_target", message)
     return options.what or known[0]
 
 

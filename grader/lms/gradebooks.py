@@ -327,7 +327,7 @@ def _layout(header: Sequence[str], file: str) -> Layout:
 
 def _refused(file: str, platform: str, faults: Sequence[str]) -> InputFileError:
     message = f"{file}: is no gradebook as {platform} exports it; export it again and do not resave it"
-    return InputFileError("gradebook", f"{message}\n{lines_of(faults)}")
+    return InputFileError("gradebook_file", f"{message}\n{lines_of(faults)}")
 
 
 def _assignment(header: Sequence[str], first: int, layout: Layout, wanted: str, file: str) -> int:
@@ -369,12 +369,12 @@ def feedback_files(grades: Sequence[Grade], options: Options) -> Delivery:
         with zipfile.ZipFile(options.form) as archive:
             found = {match[1]: match for name in archive.namelist() if (match := _FOLDER.fullmatch(name))}
     except (OSError, zipfile.BadZipFile) as error:
-        raise InputFileError("gradebook", f"{options.form}: is no archive of ILIAS ({error})") from error
+        raise InputFileError("gradebook_file", f"{options.form}: is no archive of ILIAS ({error})") from error
     if not found:
         message = (
             f"{options.form}: has no folders multi_feedback.../Last_First_login_number; download it again"
         )
-        raise InputFileError("gradebook", message)
+        raise InputFileError("gradebook_file", message)
     folders = list(found)
     students = {**options.people, **{grade.student_id: grade.person for grade in grades}}
     matches = match_rows(

@@ -49,6 +49,8 @@ class Options:
     form : the platform's own file to fill in: Moodle's worksheet, an exported gradebook
     criteria, submissions : the platform's answers for its rubric and for the students' submissions
     item : the grade item's name; the assignment's id where empty
+    replace_guide : Moodle's answer with everybody's points in the guide that goes
+    groups : whether students hand in as groups; None where not said
     now : time of the export; the clock's if None
     """
 
@@ -72,6 +74,7 @@ class Options:
     cmid: int | None = None
     context_id: int | None = None
     replace_guide: Path | None = None
+    groups: bool | None = None
     lang: str = "en"
     now: datetime | None = None
 

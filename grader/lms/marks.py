@@ -375,8 +375,8 @@ def _criteria_of(path: Path) -> list[PlatformEntry]:
     if not known:
         raise InputFileError(
             "criteria",
-            f"{path}: no criteria are in this answer; ask Moodle for core_grading_get_definitions, Canvas for"
-            " the rubric, or write a CSV table with the columns criterion,id",
+            f"{path}: no criteria are in this answer; ask the platform for its rubric (Moodle:"
+            " core_grading_get_definitions), or write a CSV table with the columns criterion,id",
         )
     return known
 
@@ -405,8 +405,9 @@ def criteria_in(answer: object) -> Iterator[PlatformEntry]:
     name = name.get("content") if isinstance(name, dict) else name
     number = answer.get("id", answer.get("qualityId"))
     if isinstance(name, str) and isinstance(number, str | int) and _OF_A_CRITERION & set(answer):
-        levels = answer.get("levels") if isinstance(answer.get("levels"), list) else []
-        of_levels = [each.get("points") for each in levels if isinstance(each, dict)]
+        levels = answer.get("levels")
+        listed = levels if isinstance(levels, list) else []
+        of_levels = [each.get("points") for each in listed if isinstance(each, dict)]
         best = max((each for each in of_levels if isinstance(each, int | float)), default=None)
         points = answer.get("maxscore", answer.get("points", best))
         yield str(number), name, float(points) if isinstance(points, int | float) else None

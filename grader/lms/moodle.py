@@ -20,7 +20,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Self
 
-from grader.lms.grades import Delivery, Grade, Options, Person, in_a_row, ready
+from grader.lms.grades import Delivery, Grade, Options, Person, ready
 from grader.lms.marks import comment
 from grader.lms.table import (
     NO_GRADE,
@@ -47,10 +47,13 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "email address", "adresă de email", "adresa de email", "adresa de e-mail",
         "адрес электронной почты",
     ),
+    "status": ("status", "статус", "statut", "estado", "stato", "állapot", "stav", "tila"),
     "group": (
-        "group", "grup", "группа", "группы", "gruppe", "groupe", "grupo", "gruppo", "groep", "grupp",
-        "skupina", "csoport", "група",
+        "group", "grup", "группа", "группы", "gruppe", "groupe", "grupo", "gruppo", "groep", "група",
+        "grupp", "grupa", "skupina", "csoport", "ryhmä", "grupė", "taldea", "ομάδα", "المجموعة",
+        "グループ", "小组", "小組", "그룹",
     ),
+    "marker": ("marker", "оценщик"),
     "grade": ("grade", "notă", "nota", "оценка"),
     "maximum": ("maximum grade", "notă maximă", "nota maximă", "максимальная оценка"),
     "scale": ("scale", "scală", "scala", "шкала"),
@@ -70,12 +73,22 @@ Of other languages the columns are known by what stands in them.
 """
 
 _REQUIRED = ("identifier", "grade", "modified")
-_NO = {"no", "nu", "нет"}
-_PARTICIPANT = re.compile(r"(\D+?)(\d+)")
+_NO = {
+    "no", "nu", "нет", "nein", "non", "não", "nee", "nej", "nie", "ні", "hayır", "όχι", "ne", "ez", "لا",
+    "否",
+}  # fmt: skip
+"""How the pack of each language says that a grade cannot be changed."""
+_PARTICIPANT = re.compile(r"([^\W\d_]\D*?)([0-9]+)")
 """The word for a participant in the site's language, in some with a space, and the number."""
 _AMOUNT = re.compile(r"\d+([.,]\d+)?")
 _ADDRESS = re.compile(r"[^@\s]+@[^@\s]+")
 _MOMENT = re.compile(r".*\d:\d\d.*")
+_ENGLISH = re.compile(
+    r"((mon|tue|wed|thu|fri|sat|sun|tues|wednes|thurs|satur)(day)?|am|pm|st|nd|rd|th|may|june?|july?"
+    r"|jan(uary)?|feb(ruary)?|mar(ch)?|apr(il)?|aug(ust)?|sept?(ember)?|oct(ober)?|(nov|dec)(ember)?)"
+)
+"""The words in dates that PHP's strtotime reads."""
+_ISO = re.compile(r"\d{4}-\d\d-\d\dT?.*")
 LOCKED = "Moodle says that this grade cannot be changed"
 
 
@@ -150,25 +163,43 @@ class Worksheet(Form):
             f"Moodle must tell {changed} updated grades (more only where it holds more decimals"
             " than it shows): otherwise this is the worksheet of another assignment or course, or an old one"
         )
-        zero = f"newer versions of Moodle pass over a grade of 0, enter it there: {in_a_row(zeros)}"
+        zero = f"newer versions of Moodle pass over a grade of 0, enter it there: {', '.join(zeros)}"
         return [note, zero] if zeros else [note]
 
     def date_by(self, downloaded: datetime) -> None:
         """Write dates as ISO: of another language than English Moodle reads none, and updates nothing.
 
         Every one becomes the worksheet's own: Moodle still skips what was graded after it.
+        Source: assignfeedback_offline_grade_importer::next takes them by PHP's strtotime.
         """
-        column = self.columns["modified"]
-        if self.table.value(0, column).strip().casefold() == COLUMNS["modified"][0]:
-            return
-        rows = [row for row in self.people if self.value(row, "modified") not in NO_GRADE]
+        rows = [row for row in self.people if not _is_read_by_moodle(self.value(row, "modified"))]
         for row in rows:
-            self.table.put(row, column, downloaded.isoformat(timespec="seconds"))
+            self.table.put(row, self.columns["modified"], downloaded.isoformat(timespec="seconds"))
         if rows:
             self.notes.append(
                 f"Moodle reads no date in this language: {len(rows)} are written as"
                 f" {downloaded.isoformat(sep=' ', timespec='minutes')}, when the worksheet was downloaded"
             )
+
+    @property
+    def group_columns(self) -> list[int]:
+        """Columns that are, or may be, those of groups: between a student's status and the grade.
+
+        Source: mod/assign/gradingtable.php, assign_grading_table::__construct.
+        """
+        if "group" in self.columns:
+            return [self.columns["group"]]
+        who = [self.columns.get(name, 0) for name in ("identifier", "name", "id", "username", "email")]
+        others = [
+            place
+            for place in range(self.columns.get("status", max(who)) + 1, self.columns["grade"])
+            if place not in self.columns.values()
+            and not all(
+                map(_MOMENT.fullmatch, {self.table.value(row, place) for row in self.people} - NO_GRADE)
+            )
+        ]
+        # The status itself is one of them where its heading is not known.
+        return others if "status" in self.columns or len(others) > 1 else []
 
     def identity(self, row: int) -> Mapping[str, str]:
         """Participant's number, address, ID number, username and name."""
@@ -272,13 +303,29 @@ def _columns(table: RawTable) -> dict[str, int]:
         if all_are(_AMOUNT, place) and (columns.get("grade") == left or all_are(_AMOUNT, left, NO_GRADE)):
             fill("maximum", [place])
     fill("grade", [columns.get("maximum", -2) - 1])
+    fill("changeable", [place for place in free if {text.casefold() for text in cells.get(place, ())} & _NO])
     fill("modified", [place for place in reversed(free) if all_are(_MOMENT, place, {"-"})])
     # Of several columns after it none is surely that of comments.
     fill("feedback", {columns.get("modified", -2) + 1} & {len(header) - 1})
     return columns
 
 
+def _is_read_by_moodle(moment: str) -> bool:
+    """Whether PHP's strtotime reads a date; a dash is no date."""
+    words = set(re.findall(r"[^\W\d_]+", moment.casefold()))
+    return (
+        moment in NO_GRADE
+        or bool(_ISO.fullmatch(moment))
+        or (bool(words) and all(map(_ENGLISH.fullmatch, words)))
+    )
+
+
 def _row_faults(sheet: Worksheet) -> Iterator[str]:
+    words = {
+        match[1] for row in sheet.people if (match := _PARTICIPANT.fullmatch(sheet.value(row, "identifier")))
+    }
+    if len(words) > 1:
+        yield f"participants are called by different words: {', '.join(map(repr, sorted(words)))}"
     rows: dict[int, int] = {}
     comma = sheet.value(0, "grade").casefold() != COLUMNS["grade"][0]
     for row in sheet.people:
@@ -347,7 +394,7 @@ def gradebook(grades: Sequence[Grade], options: Options) -> Delivery:
         raise CallError("gradebook", f"{message}\n{lines_of(faults)}")
     scores = [grade.out_of(options.maximum, rescale=options.rescale) for grade in graded]
     users = [_user(grade, identity) for grade in graded]
-    rows = zip(users, map(number, scores), comments, strict=True)
+    rows = zip(users, [number(score, 2) for score in scores], comments, strict=True)
     maximum = options.maximum or max((grade.max_score for grade in graded), default=0.0)
     new = "a new item is out of 100 and takes no feedback"
     notes = [
@@ -416,11 +463,22 @@ def feedback_files(grades: Sequence[Grade], options: Options) -> Delivery:
     return Delivery(files, unplaced=missing, notes=(first, *notes))
 
 
+def _group_error(reason: str) -> CallError:
+    """Source: mod/assign/feedback/file/importziplib.php, get_participant_mapping."""
+    return CallError(
+        "groups",
+        "students hand in as groups, and Moodle takes a number in this archive for a group's: others would"
+        f" get the page ({reason}); export grades with comments (--worksheet without --what)",
+    )
+
+
 def _participants(
     grades: Sequence[Grade], options: Options
 ) -> tuple[dict[str, int], dict[str, str], list[str]]:
     """Moodle's number of each participant, why others have none, and what a person should check."""
     people = {grade.student_id: grade.person for grade in grades}
+    if options.groups:
+        raise _group_error("as --groups says")
     if options.form is None:
         numbers = {student: who.participant for student, who in people.items() if who.participant is not None}
         if all(person.participant is None for person in options.people.values()):
@@ -430,14 +488,15 @@ def _participants(
                 " (--worksheet), or a table with the columns student_id,participant (--ids)",
             )
         others = people.keys() - numbers.keys()
-        return numbers, dict.fromkeys(others, "the table of ids has no participant"), []
-    sheet = Worksheet.opened(bytes_of(options.form, "form_missing"), options.form.name)
-    if "group" in sheet.columns:
-        raise CallError(
-            "groups",
-            f"{options.form}: students hand in as groups, and Moodle takes a number in this archive for a"
-            " group's: others would get the page; export grades with comments (--worksheet without --what)",
+        notes = (
+            [] if options.groups is False else ["not for groups: there Moodle takes a number for a group's"]
         )
+        return numbers, dict.fromkeys(others, "the table of ids has no participant"), notes
+    sheet = Worksheet.opened(bytes_of(options.form, "form_missing"), options.form.name)
+    if "group" in sheet.columns or (options.groups is None and sheet.group_columns):
+        titles = ", ".join(f"'{sheet.table.value(0, place)}'" for place in sheet.group_columns)
+        maybe = "" if "group" in sheet.columns else "; if that is none of groups, give --no-groups"
+        raise _group_error(f"as the worksheet's column {titles} tells{maybe}")
     matches = sheet.match(grades, options)
     rows = {student: row for student, row in matches.rows.items() if student in people}
     locked = {student: why for student, row in rows.items() if (why := sheet.why_fixed(row))}

@@ -111,10 +111,14 @@ class MoodleAreas(Payload):
 
 
 class MoodleRubricDocument(Payload):
-    """The call that makes the rubric a marking guide of an assignment."""
+    """The call that makes the rubric a marking guide of an assignment.
+
+    `fillings_lost` says how many points of students may go with a guide that is there; None: none may be.
+    """
 
     schema_version: Version = 1
     assignment: str
+    fillings_lost: Annotated[int, Field(ge=0)] | None = None
     wsfunction: Literal["core_grading_save_definitions"] = "core_grading_save_definitions"
     arguments: MoodleAreas
 
@@ -238,16 +242,16 @@ def guide(grades: Sequence[Grade], options: Options) -> Delivery:
             "guide_comments": [{"sortorder": 1, "description": "See the feedback file."}],
         },
     }
-    content = {
+    content: dict[str, object] = {
         "assignment": grades[0].assignment,
         "arguments": {"areas": [{"cmid": cmid, "contextid": context_id, "definitions": [definition]}]},
     }
-    text = json_document(MoodleRubricDocument, content, "the marking guide")
-    if options.replace_guide is None:
-        return Delivery(text)
-    return Delivery(
-        text, notes=(f"saving this guide deletes the one there with {_fillings(options.replace_guide)}",)
-    )
+    notes = []
+    if options.replace_guide is not None:
+        lost = _fillings(options.replace_guide)
+        content["fillings_lost"] = sum(lost)
+        notes = [f"saving this guide deletes the one there with {sum(lost)} fillings of {len(lost)} grades"]
+    return Delivery(json_document(MoodleRubricDocument, content, "the marking guide"), notes=tuple(notes))
 
 
 def _place(options: Options) -> tuple[int, int]:
@@ -279,15 +283,15 @@ def _place(options: Options) -> tuple[int, int]:
     return cmid, context_id
 
 
-def _fillings(path: Path) -> str:
-    """How many points of how many students a guide holds, by Moodle's answer; InputFileError for another."""
+def _fillings(path: Path) -> list[int]:
+    """How many points each grade by a guide holds, by Moodle's answer; InputFileError for another."""
     answer = read_answer(path)
     try:
-        filled = [len(instance["guide"]["criteria"]) for instance in answer["instances"]]
-    except (LookupError, TypeError) as error:
+        # An instance that nobody filled in has no guide.
+        return [len((each.get("guide") or {}).get("criteria", ())) for each in answer["instances"]]
+    except (LookupError, TypeError, AttributeError) as error:
         message = "is not Moodle's answer to core_grading_get_gradingform_instances"
         raise InputFileError("criteria", f"{path}: {message}") from error
-    return f"{sum(filled)} fillings of {len(filled)} students"
 
 
 def _area(options: Options) -> Mapping[str, object]:
@@ -348,9 +352,9 @@ def fillings(grades: Sequence[Grade], options: Options) -> Delivery:
             "ids_needed", "nobody's number in Moodle is known: give a table student_id,id (--ids)"
         )
     content = {"assignment": grades[0].assignment, "criteria": criteria, "calls": calls}
-    return Delivery(
-        json_document(MoodleMarksDocument, content, "the marking guide's points"), unplaced=missing
-    )
+    document = json_document(MoodleMarksDocument, content, "the marking guide's points")
+    note = "each call also replaces the student's feedback comment: without one Moodle stores half of it"
+    return Delivery(document, unplaced=missing, notes=(note,))
 
 
 def _filled(number: str, mark: Mark) -> dict[str, object]:

@@ -428,7 +428,12 @@ def _key(column: str, text: str) -> str:
     if column != NAME:
         return " ".join(unicodedata.normalize("NFKC", text).casefold().split())
     letters = unicodedata.normalize("NFKD", text).casefold()
-    plain = "".join(letter for letter in letters if letter.isalnum() or letter.isspace() or letter in ",-")
+    # Of the apostrophes some are letters to Unicode: category Lm.
+    plain = "".join(
+        letter
+        for letter in letters
+        if letter in ",-" or letter.isspace() or (letter.isalnum() and unicodedata.category(letter) != "Lm")
+    )
     return " ".join(sorted(plain.replace(",", " ").replace("-", " ").split()))
 
 

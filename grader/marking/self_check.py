@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from grader.documents import Quantity, Tolerance
+from grader.marking.settling import NEARLY_CERTAIN
 from grader.outcomes import Judgement, NamedMistake, Outcome, Reason
+from reference.authored.assignment import SCALE_NAMES
 
 Level = Literal["symbol", "hint", "full"]
 LEVELS: tuple[Level, ...] = ("symbol", "hint", "full")
@@ -51,6 +53,11 @@ def likely_mistakes(judgement: Judgement, level: Level) -> tuple[NamedMistake, .
     return tuple(one for one in judgement.mistakes if level == "full" and one.code != "vector_missing")
 
 
+def certain_mistakes(judgement: Judgement) -> tuple[NamedMistake, ...]:
+    """The mistakes that nothing else explains nearly as well: a hint may tell the law that they break."""
+    return tuple(one for one in judgement.mistakes if one.confidence >= NEARLY_CERTAIN and not one.rivals)
+
+
 def is_all_right(checked: tuple[Checked, ...]) -> bool:
     """Whether nothing is off or open."""
     return all(one.result == "right" for one in checked)
@@ -58,6 +65,9 @@ def is_all_right(checked: tuple[Checked, ...]) -> bool:
 
 def _is_handed_in(outcome: Outcome) -> bool:
     absent = {"not_measured", "optional", "unread", "scale_assumed"}
+    if outcome.measured == Quantity() and outcome.name not in SCALE_NAMES:
+        # What rests on a refused entry alone was not handed in.
+        absent.add("entry_refused")
     return outcome.verdict not in {"not_judged", "review", "none"} or not (
         absent & {reason.code for reason in outcome.reasons[:1]}
     )

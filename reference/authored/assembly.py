@@ -22,6 +22,7 @@ from reference.authored.mechanism import (
     SlottedLinkTable,
 )
 from reference.authored.toml_file import LENGTH_UNITS_M, SideText
+from reference.errors import near_names
 from reference.geometry import ComplexArray, FloatArray
 from reference.kinematics import assur
 from reference.mechanism import (
@@ -94,9 +95,10 @@ class _Numbers:
         first, second = text.words
         unknown = text.side.names - self.values.keys()
         if unknown:
-            raise FormulaError(
-                f"side = '{text.side.text}' is neither {first} nor {second}, nor data of a variant"
-            )
+            near = near_names(min(unknown), self.values)
+            meant = f"; did you mean {' or '.join(near)}?" if near else ""
+            message = f"is neither {first} nor {second}, nor data of a variant{meant}"
+            raise FormulaError(f"side = '{text.side.text}' {message}")
         signs = np.sign(self.number(text.side))
         if np.any(signs == 0.0):
             detail = f"above zero is {first}, below {second}"

@@ -8,14 +8,15 @@ import csv
 import io
 import math
 import re
+import unicodedata
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import BaseModel, model_validator
+from pydantic import BaseModel, BeforeValidator, model_validator
 
 from reference.authored.formula import CONSTANTS, FUNCTIONS, Formula
 from reference.authored.toml_file import (
@@ -44,6 +45,7 @@ MOST_VARIANTS = 10_000
 """Of an assignment: more than any class has students, and all of them are computed before it is used."""
 LARGEST_KEY = 1e9
 """A roster's numbers have nine digits at most."""
+SPREADSHEETS = {".xlsx", ".xls", ".ods", ".numbers"}
 KEYS = ("n", "position")
 """Columns that say which variant a row is of."""
 
@@ -88,6 +90,18 @@ class Column:
     words: tuple[str, ...] = ()
 
 
+_FORMS = (
+    'needs either file = "NAME.csv" (a table beside this file), or columns and rows, such as'
+    ' columns = ["n", "a [mm]"] and rows = [[1, 40], [2, 45]]'
+)
+
+
+def _read_cell(value: object) -> object:
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise ValueError("a number or a side is expected in a cell")  # noqa: TRY004 - as above
+    return value
+
+
 class DataTable(Authored):
     """Data of the variants, row by row: `columns` and `rows` here, or the `file` of a CSV beside this one.
 
@@ -96,13 +110,15 @@ class DataTable(Authored):
 
     file: str | None = None
     columns: list[str] | None = None
-    rows: list[list[float | int | str]] | None = None
+    rows: list[list[Annotated[float | int | str, BeforeValidator(_read_cell)]]] | None = None
 
     @model_validator(mode="before")
     @classmethod
     def _by_rows(cls, data: Any) -> Any:  # noqa: ANN401 - not yet validated
         if isinstance(data, str):
             return {"file": data}
+        if not isinstance(data, dict | list):
+            raise ValueError(_FORMS)  # noqa: TRY004 - pydantic's way to refuse
         if isinstance(data, list) and data and all(isinstance(row, dict) for row in data):
             columns = [*dict.fromkeys(name for row in data for name in row)]
             return {"columns": columns, "rows": [[row.get(name, "") for name in columns] for row in data]}
@@ -117,10 +133,7 @@ class DataTable(Authored):
     def _has_rows_once(self) -> Self:
         inside = (self.columns is not None, self.rows is not None)
         if (self.file is None) != all(inside) or (self.file is not None and any(inside)):
-            raise ValueError(
-                'needs either file = "NAME.csv" (a table beside this file), or columns and rows, such as'
-                ' columns = ["n", "a [mm]"] and rows = [[1, 40], [2, 45]]'
-            )
+            raise ValueError(_FORMS)
         return self
 
 
@@ -218,6 +231,8 @@ def read_rows(table: DataTable, beside: Path, length_unit_m: float) -> tuple[Dat
         source, name = str(beside), "the table"
     else:
         path = beside.parent / table.file
+        if path.suffix.lower() in SPREADSHEETS:
+            raise AuthoredFileError(str(path), (Finding("$", "is a spreadsheet: save it as CSV in UTF-8"),))
         text = text_of(path)
         delimiter = delimiter_of(text)
         split, findings = table_lines(text, delimiter, MOST_VARIANTS)
@@ -260,7 +275,9 @@ class _Reader:
         """The variant of each row, the columns, and where each row stands, in the order of the variants."""
         headings = self._headings(lines[0][1] if lines else ())
         rows = lines[1:]
-        if not self.findings and not rows:
+        if self.findings:
+            return (), {}, ()
+        if not rows:
             self.fault(self.head, "there are no rows below the names of the columns")
         for number, cells in rows:
             if any(cell != "" for cell in cells[len(headings) :]):
@@ -300,7 +317,13 @@ class _Reader:
             name = parts[1] if parts else text
             if parts is None or not _NAME.fullmatch(name):
                 example = "a name and its unit are expected, such as l_AB [mm]: letters A-Z a-z, digits and _"
-                self.fault(where, f"'{text}' is no heading: {example}" if text else "has no heading")
+                foreign = [
+                    f"; '{one}' is {unicodedata.name(one, 'no letter')}" for one in name if one > "\x7f"
+                ]
+                self.fault(
+                    where,
+                    f"'{text}' is no heading: {example}{''.join(foreign[:1])}" if text else "has no heading",
+                )
             elif name in CONSTANTS or name in FUNCTIONS:
                 self.fault(where, f"{name} has a meaning in formulas already: choose another name")
             elif name in {heading.name for heading in headings}:
@@ -309,7 +332,8 @@ class _Reader:
                 headings.append(Column(name, self._unit(where, parts[2] or parts[3] or "")))
         if not self.findings and not {heading.name for heading in headings} & {*KEYS}:
             message = "there is no column n (or position), which says whose row it is"
-            self.fault(self.head, message)
+            first = f": if {headings[0].name} holds the numbers, call it n" if headings else ""
+            self.fault(self.head, message + first)
         return headings
 
     def _unit(self, where: str, text: str) -> str:
@@ -399,7 +423,8 @@ def _number_in(cell: Cell, name: str, *, decimal_comma: bool) -> float:
     parts = re.fullmatch(r"([-+0-9.,]+)\s*(\D.*)", plain)
     if parts is not None and (unit := _unit_of(parts[2])) in UNITS:
         raise ValueError(f"'{cell}' is no number: the unit stands in the heading, as {name} [{unit}]")
-    raise ValueError(f"'{cell}' is no number" + (", and no side" if cell.isalpha() else ""))
+    side = f" (a side is {', '.join(SIDES)})" if "side" in name.lower() else ""
+    raise ValueError(f"'{cell}' is no number{side}")
 
 
 def misused_columns(thing: object, rows: VariantRows, path: str, key: str = "") -> Iterator[Finding]:

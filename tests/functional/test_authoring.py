@@ -1,6 +1,7 @@
 """From a new assignment to its first plan, as a teacher would."""
 
 import json
+import re
 import shlex
 import tomllib
 import xml.etree.ElementTree as ET
@@ -15,7 +16,7 @@ def test_what_a_new_assignment_says_to_do_next_can_be_done(planmark, tmp_path, o
     assert {path.name for path in tmp_path.iterdir()} == {
         f"mine.{kind}.toml" for kind in ("assignment", "mechanism", "rubric")
     }
-    following = [line.strip() for line in told.stdout.splitlines() if line.startswith("  planmark ")]
+    following = re.findall(r"(?m)^(?:see it:|next:.*) (planmark .*)$", told.stdout)
     assert len(following) == 2
     for command in following:
         ran = planmark(*shlex.split(command)[1:])

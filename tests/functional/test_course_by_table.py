@@ -1,4 +1,4 @@
-"""A course whose data stand in a table, as docs/assignments.md shows it: from the files to the marks."""
+"""A course whose data stand in a table, as docs/course.md shows it: from the files to the marks."""
 
 import json
 import re
@@ -17,7 +17,7 @@ from reference.kinematics.cycle import cycle
 from reference.plan import exact_plan
 from tests.functional.test_grade import perfect_rows, results_of, write_roster, write_table
 
-DOCS = Path(__file__).resolve().parents[2] / "docs" / "assignments.md"
+DOCS = Path(__file__).resolve().parents[2] / "docs" / "course.md"
 RUBRIC = """
 schema_version = 1
 id = "conveyor"

@@ -126,7 +126,8 @@ def test_every_command_of_the_documentation_writes_its_file(desk, command):
 def test_every_option_is_documented():
     parameters = typer.main.get_command(app).commands["export"].params
     options = {option for parameter in parameters for option in parameter.opts if option.startswith("--")}
-    assert options <= set(re.findall(r"--[a-z-]+", DOCUMENT))
+    of_all_commands = (ROOT / "docs" / "command_line.md").read_text(encoding="utf-8")
+    assert options <= set(re.findall(r"--[a-z-]+", DOCUMENT + of_all_commands))
 
 
 @pytest.mark.parametrize(
@@ -134,6 +135,14 @@ def test_every_option_is_documented():
     [
         ("export marks --to sakai", "'sakai' is no export target"),
         ("export marks --to moodle --what results", "moodle is given no 'results'"),
+        ("export marks --to canvas --what marks", "known are grades, rubric (or --to canvas-api)"),
+        ("export marks --to canvas-api", "canvas-api needs --course-id and --assignment-id"),
+        ("export marks --to canvas-api --course-id x --assignment-id 1", "'x' is no number"),
+        ("export marks --to openedx --submissions rubric.json", "no submissions are in this answer"),
+        ("export marks --to openedx --submissions none.json", "none.json: cannot be read"),
+        ("export marks --to blackboard", "Blackboard takes grades only in its own file"),
+        ("export marks --to ilias --what feedback", "ILIAS's archive is needed"),
+        ("export marks --to brightspace --gradebook blackboard.xls", "it is one of Blackboard's"),
         ("export nowhere --to moodle", "run planmark grade first"),
         ("export marks --to moodle --worksheet none.csv", "none.csv: cannot be read"),
         ("export marks --to canvas --worksheet Grades-Pump.csv", "--worksheet is Moodle's"),

@@ -262,3 +262,68 @@ def test_a_call_that_names_what_there_is_not_is_refused(planmark, tmp_path, call
     assert ran.stderr.strip()
     assert "Traceback" not in ran.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_a_student_fills_in_the_template_and_needs_no_student_id(planmark, tmp_path):
+    ran = planmark("check", "pump", "--n", 7, "--template", tmp_path / "mine.csv", "--lang", "ro")
+    assert ran.returncode == 0
+    file = tmp_path / "mine.csv"
+    header, *comments, last = file.read_text(encoding="utf-8-sig").splitlines()
+    assert header.startswith("n;kL;kv;ka;v_A;v_A_deg;")
+    assert all(line.lstrip('"').startswith("#") for line in comments)
+    assert "student_id" not in header
+    assert planmark("check", "pump", "--n", 7, "--template", file).returncode == 2
+    untouched = planmark("check", "pump", "--measured", file)
+    assert untouched.returncode == 1
+    assert "nothing" in untouched.stdout
+    filled = last.split(";")
+    filled[header.split(";").index("v_A")] = "60,0"
+    file.write_text("\r\n".join([header, *comments, ";".join(filled)]), encoding="utf-8")
+    assert planmark("check", "pump", "--measured", file).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        ("pump --measured nowhere.csv", "нет такого файла"),
+        ("pump --measured bare.csv", "нужен параметр --n"),
+        ("pump --n 77 --measured bare.csv", "n = 77"),
+        ("pump --n 7", "--measured"),
+        ("pumpp --n 7 --measured bare.csv", "нет задания «pumpp»"),
+        ("pump --n 7 --measured bare.csv --level all", "--level all"),
+        ("pump --n 7 --measured bare.csv --page mine.txt", ".html"),
+        ("pump --n 7 --template mine.txt", ".csv"),
+        ("pump --n 8 --measured both.csv", "n 7"),
+    ],
+)
+def test_errors_of_a_self_check_are_in_the_students_language(planmark, tmp_path, call, told):
+    (tmp_path / "bare.csv").write_text("v_A\n60\n", encoding="utf-8")
+    (tmp_path / "both.csv").write_text("n,v_A\n7,60\n", encoding="utf-8")
+    ran = planmark("check", *call.split(), "--lang", "ru")
+    assert ran.returncode == 2
+    assert told in ran.stderr
+    assert any("а" <= letter <= "я" for letter in ran.stderr)
+
+
+def test_the_page_of_a_self_check_has_no_points_and_sends_nobody_to_a_person(planmark, tmp_path):
+    file = tmp_path / "mine.csv"
+    file.write_text("v_A,v_B,v_D,kv\n60,5,99,0.3\n", encoding="utf-8")
+    page = tmp_path / "mine.html"
+    assert planmark("check", "pump", "--n", 7, "--measured", file, "--page", page).returncode == 1
+    text = page.read_text(encoding="utf-8")
+    for word in ("needs review", "waits for a person", "Points", "score is", "/ 43"):
+        assert word not in text
+    assert 'class="score' not in text
+    assert "Look at" in text
+
+
+def test_a_column_that_is_not_known_costs_no_class(planmark, tmp_path):
+    (tmp_path / "in").mkdir()
+    table = "student_id,n,v_A,remark\ns01,7,60,good\ns02,8,60,\n"
+    (tmp_path / "in" / "class.csv").write_text(table, encoding="utf-8")
+    planmark("grade", "in", "--assignment", "pump", "--out", "out")
+    results = json.loads((tmp_path / "out" / "results.json").read_text(encoding="utf-8"))
+    assert not results["unmatched"]
+    first, second = results["reports"]
+    assert [problem["code"] for problem in first["problems"]] == ["measurement_columns"]
+    assert not second["problems"]

@@ -4,43 +4,100 @@ import csv
 import io
 import re
 import zipfile
+from contextlib import suppress
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
 
 CANVAS_NUMBER = re.compile(r"-?[0-9.,]+%?")
 
 
-def moodle_worksheet(data, maximum, word="Participant "):
-    """Grades and comments by participant, as Moodle stores them; who is skipped is not there."""
-    header, *rows = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""))
-    stored = {}
-    for row in (row for row in rows if row):
-        cells = dict(zip(header, row, strict=True))
-        grade = cells["Grade"].replace(" ", "")
-        if not cells["Identifier"].startswith(word) or grade in {"", "-"}:
-            continue
-        # PHP's cast of a text to a number: its leading digits, else 0.
-        leading = re.match(r"-?[0-9]*\.?[0-9]*", grade)
-        value = float(leading[0] or 0) if leading else 0.0
-        if 0.0 <= value <= maximum:
-            place = header.index("Feedback comments") if "Feedback comments" in header else 0
-            comment = row[place] if place else None
-            stored[int(cells["Identifier"][len(word) :])] = (value, comment)
-    return stored
+@dataclass
+class MoodleSite:
+    """An assignment of a Moodle site: what it holds by participant, and what an import changed.
+
+    `strings` are the headings and the word for a participant in the teacher's language pack; `grades`
+    are the grade and the time of its last change.
+    """
+
+    maximum: float
+    grades: dict = field(default_factory=dict)
+    comments: dict = field(default_factory=dict)
+    strings: tuple = ("Identifier", "Grade", "Last modified (grade)", "Feedback comments", "Participant ")
+    decimal_mark: str = "."
+    passes_over_zero: bool = False
+    updated: int = 0
+    commented: int = 0
+
+    def upload(self, data):
+        """Moodle 4.5: offline/importgradeslib.php, assignfeedback_offline_grade_importer::init and next,
+        and offline/locallib.php, assign_feedback_offline::process_import_grades.
+        """
+        header, *rows = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""))
+        identifier, grade, modified, feedback, word = self.strings
+        # Headings are compared as they are; a column of comments at place 0 is empty() to PHP.
+        who, what, when = (header.index(each) for each in (identifier, grade, modified))
+        told = header.index(feedback) if feedback in header else 0
+        for row in filter(None, rows):
+            number = row[who][len(word) :]
+            if number.isdigit():
+                self.import_row(int(number), row[what], strtotime(row[when]), row[told] if told else None)
+        return self
+
+    def import_row(self, participant, text, modified, comment):
+        value = unformat_float(text, self.decimal_mark)
+        held, changed = self.grades.get(participant, (None, None))
+        is_stale = changed is not None and changed > modified + 60
+        is_same = held is not None and held == value
+        is_none = value is None or value < 0 or (self.passes_over_zero and not value)
+        if not (is_same or is_none or is_stale or value > self.maximum):
+            self.grades[participant] = (value, NOW)
+            self.updated += 1
+        if comment is not None and not is_stale and comment != self.comments.get(participant, ""):
+            self.comments[participant] = comment
+            self.commented += 1
 
 
-def moodle_gradebook(text, users, column=1):
-    """Grades by user of a new grade item; one unknown user aborts all."""
+NOW = datetime(2026, 11, 22, tzinfo=UTC).timestamp()
+
+
+def unformat_float(text, decimal_mark):
+    """Moodle 4.5: lib/moodlelib.php, unformat_float; PHP casts a text's leading digits, else 0."""
+    text = text.strip().replace(" ", "").replace(decimal_mark, ".")
+    leading = re.match(r"-?[0-9]*\.?[0-9]*", text)[0]
+    return None if not text else float(leading) if any(map(str.isdigit, leading)) else 0.0
+
+
+def strtotime(text):
+    """Seconds since 1970; 0 where PHP's strtotime knows none of the words. The server's zone is UTC."""
+    for form in ("%A, %d %B %Y, %I:%M %p", "%Y-%m-%dT%H:%M:%S%z"):
+        with suppress(ValueError):
+            read = datetime.strptime(text, form)  # noqa: DTZ007 - the zone is added below
+            return (read if read.tzinfo else read.replace(tzinfo=UTC)).timestamp()
+    return 0
+
+
+def moodle_gradebook(text, users, existing=None):
+    """Grades by user, with feedback in an item that is there, of a maximum; an error aborts all.
+
+    Moodle 4.5: grade/import/csv/classes/load_data.php, gradeimport_csv_load_data: a new item is out of
+    100, and feedback can be mapped to items that are there alone (map_user_data_with_value, 'feedback').
+    """
     _, *rows = csv.reader(io.StringIO(text, newline=""))
     stored = {}
     for row in rows:
-        if row[0] not in users:
+        grade = None if row[1].strip() in {"", "-"} else float(row[1])
+        if row[0] not in users or (grade is not None and grade > (existing or 100.0)):
             return {}
-        # A blank is stored as 0 in a new item, and only a dash is none.
-        stored[row[0]] = None if row[column].strip() == "-" else float(row[column] or 0)
+        stored[row[0]] = (grade, row[2]) if existing else grade
     return stored
 
 
 def moodle_feedback(data, participants):
-    """Files by participant: a path's part with three underscores says whose and for which plugin."""
+    """Files by participant: a path's part with three underscores says whose and for which plugin.
+
+    Moodle 4.5: feedback/file/importziplib.php, assignfeedback_file_zip_importer. Where students hand in
+    as groups, get_participant_mapping gives groups' numbers instead of `participants`.
+    """
     stored = {}
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         for name in archive.namelist():

@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from grader.lms.api import submissions_in
 from grader.lms.export import draft, export, read_results
 from grader.lms.gradebooks import fill_gradebook
 from grader.lms.grades import Options, Person, grades_of
@@ -54,8 +55,10 @@ def test_moodle_stores_what_was_meant_in_any_worksheet(people, style, mark):
     filled = fill_worksheet(
         data, "w.csv", grades_of(results(*graded), options), options, comments, datetime.now(UTC)
     )
-    stored = importers.moodle_worksheet(filled.content, 10.0)
-    assert stored == {at: (round(people[at][2], 2), comments[f"s{at}"]) for at in range(len(people))}
+    site = importers.MoodleSite(10.0).upload(filled.content)
+    assert site.comments == {at: comments[f"s{at}"] for at in range(len(people))}
+    stored = {at: grade for at, (grade, _) in site.grades.items()}
+    assert stored == {at: round(people[at][2], 2) for at in range(len(people))}
     for before, after in zip(read(data)[1:], read(filled.content)[1:], strict=True):
         assert before[:2] + before[3:5] == after[:2] + after[3:5]
 
@@ -105,7 +108,7 @@ def test_a_file_of_any_content_is_used_or_refused(tmp_path, data):
 
 keys = st.sampled_from(
     "areas cmid contextid definitions guide guide_criteria data criteria rubric id shortname description"
-    " maxscore points schema_version reports student_id score assignment".split()
+    " id userId recipient outcomes levels qualityId maxscore points schema_version reports student_id score assignment".split()
 )
 answers = st.recursive(
     st.one_of(st.none(), st.booleans(), st.integers(-2, 3), st.floats(), texts),
@@ -119,6 +122,7 @@ answers = st.recursive(
 def test_an_answer_of_any_shape_is_used_or_refused(tmp_path, document):
     path = tmp_path / "answer.json"
     path.write_text(json.dumps(document), encoding="utf-8")
+    assert all(one.user for one in submissions_in(document))
     with suppress(PlanmarkError):
         numbered([], path)
     with suppress(PlanmarkError):

@@ -470,8 +470,9 @@ def test_moodle_stores_the_worksheets_grades_as_they_are_meant(tmp_path):
         marked("s_3", None, 2.5, status="needs_review"),
     )
     delivery, path = moodle(tmp_path, "grades", *reports, name="o.csv", form=form, people=BY_MAIL)
-    stored = importers.moodle_worksheet(path.read_bytes(), 10.0)
-    assert stored == {101: (7.5, "<ul><li>~ <b>Vector 2</b>: Told &lt;why&gt; &amp; how.</li></ul>")}
+    site = importers.MoodleSite(10.0).upload(path.read_bytes())
+    assert site.grades == {101: (7.5, importers.NOW)}
+    assert site.comments == {101: "<ul><li>~ <b>Vector 2</b>: Told &lt;why&gt; &amp; how.</li></ul>"}
     assert set(delivery.unplaced) == {"s02"}
     assert set(delivery.withheld) == {"s_3"}
 

@@ -82,7 +82,8 @@ def test_names_have_nothing_that_moodle_takes_for_a_tag(tmp_path, answer):
 @pytest.fixture
 def points(tmp_path):
     path = tmp_path / "instances.json"
-    filled = [{"id": at, "guide": {"criteria": [{"id": 1}, {"id": 2}]}} for at in range(3)]
+    filled = [{"id": at, "guide": {"criteria": [{"id": 1}, {"id": 2}, {"id": 3}]}} for at in range(2)]
+    filled.append({"id": 2})
     path.write_text(json.dumps({"instances": filled, "warnings": []}))
     return path
 
@@ -94,7 +95,7 @@ def test_an_activity_told_by_its_numbers_alone_may_have_a_guide(tmp_path, points
         tmp_path, "rubric", marked("s01", 5.0), cmid=1, context_id=2, replace_guide=points
     )
     assert json.loads(path.read_bytes())["arguments"]["areas"][0]["contextid"] == 2
-    assert "6 fillings of 3 students" in delivery.notes[0]
+    assert "6 fillings of 3 grades" in delivery.notes[0]
 
 
 def test_an_activity_that_nobody_tells_is_asked_for(tmp_path, answer):
@@ -112,8 +113,9 @@ def test_a_guide_is_never_written_over_another(tmp_path, answer):
 
 def test_a_guide_is_replaced_only_with_a_count_of_the_points_that_go(tmp_path, answer, points):
     with_guide = answer(GUIDE)
-    delivery, _ = moodle(tmp_path, "rubric", marked("s01", 5.0), criteria=with_guide, replace_guide=points)
-    assert "deletes the one there with 6 fillings of 3 students" in delivery.notes[0]
+    delivery, path = moodle(tmp_path, "rubric", marked("s01", 5.0), criteria=with_guide, replace_guide=points)
+    assert json.loads(path.read_bytes())["fillings_lost"] == 6
+    assert "deletes the one there with 6 fillings of 3 grades" in delivery.notes[0]
     with pytest.raises(InputFileError, match="core_grading_get_gradingform_instances"):
         moodle(tmp_path, "rubric", marked("s01", 5.0), criteria=with_guide, replace_guide=with_guide)
 

@@ -206,8 +206,8 @@ def test_every_faulty_cell_is_told_at_once_with_row_and_column(course):
         ("n;;a", "line 1, column 2", "has no heading"),
         ("n;a;a", "line 1, column 3", "two columns a"),
         ("n;pi", "line 1, column 2", "has a meaning in formulas already"),
-        ("number;a", "line 1", "no column n"),
-        ("n;\u0430", "line 1, column 2", "is no heading"),
+        ("number;a", "line 1", "no column n (or position), which says whose row it is: if number holds"),
+        ("n;\u0430", "line 1, column 2", "'\u0430' is CYRILLIC SMALL LETTER A"),
     ],
 )
 def test_a_heading_that_is_none_is_told(course, heading, where, words):
@@ -220,6 +220,31 @@ def test_too_many_cells_an_empty_table_and_no_table_are_told(course):
     assert "no rows" in faults(course(HEADING))[1]["line 1"]
     assert faults(course(variant='table = "seven.csv"'))[1] == {"$": "there is no such file"}
     assert "either file" in faults(course(variant="[variant.table]\nrows = [[1]]"))[1]["$.variant.table"]
+
+
+@pytest.mark.parametrize(
+    ("table", "path", "words"),
+    [
+        ("table = 3", "$.variant.table", "either file"),
+        (
+            "table = { columns = ['n', 'a'], rows = [[1, true]] }",
+            "$.variant.table.rows[0][1]",
+            "a number or a side",
+        ),
+        ("table = {}", "$.variant.table", "either file"),
+    ],
+)
+def test_what_is_no_table_is_told_once(course, table, path, words):
+    _, told = faults(course(variant=table))
+    assert list(told) == [path]
+    assert words in told[path]
+
+
+def test_a_spreadsheet_is_no_csv(course, tmp_path):
+    (tmp_path / "six.xlsx").write_bytes(b"PK\x03\x04" + bytes(100))
+    assert faults(course(variant='table = "six.xlsx"'))[1] == {
+        "$": "is a spreadsheet: save it as CSV in UTF-8"
+    }
 
 
 def test_a_faulty_row_in_the_file_itself_is_told_with_its_path(course):

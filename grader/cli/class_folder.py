@@ -1,0 +1,86 @@
+"""Arguments that name a class's folder, and the options that its `planmark.toml` gives."""
+
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from grader.cli.terminal import note
+
+if TYPE_CHECKING:
+    from grader.inputs.class_file import ClassSettings
+
+SETTINGS = "planmark.class_settings"
+"""Where a command's context holds the settings that it found."""
+
+
+def class_folder(context: typer.Context, folder: Path | None) -> Path | None:
+    """The folder that is named, else the working folder; the options that are absent come from its file."""
+    if context.resilient_parsing:
+        return folder
+    settings = _settings(context, (folder or Path(), *_above(folder)))
+    if folder is None and settings is None:
+        raise typer.BadParameter("name the folder; there is no planmark.toml in the working folder")
+    return folder or Path()
+
+
+def class_results(context: typer.Context, folder: Path | None) -> Path | None:
+    """The folder of results: the one that is named, or that of the class whose folder is named.
+
+    A class is known by its `planmark.toml`: in the folder, in the working folder above it, or beside the
+    submissions whose results these are.
+    """
+    if context.resilient_parsing:
+        return folder
+    places = [folder or Path(), *_above(folder)]
+    if folder is not None and not (folder / "planmark.toml").is_file():
+        from grader.folder.changes import noted_run
+        from reference.errors import CallError
+
+        with suppress(CallError):  # the command itself says what is missing
+            places.append(noted_run(folder).folder)
+    settings = _settings(context, places)
+    if settings is None and folder is None:
+        raise typer.BadParameter(
+            "name the folder of results; there is no planmark.toml in the working folder"
+        )
+    is_class = settings is not None and settings.file.parent.resolve() == (folder or Path()).resolve()
+    return settings.out if settings is not None and is_class and settings.out.is_dir() else folder or Path()
+
+
+def _above(folder: Path | None) -> list[Path]:
+    """The working folder, where a named folder lies in it."""
+    return [] if folder is None or not folder.resolve().is_relative_to(Path.cwd()) else [Path()]
+
+
+def _settings(context: typer.Context, places: Iterable[Path]) -> "ClassSettings | None":
+    """The settings of the first place that has a file, as defaults of the command's options."""
+    file = next((place / "planmark.toml" for place in places if (place / "planmark.toml").is_file()), None)
+    if file is None:
+        return None
+    from grader.inputs.class_file import read_class_file
+    from grader.lms.export import TARGETS
+
+    settings = read_class_file(file, TARGETS)
+    values = dict(settings.values)
+    if context.info_name == "match":
+        # Its --out is a roster.
+        del values["out"]
+    context.default_map = values
+    context.meta[SETTINGS] = settings
+    return settings
+
+
+def tell_used(context: typer.Context) -> None:
+    """Print in one line which options came from the class's file."""
+    settings = context.meta.get(SETTINGS)
+    if settings is None:
+        return
+    used = []
+    for key, parameter in settings.keys.items():
+        source = context.get_parameter_source(parameter)
+        if source is not None and source.name == "DEFAULT_MAP":
+            used.append(f"{key} {settings.values[parameter]}")
+    note(f"{settings.file}: {', '.join(used) or 'nothing is used of it'}")

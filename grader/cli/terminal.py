@@ -1,0 +1,106 @@
+"""What the terminal and the log are told: notes, the next step, progress in a pipe."""
+
+import logging
+import os
+import platform
+import shlex
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import typer
+
+from grader import __version__
+
+LOG = logging.getLogger("planmark")
+INTERRUPTED = 130
+"""The exit status of a program that Ctrl+C ended, as shells count: 128 and the signal's number."""
+
+
+class _Screen(logging.Handler):
+    """Notes on standard output, details on standard error."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print a record."""
+        typer.echo(self.format(record), err=record.levelno < logging.INFO)
+
+
+_SCREEN = _Screen(logging.INFO)
+LOG.setLevel(logging.INFO)
+LOG.addHandler(_SCREEN)
+
+
+def set_up(*, quiet: bool, verbose: bool, log: Path | None) -> None:
+    """Say what is shown and logged from now on; raises OutputError for a log that cannot be written."""
+    level = logging.WARNING if quiet else logging.INFO
+    _SCREEN.setLevel(logging.DEBUG if verbose else level)
+    for handler in set(LOG.handlers) - {_SCREEN}:
+        LOG.removeHandler(handler)
+        handler.close()
+    LOG.setLevel(logging.DEBUG if verbose or log else level)
+    LOG.propagate = False
+    if log is not None:
+        from grader.files import log_to
+
+        log_to(log)
+
+
+def is_quiet() -> bool:
+    """Whether notes and progress are not wanted."""
+    return _SCREEN.level > logging.INFO
+
+
+def note(text: str) -> None:
+    """Print what `--quiet` leaves out."""
+    LOG.info("%s", text)
+
+
+def note_call() -> None:
+    """Log the versions, and how the program was called."""
+    system = f"Python {platform.python_version()}, {platform.platform()}"
+    LOG.debug("planmark %s, %s, in %s", __version__, system, Path.cwd())
+    LOG.debug("%s", shown_command("planmark", *sys.argv[1:]))
+
+
+def tell_next(*command: object, before: str = "") -> None:
+    """Print the command that comes next, and what is to be done before it."""
+    note(f"next: {before}{shown_command('planmark', *command)}")
+
+
+def shown_command(*words: object) -> str:
+    """A command as it can be typed into this system's shell."""
+    texts = [str(word) for word in words]
+    return subprocess.list2cmdline(texts) if os.name == "nt" else shlex.join(texts)
+
+
+def color() -> bool | None:
+    """False where NO_COLOR asks for none (https://no-color.org); else None: as the terminal is."""
+    return False if os.environ.get("NO_COLOR") else None
+
+
+def set_encoding() -> None:
+    """Write UTF-8, or the encoding that PYTHONIOENCODING names with escapes for what it does not have."""
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure = getattr(stream, "reconfigure", None)
+        if reconfigure and os.environ.get("PYTHONIOENCODING"):
+            reconfigure(errors="backslashreplace")
+        elif reconfigure:
+            reconfigure(encoding="utf-8", errors="replace")
+
+
+class StepLines:
+    """Progress as lines for a pipe or a file: now and then, and when a kind of work is done."""
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds, self._last = seconds, time.monotonic()
+        self._done: dict[str, int] = {}
+
+    def __call__(self, what: str, done: int, total: int) -> None:
+        """Tell how much of a kind of work is done, if it is time."""
+        is_end = done >= total and self._done.get(what) != done
+        self._done[what] = done
+        if is_end or time.monotonic() - self._last >= self._seconds:
+            self._last = time.monotonic()
+            if not is_quiet():
+                typer.echo(f"{what}: {done} of {total}", err=True)

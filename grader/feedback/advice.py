@@ -1,0 +1,207 @@
+"""What a self-check says of a value: in which way it is off, and what to look at; never the answer.
+
+A mistake that the diagnosis names with certainty is told by the law that it breaks.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from grader.feedback.mistakes import ALONG_GUIDE, CORIOLIS_END, DRIVEN_ACROSS, DRIVEN_ALONG
+from grader.feedback.sentences import line_of, reason_sentence
+from grader.language import N_, Tongue
+from grader.marking.self_check import Checked, Level, Result, certain_mistakes, checked_values
+from grader.outcomes import Judgement, NamedMistake, Reason
+from reference.authored.assignment import SCALE_NAMES
+
+RESULTS: Mapping[Result, tuple[str, str]] = {
+    "right": ("✓", N_("right")),
+    "off": ("✗", N_("off")),
+    "open": ("?", N_("cannot be told")),
+}
+"""Mark and word of each result."""
+
+OWN_HINTS: dict[str, str] = {
+    "follows": N_("It follows rightly from your own earlier work."),
+    "hand_may_miss": N_("Its lines meet at so small an angle that a careful hand may be off by as much."),
+    "near_limit": N_("It lies so near the limit of the tolerance that it cannot be told."),
+    "entry_refused": N_("An entry that it rests on cannot be used."),
+}
+"""In place of the sentences that speak of points or of a person who must look."""
+
+_LINES = N_(
+    "Look at the two lines that meet in its end: from which point, and along or across what, is each?"
+)
+_LETTERS = N_("Look at the letters of its name: from which point of the plan to which does it run?")
+_ENTRY = N_("Look at this entry of your file: its number, unit and column.")
+_SCALE = N_("Write the scale that you used into your file, with its unit, such as 1:5 or 0.005 m/mm.")
+SIZE = {
+    "driven": N_("Look at the real value that you computed for it, and at the scale that you divided it by."),
+    "n": N_("Look at v²/l again: which velocity, which length, and by which scale did you divide?"),
+    "c": N_(
+        "Look at 2·ω·v again: which link turns, what slides along it, and by which scale did you divide?"
+    ),
+    "": _LINES,
+}
+TURN = {
+    "driven": N_("Look at the driven link on your sketch: how does this vector lie to it?"),
+    "n": N_("Look at the link that it lies along."),
+    "t": N_("Look at the link that it stands perpendicular to."),
+    "c": N_("Look at the sliding velocity that it is turned from."),
+    "": N_("Look at what sets the direction of its lines: which link, or which guide?"),
+}
+SENSE = {
+    "driven": N_("Look at the sense in which the driven link moves."),
+    "n": N_("Look at the point that it must point towards."),
+    "c": N_("Look at the sense in which the guide turns."),
+    "": _LETTERS,
+}
+VALUE = {
+    "rate": N_("Look at the vector and the length that you divided, and at their units."),
+    "": N_("Look at the drawn length, and at the scale that you multiplied it by."),
+}
+ADVICE: dict[str, Mapping[str, str]] = {
+    "too_long": SIZE,
+    "too_short": SIZE,
+    "turned_left": TURN,
+    "turned_right": TURN,
+    "reversed": SENSE,
+    "value_too_large": VALUE,
+    "value_too_small": VALUE,
+    "value_reversed": {"": N_("Look at your sketch: which way does the relative vector turn the link?")},
+    "should_be_zero": {"": N_("Look at which points stand still for an instant here.")},
+    "not_measured": {"": N_("Measure what is missing, and write it into your file.")},
+    "too_short_to_judge": {"": N_("Measure what is missing, and write it into your file.")},
+    "unread": {"": _ENTRY},
+    "entry_refused": {"": _ENTRY},
+    "near_limit": {"": N_("Measure it again.")},
+    "hand_may_miss": {"": _LINES},
+    "other_variant": {"": N_("Look at your number, and at the data that belong to it.")},
+    "scale_off": {"": N_("Look at how it is made: real value divided by drawn length, each with its unit.")},
+    "scale_refused": {"": _SCALE},
+    "scale_assumed": {"": _SCALE},
+}
+"""What to look at, by code of the reason and kind of the value; `""` for every other kind."""
+
+LAWS: dict[str, str] = {
+    "parallel_for_perpendicular": N_(
+        "Two points of one link can only turn about each other: one moves across the line that joins them."
+    ),
+    "wrong_link": N_(
+        "The direction of a relative vector is set by the link that joins the two points in its name."
+    ),
+    "sense_reversed": N_("A link turns with its ends: each end moves the way in which the link turns."),
+    "rpm_not_converted": N_("ω = π·n/30 with n in rev/min gives ω in rad/s."),
+    "scale_wrong": N_(
+        "A scale is the real value divided by the drawn length, one and the same for the whole plan."
+    ),
+    "normal_reversed": N_("a_n points towards the centre of rotation, always."),
+    "normal_missing": N_("A point that turns has a_n = v²/l too; only where v = 0 there is none."),
+    "normal_from_absolute": N_("a_n = v²/l of a link uses the relative velocity of its ends."),
+    "other_variant": N_("Each number has its own data."),
+    "other_assembly": N_(
+        "Two arcs meet in two points: the scheme of the assignment shows which one is meant."
+    ),
+    "image_mirrored": N_("The image of a link is similar to it, with its letters in the same sense."),
+    "wrong_intersection": N_(
+        "v_B = v_A + v_BA: each vector begins where the one before it ends, accelerations too."
+    ),
+    "labels_swapped": N_("The vector from the pole to a letter belongs to the point with that letter."),
+    "figure_rotated": N_("All directions of a plan are taken from the mechanism in the same position."),
+    "arithmetic": N_("Drawn length = real value / scale."),
+}
+"""The law that a mistake breaks, by its code."""
+_CORIOLIS = {
+    "normal_missing": N_("Where a block slides along a guide that turns there is a_c = 2·ω·v too."),
+    "normal_reversed": N_("a_c is the sliding velocity turned by 90° in the sense in which the guide turns."),
+    "arithmetic": N_("a_c = 2·ω·v."),
+}
+_GUIDE = {
+    "parallel_for_perpendicular": N_("A block can only move along its guide."),
+    "wrong_link": N_("A block moves along its own guide."),
+}
+_DRIVEN = {
+    DRIVEN_ACROSS: {
+        "parallel_for_perpendicular": N_(
+            "A point that turns about a pivot moves across the line to the pivot."
+        )
+    },
+    DRIVEN_ALONG: {"parallel_for_perpendicular": N_("a_n lies along the link, towards the pivot.")},
+}
+_SAME = N_("The same mistake as at %(name)s.")
+
+
+@dataclass(frozen=True, slots=True)
+class CheckedLine:
+    """What a self-check tells of one value, in a language; `advice` is empty where there is none."""
+
+    checked: Checked
+    name: str
+    hint: str
+    advice: str
+
+    @property
+    def result(self) -> Result:
+        """Right, off, or open."""
+        return self.checked.result
+
+
+def checked_lines(
+    judgement: Judgement, level: Level, speaker: Tongue, names: Mapping[str, str], driven: str
+) -> list[CheckedLine]:
+    """The values that were handed in, each with its hint and one line of advice as the level allows.
+
+    Arguments: `names` renames what students know by another name, `driven` is the driven link's pin.
+    """
+    laws: dict[str, str] = {}
+    told: dict[str, str] = {}
+    lines = []
+    for mistake in certain_mistakes(judgement) if level == "hint" else ():
+        law = law_of(mistake)
+        laws |= dict.fromkeys((one for one in mistake.explains if one not in laws), law)
+    for one in checked_values(judgement, level):
+        name = names.get(one.name, one.name)
+        # What is right needs one reason: the others say what would be off, had it not been accepted.
+        shown = one.reasons[:1] if one.result == "right" else one.reasons
+        hint = " ".join(dict.fromkeys(_hint(reason, speaker, level, names) for reason in shown))
+        advice = ""
+        if level == "hint" and one.result != "right":
+            law = laws.get(one.criterion, "")
+            if law in told:
+                advice = speaker.gettext(_SAME) % {"name": told[law]}
+            else:
+                advice = speaker.gettext(law or advice_on(one.reasons, one.name, driven))
+            told.update({law: name} if law and law not in told else {})
+        lines.append(CheckedLine(one, name, hint, advice))
+    return lines
+
+
+def _hint(reason: Reason, speaker: Tongue, level: Level, names: Mapping[str, str]) -> str:
+    if level == "hint" and reason.code in OWN_HINTS:
+        return speaker.gettext(OWN_HINTS[reason.code])
+    return reason_sentence(reason, speaker, level, names)
+
+
+def advice_on(reasons: Sequence[Reason], name: str, driven: str) -> str:
+    """What to look at, a key of the catalogues; empty where no reason has any."""
+    known = next((ADVICE[reason.code] for reason in reasons if reason.code in ADVICE), {})
+    return known.get(_kind(name, driven), known.get("", ""))
+
+
+def _kind(name: str, driven: str) -> str:
+    """The kind of a value: scale, rate, driven, a part of an acceleration (n, t, c, r), or none of these."""
+    if name in SCALE_NAMES:
+        return "scale"
+    if name.startswith(("omega", "epsilon")):
+        return "rate"
+    _, about, part = f"{name}__".split("_")[:3]
+    return "driven" if about == driven else part
+
+
+def law_of(mistake: NamedMistake) -> str:
+    """The law that a mistake breaks, a key of the catalogues; empty for one without."""
+    usual = LAWS.get(mistake.code, "")
+    if mistake.at.startswith(CORIOLIS_END):
+        return _CORIOLIS.get(mistake.code, usual)
+    line = line_of(mistake)
+    others = _GUIDE if line == ALONG_GUIDE else _DRIVEN.get(line, {})
+    return others.get(mistake.code, usual)

@@ -1,0 +1,43 @@
+"""The page of a self-check: what is right, off, or cannot be told, and the plans as measured; no points."""
+
+from collections.abc import Sequence
+
+from grader.documents import ReportDocument
+from grader.feedback.advice import RESULTS, CheckedLine
+from grader.feedback.student_page import About, StudentPage
+from grader.feedback.words import environment
+from grader.language import tongue
+from grader.overlay.scene import Picture
+
+VERDICTS = {"right": "full", "off": "none", "open": "not_judged"}
+"""The verdict whose colour each result has."""
+
+
+def check_page(
+    report: ReportDocument,
+    pictures: Sequence[Picture],
+    lines: Sequence[CheckedLine],
+    mistakes: Sequence[str],
+    lang: str,
+    about: About,
+) -> str:
+    """The page as HTML.
+
+    Arguments
+    ---------
+    report : its variant, its problems and the names of its criteria are shown, no verdict of it
+    lines : what is said of each value, as `grader.feedback.advice.checked_lines` gives it
+    mistakes : what is said of mistakes; empty where nothing may be
+    """
+    speaker = tongue(lang)
+    page = StudentPage(report, tuple(pictures), speaker, about=about)
+    groups = [
+        (result, [line for line in lines if line.result == result]) for result in ("off", "open", "right")
+    ]
+    return (
+        environment(speaker.lang)
+        .get_template("check.html")
+        .render(
+            page=page, title=about.title, groups=groups, mistakes=mistakes, results=RESULTS, tone=VERDICTS
+        )
+    )

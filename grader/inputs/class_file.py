@@ -1,0 +1,106 @@
+"""`planmark.toml` in a class's folder: what every command on that class is told once."""
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field
+
+from reference.authored.assignment import built_in, locate
+from reference.authored.toml_file import Authored, is_file, load
+from reference.errors import AuthoredFileError, Finding
+
+
+def _check_path(text: str) -> str:
+    if not text or not text.isprintable():
+        # In double quotes TOML takes the backslash of a path for the begin of a sign: \\r, \\t.
+        raise ValueError("is no path: write it with / or between single quotes: 'lists\\roster.csv'")
+    return text
+
+
+_Path = Annotated[str, AfterValidator(_check_path)]
+
+
+class ClassFile(Authored):
+    """The keys as they are written; all may be absent."""
+
+    assignment: _Path | None = None
+    roster: _Path | None = None
+    language: Literal["en", "ro", "ru"] | None = None
+    pages: Annotated[int, Field(ge=1)] | None = None
+    platform: _Path | None = None
+    out: _Path = "results"
+    log: _Path | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ClassSettings:
+    """The settings of a class.
+
+    Attributes
+    ----------
+    values : by the names of the commands' parameters; paths are resolved against the file's folder
+    keys : the keys that are in the file, each with the parameter that it stands for
+    """
+
+    file: Path
+    values: dict[str, str | int]
+    keys: dict[str, str]
+
+    @property
+    def out(self) -> Path:
+        """The folder of results."""
+        return Path(str(self.values["out"]))
+
+
+_PARAMETERS = {"language": "lang", "pages": "pages_per_student", "platform": "to"}
+"""Keys that have another name than the parameter they stand for."""
+
+
+_PATHS = ("roster", "out", "log")
+
+
+def read_class_file(path: Path, platforms: Collection[str]) -> ClassSettings:
+    """The settings of a class; raises AuthoredFileError with every fault of the file.
+
+    Arguments: `platforms` that there are exports for.
+    """
+    written = _loaded(path).model_dump(exclude_none=True)
+    # Windows writes backslashes, and takes slashes as well.
+    texts = {key: written[key].replace("\\", "/") for key in ("assignment", *_PATHS) if key in written}
+    resolved = {
+        key: text if key == "assignment" and not text.endswith(".toml") else str(path.parent / text)
+        for key, text in texts.items()
+    }
+    faults = list(_faults(path, {**written, **resolved}, platforms))
+    if faults:
+        raise AuthoredFileError(str(path), tuple(faults))
+    keys = {key: _PARAMETERS.get(key, key) for key in written}
+    values = {**written, **resolved}
+    return ClassSettings(path, {keys[key]: values[key] for key in written}, keys)
+
+
+def _loaded(path: Path) -> ClassFile:
+    """The file as it is written; of a path in double quotes with backslashes the fault says what to do."""
+    try:
+        return load(ClassFile, path)
+    except AuthoredFileError as error:
+        (first, *_) = error.findings
+        if first.path != "$" or "is not TOML" not in first.message or b"\\" not in path.read_bytes():
+            raise
+        told = f"{first.message}; write a path with / or between single quotes: 'lists\\roster.csv'"
+        raise AuthoredFileError(error.file, (Finding("$", told),)) from error
+
+
+def _faults(path: Path, values: dict[str, Any], platforms: Collection[str]) -> Iterator[Finding]:
+    """What the values name and is not there."""
+    name, roster, platform = (values.get(key) for key in ("assignment", "roster", "platform"))
+    if name is not None and not is_file(locate("assignment", name)):
+        known = f"the built-in ones are {', '.join(built_in())}"
+        yield Finding("$.assignment", f"there is no '{name}': {known}; or write the path of a .toml file")
+    if roster is not None and not is_file(Path(roster)):
+        told = f"there is no file {roster}; write its path relative to the folder of {path.name}"
+        yield Finding("$.roster", told)
+    if platform is not None and platform not in platforms:
+        yield Finding("$.platform", f"'{platform}' is not known; write one of {', '.join(platforms)}")
