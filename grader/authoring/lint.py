@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from grader.authoring.findings import SEVERITIES, LintFinding, mechanism_place
+from grader.authoring.findings import NAMED, SEVERITIES, File, LintFinding, mechanism_place
 from grader.authoring.round_scales import (
     WELL_READ_MM,
     AskedVectors,
@@ -44,11 +44,12 @@ from grader.documents import (
     LintVariant,
     LintWorst,
 )
+from grader.language import LANGUAGES
 from grader.printed.layout import SCALE_OF
 from grader.rubric import RubricFile, check_rubric
 from reference.authored.assignment import TRADITIONS, Assignment, Variant
 from reference.authored.formula import Formula
-from reference.authored.toml_file import SideText
+from reference.authored.toml_file import SideText, Text
 from reference.authored.variant_table import KEYS
 from reference.construction.derive import image_name
 from reference.construction.graph import Construction, ancestors
@@ -227,6 +228,40 @@ def data_findings(
     yield from _not_told(assignment)
     yield from _unknown_names(assignment, construction)
     yield from _unneeded(assignment, rubric, construction)
+    yield from _untranslated(assignment, rubric)
+
+
+def texts_in(thing: object, path: str) -> Iterator[tuple[str, Text]]:
+    """The texts of an authored table, however deep they stand, each with its path in the file."""
+    inside: Iterable[tuple[str, object]] = ()
+    if isinstance(thing, Text):
+        yield path, thing
+    elif isinstance(thing, BaseModel):
+        inside = ((f".{name}", getattr(thing, name)) for name in type(thing).model_fields)
+    elif isinstance(thing, list):
+        inside = ((f"[{index}]", one) for index, one in enumerate(thing))
+    for key, one in inside:
+        yield from texts_in(one, path + key)
+
+
+def _untranslated(assignment: Assignment, rubric: RubricFile) -> Iterator[LintFinding]:
+    """Texts that some students would read in English: one finding for each file."""
+    file = assignment.file
+    files: dict[File, BaseModel] = {"assignment": file, "rubric": rubric}
+    if isinstance(file.mechanism, str):
+        files["mechanism"] = assignment.mechanism_file
+    for name, authored in files.items():
+        # The first language is English, which is required.
+        missing = [
+            f"{path}.{language}"
+            for path, text in texts_in(authored, "$")
+            for language in LANGUAGES[1:]
+            if not getattr(text, language)
+        ]
+        if missing:
+            more = f" and {len(missing) - NAMED} more" if len(missing) > NAMED else ""
+            message = f"students read English in place of {', '.join(missing[:NAMED])}{more}"
+            yield LintFinding("hint", "not_translated", name, missing[0], message)
 
 
 def _rubric_faults(rubric: RubricFile, construction: Construction) -> Iterator[LintFinding]:

@@ -299,3 +299,25 @@ def test_variants_behind_a_flat_position_are_told(tmp_path, side, told):
     found = findings_of(tmp_path / "four-bar.assignment.toml", "another_assembly")
     assert [named(one.variants) for one in found] == ([told] if told else [])
     assert {one.path for one in found} <= {"$.group[0].side"}
+
+
+@pytest.mark.parametrize(
+    ("kind", "old", "path"),
+    [
+        ("rubric", 'ro = "Viteza punctului A", ', "$.criterion["),
+        ("mechanism", "ro = ", "$.title"),
+        ("assignment", "ro = ", "$."),
+    ],
+)
+def test_a_text_that_is_missing_in_one_language_is_told_with_its_path(tmp_path, kind, old, path):
+    file = edited(tmp_path, "shaper", kind, old, "" if old.startswith('ro = "') else "# ro = ")
+    told = findings_of(file, "not_translated")
+    assert [(one.severity, one.file) for one in told] == [("hint", kind)]
+    assert told[0].path.startswith(path)
+    assert told[0].path.endswith(".ro")
+    assert told[0].path in told[0].message
+
+
+@pytest.mark.parametrize("name", built_in())
+def test_the_built_in_assignments_are_in_three_languages(name):
+    assert not findings_of(name, "not_translated")

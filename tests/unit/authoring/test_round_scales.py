@@ -39,8 +39,13 @@ def test_rounding_up_gives_the_least_round_number_that_is_not_below():
     assert np.all(below < values)
 
 
+@pytest.mark.parametrize("scale", [0.004, 0.0004, 0.04, 0.02, 0.2, 2.0, 0.0025, 0.005, 0.1 * 0.2])
+def test_scales_as_courses_use_them_are_round(scale):
+    np.testing.assert_allclose(round_up(np.array([scale])), [scale], rtol=ROUNDING)
+
+
 @pytest.mark.parametrize(
-    ("scale", "told"), [(0.005, "1:5"), (0.0025, "1:2.5"), (0.001, "1:1"), (1e-4, "10:1")]
+    ("scale", "told"), [(0.005, "1:5"), (0.004, "1:4"), (0.0025, "1:2.5"), (0.001, "1:1"), (1e-4, "10:1")]
 )
 def test_a_scale_of_lengths_is_told_as_a_ratio(scale, told):
     assert ratio_text(scale) == told
