@@ -1,4 +1,4 @@
-"""What the site has beside the files of this folder: the page of all sentences, written when it is built."""
+"""What the site has beside the files of this folder: pages that are written when it is built."""
 
 import sys
 from pathlib import Path
@@ -8,10 +8,11 @@ from mkdocs.structure.files import File, Files
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from docs.make_sentences import page
+from docs import make_faults, make_sentences
 
 
 def on_files(files: Files, *, config: MkDocsConfig) -> Files:
-    """Add the generated page."""
-    files.append(File.generated(config, "sentences.md", content=page()))
+    """Add the generated pages."""
+    for name, made in (("sentences.md", make_sentences), ("faults.md", make_faults)):
+        files.append(File.generated(config, name, content=made.page()))
     return files

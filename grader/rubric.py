@@ -9,15 +9,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, cast
 
 from pydantic import Field, model_validator
 
 from grader.records import MECHANISM
-from reference.authored.assignment import Assignment, locate
+from reference.authored.assignment import Assignment, AssignmentFile, load_assignment, locate
 from reference.authored.toml_file import Authored, Identifier, Text, is_file, load
 from reference.construction.graph import Construction
-from reference.errors import AuthoredFileError, CallError, Finding
+from reference.errors import AuthoredFileError, CallError, Faults, Finding, look_alikes
 from reference.plan import construction_for
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -297,7 +297,10 @@ def check_rubric(rubric: RubricFile, construction: Construction) -> list[Finding
         "link": tuple(construction.links),
     }
     return [
-        Finding(f"$.criterion[{index}].{key}", f"{name} is not in this mechanism: {', '.join(names)}")
+        Finding(
+            f"$.criterion[{index}].{key}",
+            f"{name} is not in this mechanism{look_alikes(name)}: {', '.join(names)}",
+        )
         for index, criterion in enumerate(rubric.criterion)
         for key, names in known.items()
         if (name := getattr(criterion, key)) is not None and name not in names
@@ -320,6 +323,22 @@ def rubric_of(assignment: Assignment) -> RubricFile:
     return rubric
 
 
+def load_both(name: str | Path) -> tuple[Assignment, RubricFile]:
+    """An assignment and its rubric; raises AuthoredFileError with the faults of all their files together."""
+    faults, loaded, rubric = Faults(), None, None
+    path = locate("assignment", str(name))
+    with faults:
+        loaded = load_assignment(name)
+    # Faults of the mechanism or the table leave the assignment's own file as it is.
+    with Faults() as told:
+        rubric = load_rubric(load(AssignmentFile, path).rubric, beside=path)
+    faults.errors += [
+        one for one in told.errors if one.file != str(path) or one.findings[0].path == "$.rubric"
+    ]
+    faults.tell()
+    return cast("Assignment", loaded), cast("RubricFile", rubric)
+
+
 def load_rubric(name: str | Path, *, beside: Path | None = None) -> RubricFile:
     """A rubric by its built-in name, a neighbour of the assignment's file, or its path.
 
@@ -327,8 +346,11 @@ def load_rubric(name: str | Path, *, beside: Path | None = None) -> RubricFile:
     """
     path = locate("rubric", str(name), beside)
     if not is_file(path) and not str(name).endswith(".toml"):
-        places = "among the built-in ones" if beside is None else f"in {beside.parent} and the built-in ones"
-        raise CallError("unknown_rubric", f"there is no rubric '{name}': {path.name} was looked for {places}")
+        missing = f"there is no rubric '{name}': {path.name} was looked for"
+        if beside is None:
+            raise CallError("unknown_rubric", f"{missing} among the built-in ones")
+        finding = Finding("$.rubric", f"{missing} beside this file and among the built-in ones")
+        raise AuthoredFileError(str(beside), (finding,))
     return _load(path.resolve(), path.stat().st_mtime_ns if is_file(path) else 0)
 
 

@@ -9,8 +9,11 @@ PlanmarkError            caught once, at the rim
 """
 
 import difflib
+import unicodedata
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
 
 MOST_FINDINGS = 20
 """A person reads no more at a time; a hostile file has a million."""
@@ -86,13 +89,51 @@ def ranges_of(numbers: Sequence[int]) -> str:
     )
 
 
-class AuthoredFileError(PlanmarkError):
-    """A mechanism, assignment or rubric file: all its faults at once."""
+def look_alikes(text: str) -> str:
+    """What to say of letters that only look Latin, as the Cyrillic А; nothing where there are none."""
+    foreign = [letter for letter in text if letter.isalpha() and not letter.isascii()]
+    names = dict.fromkeys(f"'{one}' is {unicodedata.name(one, 'no letter')}" for one in foreign[:3])
+    return f" ({', '.join(names)}: type it on a Latin keyboard)" if names else ""
 
-    def __init__(self, file: str, findings: tuple[Finding, ...]) -> None:
-        super().__init__("authored_file", f"{file}: {len(findings)} fault(s)\n{lines_of(findings)}")
-        self.file = file
-        self.findings = findings
+
+class AuthoredFileError(PlanmarkError):
+    """A mechanism, assignment or rubric file: all its faults at once, and those of the files with it."""
+
+    def __init__(
+        self, file: str, findings: tuple[Finding, ...], others: Sequence["AuthoredFileError"] = ()
+    ) -> None:
+        text = f"{file}: {len(findings)} fault(s)\n{lines_of(findings)}"
+        super().__init__("authored_file", "\n".join([text, *(other.message for other in others)]))
+        self.file, self.findings, self.others = file, findings, tuple(others)
+
+
+class Faults:
+    """Gathers the faults of several files, to be told together.
+
+    In a `with` block it takes what is raised, and the next block goes on; `tell` raises all of it.
+    """
+
+    def __init__(self) -> None:
+        self.errors: list[AuthoredFileError] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
+        if isinstance(error, AuthoredFileError):
+            self.errors += [AuthoredFileError(error.file, error.findings), *error.others]
+        return isinstance(error, AuthoredFileError)
+
+    def add(self, file: Path, findings: Iterable[Finding]) -> None:
+        """The findings of one file, where there are any."""
+        if found := tuple(findings):
+            self.errors.append(AuthoredFileError(str(file), found))
+
+    def tell(self) -> None:
+        """Raises AuthoredFileError with everything that was gathered; nothing where there is nothing."""
+        if self.errors:
+            first, *others = self.errors
+            raise AuthoredFileError(first.file, first.findings, others)
 
 
 class MechanismError(PlanmarkError):

@@ -49,12 +49,17 @@ from grader.printed.layout import SCALE_OF
 from grader.rubric import RubricFile, check_rubric
 from reference.authored.assignment import TRADITIONS, Assignment, Variant
 from reference.authored.formula import Formula
-from reference.authored.toml_file import SideText, Text
-from reference.authored.variant_table import KEYS
+from reference.authored.toml_file import LENGTH_UNITS_M, SideText, Text
+from reference.authored.variant_table import KEYS, LENGTHS, formulas_in
 from reference.construction.derive import image_name
 from reference.construction.graph import Construction, ancestors
 from reference.geometry import FloatArray
 from reference.plan import Plan, construction_for, exact_plan
+
+ODD_RATIO = 200.0
+"""Of the longest link to another one: no drawing shows both, and metres are a thousand millimetres."""
+SMALLEST_M, LARGEST_M = 0.002, 50.0
+"""Between a watch's links and a crane's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +100,8 @@ def lint(assignment: Assignment, rubric: RubricFile) -> Lint:
     )
     construction = construction_for(assignment, variants, accelerations=accelerations)
     broken = broken_variants(assignment, variants)
-    findings = [*broken_findings(assignment, broken), *data_findings(assignment, rubric, construction)]
+    findings = [*broken_findings(assignment, broken), *_odd_sizes(assignment)]
+    findings += data_findings(assignment, rubric, construction)
     rows = {each.variant: _row(each.variant, problem=each.error.message) for each in broken}
     sound = [variant for variant in variants if variant not in rows]
     if not sound:
@@ -273,6 +279,27 @@ def _rubric_faults(rubric: RubricFile, construction: Construction) -> Iterator[L
             message = f"{criterion.name} is judged by {judged_by[criterion.name]} already"
             yield LintFinding("hint", "asked_twice", "rubric", f"$.criterion[{index}]", message)
         judged_by.setdefault(criterion.name, criterion.id)
+
+
+def _odd_sizes(assignment: Assignment) -> Iterator[LintFinding]:
+    """Lengths that look as if they were in another unit than the file's."""
+    file = assignment.mechanism_file
+    values, unit = assignment.values(assignment.variants()), file.length_unit
+    lengths = {
+        path: float(np.max(leaf(values)))
+        for path, key, leaf in formulas_in(file, "")
+        if key in LENGTHS and isinstance(leaf, Formula)
+    }
+    longest = max(lengths.values(), default=0.0)
+    for path, length in lengths.items():
+        if length * ODD_RATIO < longest:
+            message = (
+                f"{length:g} beside {longest:g}: all lengths here are in {unit}; is this one in another unit?"
+            )
+            yield LintFinding("warning", "odd_size", *mechanism_place(assignment, path), message)
+    if lengths and not SMALLEST_M <= longest * LENGTH_UNITS_M[unit] <= LARGEST_M:
+        message = f"the longest link is {longest:g} {unit}: are the lengths in another unit?"
+        yield LintFinding("warning", "odd_size", *mechanism_place(assignment, ".length_unit"), message)
 
 
 def _with_their_own(assignment: Assignment, names: Iterable[str]) -> set[str]:

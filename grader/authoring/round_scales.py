@@ -32,6 +32,8 @@ STEPS = (1.0, 2.0, 2.5, 4.0, 5.0, 10.0)
 GOST 2.302 adds 2.5 and 4."""
 LEAST_LINK_MM = 20.0
 """The plans' directions are read off the sketch: a shorter link tells them less well than a hand draws."""
+LEAST_DRAWN_MM = 2.0
+"""A shorter link cannot be drawn: more likely the scale is in another unit."""
 _SLACK = 1e-9
 """Relative rounding error of a scale that is a round step: 0.005 computed as 0.0050000000001 is 0.005."""
 
@@ -384,6 +386,12 @@ def scale_findings(assignment: Assignment, plan: Plan, proposed: Sequence[Propos
     drawn = {figure for _, figures in pages_of(assignment, plan) for figure in figures}
     names = [name for figure, name in SCALE_OF.items() if figure in drawn]
     own, round_, each = (proposal.over_all for proposal in proposed)
+    if own.shortest_link_mm < LEAST_DRAWN_MM:
+        message = (
+            f"the shortest link is drawn {own.shortest_link_mm:.2g} mm long: kL is metres on a millimetre, 1:2.5 is"
+            " 0.0025"
+        )
+        yield LintFinding("warning", "tiny_sketch", "assignment", "$.scales.kL", message)
     values = {name: np.asarray(getattr(plan.scales, name)) for name in names}
     is_round = all(np.allclose(round_up(scale), scale, rtol=1e-6) for name, scale in values.items())
     if own.room < 1.0 or not is_round:

@@ -14,8 +14,8 @@ from grader.authoring.round_scales import WELL_READ_MM, ratio_text
 from grader.cli.app import new_table
 from grader.documents import LintLeast, LintScales, LintVariant, LintWorst
 from grader.files import write_whole
-from grader.rubric import load_rubric
-from reference.authored.assignment import Variant, load_assignment
+from grader.rubric import load_both
+from reference.authored.assignment import Variant
 from reference.drawing.canvas import Label
 from reference.drawing.canvas import svg as as_svg
 from reference.drawing.sheets import FRAME, reference_drawing
@@ -29,8 +29,8 @@ COLOURS = {"fault": "bold red", "warning": "yellow", "hint": "cyan"}
 
 def lint_assignment(name: str, *, as_json: bool, svg: Path | None) -> bool:
     """Print every finding on an assignment and its rubric; whether any needs a person."""
-    assignment = load_assignment(name)
-    result = lint(assignment, load_rubric(assignment.file.rubric, beside=assignment.path))
+    assignment, rubric = load_both(name)
+    result = lint(assignment, rubric)
     if svg is not None and result.plan is not None and result.worst is not None:
         worst = _variant_of(result.worst)
         why = f"{worst}: {result.worst.why}"

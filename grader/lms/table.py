@@ -567,7 +567,11 @@ def fill_in(
                 "maximum_unknown",
                 f"{file}: states no maximum grade; look it up in {form.platform} and give it (--maximum)",
             )
-        texts[row] = number(grade.out_of(maximum, rescale=options.rescale), form.decimals(row))
+        try:
+            score = grade.out_of(maximum, rescale=options.rescale)
+        except CallError as error:
+            raise CallError(error.code, f"{file}: {error.message}") from error
+        texts[row] = number(score, form.decimals(row))
         zeros += [student] if texts[row] == "0" else []
         changed += [row] if form.put_grade(row, texts[row]) else []
         if student in comments:

@@ -5,12 +5,12 @@ evaluated on arrays over variants.
 """
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -18,19 +18,21 @@ from pydantic import Field, model_validator
 from reference.authored import toml_file
 from reference.authored.assembly import LARGEST, build_driver, build_mechanism
 from reference.authored.flat_positions import signs_of, with_signs
-from reference.authored.formula import Formula, FormulaError, Value
+from reference.authored.formula import CONSTANTS, FUNCTIONS, Formula, FormulaError, Value
 from reference.authored.mechanism import MechanismFile, check_mechanism
-from reference.authored.toml_file import LENGTH_UNITS_M, Authored, FormulaText, Identifier, Text
+from reference.authored.toml_file import LENGTH_UNITS_M, Authored, FormulaText, Identifier, SideText, Text
 from reference.authored.variant_table import (
     KEYS,
+    LENGTHS,
     MOST_VARIANTS,
     DataTable,
     VariantRows,
+    formulas_in,
     misused_columns,
     or_its_file,
     read_rows,
 )
-from reference.errors import AuthoredFileError, CallError, Finding, ranges_of
+from reference.errors import AuthoredFileError, CallError, Faults, Finding, near_names, ranges_of
 from reference.geometry import FloatArray
 from reference.kinematics.motion import BoolArray
 from reference.mechanism import Crank, Driver, Mechanism
@@ -334,27 +336,64 @@ def load_assignment(name: str | Path) -> Assignment:
 @cache
 def _load(path: Path, _changed_ns: int) -> Assignment:
     file = toml_file.load(AssignmentFile, path)
-    source, mechanism = path, file.mechanism
+    source, mechanism, rows = path, file.mechanism, None
+    faults = Faults()
     if isinstance(mechanism, str):
         source = locate("mechanism", mechanism, path)
-        mechanism = toml_file.load(MechanismFile, source)
-    faults = tuple(check_mechanism(mechanism))
-    if faults:
-        raise AuthoredFileError(str(source), faults)
-    rows = None
+        with faults:
+            mechanism = _load_mechanism(mechanism, source, path)
+    if isinstance(mechanism, MechanismFile):
+        faults.add(source, check_mechanism(mechanism))
     if file.variant.table is not None:
-        table, rows = read_rows(file.variant.table, path, LENGTH_UNITS_M[mechanism.length_unit])
-        file = file.model_copy(update={"variant": file.variant.model_copy(update={"table": table})})
-    assignment = Assignment(file, mechanism, path, rows)
-    findings = [*_check_table(assignment)] or _check_formulas(assignment)
-    if findings:
-        raise AuthoredFileError(str(path), tuple(findings))
+        unit = mechanism.length_unit if isinstance(mechanism, MechanismFile) else "m"
+        with faults:
+            table, rows = read_rows(file.variant.table, path, LENGTH_UNITS_M[unit])
+            file = file.model_copy(update={"variant": file.variant.model_copy(update={"table": table})})
+    faults.add(path, _check_values(file))
+    faults.tell()
+    assignment = Assignment(file, cast("MechanismFile", mechanism), path, rows)
+    faults.add(path, _check_table(assignment))
+    if not faults.errors:
+        _check_formulas(assignment, source, faults)
+    faults.tell()
     variants = assignment.variants()
     if not assignment.numbers("position"):
         return assignment
     signs = signs_of(assignment.mechanism(variants), [variant.n for variant in variants])
     by_variant = {node: dict(zip(variants, passed.tolist(), strict=True)) for node, passed in signs.items()}
     return replace(assignment, signs=by_variant)
+
+
+def _load_mechanism(name: str, source: Path, beside: Path) -> MechanismFile:
+    """The mechanism that an assignment names; AuthoredFileError of the assignment where there is none."""
+    if not toml_file.is_file(source):
+        suffix = SUFFIXES["mechanism"]
+        known = [
+            one.name.removesuffix(suffix) for one in (*beside.parent.glob(f"*{suffix}"), *_built_in(suffix))
+        ]
+        near = near_names(name, known, most=1)
+        meant = f" (did you mean {near[0]}?)" if near else ""
+        missing = f"there is no mechanism '{name}'{meant}: {source.name} was looked for beside this file"
+        raise AuthoredFileError(
+            str(beside), (Finding("$.mechanism", f"{missing} and among the built-in ones"),)
+        )
+    return toml_file.load(MechanismFile, source)
+
+
+def _built_in(suffix: str) -> Iterator[Path]:
+    return library().glob(f"*{suffix}")
+
+
+def _check_values(file: AssignmentFile) -> Iterator[Finding]:
+    """Names that formulas know already; ranges that are empty."""
+    for name in file.variant.values:
+        if name in CONSTANTS or name in FUNCTIONS or name in KEYS:
+            message = f"{name} has a meaning in formulas already: choose another name"
+            yield Finding(f"$.variant.values.{name}", message)
+    for name in KEYS:
+        numbers = getattr(file.variant, name)
+        if numbers is not None and not numbers.values:
+            yield Finding(f"$.variant.{name}", "the range is empty: 'from' must not exceed 'to'")
 
 
 def _check_table(assignment: Assignment) -> Iterator[Finding]:
@@ -376,37 +415,76 @@ def _check_table(assignment: Assignment) -> Iterator[Finding]:
     yield from misused_columns(assignment.mechanism_file, rows, place)
 
 
-def _check_formulas(assignment: Assignment) -> list[Finding]:
-    """Names that no formula above defines; formulas that fail for some variant."""
+def _check_formulas(assignment: Assignment, source: Path, faults: Faults) -> None:
+    """Gathers names that no formula above defines, and formulas that fail for some variant, each by itself.
+
+    Arguments: `source` is the mechanism's file.
+    """
     variants = assignment.variants()
-    if not variants:
-        return [Finding("$.variant", "the range of n or position is empty: 'from' must not exceed 'to'")]
-    findings: list[Finding] = []
+    broken: set[str] = set()
 
-    def proposed_scales(variants: list[Variant]) -> None:
-        scales = assignment.scales(variants)
-        for name in SCALE_NAMES:
-            if not np.all((getattr(scales, name) > 1.0 / LARGEST) & (getattr(scales, name) < LARGEST)):
-                raise FormulaError(f"{name} must be above zero for every variant")
-
-    def evaluated(formula: Formula) -> Callable[[list[Variant]], object]:
-        return lambda variants: formula(assignment.values(variants))
-
-    for what, path in (
-        (assignment.values, "$.variant.values"),
-        (assignment.mechanism, "$.mechanism"),
-        (proposed_scales, "$.scales"),
-        *(
-            (evaluated(one.value), f"$.given[{index}].value")
-            for index, one in enumerate(assignment.file.given)
-        ),
-    ):
+    def check(
+        path: str, formula: Formula, known: Mapping[str, Value], *, is_length: bool = False
+    ) -> list[Finding]:
+        # What follows from a value with a fault has no fault of its own.
+        if broken & formula.names:
+            return []
         try:
-            what(variants)
+            values = formula(known)
+            if is_length and np.any(values <= 0.0):
+                raise FormulaError(f"'{formula.text}' must be a positive length", values <= 0.0)  # noqa: TRY301
         except FormulaError as error:
-            findings.append(Finding(path, str(error) + _failing(variants, error.which)))
-            break
-    return findings
+            return [Finding(path, str(error) + _failing(variants, error.which))]
+        return []
+
+    own: list[Finding] = []
+    known = replace(assignment, file=_without_values(assignment.file)).values(variants)
+    for name, formula in assignment.file.variant.values.items():
+        if found := check(f"$.variant.values.{name}", formula, known):
+            broken.add(name)
+            own += found
+        elif not broken & formula.names:
+            known[name] = formula(known)
+        else:
+            broken.add(name)
+    inside = isinstance(assignment.file.mechanism, MechanismFile)
+    of_mechanism: list[Finding] = []
+    for path, key, leaf in formulas_in(assignment.mechanism_file, "$.mechanism" if inside else "$"):
+        one = leaf.side if isinstance(leaf, SideText) else leaf
+        if isinstance(one, Formula):
+            of_mechanism += check(path, one, known, is_length=key in LENGTHS)
+    own += of_mechanism if inside else []
+    for index, datum in enumerate(assignment.file.given):
+        own += check(f"$.given[{index}].value", datum.value, known)
+    if not (broken or of_mechanism):
+        own += _check_scales(assignment, variants)
+    faults.add(assignment.path, own)
+    faults.add(source, () if inside else of_mechanism)
+    if not faults.errors:
+        try:
+            assignment.mechanism(variants)
+        except FormulaError as error:
+            where = "$.mechanism" if inside else "$"
+            faults.add(source, [Finding(where, str(error) + _failing(variants, error.which))])
+
+
+def _without_values(file: AssignmentFile) -> AssignmentFile:
+    return file.model_copy(update={"variant": file.variant.model_copy(update={"values": {}})})
+
+
+def _check_scales(assignment: Assignment, variants: list[Variant]) -> Iterator[Finding]:
+    """The first scale that cannot be worked out, or is not above zero; the others follow from it."""
+    known: dict[str, FloatArray | float] = dict.fromkeys(SCALE_NAMES, 1.0)
+    for name in SCALE_NAMES:
+        del known[name]
+        try:
+            known[name] = getattr(assignment.scales(variants, **known), name)
+        except FormulaError as error:
+            yield Finding(f"$.scales.{name}", str(error) + _failing(variants, error.which))
+            return
+        if not np.all((known[name] > 1.0 / LARGEST) & (known[name] < LARGEST)):
+            yield Finding(f"$.scales.{name}", f"{name} must be above zero for every variant")
+            return
 
 
 def _failing(variants: list[Variant], which: BoolArray | None) -> str:

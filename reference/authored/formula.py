@@ -7,6 +7,7 @@ nothing. Evaluation works on floats and on NumPy arrays alike.
 
 import ast
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, reduce
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.errors import near_names
+from reference.errors import look_alikes, near_names
 from reference.geometry import FloatArray
 
 MAX_LENGTH = 200
@@ -120,10 +121,21 @@ def parse(text: str | float) -> Formula:
     try:
         tree = ast.parse(text.replace("^", "**"), mode="eval").body
     except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
-        raise FormulaError(f"'{text}' is not a formula") from error
+        raise FormulaError(f"'{text}' is not a formula{_advice(text)}") from error
     names: set[str] = set()
     _check(tree, names, text, depth=0)
     return Formula(text, tree, frozenset(names))
+
+
+def _advice(text: str) -> str:
+    """What to do about a text that is often written in place of a formula; nothing for any other."""
+    if re.fullmatch(r"\d+([.,]\d+)?\s*:\s*\d+([.,]\d+)?", text):
+        return ": a scale is a number of metres on a millimetre, 1:2.5 is 0.0025"
+    if re.fullmatch(r"[+-]?\d+,\d+", text):
+        return ": write a decimal point"
+    if re.fullmatch(r"[+-]?\d+(\.\d*)?\s*[^\d\s(+*/-][^(+*]*", text):
+        return ": write the number alone; the key and length_unit say its unit"
+    return ""
 
 
 def _check(node: ast.expr, names: set[str], text: str, depth: int) -> None:
@@ -192,4 +204,4 @@ def _evaluate(node: ast.expr, values: Mapping[str, Value]) -> Any:  # noqa: ANN4
 def _unknown_name(name: str, known: Mapping[str, object]) -> str:
     near = near_names(name, known)
     hint = f"; did you mean {' or '.join(near)}?" if near else f"; known: {', '.join(sorted(known))}"
-    return f"unknown name {name}{hint}"
+    return f"unknown name {name}{look_alikes(name)}{hint}"

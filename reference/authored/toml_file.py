@@ -20,7 +20,7 @@ from pydantic import (
 
 from reference.authored import formula
 from reference.authored.formula import Formula
-from reference.errors import MOST_FINDINGS, AuthoredFileError, Finding, near_names
+from reference.errors import MOST_FINDINGS, AuthoredFileError, Finding, look_alikes, near_names
 
 LENGTH_UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 MAX_BYTES = 200_000
@@ -52,9 +52,11 @@ def _read_formula(value: object) -> Formula:
 
 
 def _check_joint(name: str) -> str:
-    if not name.isalnum() or not name[0].isupper() or name.lower() in {"o", "n"}:
+    if not (name.isalnum() and name.isascii()) or not name[0].isupper() or name.lower() in {"o", "n"}:
         # A joint's image in the plans is its name in lower case: the two must differ.
-        raise ValueError(f"'{name}' is no joint's name: a capital, then letters or digits (not O or N)")
+        raise ValueError(
+            f"'{name}' is no joint's name: a capital, then letters or digits (not O or N){look_alikes(name)}"
+        )
     return name
 
 
@@ -133,15 +135,35 @@ def load(model: type[Model], path: Path) -> Model:
 
     Raises AuthoredFileError with every fault found, each with its path in the file.
     """
+    text = text_of(path)
     try:
-        data = tomllib.loads(text_of(path))
+        data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         # Besides TOMLDecodeError: numbers of thousands of digits, tables nested a thousand deep.
-        raise AuthoredFileError(str(path), (Finding("$", f"is not TOML: {error}"),)) from error
+        raise AuthoredFileError(str(path), (_no_toml(error, text),)) from error
     faults = tuple(_check_tree(data))
     if faults:
         raise AuthoredFileError(str(path), faults)
     return validate(model, data, str(path))
+
+
+def _no_toml(error: Exception, text: str) -> Finding:
+    """Where a text is no TOML, the line itself, and what most likely to do."""
+    found = re.search(r" \(at line (\d+), column \d+\)", str(error))
+    if found is None:
+        return Finding("$", f"is not TOML: {error}")
+    line = text.split("\n")[int(found[1]) - 1].strip()
+    advice = ""
+    if re.search(r"=.*\d,\d", line):
+        advice = "; a number has a decimal point"
+    elif re.search(r"=\s*[\d.+-]+\s*[^\d\s#]", line):
+        advice = "; a number stands alone, without its unit, and a formula in quotes"
+    elif line.count('"') % 2:
+        advice = "; a quote is opened and never closed"
+    elif line.startswith("[") and re.search("twice|overwrite", str(error)):
+        advice = f"; a table that stands more than once has two brackets: [[{line.strip('[] ')}]]"
+    what = str(error).replace(found[0], "")
+    return Finding(f"line {found[1]}", f"is not TOML: {line[:MAX_NAME]} ({what}{advice})")
 
 
 def text_of(path: Path) -> str:
@@ -207,25 +229,56 @@ def validate(model: type[Model], data: dict[str, Any], file: str) -> Model:
 
 def findings_of(error: ValidationError, model: type[BaseModel]) -> Iterator[Finding]:
     """Pydantic's faults as paths and plain sentences: the first twenty, and how many more there are."""
-    faults = error.errors(include_url=False, include_context=False, include_input=False)
+    faults = error.errors(include_url=False, include_context=False)
     for fault in faults[:MOST_FINDINGS]:
         *above, last = fault["loc"] or ("",)
         is_field = fault["type"] in {"extra_forbidden", "missing"}
         path = "$" + "".join(map(_path_part, above)) + (f".{last}" if is_field else _path_part(last))
-        message = fault["msg"].removeprefix("Value error, ").replace(" after validation", "")
+        message, given = fault["msg"].removeprefix("Value error, "), fault["input"]
         if fault["type"] == "extra_forbidden":
             message = _not_known(str(fault["loc"][-1]), model)
         elif fault["type"] == "missing":
             message = "is missing" + _WHY_NEEDED.get(str(fault["loc"][-1]), "")
         elif fault["type"].startswith("union_tag"):
-            message = f"needs a type, one of {', '.join(_GROUP_TYPES)}"
-        yield Finding(path, message)
+            path, message = f"{path}.type", _no_type(given)
+        elif fault["type"] in {"model_type", "model_attributes_type"}:
+            message = "must be a table" + (f": [{last}], not [[{last}]]" if isinstance(given, list) else "")
+        elif fault["type"] == "list_type":
+            message = f"must be a list{_a_list(str(last), given)}"
+        elif fault["type"] in {"too_long", "too_short"}:
+            message = fault["msg"].replace("List should have", "must have").replace(" after validation", "")
+            message += "; a number has a decimal point" if fault["type"] == "too_long" else ""
+        elif fault["type"] == "string_pattern_mismatch" and isinstance(given, str):
+            message = f"'{given[:MAX_NAME]}' is no name here: letters A-Z a-z and digits{look_alikes(given)}"
+            path = path.removesuffix(".[key]")
+        elif fault["type"] == "string_too_long":
+            message = message.replace("String should have", "must have")
+        yield Finding(
+            path,
+            message.replace("Input should be a valid", "must be a").replace("Input should be", "must be"),
+        )
     if len(faults) > MOST_FINDINGS:
         yield Finding("$", f"and {len(faults) - MOST_FINDINGS} more faults")
 
 
 _GROUP_TYPES = ("RRR", "RRP", "RPR", "PRP", "RPP", "plate", "point_on_line", "point")
 _UNION_TAGS = {*_GROUP_TYPES, "str", "MechanismFile"}
+
+
+def _no_type(table: object) -> str:
+    """What is wrong with a group's type."""
+    given = table.get("type") if isinstance(table, dict) else None
+    known = f"one of {', '.join(_GROUP_TYPES)}"
+    if not isinstance(given, str):
+        return f"is missing: it must be {known}"
+    near = near_names(given, _GROUP_TYPES, most=1)
+    meant = f"; did you mean {near[0]}?" if near else ""
+    return f"'{given[:MAX_NAME]}' is no type: it must be {known}{meant}{look_alikes(given)}"
+
+
+def _a_list(name: str, given: object) -> str:
+    """How a list is written, of tables or of numbers."""
+    return f" of tables: [[{name}]], not [{name}]" if isinstance(given, dict) else ", in square brackets"
 
 
 _WHY_NEEDED = {

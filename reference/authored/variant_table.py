@@ -8,7 +8,6 @@ import csv
 import io
 import math
 import re
-import unicodedata
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
@@ -28,7 +27,7 @@ from reference.authored.toml_file import (
     SideText,
     text_of,
 )
-from reference.errors import AuthoredFileError, Finding
+from reference.errors import AuthoredFileError, Finding, look_alikes
 from reference.geometry import FloatArray
 
 MEASURES = {
@@ -41,6 +40,8 @@ MEASURES = {
     "acceleration": "an acceleration",
 }
 """What a key of a mechanism is, in the words of `UNITS`."""
+LENGTHS = {"length", "lengths"}
+"""Keys of lengths that must be above zero; coordinates need not."""
 MOST_VARIANTS = 10_000
 """Of an assignment: more than any class has students, and all of them are computed before it is used."""
 LARGEST_KEY = 1e9
@@ -233,6 +234,9 @@ def read_rows(table: DataTable, beside: Path, length_unit_m: float) -> tuple[Dat
         path = beside.parent / table.file
         if path.suffix.lower() in SPREADSHEETS:
             raise AuthoredFileError(str(path), (Finding("$", "is a spreadsheet: save it as CSV in UTF-8"),))
+        if not path.is_file():
+            missing = Finding("$.variant.table", f"there is no file {table.file} beside this one")
+            raise AuthoredFileError(str(beside), (missing,))
         text = text_of(path)
         delimiter = delimiter_of(text)
         split, findings = table_lines(text, delimiter, MOST_VARIANTS)
@@ -317,13 +321,8 @@ class _Reader:
             name = parts[1] if parts else text
             if parts is None or not _NAME.fullmatch(name):
                 example = "a name and its unit are expected, such as l_AB [mm]: letters A-Z a-z, digits and _"
-                foreign = [
-                    f"; '{one}' is {unicodedata.name(one, 'no letter')}" for one in name if one > "\x7f"
-                ]
-                self.fault(
-                    where,
-                    f"'{text}' is no heading: {example}{''.join(foreign[:1])}" if text else "has no heading",
-                )
+                why = f"'{text}' is no heading: {example}{look_alikes(name)}"
+                self.fault(where, why if text else "has no heading")
             elif name in CONSTANTS or name in FUNCTIONS:
                 self.fault(where, f"{name} has a meaning in formulas already: choose another name")
             elif name in {heading.name for heading in headings}:
@@ -427,29 +426,36 @@ def _number_in(cell: Cell, name: str, *, decimal_comma: bool) -> float:
     raise ValueError(f"'{cell}' is no number{side}")
 
 
-def misused_columns(thing: object, rows: VariantRows, path: str, key: str = "") -> Iterator[Finding]:
-    """Columns that stand alone in a key of the mechanism and are of another kind; lengths not above zero."""
-    if isinstance(thing, BaseModel):
+def formulas_in(thing: object, path: str, key: str = "") -> Iterator[tuple[str, str, Formula | SideText]]:
+    """Every formula and side of an authored table, however deep: its path, the key of the format, itself."""
+    inside: list[tuple[str, str, object]] = []
+    if isinstance(thing, Formula | SideText):
+        yield path, key, thing
+    elif isinstance(thing, BaseModel):
         inside = [(f"{path}.{name}", name, getattr(thing, name)) for name in type(thing).model_fields]
     elif isinstance(thing, dict):
-        inside = [(f"{path}.{name}", key, part) for name, part in thing.items()]
+        inside = [(f"{path}.{name}", key or name, part) for name, part in thing.items()]
     elif isinstance(thing, list):
         inside = [(f"{path}[{index}]", key, part) for index, part in enumerate(thing)]
-    else:
-        inside = []
-        formula = thing.side if isinstance(thing, SideText) else thing
-        column = rows.columns.get(formula.text) if isinstance(formula, Formula) else None
-        if column is not None:
-            message = _misuse(column, key, thing.words if isinstance(thing, SideText) else ())
-            if message:
-                yield Finding(path, f"column {column.name} of {rows.source} {message}")
-            elif key in {"length", "lengths"}:
-                for place, number in zip(rows.places, column.numbers, strict=True):
-                    if number <= 0.0:
-                        where = f"{place}, column {column.name}"
-                        yield Finding(where, f"{number:g}: a length must be above zero ({path})")
     for where, name, part in inside:
-        yield from misused_columns(part, rows, where, name)
+        yield from formulas_in(part, where, name)
+
+
+def misused_columns(thing: object, rows: VariantRows, path: str) -> Iterator[Finding]:
+    """Columns that stand alone in a key of the mechanism and are of another kind; lengths not above zero."""
+    for where, key, leaf in formulas_in(thing, path):
+        formula = leaf.side if isinstance(leaf, SideText) else leaf
+        column = rows.columns.get(formula.text) if isinstance(formula, Formula) else None
+        if column is None:
+            continue
+        message = _misuse(column, key, leaf.words if isinstance(leaf, SideText) else ())
+        if message:
+            yield Finding(where, f"column {column.name} of {rows.source} {message}")
+        elif key in LENGTHS:
+            for place, number in zip(rows.places, column.numbers, strict=True):
+                if number <= 0.0:
+                    cell = f"{place}, column {column.name}"
+                    yield Finding(cell, f"{number:g}: a length must be above zero ({where})")
 
 
 def _misuse(column: Column, key: str, words: tuple[str, ...]) -> str | None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SETTINGS = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
-MADE = {"sentences.md"}
+MADE = {"sentences.md", "faults.md"}
 """Pages that are made when the site is built."""
 
 
