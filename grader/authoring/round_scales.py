@@ -388,8 +388,8 @@ def scale_findings(assignment: Assignment, plan: Plan, proposed: Sequence[Propos
     own, round_, each = (proposal.over_all for proposal in proposed)
     if own.shortest_link_mm < LEAST_DRAWN_MM:
         message = (
-            f"the shortest link is drawn {own.shortest_link_mm:.2g} mm long: kL is metres on a millimetre, 1:2.5 is"
-            " 0.0025"
+            f"the shortest link is drawn {own.shortest_link_mm:.2g} mm long: kL is metres on a millimetre,"
+            " 1:2.5 is 0.0025"
         )
         yield LintFinding("warning", "tiny_sketch", "assignment", "$.scales.kL", message)
     values = {name: np.asarray(getattr(plan.scales, name)) for name in names}

@@ -87,10 +87,10 @@ def _loaded(path: Path) -> ClassFile:
         return load(ClassFile, path)
     except AuthoredFileError as error:
         (first, *_) = error.findings
-        if first.path != "$" or "is not TOML" not in first.message or b"\\" not in path.read_bytes():
+        if "is not TOML" not in first.message or b"\\" not in path.read_bytes():
             raise
         told = f"{first.message}; write a path with / or between single quotes: 'lists\\roster.csv'"
-        raise AuthoredFileError(error.file, (Finding("$", told),)) from error
+        raise AuthoredFileError(error.file, (Finding(first.path, told),)) from error
 
 
 def _faults(path: Path, values: dict[str, Any], platforms: Collection[str]) -> Iterator[Finding]:

@@ -56,13 +56,14 @@ SHORTEST_M = 1e-9
 underflow."""
 
 
-class _Numbers:
+class Numbers:
     """Formulas to arrays in SI, of shape (N,) or, where they do not depend on the variant, (1,)."""
 
     def __init__(self, values: Mapping[str, Value], count: int, unit_m: float) -> None:
         self.values, self.count, self.unit_m = values, count, unit_m
 
     def number(self, formula: Formula) -> FloatArray:
+        """A number as it is written; raises FormulaError for one beyond any mechanism."""
         numbers = formula(self.values)
         if np.abs(numbers).max(initial=0.0) > LARGEST:
             message = f"'{formula.text}' is larger than {LARGEST:g}: beyond any mechanism"
@@ -70,6 +71,7 @@ class _Numbers:
         return numbers if numbers.ndim else numbers[None]
 
     def length(self, formula: Formula, what: str) -> FloatArray:
+        """A length above zero, m; raises FormulaError for any other, which calls it `what`."""
         lengths = self.distance(formula)
         least = lengths.min(initial=LARGEST)
         if least <= 0.0:
@@ -106,6 +108,7 @@ class _Numbers:
         return signs
 
     def point(self, point: list[Formula]) -> ComplexArray:
+        """Coordinates, m, as x + iy."""
         x, y = (self.distance(formula) for formula in point)
         return np.asarray(x + 1j * y)
 
@@ -141,7 +144,7 @@ def build_mechanism(file: MechanismFile, values: Mapping[str, Value], count: int
     Raises FormulaError for a number or length that no mechanism can have. The file must have passed
     `reference.authored.mechanism.check_mechanism`.
     """
-    numbers = _Numbers(values, count, LENGTH_UNITS_M[file.length_unit])
+    numbers = Numbers(values, count, LENGTH_UNITS_M[file.length_unit])
     bodies = _LinkAxes()
     driver = _driver(file, numbers)
     if isinstance(driver, Crank):
@@ -154,12 +157,12 @@ def build_mechanism(file: MechanismFile, values: Mapping[str, Value], count: int
 
 def build_driver(file: MechanismFile, values: Mapping[str, Value], count: int) -> Driver:
     """The driven link alone, as `build_mechanism` has it."""
-    numbers = _Numbers(values, count, LENGTH_UNITS_M[file.length_unit])
+    numbers = Numbers(values, count, LENGTH_UNITS_M[file.length_unit])
     driver: Driver = with_arrays(_driver(file, numbers), numbers.for_all)
     return driver
 
 
-def _located(index: int, table: AnyGroupTable, numbers: _Numbers, bodies: _LinkAxes) -> Group:
+def _located(index: int, table: AnyGroupTable, numbers: Numbers, bodies: _LinkAxes) -> Group:
     """One group; an error in its numbers names its place in the file."""
     try:
         return _group(table, numbers, bodies)
@@ -167,7 +170,7 @@ def _located(index: int, table: AnyGroupTable, numbers: _Numbers, bodies: _LinkA
         raise FormulaError(f"group[{index}]: {error}", error.which) from error
 
 
-def _driver(file: MechanismFile, numbers: _Numbers) -> Driver:
+def _driver(file: MechanismFile, numbers: Numbers) -> Driver:
     zero, table = np.zeros(1), file.driver
     if isinstance(table, CrankTable):
         return Crank(
@@ -191,7 +194,7 @@ def _driver(file: MechanismFile, numbers: _Numbers) -> Driver:
     )
 
 
-def _omega(crank: CrankTable, numbers: _Numbers) -> FloatArray:
+def _omega(crank: CrankTable, numbers: Numbers) -> FloatArray:
     """The crank's angular velocity, rad/s, directly or from rev/min through a gear."""
     if crank.omega is not None:
         return numbers.number(crank.omega)
@@ -204,20 +207,20 @@ def _omega(crank: CrankTable, numbers: _Numbers) -> FloatArray:
     return np.asarray(np.pi * rpm / 30.0)
 
 
-def _fixed(guide: FixedGuideTable | GuideTable, numbers: _Numbers) -> FixedGuide:
+def _fixed(guide: FixedGuideTable | GuideTable, numbers: Numbers) -> FixedGuide:
     # A table without joints has a point and a direction.
     through, angle_deg = cast("list[Formula]", guide.through), cast("Formula", guide.angle_deg)
     return FixedGuide(numbers.point(through), numbers.angle(angle_deg))
 
 
-def _guide(guide: GuideTable, numbers: _Numbers, bodies: _LinkAxes) -> Guide:
+def _guide(guide: GuideTable, numbers: Numbers, bodies: _LinkAxes) -> Guide:
     if guide.joints is None or guide.coincident is None:
         return _fixed(guide, numbers)
     base = (guide.joints[0], guide.joints[1])
     return MovingGuide(bodies.link_of(base), base, guide.coincident)
 
 
-def _group(table: AnyGroupTable, numbers: _Numbers, bodies: _LinkAxes) -> Group:
+def _group(table: AnyGroupTable, numbers: Numbers, bodies: _LinkAxes) -> Group:
     """One group; `bodies` collects what each link carries."""
     node = table.node
     if isinstance(table, PlateTable | PointOnLineTable | PointTable):
@@ -243,7 +246,7 @@ def _group(table: AnyGroupTable, numbers: _Numbers, bodies: _LinkAxes) -> Group:
             return Yoke(node, table.pin, numbers.angle(table.slot_deg), _fixed(table.guide, numbers))
 
 
-def _slotted_link(table: SlottedLinkTable, numbers: _Numbers, bodies: _LinkAxes) -> SlottedLink:
+def _slotted_link(table: SlottedLinkTable, numbers: Numbers, bodies: _LinkAxes) -> SlottedLink:
     zero = np.zeros(1)
     offset = zero if table.offset is None else numbers.distance(table.offset)
     bodies.axes[table.link] = {table.pivot: np.zeros(1, complex)}
@@ -257,7 +260,7 @@ def _slotted_link(table: SlottedLinkTable, numbers: _Numbers, bodies: _LinkAxes)
 
 
 def _link_point(
-    table: PlateTable | PointOnLineTable | PointTable, numbers: _Numbers, bodies: _LinkAxes
+    table: PlateTable | PointOnLineTable | PointTable, numbers: Numbers, bodies: _LinkAxes
 ) -> Group:
     """A further point of a link: rigid with its base, however it is given."""
     node, link, (p, q) = table.node, table.link, table.base

@@ -5,9 +5,9 @@ evaluated on arrays over variants.
 """
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, cast
@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from reference.authored import toml_file
-from reference.authored.assembly import LARGEST, build_driver, build_mechanism
+from reference.authored.assembly import LARGEST, Numbers, build_driver, build_mechanism
 from reference.authored.flat_positions import signs_of, with_signs
 from reference.authored.formula import CONSTANTS, FUNCTIONS, Formula, FormulaError, Value
 from reference.authored.mechanism import MechanismFile, check_mechanism
@@ -353,9 +353,8 @@ def _load(path: Path, _changed_ns: int) -> Assignment:
     faults.tell()
     assignment = Assignment(file, cast("MechanismFile", mechanism), path, rows)
     faults.add(path, _check_table(assignment))
-    if not faults.errors:
-        _check_formulas(assignment, source, faults)
     faults.tell()
+    _check_formulas(assignment, source).tell()
     variants = assignment.variants()
     if not assignment.numbers("position"):
         return assignment
@@ -415,61 +414,52 @@ def _check_table(assignment: Assignment) -> Iterator[Finding]:
     yield from misused_columns(assignment.mechanism_file, rows, place)
 
 
-def _check_formulas(assignment: Assignment, source: Path, faults: Faults) -> None:
-    """Gathers names that no formula above defines, and formulas that fail for some variant, each by itself.
+def _check_formulas(assignment: Assignment, source: Path) -> Faults:
+    """Names that no formula above defines, and formulas that fail for some variant, each by itself.
+
+    What follows from a value with a fault has no fault of its own.
 
     Arguments: `source` is the mechanism's file.
     """
-    variants = assignment.variants()
+    variants, file = assignment.variants(), assignment.file
+    spec = file.variant.model_copy(update={"values": {}})
+    known = replace(assignment, file=file.model_copy(update={"variant": spec})).values(variants)
     broken: set[str] = set()
 
-    def check(
-        path: str, formula: Formula, known: Mapping[str, Value], *, is_length: bool = False
-    ) -> list[Finding]:
-        # What follows from a value with a fault has no fault of its own.
-        if broken & formula.names:
-            return []
+    def check(path: str, names: frozenset[str], evaluate: Callable[[], object]) -> list[Finding]:
         try:
-            values = formula(known)
-            if is_length and np.any(values <= 0.0):
-                raise FormulaError(f"'{formula.text}' must be a positive length", values <= 0.0)  # noqa: TRY301
+            if not broken & names:
+                evaluate()
         except FormulaError as error:
             return [Finding(path, str(error) + _failing(variants, error.which))]
         return []
 
     own: list[Finding] = []
-    known = replace(assignment, file=_without_values(assignment.file)).values(variants)
-    for name, formula in assignment.file.variant.values.items():
-        if found := check(f"$.variant.values.{name}", formula, known):
+    for name, formula in file.variant.values.items():
+        own += check(f"$.variant.values.{name}", formula.names, partial(formula, known))
+        if own or broken & formula.names:
             broken.add(name)
-            own += found
-        elif not broken & formula.names:
-            known[name] = formula(known)
         else:
-            broken.add(name)
-    inside = isinstance(assignment.file.mechanism, MechanismFile)
+            known[name] = formula(known)
+    is_inside = isinstance(file.mechanism, MechanismFile)
+    numbers = Numbers(known, len(variants), LENGTH_UNITS_M[assignment.mechanism_file.length_unit])
     of_mechanism: list[Finding] = []
-    for path, key, leaf in formulas_in(assignment.mechanism_file, "$.mechanism" if inside else "$"):
-        one = leaf.side if isinstance(leaf, SideText) else leaf
-        if isinstance(one, Formula):
-            of_mechanism += check(path, one, known, is_length=key in LENGTHS)
-    own += of_mechanism if inside else []
-    for index, datum in enumerate(assignment.file.given):
-        own += check(f"$.given[{index}].value", datum.value, known)
-    if not (broken or of_mechanism):
+    for path, key, leaf in formulas_in(assignment.mechanism_file, "$.mechanism" if is_inside else "$"):
+        if isinstance(leaf, SideText):
+            names = leaf.side.names if isinstance(leaf.side, Formula) else frozenset()
+            of_mechanism += check(path, names, partial(numbers.side, leaf))
+        else:
+            read = partial(numbers.length, what=key) if key in LENGTHS else numbers.number
+            of_mechanism += check(path, leaf.names, partial(read, leaf))
+    for index, datum in enumerate(file.given):
+        own += check(f"$.given[{index}].value", datum.value.names, partial(datum.value, known))
+    faults = Faults()
+    if not (own or of_mechanism):
         own += _check_scales(assignment, variants)
+        of_mechanism += check("$", frozenset(), partial(assignment.mechanism, variants))
     faults.add(assignment.path, own)
-    faults.add(source, () if inside else of_mechanism)
-    if not faults.errors:
-        try:
-            assignment.mechanism(variants)
-        except FormulaError as error:
-            where = "$.mechanism" if inside else "$"
-            faults.add(source, [Finding(where, str(error) + _failing(variants, error.which))])
-
-
-def _without_values(file: AssignmentFile) -> AssignmentFile:
-    return file.model_copy(update={"variant": file.variant.model_copy(update={"values": {}})})
+    faults.add(source, of_mechanism)
+    return faults
 
 
 def _check_scales(assignment: Assignment, variants: list[Variant]) -> Iterator[Finding]:

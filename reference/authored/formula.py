@@ -133,6 +133,8 @@ def _advice(text: str) -> str:
         return ": a scale is a number of metres on a millimetre, 1:2.5 is 0.0025"
     if re.fullmatch(r"[+-]?\d+,\d+", text):
         return ": write a decimal point"
+    if text.count("(") != text.count(")"):
+        return ": a bracket is opened and not closed, or closed and not opened"
     if re.fullmatch(r"[+-]?\d+(\.\d*)?\s*[^\d\s(+*/-][^(+*]*", text):
         return ": write the number alone; the key and length_unit say its unit"
     return ""

@@ -251,6 +251,8 @@ def findings_of(error: ValidationError, model: type[BaseModel]) -> Iterator[Find
         elif fault["type"] == "string_pattern_mismatch" and isinstance(given, str):
             message = f"'{given[:MAX_NAME]}' is no name here: letters A-Z a-z and digits{look_alikes(given)}"
             path = path.removesuffix(".[key]")
+        elif fault["type"] in {"float_type", "int_type"} and isinstance(given, str):
+            message = "must be a number, without quotes"
         elif fault["type"] == "string_too_long":
             message = message.replace("String should have", "must have")
         yield Finding(

@@ -330,7 +330,7 @@ def _problems(results: dict[str, Any]) -> list[str]:
     """What stands in the results, each with its file."""
     reports = [results, *results["reports"], *results["unmatched"]]
     problems = [one for report in reports for one in report.get("problems", ())]
-    return [f"{one['file']}: {one['message']}" for one in problems]
+    return [f"{one['file'] or 'class'}: {one['message']}" for one in problems]
 
 
 def told(cases: list[Case]) -> Iterator[Told]:

@@ -110,7 +110,7 @@ def test_every_kind_of_group_is_titled_given_and_fits(name, tmp_path):
             SIX_BAR.replace('"RRR"', '"RRX"'),
             TABLE,
             AuthoredFileError,
-            r"group\[0\]: needs a type, one of RRR",
+            r"group\[0\].type: 'RRX' is no type",
         ),
         (SIX_BAR, "n,a [mm]\n1,85\n", AuthoredFileError, "unknown name"),
         (SIX_BAR.replace("210, 165", "21, 16"), TABLE, CallError, "no variant of it assembles"),

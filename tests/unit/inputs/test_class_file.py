@@ -60,12 +60,12 @@ def test_an_absolute_path_stays(tmp_path):
         ('roster = "r.csv"', "$.roster", "relative to the folder of planmark.toml"),
         ('roster = ""', "$.roster", "is no path"),
         ('roster = "lists\\roster.csv"', "$.roster", "between single quotes"),
-        ('roster = "C:\\Users\\ana.csv"', "$", "between single quotes"),
+        ('roster = "C:\\Users\\ana.csv"', "line 1", "between single quotes"),
         ('language = "de"', "$.language", "'en', 'ro' or 'ru'"),
         ("pages = 0", "$.pages", "greater than or equal to 1"),
-        ('pages = "2"', "$.pages", "integer"),
+        ('pages = "2"', "$.pages", "without quotes"),
         ('platform = "canva"', "$.platform", "csv, moodle"),
-        ("roster = ", "$", "is not TOML"),
+        ("roster = ", "line 1", "is not TOML"),
     ],
 )
 def test_a_fault_is_told_with_file_key_and_what_to_do(tmp_path, text, path, advice):

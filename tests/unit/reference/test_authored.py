@@ -89,7 +89,7 @@ def test_all_faults_of_a_file_are_told_at_once_each_with_its_path(mechanism):
 def test_a_misspelt_group_type_is_told_with_the_known_ones(mechanism):
     mechanism["group"][0]["type"] = "RR"
     (told,) = findings(MechanismFile, mechanism).items()
-    assert told[0] == "$.group[0]"
+    assert told[0] == "$.group[0].type"
     assert "RRP" in told[1]
 
 
@@ -245,7 +245,7 @@ def test_a_length_that_some_variant_makes_negative_is_a_fault_of_the_file(assign
 def test_scales_that_draw_nothing_are_faults_of_the_file(assignment, old, new, words):
     with pytest.raises(AuthoredFileError, match=words) as error:
         load_assignment(assignment((old, new)))
-    assert error.value.findings[0].path == "$.scales"
+    assert error.value.findings[0].path.startswith("$.scales.k")
 
 
 @pytest.mark.parametrize("length", ["1e-12", "1e300"])
@@ -315,7 +315,7 @@ def test_a_damaged_file_gives_a_plan_or_a_told_error_and_nothing_else(name):
             if not isinstance(file.mechanism, MechanismFile) or list(check_mechanism(file.mechanism)):
                 continue
             assignment = Assignment(file, file.mechanism, Path("the file"))
-            if _check_formulas(assignment):
+            if _check_formulas(assignment, Path("the file")).errors:
                 continue
             plan = exact_plan(assignment, assignment.variants()[:3])
         except PlanmarkError:
@@ -328,7 +328,7 @@ def test_a_damaged_file_gives_a_plan_or_a_told_error_and_nothing_else(name):
 
 
 def test_an_empty_range_of_variants_is_a_fault_of_the_file(assignment):
-    with pytest.raises(AuthoredFileError, match="range of n or position is empty"):
+    with pytest.raises(AuthoredFileError, match=r"variant\.n: the range is empty"):
         load_assignment(assignment(("from = 1, to = 30", "from = 30, to = 1")))
 
 
@@ -358,7 +358,7 @@ def test_numbers_and_positions_together_are_bounded(assignment):
         ("crank_mm = 60", "crank_mm" + ".a" * 20_000 + " = 1", "$"),
         ("crank_mm = 60", 'crank_mm = "' + "9" * 180 + '**16"', "$.scales"),
         ("crank_mm = 60", 'crank_mm = "n\\u0000"', "$.scales.crank_mm"),
-        ("crank_mm = 60", "crank_mm = 60\0", "$"),
+        ("crank_mm = 60", "crank_mm = 60\0", "line 45"),
         ('mechanism = "pump"', f'mechanism = "{"p" * 300}"', "$"),
         ('mechanism = "pump"', 'mechanism = "/dev/zero"', "$"),
         ('mechanism = "pump"', 'mechanism = "p\\u0000"', "$"),

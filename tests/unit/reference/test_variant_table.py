@@ -218,7 +218,9 @@ def test_a_heading_that_is_none_is_told(course, heading, where, words):
 def test_too_many_cells_an_empty_table_and_no_table_are_told(course):
     assert "12 cells" in faults(course(HEADING, ROWS[1] + ";7"))[1]["line 2"]
     assert "no rows" in faults(course(HEADING))[1]["line 1"]
-    assert faults(course(variant='table = "seven.csv"'))[1] == {"$": "there is no such file"}
+    assert faults(course(variant='table = "seven.csv"'))[1] == {
+        "$.variant.table": "there is no file seven.csv beside this one"
+    }
     assert "either file" in faults(course(variant="[variant.table]\nrows = [[1]]"))[1]["$.variant.table"]
 
 
@@ -282,9 +284,9 @@ def test_lengths_that_are_none_are_told_row_by_row(course):
 
 def test_a_formula_that_fails_names_the_first_row_where_it_does(course):
     _, told = faults(course(mechanism=[('length = "a"', 'length = "a - 42"')]))
-    assert told["$.mechanism"] == "'a - 42' (crank) must be a positive length (for n = 1)"
+    assert told["$.crank.length"] == "'a - 42' (length) must be a positive length (for n = 1)"
     _, told = faults(course(mechanism=[('length = "e"', 'length = "sqrt(42 - a)"')]))
-    assert told["$.mechanism"].endswith("(for n = 2 and 2 more)")
+    assert told["$.group[1].length"].endswith("(for n = 2 and 2 more)")
 
 
 def test_a_number_that_is_not_in_the_table_is_refused_with_those_that_are(course):
@@ -315,9 +317,9 @@ def test_a_side_is_a_formula_of_the_data(course):
     mechanism = assignment.mechanism(assignment.variants())
     np.testing.assert_array_equal(mechanism.groups[0].side, [1, 1, -1, -1])
     _, told = faults(course(mechanism=[('side = "side_B"', 'side = "2 - n"')]))
-    assert "is zero: above zero is left, below right (for n = 2)" in told["$.mechanism"]
+    assert "is zero: above zero is left, below right (for n = 2)" in told["$.group[0].side"]
     _, told = faults(course(mechanism=[('side = "side_B"', 'side = "side_D"')]))
-    assert "neither left nor right, nor data of a variant" in told["$.mechanism"]
+    assert "neither left nor right, nor data of a variant" in told["$.group[0].side"]
 
 
 def test_numbers_in_words():
