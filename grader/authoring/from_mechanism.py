@@ -27,10 +27,10 @@ from reference.authored.mechanism import (
     SliderTable,
     SlottedLinkTable,
 )
-from reference.authored.toml_file import SideText, Text, load
+from reference.authored.toml_file import SideText, Text, load, text_of
 from reference.authored.variant_table import KEYS, MEASURES
 from reference.construction.graph import Construction
-from reference.errors import CallError
+from reference.errors import AuthoredFileError, CallError
 from reference.plan import construction_for
 
 Texts = Mapping[str, str]
@@ -72,6 +72,11 @@ RELATIVE = {
 _POINTS = {"scale": 1.0, "link": 0.5, "vector": 2.0, "angular": 0.5}
 _OPTIONAL = {"scale", "link", "angular"}
 """What a student may leave out without losing points."""
+KEYS_OF_A_CRITERION = """\
+# One for each thing judged: exactly one of vector, angular, scale and link. Of its other keys: points
+# for full marks; optional = true: not judged where it was not handed in; direction = false: only the length
+# counts."""
+"""The start's own comments stand at keys that not every criterion has."""
 _PLANS_MM = 60.0
 """The first vector of a plan at the scales with which the round ones are sought."""
 
@@ -107,10 +112,15 @@ def texts_for(mechanism: Path, name: str, start: Texts, table: Path | None) -> d
         paths = {kind: beside / f"{name}{SUFFIXES[kind]}" for kind in SUFFIXES}
         paths["mechanism"].write_bytes(mechanism.read_bytes())
         if table is not None:
-            (beside / table.name).write_bytes(table.read_bytes())
+            (beside / table.name).write_text(text_of(table), encoding="utf-8")
         assignment = _assignment(file, name, start["assignment"], first, table)
         paths["assignment"].write_text(assignment, encoding="utf-8")
-        loaded = load_assignment(paths["assignment"])
+        try:
+            loaded = load_assignment(paths["assignment"])
+        except AuthoredFileError as error:
+            # The copies are gone when the message is read.
+            of_table = table is not None and Path(error.file).name == table.name
+            raise AuthoredFileError(str(table if of_table else mechanism), error.findings) from error
         rubric = _rubric(file, name, start["rubric"], loaded)
         paths["rubric"].write_text(rubric, encoding="utf-8")
         proposed = lint(loaded, load_rubric(paths["rubric"])).scales
@@ -290,24 +300,24 @@ def _rubric(
     titles = _titles(file.title, TITLE)
     blocks = [_with(block, titles) if _heading(block) == "title" else block.rstrip("\n") for block in blocks]
     blocks[0] = re.sub(r'(?m)^id = "[^"]*"', f"id = {_text(name)}", blocks[0])
-    if unasked:
-        blocks.append(
-            f"# Not asked for, in some variant too short to be measured: {', '.join(sorted(unasked))}."
-        )
     criteria = [
         *(("scale", name, phrase, {}) for name, phrase in SCALES.items()),
         *(("link", name, LINK, {"name": name}) for name in construction.links),
-        *(
-            ("vector", name, *titled(name, construction))
-            for name in construction.vectors
-            if name not in unasked
-        ),
+        *(("vector", name, *titled(name, construction)) for name in construction.vectors),
         *(
             ("angular", name, RATES[name.partition("_")[0]], {"name": name.partition("_")[2]})
             for name in construction.rates
         ),
     ]
-    return "\n\n".join([*blocks, *(_criterion(*one) for one in criteria)]) + "\n"
+    asked = [KEYS_OF_A_CRITERION, *(_criterion(*one) for one in criteria if one[1] not in unasked)]
+    left_out = [_criterion(*one) for one in criteria if one[1] in unasked]
+    if left_out:
+        asked.append(
+            "# Not asked for: too short in some variants to be judged on their direction. Without the # they"
+            "\n# are judged there on their length alone, and lint names the variants."
+        )
+        asked += [re.sub("(?m)^", "# ", one) for one in left_out]
+    return "\n\n".join([*blocks, *asked]) + "\n"
 
 
 def _criterion(kind: str, name: str, phrase: str, known: Mapping[str, str]) -> str:

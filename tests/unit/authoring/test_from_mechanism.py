@@ -1,14 +1,16 @@
 """Assignments made from a mechanism's own file."""
 
+import re
 from pathlib import Path
 
 import pytest
 
 from grader.authoring.lint import lint
 from grader.authoring.new import new_assignment, starts, starts_folder
-from grader.rubric import rubric_of
+from grader.rubric import load_rubric, rubric_of
 from reference.authored.assignment import load_assignment
 from reference.errors import AuthoredFileError, CallError
+from reference.plan import construction_for
 
 SIX_BAR = """
 schema_version = 1
@@ -62,8 +64,25 @@ def test_an_assignment_of_a_mechanism_and_a_table_has_no_fault_and_no_warning(tm
     assert "round_scales" not in {finding.code for finding in result.findings}
     assert assignment.mechanism_file.id == "six"
     given = {datum.label: value for datum, value in assignment.given(assignment.variants()[0])}
-    lengths = {"O1A": 85.0, "AB": 210.0, "O2B": 165.0, "BC": 320.0, "x(O2)": 260.0}
-    assert {**lengths, "n": 120.0}.items() <= given.items()
+    told = {"O1A": 85.0, "AB": 210.0, "O2B": 165.0, "BC": 320.0, "x(O2)": 260.0, "n": 120.0}
+    assert told.items() <= given.items()
+
+
+def test_vectors_too_short_in_some_variant_are_criteria_behind_comment_signs(tmp_path):
+    mechanism, table = written(
+        tmp_path, table=TABLE + "7,85,260,35,120,left\n"
+    )  # near the dead point, 33.85 degrees
+    new = new_assignment(tmp_path / "six", mechanism=str(mechanism), table=table)
+    assignment = load_assignment(new.assignment)
+    asked = {criterion.vector for criterion in rubric_of(assignment).criterion} - {None}
+    vectors = set(construction_for(assignment).vectors)
+    assert asked < vectors
+    text = new.rubric.read_text(encoding="utf-8")
+    before, _, behind = text.partition("# Not asked for")
+    blocks = re.sub("(?m)^# ", "", behind.partition("\n\n")[2])
+    new.rubric.write_text(before + blocks, encoding="utf-8")
+    everything = load_rubric(new.rubric)
+    assert {criterion.vector for criterion in everything.criterion} - {None} == vectors
 
 
 def test_titles_are_those_of_the_mechanism_in_its_languages(tmp_path):
@@ -112,7 +131,7 @@ def test_every_kind_of_group_is_titled_given_and_fits(name, tmp_path):
             AuthoredFileError,
             r"group\[0\].type: 'RRX' is no type",
         ),
-        (SIX_BAR, "n,a [mm]\n1,85\n", AuthoredFileError, "unknown name"),
+        (SIX_BAR, "n,a [mm]\n1,85\n", AuthoredFileError, r"(?s)mine\.mechanism\.toml: .*unknown name"),
         (SIX_BAR.replace("210, 165", "21, 16"), TABLE, CallError, "no variant of it assembles"),
     ],
 )
