@@ -170,7 +170,7 @@ def draft_matches(
     if not folder.is_dir():
         raise CallError("folder_missing", f"{folder}: there is no such folder")
     assignment, roster = load_assignment(name), read_roster(roster_file)
-    paths = submissions(folder, roster_file, (out,))
+    paths = submissions(folder, roster_file, (out, *assignment.own_files))
     with (
         progress() as tell,
         tempfile.TemporaryDirectory() as notes,

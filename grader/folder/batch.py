@@ -231,7 +231,8 @@ def _roster(batch: Batch) -> Roster | None:
 def _files(batch: Batch) -> list[Path]:
     if not batch.folder.is_dir():
         raise CallError("folder_missing", f"{batch.folder}: there is no such folder")
-    return submissions(batch.folder, batch.roster, passed_over=(batch.out, batch.decisions_path))
+    others = (batch.out, batch.decisions_path, *batch.assignment.own_files)
+    return submissions(batch.folder, batch.roster, passed_over=others)
 
 
 def _submissions(

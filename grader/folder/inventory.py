@@ -33,11 +33,10 @@ _TOOL_NAMES = frozenset(
         "index.html",
         "truth.jsonl",
         "decisions.csv",
-        "planmark.toml",
     }
 )
 _TOOL_STARTS = (".", "~$", "__MACOSX")
-_TOOL_ENDS = (".part", ".tmp", ".bak", ".crdownload", ".log", "~")
+_TOOL_ENDS = (".part", ".tmp", ".bak", ".crdownload", ".log", ".toml", "~")
 _FILE_TYPES = frozenset({".jpg", ".jpeg", ".png", ".tif", ".tiff", ".pdf", ".csv", ".json"})
 _DIGITS = re.compile(r"(\d+)")
 

@@ -113,7 +113,7 @@ class Worksheet(Form):
             raise InputFileError(
                 "worksheet", f"{file}: the worksheet is empty; download it from Moodle again"
             )
-        columns = _columns(table)
+        columns = _columns(table, file)
         header = ", ".join(table.value(0, place).strip() for place in range(len(table.rows[0])))
         faults = [
             f"row 1: there is no column '{COLUMNS[name][0].capitalize()}' (columns: {header})"
@@ -253,7 +253,7 @@ def fill_worksheet(
     return fill_in(sheet, file, grades, options, comments)
 
 
-def _columns(table: RawTable) -> dict[str, int]:
+def _columns(table: RawTable, file: str) -> dict[str, int]:
     """Places of columns by our names: by their headings, else by what stands in them.
 
     Their order is Moodle's own: identifier, full name, ..., grade, maximum, ..., date of the grade,
@@ -267,7 +267,7 @@ def _columns(table: RawTable) -> dict[str, int]:
         places = [place for place, title in enumerate(header) if title in known]
         if len(places) > 1:
             raise InputFileError(
-                "worksheet", f"row 1: there are {len(places)} columns '{table.value(0, places[0])}'"
+                "worksheet", f"{file}, row 1: there are {len(places)} columns '{table.value(0, places[0])}'"
             )
         if places:
             columns[name] = places[0]

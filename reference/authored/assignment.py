@@ -183,6 +183,12 @@ class Assignment:
         """Its name."""
         return self.file.id
 
+    @property
+    def own_files(self) -> tuple[Path, ...]:
+        """The assignment's file, and the CSV of its variants where it has one."""
+        table = self.file.variant.table
+        return (self.path, *([self.path.parent / table.file] if table and table.file else []))
+
     def variants(self) -> list[Variant]:
         """Every variant there is, numbers first, positions within."""
         spec = self.file.variant

@@ -9,12 +9,15 @@ import jsonschema
 import numpy as np
 import pypdfium2
 import pytest
+from typer.testing import CliRunner
 
+from grader.cli.app import app
 from grader.cli.exporting import schema
 from reference.authored.assignment import load_assignment
 from reference.errors import AuthoredFileError
 from reference.kinematics.cycle import cycle
 from reference.plan import exact_plan
+from tests.functional.broken_files import Case
 from tests.functional.test_grade import perfect_rows, results_of, write_roster, write_table
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "course.md"
@@ -167,3 +170,16 @@ def test_an_assignment_like_it_has_a_table_of_its_own(planmark, conveyor, tmp_pa
         == load_assignment(conveyor).variants()
     )
     assert planmark("new", "second", "--like", conveyor).returncode == 0
+
+
+def test_the_courses_own_files_in_the_folder_are_no_submissions(tmp_path, monkeypatch):
+    Case("", "", "", "", "").write(tmp_path)
+    for path in (tmp_path / "class").iterdir():
+        path.rename(tmp_path / path.name)
+    for name in ("decisions.csv", "ids.csv", "worksheet.csv"):
+        (tmp_path / name).unlink()
+    monkeypatch.chdir(tmp_path)
+    CliRunner().invoke(app, "grade . --assignment course.assignment.toml --out marks -q".split())
+    results = json.loads((tmp_path / "marks" / "results.json").read_bytes())
+    assert results["unmatched"] == []
+    assert [report["student_id"] for report in results["reports"]] == ["s01", "s02"]
