@@ -20,7 +20,8 @@ from grader.documents import (
     ResultsDocument,
 )
 from grader.inputs.roster import read_roster
-from grader.lms import api
+from grader.lms.api import canvas, classroom, graph, openedx
+from grader.lms.api.requests import RequestsDocument
 from grader.lms.export import export as deliver
 from grader.lms.export import read_results, usual_name
 from grader.lms.grades import Delivery, Options, Person
@@ -42,17 +43,17 @@ MODELS: dict[str, tuple[type[BaseModel], Literal["validation", "serialization"]]
     "calibration": (CalibrationDocument, "serialization"),
     "moodle-rubric": (MoodleRubricDocument, "serialization"),
     "moodle-marks": (MoodleMarksDocument, "serialization"),
-    "canvas-rubric": (api.CanvasRubricBody, "serialization"),
-    "canvas-assessment": (api.CanvasBody, "serialization"),
-    "openedx-rubric": (api.EdxRubric, "serialization"),
-    "openedx-assessment": (api.EdxGrade, "serialization"),
-    "google-rubric": (api.GoogleRubric, "serialization"),
-    "google-grade": (api.GoogleGrade, "serialization"),
-    "ms-rubric": (api.GraphRubric, "serialization"),
-    "ms-rubric-outcome": (api.GraphRubricOutcome, "serialization"),
-    "ms-points-outcome": (api.GraphPointsOutcome, "serialization"),
-    "ms-feedback-outcome": (api.GraphFeedbackOutcome, "serialization"),
-    "api-plan": (api.PlanDocument, "serialization"),
+    "canvas-rubric": (canvas.CanvasRubricBody, "serialization"),
+    "canvas-assessment": (canvas.CanvasBody, "serialization"),
+    "openedx-rubric": (openedx.EdxRubric, "serialization"),
+    "openedx-assessment": (openedx.EdxGrade, "serialization"),
+    "google-rubric": (classroom.GoogleRubric, "serialization"),
+    "google-grade": (classroom.GoogleGrade, "serialization"),
+    "ms-rubric": (graph.GraphRubric, "serialization"),
+    "ms-rubric-outcome": (graph.GraphRubricOutcome, "serialization"),
+    "ms-points-outcome": (graph.GraphPointsOutcome, "serialization"),
+    "ms-feedback-outcome": (graph.GraphFeedbackOutcome, "serialization"),
+    "api-plan": (RequestsDocument, "serialization"),
     "gradescope": (GradescopeDocument, "serialization"),
     "lti": (LtiDocument, "serialization"),
     "mechanism": (MechanismFile, "validation"),

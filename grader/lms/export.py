@@ -13,7 +13,8 @@ from pydantic import ValidationError
 
 from grader.documents import SCHEMA_VERSION, ResultsDocument
 from grader.files import create_whole, replacing, write_whole
-from grader.lms import api, gradebooks, moodle, moodle_guide, scores
+from grader.lms import gradebooks, moodle, moodle_guide, scores
+from grader.lms.api import canvas, classroom, graph, openedx
 from grader.lms.grades import Content, Delivery, Grade, Options, grades_of, in_a_row, ready
 from grader.lms.marks import faults_of
 from grader.lms.table import criteria_text, not_as_meant, summary_text
@@ -78,14 +79,14 @@ KINDS: Mapping[tuple[str, str], _Kind] = {
     ),
     ("moodle", "marks"): _of_grades(".json", moodle_guide.fillings, "criteria assignment_id"),
     ("canvas", "grades"): _of_grades(".csv", gradebooks.grades_file, "maximum rescale form item"),
-    ("canvas", "rubric"): _of_grades(".csv", api.rubric, "item"),
-    ("canvas-api", "marks"): _of_grades(".zip", api.canvas_api, "item criteria course_id assignment_id"),
-    ("openedx", "marks"): _of_grades(".zip", api.openedx, "submissions assignment_id"),
+    ("canvas", "rubric"): _of_grades(".csv", canvas.rubric, "item"),
+    ("canvas-api", "marks"): _of_grades(".zip", canvas.canvas_api, "item criteria course_id assignment_id"),
+    ("openedx", "marks"): _of_grades(".zip", openedx.openedx, "submissions assignment_id"),
     ("google-classroom", "marks"): _of_grades(
-        ".zip", api.google_classroom, "criteria submissions course_id assignment_id maximum rescale"
+        ".zip", classroom.google_classroom, "criteria submissions course_id assignment_id maximum rescale"
     ),
     ("ms-education", "marks"): _of_grades(
-        ".zip", api.ms_education, "item criteria submissions course_id assignment_id maximum rescale"
+        ".zip", graph.ms_education, "item criteria submissions course_id assignment_id maximum rescale"
     ),
     ("brightspace", "grades"): _of_grades(".csv", gradebooks.grades_file, "maximum rescale form item"),
     ("blackboard", "grades"): _of_grades(".csv", gradebooks.grades_file, "maximum rescale form item"),

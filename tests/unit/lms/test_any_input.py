@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from grader.lms.api import submissions_in
+from grader.lms.api.requests import submissions_in
 from grader.lms.export import draft, export, read_results
 from grader.lms.gradebooks import fill_gradebook
 from grader.lms.grades import Options, Person, grades_of

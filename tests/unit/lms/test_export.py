@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from grader.documents import AlikeDocument
 from grader.files import OutputError
 from grader.lms import table
-from grader.lms.api import CanvasBody
+from grader.lms.api.canvas import CanvasBody
 from grader.lms.export import KINDS, export, usual_name
 from grader.lms.grades import Options, Person
 from grader.lms.marks import PlatformCriterion

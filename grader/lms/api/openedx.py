@@ -1,0 +1,171 @@
+"""Open edX: the rubric of an open response assessment in whole points, and staff assessments."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal, Self
+from urllib.parse import quote
+from xml.etree import ElementTree as ET
+
+from pydantic import Field, model_validator
+
+from grader.lms.api.requests import NOT_EMPTY, Plan, place_of, ready_marks, students_submissions, total_of
+from grader.lms.grades import Delivery, Grade, Options, in_a_row, ready
+from grader.lms.marks import (
+    CLOSE,
+    Filled,
+    Payload,
+    check_unique,
+    class_criteria,
+    json_document,
+    plain_comment,
+)
+from grader.lms.table import number
+
+Whole = Annotated[int, Field(ge=0, strict=True)]
+
+
+class EdxOption(Payload):
+    """A level of a criterion."""
+
+    order_num: Whole
+    name: Filled
+    label: str
+    explanation: str
+    points: Whole
+
+
+class EdxCriterion(Payload):
+    """A criterion with all points that the class has in it."""
+
+    order_num: Whole
+    name: Filled
+    label: str
+    prompt: str
+    feedback: Literal["disabled", "optional", "required"] = "optional"
+    options: Annotated[list[EdxOption], Field(min_length=2)]
+
+    @model_validator(mode="after")
+    def _is_whole(self) -> Self:
+        check_unique((option.name for option in self.options), "option")
+        return self
+
+
+class EdxRubric(Payload):
+    """The rubric's keys of what Studio's editor sends (edx-ora2, xblock/schema.py, EDITOR_UPDATE_SCHEMA)."""
+
+    criteria: Annotated[list[EdxCriterion], NOT_EMPTY]
+    feedback_prompt: str = ""
+    feedback_default_text: str = ""
+
+
+class EdxMark(Payload):
+    """The option that a student is given."""
+
+    name: Filled
+    feedback: str
+    selectedOption: Filled  # noqa: N815 - the platform's own name, here and below
+
+
+class EdxGrade(Payload):
+    """A staff assessment (edx-platform, ora_staff_grader/serializers.py, StaffAssessSerializer)."""
+
+    overallFeedback: str  # noqa: N815
+    criteria: Annotated[list[EdxMark], NOT_EMPTY]
+
+
+_FACTORS = (1, 2, 4, 5, 10, 20, 25, 50, 100)
+"""Of points that are to be whole; finer points than hundredths are rounded, and told."""
+
+
+def openedx(grades: Sequence[Grade], options: Options) -> Delivery:
+    """The rubric as JSON and as OLX, and the staff assessments of the students whose submissions are known.
+
+    Open response assessments take whole points: all are times one number.
+    """
+    criteria = class_criteria(grades, options)
+    marked = {grade.student_id: ready_marks(grade, options) for grade in ready(grades)}
+    given = {each.id: {0.0, each.max_points} for each in criteria}
+    for mark in (mark for marks in marked.values() for mark in marks):
+        given[mark.criterion].add(mark.points)
+    points = [one for each in given.values() for one in each]
+    factor = next((one for one in _FACTORS if all(_is_whole(point * one) for point in points)), _FACTORS[-1])
+    rubric_body = {
+        "criteria": [
+            {
+                "order_num": at,
+                "name": each.id,
+                "label": each.titles[0],
+                "prompt": each.titles[0],
+                "options": [
+                    {"order_num": place, "name": number(whole / factor), "label": number(whole / factor),
+                     "explanation": "", "points": whole}
+                    for place, whole in enumerate(sorted({round(one * factor) for one in given[each.id]}))
+                ],
+            }
+            for at, each in enumerate(criteria)
+        ],
+    }  # fmt: skip
+    plan = Plan(
+        "Open edX",
+        "https://courses.example.org",
+        [
+            "openedx/edx-ora2: openassessment/xblock/schema.py (EDITOR_UPDATE_SCHEMA)",
+            "openedx/edx-ora2: openassessment/xblock/xml.py (serialize_rubric)",
+            "openedx/edx-platform: lms/djangoapps/ora_staff_grader (urls.py, StaffAssessSerializer)",
+        ],
+    )
+    plan.files["rubric.json"] = json_document(EdxRubric, rubric_body, "rubric.json for Open edX").encode()
+    plan.files["rubric.xml"] = _olx(rubric_body)
+    known, missing = students_submissions(grades, options, "/api/ora_staff_grader/initialize?oraLocation=...")
+    (block,) = place_of(options, "assignment_id") if known else ("",)
+    by_id = {grade.student_id: grade for grade in grades}
+    for student, submission in known.items():
+        where = f"oraLocation={block}&submissionUUID={quote(submission.id, safe='')}"
+        body = {
+            "overallFeedback": plain_comment(by_id[student]),
+            "criteria": [
+                {
+                    "name": mark.criterion,
+                    "feedback": mark.remark,
+                    "selectedOption": number(round(mark.points * factor) / factor),
+                }
+                for mark in marked[student]
+            ],
+        }
+        base = "/api/ora_staff_grader/submission"
+        plan.add(f"POST {base}/lock?{where}", Payload, {}, "lock", student)
+        plan.add(f"POST {base}/grade?{where}", EdxGrade, body, "grade", student)
+    notes = [
+        (
+            f"Open edX takes whole points: all are times {factor}, {number(total_of(criteria))} become"
+            f" {number(factor * total_of(criteria))}; the grade is their share and stays the same"
+        ),
+        "the options are the points that this class has: after a regrade with others put the rubric in again",
+    ]
+    rough = [
+        student
+        for student, marks in marked.items()
+        if not all(_is_whole(mark.points * factor) for mark in marks)
+    ]
+    if rough:
+        notes.insert(1, f"rounded to hundredths: the points of {in_a_row(rough)}")
+    return plan.delivery(grades, unplaced=missing, notes=tuple(notes))
+
+
+def _is_whole(value: float) -> bool:
+    return math.isclose(value, round(value), abs_tol=CLOSE)
+
+
+def _olx(rubric_body: Mapping[str, Any]) -> bytes:
+    """The rubric as it stands in an exported course, to be put into its `openassessment`."""
+    root = ET.Element("rubric")
+    for criterion in rubric_body["criteria"]:
+        element = ET.SubElement(root, "criterion", feedback="optional")
+        for name in ("name", "label", "prompt"):
+            ET.SubElement(element, name).text = criterion[name]
+        for option in criterion["options"]:
+            inner = ET.SubElement(element, "option", points=str(option["points"]))
+            for name in ("name", "label", "explanation"):
+                ET.SubElement(inner, name).text = option[name]
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode").encode() + b"\n"

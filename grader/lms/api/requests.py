@@ -1,0 +1,185 @@
+"""Requests to a platform: the plan of the calls, where they go, and whose submission is whose."""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Literal, Self
+from urllib.parse import quote
+
+from pydantic import Field, model_validator
+
+from grader.lms.grades import Delivery, Grade, Options, ready
+from grader.lms.marks import (
+    Criterion,
+    Filled,
+    Mark,
+    Payload,
+    Version,
+    check_unique,
+    json_document,
+    marks_of,
+    read_answer,
+    together,
+)
+from grader.lms.table import match_rows
+from reference.errors import CallError
+
+NOT_EMPTY = Field(min_length=1)
+"""Of an object or a list that is never empty."""
+
+# The plan -----------------------------------------------------------------------------------------
+
+
+class PlannedCall(Payload):
+    """A request: the file of its body lies beside the plan."""
+
+    method: Literal["POST", "PUT", "PATCH"]
+    path: Annotated[str, Field(pattern=r"^/[^\s{}]+$")]
+    body: Filled
+    student_id: str | None = None
+
+
+class RequestsDocument(Payload):
+    """The calls in the order in which they are to be made, to the platform's `server`."""
+
+    schema_version: Version = 1
+    platform: str
+    assignment: str
+    server: str
+    sources: list[str]
+    calls: list[PlannedCall]
+
+    @model_validator(mode="after")
+    def _is_whole(self) -> Self:
+        check_unique((call.body for call in self.calls), "body")
+        check_unique((call.path for call in self.calls), "the call")
+        return self
+
+
+@dataclass(slots=True)
+class Plan:
+    """Files that are collected for a plan."""
+
+    platform: str
+    server: str
+    sources: Sequence[str]
+    calls: list[dict[str, str | None]] = field(default_factory=list)
+    files: dict[str, bytes] = field(default_factory=dict)
+
+    def add(
+        self, call: str, model: type[Payload], body: Mapping[str, Any], what: str, student: str | None = None
+    ) -> None:
+        """Add a call, as ``POST /path``; `what` names its file, after the student."""
+        method, _, path = call.partition(" ")
+        name = "-".join(filter(None, (f"{len(self.calls) + 1:03}", student, what))) + ".json"
+        self.files[name] = json_document(model, body, f"{name} for {self.platform}").encode()
+        self.calls.append({"method": method, "path": path, "body": name, "student_id": student})
+
+    def delivery(self, grades: Sequence[Grade], **more: Any) -> Delivery:  # noqa: ANN401 - fields of a delivery
+        """The plan with its files."""
+        content = {
+            "platform": self.platform,
+            "assignment": grades[0].assignment,
+            "server": self.server,
+            "sources": self.sources,
+            "calls": self.calls,
+        }
+        plan = json_document(RequestsDocument, content, "the plan").encode()
+        return Delivery({"plan.json": plan, **self.files}, **more)
+
+
+def place_of(options: Options, *names: str) -> list[str]:
+    """The platform's numbers of course and assignment, for a path; CallError where one is not given."""
+    values = [getattr(options, name) for name in names]
+    missing = [f"--{name.replace('_', '-')}" for name, value in zip(names, values, strict=True) if not value]
+    if missing:
+        raise CallError("place_needed", f"{options.to} needs {' and '.join(missing)}: where the rubric goes")
+    return [quote(str(value), safe="") for value in values]
+
+
+@dataclass(frozen=True, slots=True)
+class Submission:
+    """A student's submission as the platform names it; `outcomes` are ids by type, of Microsoft's alone."""
+
+    id: str
+    user: Mapping[str, str]
+    outcomes: Mapping[str, str]
+
+
+def submissions_in(answer: object) -> Iterator[Submission]:
+    """Submissions in a platform's answer, wherever they are nested in it."""
+    if isinstance(answer, list):
+        for each in answer:
+            yield from submissions_in(each)
+    if not isinstance(answer, dict):
+        return
+    number_there = next(
+        (answer[key] for key in ("submissionUUID", "submissionUuid", "id") if key in answer), None
+    )
+    recipient = answer.get("recipient")
+    of_recipient = recipient if isinstance(recipient, dict) else {}
+    cells = {
+        "userId": answer.get("userId") or of_recipient.get("userId"),
+        "username": answer.get("username"),
+        "email": answer.get("email"),
+    }
+    user = {kind: cell for kind, cell in cells.items() if isinstance(cell, str) and cell}
+    if isinstance(number_there, str) and user:
+        outcomes = answer.get("outcomes")
+        yield Submission(
+            number_there,
+            user,
+            {
+                str(each.get("@odata.type", "")).rpartition(".")[2]: str(each.get("id", ""))
+                for each in (outcomes if isinstance(outcomes, list) else [])
+                if isinstance(each, dict)
+            },
+        )
+        return
+    for inner in answer.values():
+        yield from submissions_in(inner)
+
+
+def students_submissions(
+    grades: Sequence[Grade], options: Options, ask: str
+) -> tuple[dict[str, Submission], dict[str, str]]:
+    """The submission of each student, and why others have none; `ask` is the request that lists them.
+
+    Raises CallError for an answer without submissions.
+    """
+    if options.submissions is None:
+        why = f"its submission is not known: ask the platform for {ask} and give the answer (--submissions)"
+        return {}, {grade.student_id: why for grade in ready(grades)}
+    known = list(submissions_in(read_answer(options.submissions)))
+    if not known:
+        message = f"{options.submissions}: no submissions are in this answer; ask for {ask}"
+        raise CallError("submissions", message)
+    students = {**options.people, **{grade.student_id: grade.person for grade in grades}}
+    matches = match_rows(
+        {row: submission.user for row, submission in enumerate(known)},
+        {
+            student: (
+                ("userId", person.platform_id),
+                ("email", person.email),
+                ("username", person.username or student),
+                ("userId", student),
+            )
+            for student, person in students.items()
+        },
+        options.submissions.name,
+    )
+    graded = {grade.student_id for grade in ready(grades)}
+    return (
+        {student: known[row] for student, row in matches.rows.items() if student in graded},
+        {student: why for student, why in matches.missing.items() if student in graded},
+    )
+
+
+def ready_marks(grade: Grade, options: Options) -> list[Mark]:
+    """The marks of a grade, named as the class's criteria."""
+    return together(marks_of(grade), options.combine)
+
+
+def total_of(criteria: Iterable[Criterion]) -> float:
+    """The maxima of all criteria together."""
+    return math.fsum(each.max_points for each in criteria)
