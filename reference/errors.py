@@ -74,14 +74,20 @@ def near_names(name: str, known: Iterable[str], *, most: int = 2, cutoff: float 
     return [by_lower[near] for near in difflib.get_close_matches(name.lower(), by_lower, most, cutoff)]
 
 
-def ranges_of(numbers: Sequence[int]) -> str:
-    """Whole numbers in rising order in words: ``from 1 to 30``, or with gaps ``= 1..9, 11, 13, 14``."""
+def runs_of(numbers: Sequence[int]) -> list[list[int]]:
+    """Whole numbers in rising order, those that follow each other together."""
     runs: list[list[int]] = []
     for number in numbers:
         if runs and number == runs[-1][-1] + 1:
             runs[-1].append(number)
         else:
             runs.append([number])
+    return runs
+
+
+def ranges_of(numbers: Sequence[int]) -> str:
+    """Whole numbers in rising order in words: ``from 1 to 30``, or with gaps ``= 1..9, 11, 13, 14``."""
+    runs = runs_of(numbers)
     if len(runs) == 1:
         return f"from {numbers[0]} to {numbers[-1]}"
     return "= " + ", ".join(

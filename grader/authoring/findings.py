@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.authored.assignment import Assignment, Variant
+from reference.errors import runs_of
 
 Severity = Literal["fault", "warning", "hint"]
 """fault: some student cannot be set or marked; warning: something a teacher should change or accept;
@@ -66,12 +67,7 @@ def named(variants: Iterable[Variant]) -> str:
 
 def _ranges(numbers: Sequence[int]) -> str:
     """Whole numbers in rising order, runs of three and more drawn together."""
-    runs: list[list[int]] = []
-    for number in numbers:
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
+    runs = runs_of(numbers)
     texts: list[str] = []
     for run in runs:
         texts.extend([f"{run[0]}..{run[-1]}"] if len(run) > 2 else map(str, run))

@@ -213,16 +213,8 @@ def _worst(rows: Sequence[LintVariant]) -> LintWorst:
 
 def names_in(thing: object) -> set[str]:
     """The names that the formulas of an authored table need, however deep they stand."""
-    if isinstance(thing, Formula):
-        return set(thing.names)
-    if isinstance(thing, SideText):
-        return names_in(thing.side)
-    inside: Iterable[object] = ()
-    if isinstance(thing, BaseModel):
-        inside = (getattr(thing, name) for name in type(thing).model_fields)
-    elif isinstance(thing, dict | list | tuple):
-        inside = thing.values() if isinstance(thing, dict) else thing
-    return set().union(*map(names_in, inside))
+    leaves = (leaf.side if isinstance(leaf, SideText) else leaf for _, _, leaf in formulas_in(thing, ""))
+    return {name for leaf in leaves if isinstance(leaf, Formula) for name in leaf.names}
 
 
 def data_findings(
