@@ -40,7 +40,7 @@ FILES = {
     "s15.json": text("s15"),
     "s15_again.json": text("s15"),
     "few.csv": b"student_id,v_A,v_A_deg\ns16,60,nan\ns17,60,5,58\nCON,1,1\n",
-    "wrong.csv": b"student_id,v_A,colour\ns18,60,5\ns19,60,4\n",
+    "wrong.csv": b"student_id,size,colour\ns18,60,5\ns19,60,4\n",
 }
 ROSTER = "student_id,name,n,kv\n" + "".join(
     f"s{number:02d},Student {number},{N},{'0.2 (m/s)/mm' if number == 11 else ''}\n"

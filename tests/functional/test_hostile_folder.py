@@ -105,4 +105,4 @@ def test_a_pipe_with_the_name_of_measurements_is_told_and_not_waited_for(tmp_pat
     os.mkfifo(folder / "class.csv")
     run = graded(folder, tmp_path / "out")
     assert run.exit_code == 1
-    assert "class.csv: cannot be read" in run.output
+    assert "class.csv: it is a folder or a pipe, not a file" in run.output
