@@ -224,9 +224,13 @@ def _equations(
     return rows, drawn
 
 
+UNSEEN = 1e-9
+"""Information, 1/mm², on a node that no entry ties to the others: it may be anywhere."""
+
+
 def _least_squares(rows: FloatArray, drawn: FloatArray, nodes: Sequence[str]) -> tuple[_Nodes, float]:
     """Nodes by least squares, their squared residuals as cost; and the largest residual."""
-    normal = np.linalg.inv(rows.T @ rows)
+    normal = np.linalg.inv(rows.T @ rows + UNSEEN * np.eye(2 * len(nodes)))
     places = normal @ (rows.T @ drawn)
     residuals = rows @ places - drawn
     found = {name: complex(*places[2 * i : 2 * i + 2]) for i, name in enumerate(nodes)}
