@@ -27,6 +27,8 @@ from reference.geometry import ComplexArray
 from reference.replay.replay import Replay
 
 NO_SPREAD = EndSpread(0.0, 0.0)
+_MOST_SHARE = 1e6
+"""Past this share of the right one a computed value gives no vector that fits any paper; its square may overflow."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -323,7 +325,9 @@ class FollowThrough:
     def own_turn(self, rate: AngularRate) -> float | None:
         """The student's own computed angular velocity as a share of the right one."""
         own, right = self.evidence.values.get(rate.name), self.task.rates[rate.name]
-        return None if own is None or not right else own / right
+        if own is None or not right or abs(own) > _MOST_SHARE * abs(right):
+            return None
+        return own / right
 
     def named(self, tail: str, head: str) -> str | None:
         """The vector from one node to another, either way round; None where it has no name."""
