@@ -28,7 +28,7 @@ from reference.replay.replay import Replay
 
 NO_SPREAD = EndSpread(0.0, 0.0)
 _MOST_SHARE = 1e6
-"""Past this share of the right one a computed value gives no vector that fits a paper; its square overflows."""
+"""Past this share of the right one a computed value gives no vector that fits; its square may overflow."""
 
 
 @dataclass(frozen=True, slots=True)
