@@ -239,6 +239,30 @@ def review(
 
 
 @app.command()
+def serve(
+    data: Annotated[
+        Path, typer.Argument(help="The folder that everything is kept in; made if it is not there.")
+    ] = Path("planmark-data"),
+    host: Annotated[
+        str, typer.Option("--host", help="Address to listen at; others reach 0.0.0.0.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="0 takes any that is free.")] = 8000,
+    address: Annotated[
+        str | None, typer.Option("--address", help="Under which students reach it: https://NAME.")
+    ] = None,
+    database: Annotated[
+        str | None,
+        typer.Option("--database", help="postgresql+psycopg://...; SQLite in the folder if not given."),
+    ] = None,
+    jobs: JobsOption = None,
+) -> None:
+    """Serve students' self-check and instructors' classes as a web application."""
+    from grader.cli.serving import serve as serve_folder
+
+    serve_folder(data, host=host, port=port, address=address, database=database, jobs=jobs)
+
+
+@app.command()
 def check(
     assignment: AssignmentArgument,
     measured: Annotated[

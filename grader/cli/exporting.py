@@ -19,12 +19,11 @@ from grader.documents import (
     ReportDocument,
     ResultsDocument,
 )
-from grader.inputs.roster import read_roster
 from grader.lms.api import canvas, classroom, graph, openedx
 from grader.lms.api.requests import RequestsDocument
 from grader.lms.export import export as deliver
 from grader.lms.export import read_results, usual_name
-from grader.lms.grades import Delivery, Options, Person
+from grader.lms.grades import Delivery, Options, people_of
 from grader.lms.moodle_guide import MoodleMarksDocument, MoodleRubricDocument
 from grader.lms.scores import GradescopeDocument, LtiDocument
 from grader.lms.table import with_ids
@@ -84,12 +83,7 @@ def export_results(
         if source is not None and path.resolve() == source.resolve():
             raise CallError("file_exists", f"{path}: is read for this export; name another file (--file)")
     results = read_results(folder)
-    people = {}
-    if roster is not None:
-        people = {
-            row.student_id: Person(name=row.name, email=row.email or "", lang=row.lang or "")
-            for row in read_roster(roster).rows
-        }
+    people = {} if roster is None else people_of(roster)
     if ids is not None:
         people = with_ids(people, ids)
     delivery = deliver(results, path, replace(options, people=people, out=folder))

@@ -36,7 +36,7 @@ def review_class(
     if token and len(token) < LEAST_TOKEN:
         raise CallError("token_short", f"--token must have {LEAST_TOKEN} signs or more")
     batch = replace(noted_batch(folder), jobs=jobs or os.cpu_count() or 1)
-    listener = _listener(host, port)
+    listener = listener_on(host, port)
     session = Session(batch)
     with progress() as tell:
         session.bring_up_to_date(tell)
@@ -52,7 +52,8 @@ def review_class(
         tell_next_of_class(results, batch.out)
 
 
-def _listener(host: str, port: int) -> socket.socket:
+def listener_on(host: str, port: int) -> socket.socket:
+    """A socket that listens; raises CallError for a port that is taken."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         return socket.create_server((host, port), family=family)

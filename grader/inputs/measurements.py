@@ -11,6 +11,8 @@ that is refused costs that value alone, and so does a column that is not known: 
 student, and `Reading.unread` names what it was entered for, so that no criterion is judged without it.
 """
 
+import csv
+import io
 import json
 import math
 import re
@@ -236,6 +238,18 @@ def read_measurements(
     if path.suffix.lower() == ".json":
         return (_parse_json(text, source),)
     return tuple(_parse_csv(text, source))
+
+
+def measurements_in(cells: Mapping[str, str], names: Names, file: str, lang: str) -> Measurements:
+    """What one student typed into a form: texts by columns of a CSV file, with decimal commas or points.
+
+    Arguments are those of `read_measurements`; raises as it does.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, delimiter=";", lineterminator="\n")
+    writer.writerows([list(cells), [value.strip() for value in cells.values()]])
+    source = _Source(file, names, tongue(lang), is_own=True)
+    return next(_parse_csv(text.getvalue(), source), replace(NOTHING_MEASURED, source=file))
 
 
 def _text_of(path: Path, source: _Source) -> str:

@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 from grader.documents import ReportDocument, ResultsDocument
 from grader.files import result_folders
-from grader.inputs.roster import why_no_id
+from grader.inputs.roster import read_roster, why_no_id
 from reference.errors import CallError, InputFileError, lines_of
 
 Content = Mapping[str, bytes | Path]
@@ -35,6 +35,14 @@ class Person:
     platform_id: str = ""
     participant: int | None = None
     lang: str = ""
+
+
+def people_of(roster: Path) -> dict[str, Person]:
+    """The students of a roster; raises AuthoredFileError for one with faults."""
+    return {
+        row.student_id: Person(name=row.name, email=row.email or "", lang=row.lang or "")
+        for row in read_roster(roster).rows
+    }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,0 +1,122 @@
+"""The application of ``planmark serve``: its routes, its errors, its start and end."""
+
+import logging
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import replace
+from http import HTTPStatus
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse, Response
+from sqlalchemy import func, select
+from starlette.exceptions import HTTPException
+
+from grader import __version__
+from grader.web import instructors, pages, students
+from grader.web.guard import Guard, RefusedError, Rim
+from grader.web.queue import Photo, Queue
+from grader.web.self_check import checked_photo
+from grader.web.service import Call, Service
+from grader.web.settings import Settings
+from grader.web.store import Account, Store
+from reference.errors import PlanmarkError
+
+LOG = logging.getLogger("planmark")
+LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
+DESCRIPTION = """
+Everything that the pages of planmark do. A program sends a token, made on the account's page, as
+`Authorization: Bearer TOKEN`. Errors are `{"code", "message"}`: what is wrong, where, and what to do.
+"""
+
+
+def application(settings: Settings, photo: Photo = checked_photo) -> FastAPI:
+    """The web application.
+
+    Raises CallError for a data base that cannot be opened.
+    """
+    store = Store(settings.database)
+    service = Service(settings, store, Guard(settings, store), Queue(settings, store, photo))
+
+    @asynccontextmanager
+    async def running(_app: FastAPI) -> AsyncIterator[None]:
+        store.forget(days=settings.keep_days)
+        service.queue.start()
+        yield
+        service.queue.stop()
+
+    app = FastAPI(
+        title="planmark", version=__version__, description=DESCRIPTION, lifespan=running,
+        docs_url=None, redoc_url=None, openapi_url="/api/v1/openapi.json",
+        responses={code: {"description": HTTPStatus(code).phrase} for code in (400, 401, 403, 404, 409, 429)},
+    )  # fmt: skip
+    app.state.service = service
+    for router in (students.router, instructors.router, pages.router):
+        app.include_router(router)
+    app.add_exception_handler(PlanmarkError, _told)
+    app.add_exception_handler(RequestValidationError, _invalid)
+    app.add_exception_handler(HTTPException, _refused)
+    app.add_exception_handler(Exception, _fault)
+    is_local = settings.host.partition(":")[0] in LOOPBACK
+    app.add_middleware(Rim, settings=settings, hosts=LOOPBACK if is_local else frozenset())
+    return app
+
+
+def first_invitation(settings: Settings) -> str | None:
+    """The address at which the first administrator makes the account; None once there is one."""
+    store = Store(settings.database)
+    with store.session() as session:
+        joined = select(func.count()).select_from(Account).where(Account.password != "")
+        if session.scalar(joined):
+            return None
+        token = instructors.invitation(session, "admin", is_admin=True)
+    return f"{settings.address}/join?token={token}"
+
+
+# Errors -------------------------------------------------------------------------------------------
+
+
+async def _told(request: Request, error: Exception) -> Response:
+    status = error.status if isinstance(error, RefusedError) else HTTPStatus.UNPROCESSABLE_ENTITY
+    code = error.code if isinstance(error, PlanmarkError) else "refused"
+    return _answer(request, int(status), code, str(error))
+
+
+async def _invalid(request: Request, error: Exception) -> Response:
+    faults = error.errors() if isinstance(error, RequestValidationError) else []
+    lines = [f"{'.'.join(map(str, fault['loc']))}: {fault['msg']}" for fault in faults[:10]]
+    return _answer(request, HTTPStatus.UNPROCESSABLE_ENTITY, "invalid", "; ".join(lines)[:2000])
+
+
+async def _refused(request: Request, error: Exception) -> Response:
+    status = error.status_code if isinstance(error, HTTPException) else HTTPStatus.NOT_FOUND
+    return _answer(request, status, "refused", HTTPStatus(status).phrase)
+
+
+async def _fault(request: Request, error: Exception) -> Response:
+    LOG.error("a fault of planmark at %s", request.url.path, exc_info=error)
+    why = "a fault of planmark: it is in the log"
+    return _answer(request, HTTPStatus.INTERNAL_SERVER_ERROR, "internal_error", why)
+
+
+def _answer(request: Request, status: int, code: str, message: str) -> Response:
+    """An error as JSON; on the pages as a page, with the way to sign in where that helps."""
+    path = request.url.path
+    if path.startswith(("/api/", "/lti/", "/static/")):
+        return JSONResponse({"code": code, "message": message}, status)
+    service: Service = request.app.state.service
+    with service.store.session() as session:
+        visitor = service.guard.visitor(_without_token(request), session)
+        call = Call(service, session, visitor, request, Response())
+        return pages.page(call, "error.html", status, code=code, message=message)
+
+
+def _without_token(request: Request) -> Request:
+    """The request as a browser's: the page of an error needs nobody's token."""
+    headers = [(name, value) for name, value in request.scope["headers"] if name != b"authorization"]
+    return Request({**request.scope, "headers": headers})
+
+
+def at_address(settings: Settings, port: int) -> Settings:
+    """The settings with the port that was really taken, where the address has none of its own."""
+    return replace(settings, address=settings.address.replace(":0", f":{port}", 1))

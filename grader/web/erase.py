@@ -1,0 +1,100 @@
+"""Everything of one student deleted from a publication: rows, files, results."""
+
+import shutil
+
+from sqlalchemy import delete, func, update
+from sqlalchemy.orm import Session
+
+from grader.documents import ResultsDocument
+from grader.files import result_folders, write_whole
+from grader.folder.changes import CACHE_FOLDER
+from grader.inputs.decisions import DecisionFile
+from grader.inputs.roster import read_roster
+from grader.lms.export import read_results
+from grader.web.places import Places
+from grader.web.store import Attempt, Audit, Link, Publication, Regrading, digest_of
+
+PAGES = ("index.html", "summary.csv")
+"""Of the whole class: they name the student, and the next run writes them anew."""
+
+
+def erase_student(session: Session, publication: Publication, places: Places, student: str) -> list[str]:
+    """Delete a student; the files that stay because they hold others, too.
+
+    The class must not be graded meanwhile.
+    """
+    for table in (Link, Regrading):
+        session.execute(
+            delete(table).where(table.publication_id == publication.id, table.student_id == student)
+        )
+    of_student = Attempt.who == f"student:{student}"
+    session.execute(delete(Attempt).where(Attempt.publication_id == publication.id, of_student))
+    anonymous = f"({digest_of(student)[:8]})"
+    told = Audit.about.startswith(publication.key, autoescape=True)
+    of_name = Audit.about.contains(student, autoescape=True)
+    session.execute(
+        update(Audit).where(told, of_name).values(about=func.replace(Audit.about, student, anonymous))
+    )
+    owners = _owners(places)
+    own = {path for path in places.submitted() if owners.get(path.name) == {student}}
+    own |= {path for path in places.submitted() if _is_named(path.stem, student) and path.name not in owners}
+    shared = [name for name, students in owners.items() if student in students and len(students) > 1]
+    for path in own:
+        path.unlink(missing_ok=True)
+    _erase_rows(places, student)
+    _erase_results(places, student)
+    return shared
+
+
+def _owners(places: Places) -> dict[str, set[str]]:
+    """Whose each file is, as the last run found it."""
+    owners: dict[str, set[str]] = {}
+    for report in _reports(places).reports:
+        for sheet in report.reading.sheets:
+            owners.setdefault(sheet.source, set()).add(report.student_id)
+    return owners
+
+
+def _reports(places: Places) -> ResultsDocument:
+    if not (places.results / "results.json").is_file():
+        return ResultsDocument(assignment="", reports=[])
+    return read_results(places.results)
+
+
+def _is_named(stem: str, student: str) -> bool:
+    return stem == student or stem.startswith(f"{student}_")
+
+
+def _erase_rows(places: Places, student: str) -> None:
+    """Take the student's lines out of the roster and of the decisions."""
+    if places.roster.is_file():
+        lines = places.roster.read_text(encoding="utf-8-sig").splitlines(keepends=True)
+        gone = {row.line for row in read_roster(places.roster).rows_of(student)}
+        kept = [line for number, line in enumerate(lines, start=1) if number not in gone]
+        write_whole(places.roster, "".join(kept))
+    decisions = DecisionFile(places.handed_in / "decisions.csv")
+    if decisions.path.is_file():
+        decisions.remove(*(row for row in decisions.all() if row.student_id == student))
+
+
+def _erase_results(places: Places, student: str) -> None:
+    results = _reports(places)
+    if not results.assignment:
+        return
+    for folder, report in zip(result_folders(results.reports), results.reports, strict=True):
+        if report.student_id == student:
+            name = folder.replace("/", "#")
+            for path in (places.results / CACHE_FOLDER).rglob(f"{name}.*"):
+                path.unlink(missing_ok=True)
+    shutil.rmtree(places.results / student, ignore_errors=True)
+    kept = results.model_copy(
+        update={
+            "reports": [one for one in results.reports if one.student_id != student],
+            "moved": [one for one in results.moved if one.student_id != student],
+            "alike": [one for one in results.alike if student not in one.students],
+            "stale": [one for one in results.stale if one.student_id != student],
+        }
+    )
+    for name in PAGES:
+        (places.results / name).unlink(missing_ok=True)
+    write_whole(places.results / "results.json", kept.model_dump_json(indent=2))

@@ -1,0 +1,324 @@
+"""Who may do what, and how often: visits, forms, bodies, headers.
+
+A browser's visit is a random cookie, of which the data base has the digest. Whatever changes something needs
+a header with the visit's own token, which a page of another site can neither read nor send; a program's
+token in the header `Authorization` needs none, because no browser sends it by itself.
+"""
+
+import hashlib
+import hmac
+import secrets
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from urllib.parse import urlsplit
+
+from argon2 import PasswordHasher
+from argon2.exceptions import VerificationError
+from fastapi import Request, Response
+from itsdangerous import BadSignature, URLSafeSerializer
+from limits import RateLimitItem, RateLimitItemPerMinute
+from limits.storage import MemoryStorage
+from limits.strategies import MovingWindowRateLimiter
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from grader.web.settings import Settings
+from grader.web.store import Account, Link, Publication, Store, Visit, digest_of
+from reference.errors import PlanmarkError
+
+COOKIE = "planmark_visit"
+FORM_HEADER = "X-Planmark-Form"
+IDLE_S = 12 * 3600.0
+"""A working day: an instructor who was away longer signs in again."""
+LEAST_PASSWORD = 12
+"""Signs of a password (NIST SP 800-63B asks for at least 8, and for 15 where nothing else is asked)."""
+HEADERS = {
+    "Content-Security-Policy": "default-src 'none'; img-src 'self' data: blob:; style-src 'self';"
+    " script-src 'self'; connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Permissions-Policy": "geolocation=(), microphone=()",
+    "X-Robots-Tag": "noindex",
+    "Cache-Control": "no-store",
+}
+RATES: dict[str, RateLimitItem] = {
+    "sign_in": RateLimitItemPerMinute(10),
+    "check": RateLimitItemPerMinute(60),
+    "photo": RateLimitItemPerMinute(10),
+    "key": RateLimitItemPerMinute(60),
+    "upload": RateLimitItemPerMinute(3000),
+}
+"""For each visitor; a class behind one address of a school is let through by the visit's cookie."""
+_HASHER = PasswordHasher()
+_NOBODY = _HASHER.hash(secrets.token_urlsafe())
+"""Compared with where there is no such account: the time tells nothing."""
+
+
+class RefusedError(PlanmarkError):
+    """A request that is not answered; `status` is HTTP's."""
+
+    exit_status = 1
+
+    def __init__(self, status: int, code: str, message: str) -> None:
+        super().__init__(code, message)
+        self.status = status
+
+
+def forbidden(message: str) -> RefusedError:
+    """The error for those who may not."""
+    return RefusedError(403, "forbidden", message)
+
+
+def missing(what: str = "page") -> RefusedError:
+    """The error for what is not there, or is not the visitor's to see: both read the same."""
+    return RefusedError(404, "not_found", f"there is no such {what}")
+
+
+def hash_of(password: str) -> str:
+    """What is stored of a password. Raises RefusedError for a short one."""
+    if not LEAST_PASSWORD <= len(password) <= 200:
+        raise RefusedError(
+            422, "password_short", f"the password must have {LEAST_PASSWORD} to 200 signs: a sentence is good"
+        )
+    return _HASHER.hash(password)
+
+
+def is_password(account: Account | None, password: str) -> bool:
+    """Whether an account has a password; takes as long where there is no account."""
+    stored = account.password if account is not None and account.password else _NOBODY
+    try:
+        return _HASHER.verify(stored, password[:200]) and account is not None and bool(account.password)
+    except VerificationError:
+        return False
+
+
+@dataclass(slots=True)
+class Visitor:
+    """Who makes a request.
+
+    Attributes
+    ----------
+    secret : of the browser's cookie, or a program's token
+    visit : as stored; None while nothing is
+    is_program : whether it came by a token
+    """
+
+    secret: str
+    visit: Visit | None
+    is_program: bool = False
+    address: str = ""
+
+    @property
+    def account(self) -> Account | None:
+        """The instructor who is signed in."""
+        return None if self.visit is None else self.visit.account
+
+    @property
+    def name(self) -> str:
+        """For the audit trail."""
+        return self.account.name if self.account is not None else f"visitor {digest_of(self.secret)[:8]}"
+
+    def is_member(self, publication: Publication) -> bool:
+        """Whether a publication is the instructor's own, or a colleague let them in."""
+        account = self.account
+        return account is not None and (
+            account.is_admin or any(one.id == account.id for one in publication.members)
+        )
+
+
+@dataclass(slots=True)
+class Guard:
+    """Decides who a request is from, and whether it may be made."""
+
+    settings: Settings
+    store: Store
+    _limiter: MovingWindowRateLimiter = field(
+        default_factory=lambda: MovingWindowRateLimiter(MemoryStorage())
+    )
+
+    @property
+    def _links(self) -> URLSafeSerializer:
+        return URLSafeSerializer(self.settings.secret, salt="personal link")
+
+    # Visits ---------------------------------------------------------------------------------------
+
+    def visitor(self, request: Request, session: Session) -> Visitor:
+        """Who a request is from. Raises RefusedError for a token that is not known."""
+        address = request.client.host if request.client else ""
+        kind, _, token = request.headers.get("authorization", "").partition(" ")
+        if kind.lower() == "bearer":
+            visit = session.get(Visit, digest_of(token.strip()))
+            if visit is None or not visit.title:
+                raise RefusedError(401, "token", "the token is not known")
+            return Visitor(token, visit, is_program=True, address=address)
+        secret = request.cookies.get(COOKIE, "")
+        visit = session.get(Visit, digest_of(secret)) if secret else None
+        if visit is not None and (visit.title or (time.time() - visit.used > IDLE_S and visit.account_id)):
+            visit = None
+        if visit is not None and time.time() - visit.used > 60.0:
+            visit.used = time.time()
+        return Visitor(secret or secrets.token_urlsafe(32), visit, address=address)
+
+    def begin(self, session: Session, visitor: Visitor, account: Account | None = None) -> Visit:
+        """The visit as stored; one that begins with a sign-in has a new secret."""
+        if account is not None:
+            if visitor.visit is not None and not visitor.is_program:
+                session.delete(visitor.visit)
+            visitor.secret, visitor.visit = secrets.token_urlsafe(32), None
+        if visitor.visit is None:
+            visitor.visit = Visit(id=digest_of(visitor.secret), account=account, links={})
+            session.add(visitor.visit)
+            session.flush()
+        return visitor.visit
+
+    def set_cookie(self, response: Response, visitor: Visitor) -> None:
+        """Let the browser keep its visit."""
+        if not visitor.is_program:
+            response.set_cookie(
+                COOKIE, visitor.secret, max_age=90 * 86400, httponly=True, secure=self.settings.is_https,
+                samesite="lax", path="/",
+            )  # fmt: skip
+
+    # Forms ----------------------------------------------------------------------------------------
+
+    def form_token(self, visitor: Visitor) -> str:
+        """What a page of ours must send with whatever changes something."""
+        key = self.settings.secret.encode()
+        return hmac.new(key, b"form " + visitor.secret.encode(), hashlib.sha256).hexdigest()
+
+    def check_form(self, request: Request, visitor: Visitor) -> None:
+        """Raises RefusedError for a request that no page of ours has made."""
+        if visitor.is_program:
+            return
+        origin = request.headers.get("origin")
+        given = request.headers.get(FORM_HEADER, "")
+        is_own = origin is None or urlsplit(origin).netloc == request.headers.get("host", "")
+        if not is_own or not hmac.compare_digest(given.encode(), self.form_token(visitor).encode()):
+            raise forbidden("the page is out of date: load it again, and repeat what you did")
+
+    # How often ------------------------------------------------------------------------------------
+
+    def count(self, rate: str, who: Iterable[str]) -> None:
+        """Count a use of something. Raises RefusedError where there are too many in a minute."""
+        for one in who:
+            if not self._limiter.hit(RATES[rate], rate, one):
+                raise RefusedError(429, "too_often", "too often in a short time: wait a minute, then go on")
+
+    # Links ----------------------------------------------------------------------------------------
+
+    def link_text(self, link: Link) -> str:
+        """The address of a personal link."""
+        return f"{self.settings.address}/s/{self._links.dumps(link.id)}"
+
+    def opened(self, session: Session, token: str) -> Link:
+        """The link that a token is of. Raises RefusedError for one that is forged, revoked or too old."""
+        try:
+            number = self._links.loads(token)
+        except BadSignature:
+            number = None
+        link = session.get(Link, number) if isinstance(number, int) else None
+        return self._valid(link)
+
+    @staticmethod
+    def _valid(link: Link | None) -> Link:
+        if link is None or link.is_revoked or link.expires < time.time():
+            raise RefusedError(
+                404, "link", "this link is not valid any more: ask your instructor for a new one"
+            )
+        return link
+
+    def own_link(self, session: Session, visitor: Visitor, publication: Publication) -> Link | None:
+        """The personal link by which a visitor came to a publication, while it is valid."""
+        number = None if visitor.visit is None else visitor.visit.links.get(str(publication.id))
+        if number is None:
+            return None
+        found = select(Link).where(Link.id == number, Link.publication_id == publication.id)
+        try:
+            return self._valid(session.scalar(found))
+        except RefusedError:
+            return None
+
+
+# Around every request -----------------------------------------------------------------------------
+
+
+@dataclass(slots=True)
+class Rim:
+    """Refuses requests for other hosts and bodies that are too large; adds the headers of safety.
+
+    Arguments: `bodies` are the bytes that a request's body may have, by the end of its path's last part
+    but one; `most` those of all others.
+    """
+
+    app: ASGIApp
+    settings: Settings
+    most: int = 1_000_000
+    hosts: frozenset[str] = field(default_factory=frozenset)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """ASGI."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        host = Headers(scope=scope).get("host", "")
+        if host != self.settings.host and urlsplit(f"//{host}").hostname not in self.hosts:
+            await _plain(send, 421, "this address is not served here: open the server's own address")
+            return
+        most = self._most(scope["path"])
+        taken = 0
+
+        async def bounded() -> Message:
+            nonlocal taken
+            message = await receive()
+            taken += len(message.get("body", b""))
+            if taken > most:
+                raise _TooLargeError
+            return message
+
+        has_begun = False
+
+        async def with_headers(message: Message) -> None:
+            nonlocal has_begun
+            if message["type"] == "http.response.start":
+                has_begun = True
+                known = {name for name, _ in message["headers"]}
+                message["headers"] = [
+                    *message["headers"],
+                    *(
+                        (name.lower().encode(), value.encode())
+                        for name, value in self._headers().items()
+                        if name.lower().encode() not in known
+                    ),
+                ]
+            await send(message)
+
+        try:
+            await self.app(scope, bounded, with_headers)
+        except _TooLargeError:
+            if not has_begun:
+                await _plain(send, 413, f"larger than {most // 1_000_000} MB: send a smaller file")
+
+    def _most(self, path: str) -> int:
+        megabytes = {"files": self.settings.upload_mb, "photos": self.settings.photo_mb}
+        parts = path.rstrip("/").split("/")
+        return next((megabytes[one] * 1_000_000 for one in parts[-2:] if one in megabytes), self.most)
+
+    def _headers(self) -> dict[str, str]:
+        if self.settings.is_https:
+            return {**HEADERS, "Strict-Transport-Security": "max-age=31536000"}
+        return HEADERS
+
+
+class _TooLargeError(Exception):
+    pass
+
+
+async def _plain(send: Send, status: int, text: str) -> None:
+    head = [(b"content-type", b"text/plain; charset=utf-8"), (b"connection", b"close")]
+    await send({"type": "http.response.start", "status": status, "headers": head})
+    await send({"type": "http.response.body", "body": text.encode()})

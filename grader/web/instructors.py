@@ -1,0 +1,630 @@
+"""What instructors may do: sign in, publish, upload, grade, release, export, answer, delete."""
+
+import pathlib
+import secrets
+import shutil
+import tempfile
+import time
+from dataclasses import replace
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Path, Query
+from fastapi.responses import Response
+from pydantic import Field
+from sqlalchemy import delete, select
+from sqlalchemy.orm import Session
+
+from grader.authoring.lint import lint
+from grader.folder.workers import result_of
+from grader.inputs.roster import read_roster
+from grader.lms.export import TARGETS, export, read_results, usual_name
+from grader.lms.grades import Options, people_of
+from grader.rubric import rubric_of
+from grader.web.erase import erase_student
+from grader.web.guard import RefusedError, hash_of, is_password, missing
+from grader.web.places import (
+    AUTHORED,
+    SUBMITTED,
+    assignment_of,
+    safe_name,
+    store,
+    stored,
+)
+from grader.web.service import FILE_BODY, Body, Call, Called, Key
+from grader.web.store import (
+    Account,
+    Audit,
+    Job,
+    Link,
+    Publication,
+    Regrading,
+    Visit,
+    digest_of,
+)
+from grader.web.students import JobState, Lang, Strict, queued, state_of
+from reference.authored.assignment import built_in
+from reference.errors import PlanmarkError
+
+router = APIRouter(prefix="/api/v1", tags=["instructors"])
+Name = Annotated[str, Field(min_length=1, max_length=80, pattern=r"^[^\x00-\x1f\x7f]+$")]
+Password = Annotated[str, Field(min_length=1, max_length=200)]
+FileName = Annotated[str, Path(max_length=200)]
+StudentId = Annotated[str, Path(pattern=r"^[A-Za-z0-9._-]{1,80}$")]
+INVITED_S = 7 * 86400.0
+"""An invitation is valid for a week."""
+
+
+# Accounts -----------------------------------------------------------------------------------------
+
+
+class SignIn(Strict):
+    """Who signs in."""
+
+    name: Name
+    password: Password
+
+
+class Invited(SignIn):
+    """Who answers an invitation, or sets the server up, by a token."""
+
+    token: Annotated[str, Field(min_length=1, max_length=200)]
+
+
+@router.post("/session")
+def sign_in(call: Called, who: SignIn) -> dict[str, Any]:
+    """Sign in; the visit begins anew."""
+    call.service.guard.count("sign_in", [f"address {call.visitor.address}", f"name {who.name}"])
+    account = call.session.scalar(select(Account).where(Account.name == who.name))
+    if not is_password(account, who.password):
+        call.note("sign-in refused", who.name)
+        call.session.commit()
+        raise RefusedError(401, "sign_in", "the name or the password is wrong")
+    return _entered(call, account)
+
+
+@router.delete("/session")
+def sign_out(call: Called) -> dict[str, str]:
+    """Sign out: the visit is deleted."""
+    if call.visitor.visit is not None:
+        call.session.delete(call.visitor.visit)
+    call.response.delete_cookie("planmark_visit")
+    return {"state": "signed out"}
+
+
+@router.post("/accounts", status_code=201)
+def invite(call: Called, name: Annotated[Name, Query()], *, is_admin: bool = False) -> dict[str, str]:
+    """Invite an instructor; the token makes the account once, within a week."""
+    admin = call.admin
+    token = invitation(call.session, name, is_admin=is_admin)
+    call.note("invited", f"{name} by {admin.name}")
+    return {"name": name, "address": f"{call.service.settings.address}/join?token={token}"}
+
+
+@router.post("/accounts/join")
+def join(call: Called, who: Invited) -> dict[str, Any]:
+    """Answer an invitation: the account gets its password."""
+    call.service.guard.count("sign_in", [f"address {call.visitor.address}"])
+    waiting = call.session.get(Visit, digest_of(who.token))
+    account = None if waiting is None else waiting.account
+    if account is None or waiting is None or waiting.title != "invitation" or account.password:
+        raise RefusedError(403, "invitation", "this invitation is not valid any more: ask for a new one")
+    if time.time() - waiting.created > INVITED_S:
+        raise RefusedError(403, "invitation", "this invitation is too old: ask for a new one")
+    other = call.session.scalar(select(Account).where(Account.name == who.name, Account.id != account.id))
+    if other is not None:
+        raise RefusedError(409, "name_taken", "somebody has this name already: choose another")
+    account.name, account.password = who.name, hash_of(who.password)
+    call.session.delete(waiting)
+    call.note("joined", who.name)
+    return _entered(call, account)
+
+
+@router.get("/accounts")
+def accounts(call: Called) -> list[dict[str, Any]]:
+    """All instructors."""
+    own = call.account
+    found = call.session.scalars(select(Account).order_by(Account.name))
+    return [
+        {"id": one.id, "name": one.name, "is_admin": one.is_admin, "has_joined": bool(one.password)}
+        for one in found if own.is_admin or one.password
+    ]  # fmt: skip
+
+
+@router.delete("/accounts/{number}")
+def remove_account(call: Called, number: int) -> dict[str, str]:
+    """Remove an instructor; the publications stay."""
+    if call.admin.id == number:
+        raise RefusedError(409, "own_account", "nobody removes the own account: let another do it")
+    found = call.session.get(Account, number)
+    if found is None:
+        raise missing("account")
+    call.session.execute(delete(Visit).where(Visit.account_id == number))
+    call.session.delete(found)
+    call.note("account removed", found.name)
+    return {"state": "removed"}
+
+
+@router.post("/tokens", status_code=201)
+def new_token(call: Called, title: Annotated[Name, Query()]) -> dict[str, str]:
+    """A token for a program, shown once: it may do what its instructor may."""
+    account, token = call.account, secrets.token_urlsafe(32)
+    if title == "invitation":
+        raise RefusedError(422, "title", "choose another title")
+    call.session.add(Visit(id=digest_of(token), account=account, title=title, links={}))
+    call.note("token made", title)
+    return {"title": title, "token": token}
+
+
+@router.get("/tokens")
+def tokens(call: Called) -> list[dict[str, Any]]:
+    """The instructor's tokens, without their secrets."""
+    own = select(Visit).where(Visit.account_id == call.account.id, Visit.title.not_in(("", "invitation")))
+    return [{"id": one.id, "title": one.title, "created": one.created} for one in call.session.scalars(own)]
+
+
+@router.delete("/tokens/{number}")
+def remove_token(call: Called, number: Key) -> dict[str, str]:
+    """Take a token back."""
+    found = call.session.get(Visit, number)
+    if found is None or found.account_id != call.account.id or not found.title:
+        raise missing("token")
+    call.session.delete(found)
+    call.note("token removed", found.title)
+    return {"state": "removed"}
+
+
+def invitation(session: Session, name: str, *, is_admin: bool) -> str:
+    """A token by which somebody makes their account. Raises RefusedError where the name is taken."""
+    account = session.scalar(select(Account).where(Account.name == name))
+    if account is not None and account.password:
+        raise RefusedError(409, "name_taken", f"there is an account '{name}' already")
+    account = account or Account(name=name, is_admin=is_admin)
+    token = secrets.token_urlsafe(32)
+    session.add_all([account, Visit(id=digest_of(token), account=account, title="invitation", links={})])
+    return token
+
+
+def _entered(call: Call, account: Account | None) -> dict[str, Any]:
+    call.service.guard.begin(call.session, call.visitor, account)
+    call.service.guard.set_cookie(call.response, call.visitor)
+    call.note("signed in")
+    return {"name": "" if account is None else account.name}
+
+
+# Publications -------------------------------------------------------------------------------------
+
+
+class Settings(Strict):
+    """What an instructor sets of a publication; what is left out stays."""
+
+    title: Annotated[str, Field(max_length=120)] | None = None
+    term: Annotated[str, Field(max_length=40, pattern=r"^[^\x00-\x1f\x7f]*$")] | None = None
+    assignment: Annotated[str, Field(max_length=120)] | None = None
+    lang: Lang | None = None
+    level: Literal["symbol", "hint"] | None = None
+    attempts: Annotated[int, Field(ge=0, le=1000)] | None = Field(
+        default=None, description="allowed for each student and variant; 0 allows any number"
+    )
+    pages_per_student: Annotated[int, Field(ge=0, le=20)] | None = Field(
+        default=None, description="of one class file in the roster's order; 0 where pages are told otherwise"
+    )
+    is_open: bool | None = None
+    is_released: bool | None = None
+    takes_sheets: bool | None = None
+
+
+@router.get("/assignments")
+def assignments(call: Called) -> list[str]:
+    """The built-in assignments."""
+    _ = call.account
+    return built_in()
+
+
+@router.get("/publications")
+def publications(call: Called) -> list[dict[str, Any]]:
+    """The instructor's publications, the newest first."""
+    account = call.account
+    found = call.session.scalars(select(Publication).order_by(Publication.id.desc()))
+    return [facts(one) for one in found if account.is_admin or call.visitor.is_member(one)]
+
+
+@router.post("/publications", status_code=201)
+def publish(call: Called, settings: Settings) -> dict[str, Any]:
+    """A new publication; with a built-in assignment it can be opened at once."""
+    publication = Publication(members=[call.account])
+    call.session.add(publication)
+    call.session.flush()
+    change_settings(call, publication, settings)
+    call.note("published", publication.key)
+    return facts(publication)
+
+
+@router.get("/publications/{key}")
+def publication(call: Called, key: Key) -> dict[str, Any]:
+    """A publication: settings, files, roster, the last job, requests that wait."""
+    own = call.own(key)
+    places = call.places(own)
+    job = last_job(call.session, own)
+    waiting = call.session.scalars(
+        select(Regrading).where(Regrading.publication_id == own.id, Regrading.answered.is_(None))
+    ).all()
+    return {
+        **facts(own),
+        "authored": sorted(path.name for path in places.authored.glob("*")),
+        "files": [{"name": path.name, "bytes": path.stat().st_size} for path in places.submitted()],
+        "students": students_of(places.roster),
+        "job": None if job is None else state_of(call, job).model_dump(),
+        "requests": len(waiting),
+        "has_results": (places.results / "results.json").is_file(),
+    }
+
+
+@router.patch("/publications/{key}")
+def change(call: Called, key: Key, settings: Settings) -> dict[str, Any]:
+    """Change settings."""
+    own = call.own(key)
+    change_settings(call, own, settings)
+    call.note("changed", f"{key} {', '.join(settings.model_fields_set)}")
+    return facts(own)
+
+
+@router.delete("/publications/{key}")
+def remove(call: Called, key: Key) -> dict[str, str]:
+    """Delete a publication with all that was handed in."""
+    own = call.own(key)
+    _remove(call, own)
+    return {"state": "removed"}
+
+
+@router.delete("/terms/{term}")
+def remove_term(call: Called, term: Annotated[str, Path(max_length=40)]) -> dict[str, int]:
+    """Delete all publications of a term that are the instructor's own."""
+    account = call.account
+    found = call.session.scalars(select(Publication).where(Publication.term == term)).all()
+    own = [one for one in found if account.is_admin or call.visitor.is_member(one)]
+    if not own:
+        raise missing("term")
+    for one in own:
+        _remove(call, one)
+    return {"removed": len(own)}
+
+
+@router.put("/publications/{key}/members/{number}")
+def add_member(call: Called, key: Key, number: int) -> dict[str, Any]:
+    """Let a colleague in."""
+    own, account = call.own(key), call.session.get(Account, number)
+    if account is None:
+        raise missing("account")
+    if account not in own.members:
+        own.members.append(account)
+    call.note("member added", f"{key} {account.name}")
+    return facts(own)
+
+
+@router.delete("/publications/{key}/members/{number}")
+def remove_member(call: Called, key: Key, number: int) -> dict[str, Any]:
+    """Let a colleague out; one always stays."""
+    own = call.own(key)
+    left = [one for one in own.members if one.id != number]
+    if not left:
+        raise RefusedError(409, "last_member", "somebody must stay: add a colleague first")
+    own.members = left
+    call.note("member removed", f"{key} {number}")
+    return facts(own)
+
+
+def change_settings(call: Call, publication: Publication, settings: Settings) -> None:
+    """Set what is given. Raises RefusedError, AuthoredFileError for an assignment that cannot be used."""
+    given = settings.model_dump(exclude_none=True)
+    for name in ("attempts", "pages_per_student"):
+        if given.get(name) == 0:
+            given[name] = None
+    for name, value in given.items():
+        setattr(publication, name, value)
+    if "assignment" in given or given.get("is_open"):
+        data = call.service.settings.data
+        result_of(call.service.queue.workers, check_assignment, data, publication.key, publication.assignment)
+        if not publication.title:
+            title = assignment_of(data, publication).file.title
+            publication.title = title.in_language(publication.lang)[:120]
+
+
+def check_assignment(data: pathlib.Path, key: str, name: str) -> list[str]:
+    """Load an assignment in a worker, whose limits bound hostile files; what lint finds."""
+    assignment = assignment_of(data, Publication(key=key, assignment=name))
+    return [str(finding) for finding in lint(assignment, rubric_of(assignment)).findings]
+
+
+def facts(publication: Publication) -> dict[str, Any]:
+    """A publication's settings."""
+    names = (
+        "key", "title", "term", "assignment", "lang", "level", "attempts", "pages_per_student", "is_open",
+        "is_released", "takes_sheets", "created",
+    )  # fmt: skip
+    members = [{"id": one.id, "name": one.name} for one in publication.members]
+    return {**{name: getattr(publication, name) for name in names}, "members": members}
+
+
+def last_job(session: Session, publication: Publication) -> Job | None:
+    """The last job that graded the class."""
+    own = select(Job).where(Job.publication_id == publication.id, Job.kind == "grade")
+    return session.scalar(own.order_by(Job.id.desc()).limit(1))
+
+
+def students_of(roster: pathlib.Path) -> list[dict[str, Any]]:
+    """The students on a roster, each once; none where there is none that can be used."""
+    try:
+        rows = read_roster(roster).rows if roster.is_file() else ()
+    except PlanmarkError:
+        return []
+    names = {row.student_id: row.name for row in rows}
+    return [{"student_id": student, "name": name} for student, name in names.items()]
+
+
+def _remove(call: Call, publication: Publication) -> None:
+    job = last_job(call.session, publication)
+    if job is not None and job.state in {"queued", "running"}:
+        raise RefusedError(409, "job_runs", "the class is being graded: cancel that first")
+    places = call.places(publication)
+    call.session.delete(publication)
+    call.note("publication removed", publication.key)
+    call.session.commit()
+    places.remove()
+
+
+# Files --------------------------------------------------------------------------------------------
+
+
+@router.put("/publications/{key}/assignment/files/{name}", openapi_extra=FILE_BODY)
+def put_authored(call: Called, key: Key, name: FileName, body: Body) -> dict[str, Any]:
+    """Store a file of the assignment; it is checked when it is chosen."""
+    own = call.own(key)
+    safe = safe_name(name, AUTHORED)
+    is_same = store(call.places(own).authored, safe, body, replace=True)
+    call.note("assignment file", f"{key} {safe}")
+    return {"name": safe, "is_same": is_same}
+
+
+@router.put("/publications/{key}/roster/files/roster.csv", openapi_extra=FILE_BODY)
+def put_roster(call: Called, key: Key, body: Body) -> dict[str, Any]:
+    """Store the roster, if nothing is wrong with it."""
+    own = call.own(key)
+    places = call.places(own)
+    trial = places.top / f"roster-{secrets.token_hex(6)}.csv"
+    try:
+        store(places.top, trial.name, body)
+        count = len(read_roster(trial).rows)
+    except PlanmarkError as error:
+        raise RefusedError(422, error.code, error.message.replace(str(trial), "roster.csv")) from error
+    finally:
+        trial.unlink(missing_ok=True)
+    store(places.handed_in, "roster.csv", body, replace=True)
+    call.note("roster", f"{key}: {count} lines")
+    return {"lines": count}
+
+
+@router.put("/publications/{key}/files/{name:path}", openapi_extra=FILE_BODY)
+def put_file(call: Called, key: Key, name: FileName, body: Body, *, replace: bool = False) -> dict[str, Any]:
+    """Store a sheet, a class file or measurements that were handed in."""
+    own = call.own(key)
+    call.count("upload")
+    safe = safe_name(name, SUBMITTED)
+    if safe.lower() in {"roster.csv", "decisions.csv"}:
+        raise RefusedError(
+            422, "file_name", "upload the roster as the roster; decisions are made in the review"
+        )
+    is_same = store(call.places(own).handed_in, safe, body, replace=replace)
+    call.note("file", f"{key} {safe}")
+    return {"name": safe, "is_same": is_same}
+
+
+@router.delete("/publications/{key}/files/{name:path}")
+def remove_file(call: Called, key: Key, name: FileName) -> dict[str, str]:
+    """Delete a file that was handed in."""
+    own = call.own(key)
+    path = stored(call.places(own).handed_in, name)
+    if path not in call.places(own).submitted():
+        raise missing("file")
+    path.unlink()
+    call.note("file removed", f"{key} {name}")
+    return {"state": "removed"}
+
+
+# Grading ------------------------------------------------------------------------------------------
+
+
+@router.post("/publications/{key}/jobs", status_code=202)
+def grade_class(call: Called, key: Key) -> JobState:
+    """Grade what is new or has changed."""
+    own = call.own(key)
+    assignment_of(call.service.settings.data, own)
+    job = last_job(call.session, own)
+    if job is not None and job.state in {"queued", "running"}:
+        return state_of(call, job)
+    call.note("grading", key)
+    return queued(call, Job(publication=own, kind="grade", asked={}))
+
+
+@router.get("/publications/{key}/jobs/{job}")
+def job_state(call: Called, key: Key, job: Key) -> JobState:
+    """How far a job is."""
+    return state_of(call, _job(call, key, job))
+
+
+@router.delete("/publications/{key}/jobs/{job}")
+def cancel(call: Called, key: Key, job: Key) -> dict[str, str]:
+    """Cancel a job; what was marked is kept."""
+    found = _job(call, key, job)
+    call.note("grading cancelled", key)
+    call.session.commit()
+    call.service.queue.cancel(found.id)
+    return {"state": "cancelled"}
+
+
+@router.get("/publications/{key}/results")
+def results(call: Called, key: Key) -> Response:
+    """`results.json` of the last run."""
+    path = call.places(call.own(key)).results / "results.json"
+    if not path.is_file():
+        raise missing("result: grade the class first")
+    return Response(path.read_bytes(), media_type="application/json")
+
+
+@router.get("/publications/{key}/exports/{platform}")
+def export_file(
+    call: Called,
+    key: Key,
+    platform: str,
+    what: Annotated[str | None, Query(max_length=20)] = None,
+    maximum: Annotated[float | None, Query(gt=0.0, lt=1e6)] = None,
+) -> Response:
+    """The file for a platform, as `planmark export` writes it without the platform's own file."""
+    return _exported(call, key, Options(to=platform, what=what, maximum=maximum))
+
+
+@router.post("/publications/{key}/exports/{platform}/files/{name}", openapi_extra=FILE_BODY)
+def filled_in(
+    call: Called,
+    key: Key,
+    platform: str,
+    name: FileName,
+    body: Body,
+    what: Annotated[str | None, Query(max_length=20)] = None,
+    *,
+    rescale: bool = False,
+) -> Response:
+    """The platform's own worksheet or gradebook, which is sent as the body, filled in."""
+    folder = call.places(call.own(key)).top / f"form-{secrets.token_hex(6)}"
+    form = folder / safe_name(name, (".csv", ".xls", ".txt"))
+    try:
+        store(folder, form.name, body)
+        return _exported(call, key, Options(to=platform, what=what, form=form, rescale=rescale))
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _exported(call: Call, key: str, options: Options) -> Response:
+    own = call.own(key)
+    if options.to not in TARGETS:
+        raise missing(f"platform: known are {', '.join(TARGETS)}")
+    places = call.places(own)
+    people = people_of(places.roster) if places.roster.is_file() else {}
+    options = replace(options, out=places.results, lang=own.lang, people=people)
+    name = usual_name(options)
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder) / name
+        export(read_results(places.results), path, options)
+        content = path.read_bytes()
+    call.note("exported", f"{key} {name}")
+    head = {"Content-Disposition": f'attachment; filename="{name}"'}
+    return Response(content, media_type="application/octet-stream", headers=head)
+
+
+def _job(call: Call, key: str, job: str) -> Job:
+    own = call.own(key)
+    found = call.session.scalar(select(Job).where(Job.key == job, Job.publication_id == own.id))
+    if found is None:
+        raise missing("job")
+    return found
+
+
+# Links, requests, deletion ------------------------------------------------------------------------
+
+
+@router.post("/publications/{key}/links", status_code=201)
+def make_links(call: Called, key: Key, student: str | None = None) -> list[dict[str, str]]:
+    """A personal link for one student of the roster, or for all that have no valid one; shown once."""
+    own = call.own(key)
+    known = [one["student_id"] for one in students_of(call.places(own).roster)]
+    if student is not None and student not in known:
+        raise missing("student on the roster")
+    valid = set(
+        call.session.scalars(
+            select(Link.student_id).where(
+                Link.publication_id == own.id, Link.is_revoked.is_(False), Link.expires > time.time()
+            )
+        )
+    )
+    wanted = [student] if student is not None else [one for one in known if one not in valid]
+    expires = time.time() + call.service.settings.link_days * 86400.0
+    links = [Link(publication=own, student_id=one, expires=expires) for one in wanted]
+    call.session.add_all(links)
+    call.session.flush()
+    call.note("links made", f"{key}: {len(links)}")
+    guard = call.service.guard
+    return [
+        {"id": str(one.id), "student_id": one.student_id, "address": guard.link_text(one)} for one in links
+    ]
+
+
+@router.get("/publications/{key}/links")
+def links(call: Called, key: Key) -> list[dict[str, Any]]:
+    """The personal links, with their addresses."""
+    own = call.own(key)
+    found = call.session.scalars(select(Link).where(Link.publication_id == own.id).order_by(Link.id))
+    guard = call.service.guard
+    return [
+        {"id": one.id, "student_id": one.student_id, "expires": one.expires, "is_revoked": one.is_revoked,
+         "address": guard.link_text(one)}
+        for one in found
+    ]  # fmt: skip
+
+
+@router.delete("/publications/{key}/links/{number}")
+def revoke(call: Called, key: Key, number: int) -> dict[str, str]:
+    """Revoke a personal link at once."""
+    own, link = call.own(key), call.session.get(Link, number)
+    if link is None or link.publication_id != own.id:
+        raise missing("link")
+    link.is_revoked = True
+    call.note("link revoked", f"{key} {link.student_id}")
+    return {"state": "revoked"}
+
+
+class Answer(Strict):
+    """An instructor's answer to a request."""
+
+    answer: Annotated[str, Field(min_length=1, max_length=2000)]
+
+
+@router.get("/publications/{key}/requests")
+def requests(call: Called, key: Key) -> list[dict[str, Any]]:
+    """Students' requests for regrading, those that wait first."""
+    own = call.own(key)
+    found = call.session.scalars(select(Regrading).where(Regrading.publication_id == own.id)).all()
+    names = ("id", "student_id", "position", "criterion", "text", "answer", "created", "answered")
+    rows = [{name: getattr(one, name) for name in names} for one in found]
+    return sorted(rows, key=lambda row: (row["answered"] is not None, row["created"]))
+
+
+@router.put("/publications/{key}/requests/{number}")
+def answer(call: Called, key: Key, number: int, said: Answer) -> dict[str, str]:
+    """Answer a request."""
+    own, request = call.own(key), call.session.get(Regrading, number)
+    if request is None or request.publication_id != own.id:
+        raise missing("request")
+    request.answer, request.answered = said.answer, time.time()
+    call.note("request answered", f"{key} {request.student_id}")
+    return {"state": "answered"}
+
+
+@router.delete("/publications/{key}/students/{student}")
+def remove_student(call: Called, key: Key, student: StudentId) -> dict[str, Any]:
+    """Delete all that is kept of a student; files that hold other students, too, are told and stay."""
+    own = call.own(key)
+    job = last_job(call.session, own)
+    if job is not None and job.state in {"queued", "running"}:
+        raise RefusedError(409, "job_runs", "the class is being graded: cancel that first")
+    kept = erase_student(call.session, own, call.places(own), student)
+    call.note("student removed", f"{key} {digest_of(student)[:8]}")
+    return {"state": "removed", "kept": kept}
+
+
+@router.get("/audit")
+def audit(call: Called, before: int | None = None) -> list[dict[str, Any]]:
+    """The audit trail, 200 entries a call, the newest first."""
+    _ = call.admin
+    asked = select(Audit).order_by(Audit.id.desc()).limit(200)
+    asked = asked if before is None else asked.where(Audit.id < before)
+    names = ("id", "at", "who", "act", "about")
+    return [{name: getattr(one, name) for name in names} for one in call.session.scalars(asked)]

@@ -1,0 +1,183 @@
+"""The pages: what a browser shows. Whatever they change goes through the routes of the API."""
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from fastapi import APIRouter
+from fastapi.responses import HTMLResponse, RedirectResponse, Response
+from jinja2 import Environment, PackageLoader
+
+from grader.feedback.words import STATES, environment
+from grader.inputs.roster import read_roster
+from grader.language import LANGUAGES, N_, tongue
+from grader.lms.export import TARGETS
+from grader.web import instructors, students
+from grader.web.guard import missing
+from grader.web.places import assignment_of
+from grader.web.self_check import form_of
+from grader.web.service import Call, Called, Key
+from grader.web.store import Publication
+from reference.authored.assignment import built_in
+from reference.errors import PlanmarkError
+
+router = APIRouter(include_in_schema=False)
+STATIC = {"app.js": "text/javascript", "app.css": "text/css"}
+TEXTS = {
+    "gone": N_("The server does not answer. Try again in a moment."),
+    "sending": N_("Sending ..."),
+    "waits": N_("Waiting: %(count)s before yours"),
+    "looking": N_("Looking at the photo ..."),
+    "left": N_("Attempts left: %(count)s"),
+    "right": N_("All that you entered is right."),
+    "nothing": N_("Nothing that this assignment asks for was entered."),
+    "unread": N_("The drawing could not be read."),
+    "graded": N_("The class is graded."),
+    "stopped": N_("Cancelled. What was marked is kept."),
+    "uploaded": N_("%(done)s of %(total)s files are there"),
+    "refused": N_("These files were not taken:"),
+    "sure": N_("This cannot be undone. Go on?"),
+    "copied": N_("Copied"),
+    "sent": N_("Your request waits for the instructor."),
+    "queued": N_("Waiting ..."),
+    "opening": N_("Opening files"),
+    "looking_at": N_("Looking at pages"),
+    "marking": N_("Marking"),
+}
+
+
+@cache
+def _environment(lang: str) -> Environment:
+    made = environment(lang).overlay(loader=PackageLoader("grader.web"))
+    speaker = tongue(lang)
+    made.globals["texts"] = {name: speaker.gettext(text) for name, text in TEXTS.items()}
+    made.filters["moment"] = lambda at: f"{datetime.fromtimestamp(at, UTC):%Y-%m-%d %H:%M:%S}"
+    made.globals["languages"] = {one: tongue(one).name for one in LANGUAGES}
+    return made
+
+
+def page(call: Call, name: str, status: int = 200, /, **known: Any) -> Response:  # noqa: ANN401 - any facts
+    """A page in the visitor's language; it has the token that its forms must send."""
+    guard, lang = call.service.guard, call.lang
+    text = (
+        _environment(lang)
+        .get_template(name)
+        .render(
+            token=guard.form_token(call.visitor),
+            account=call.visitor.account,
+            path=call.request.url.path,
+            **known,
+        )
+    )
+    response = HTMLResponse(text, status)
+    guard.set_cookie(response, call.visitor)
+    if call.request.query_params.get("lang") in LANGUAGES:
+        response.set_cookie("planmark_lang", lang, max_age=31536000, samesite="lax", httponly=True)
+    return response
+
+
+@router.get("/")
+def home(call: Called) -> Response:
+    """An instructor's publications; for everybody else the way to a class and to sign in."""
+    if call.visitor.account is None:
+        return page(call, "home.html")
+    return page(
+        call, "publications.html", publications=instructors.publications(call), assignments=built_in()
+    )
+
+
+@router.get("/sign-in")
+def sign_in(call: Called) -> Response:
+    """The form to sign in."""
+    return page(call, "sign_in.html", invitation="")
+
+
+@router.get("/join")
+def join(call: Called, token: str = "") -> Response:
+    """The form by which an invited instructor makes the account."""
+    return page(call, "sign_in.html", invitation=token[:200])
+
+
+@router.get("/c/{key}")
+def self_check(call: Called, key: Key) -> Response:
+    """A student's page: check values or a photo, own feedback, requests."""
+    publication = call.publication(key)
+    link = call.link(publication)
+    if link is None:
+        students.open_for_checks(call, key)
+    assignment = assignment_of(call.service.settings.data, publication)
+    own = students.own_reports(call, publication) if link is not None and publication.is_released else []
+    requests = [] if link is None else students.own_requests(call, key)
+    row = _row(call, publication, "" if link is None else link.student_id)
+    return page(
+        call, "self_check.html", publication=publication, form=form_of(assignment, call.lang), link=link,
+        own=own, requests=requests, row=row,
+        is_open=publication.is_open or call.visitor.is_member(publication),
+    )  # fmt: skip
+
+
+@router.get("/s/{token}")
+def open_link(call: Called, token: str) -> Response:
+    """A personal link: it opens the class's page as the student's own."""
+    link = students.enter(call, token)
+    response = RedirectResponse(f"/c/{link.publication.key}", 303)
+    call.service.guard.set_cookie(response, call.visitor)
+    return response
+
+
+@router.get("/publications/{key}")
+def publication(call: Called, key: Key) -> Response:
+    """An instructor's page of a class."""
+    known = instructors.publication(call, key)
+    links = {one["student_id"]: one for one in instructors.links(call, key) if not one["is_revoked"]}
+    return page(
+        call, "publication.html", one=known, links=links, requests=instructors.requests(call, key),
+        assignments=built_in(), colleagues=instructors.accounts(call), platforms=TARGETS, states=STATES,
+        address=f"{call.service.settings.address}/c/{key}",
+    )  # fmt: skip
+
+
+@router.get("/publications/{key}/results/{path:path}")
+def result_page(call: Called, key: Key, path: str) -> Response:
+    """A page of the results, as `planmark grade` wrote it."""
+    top = call.places(call.own(key)).results.resolve()
+    wanted = (top / path).resolve()
+    hidden = any(part.startswith(".") for part in path.split("/"))
+    if hidden or not wanted.is_relative_to(top) or wanted.suffix not in {".html", ".png", ".csv"}:
+        raise missing()
+    if not wanted.is_file():
+        raise missing()
+    return students.page_file(wanted)
+
+
+@router.get("/account")
+def account(call: Called) -> Response:
+    """The instructor's own account: tokens, and for administrators colleagues and the audit trail."""
+    own = call.account
+    return page(
+        call, "account.html", tokens=instructors.tokens(call), accounts=instructors.accounts(call),
+        audit=instructors.audit(call) if own.is_admin else [],
+    )  # fmt: skip
+
+
+@router.get("/static/{name}")
+def static(name: str) -> Response:
+    """The script and the style sheet."""
+    if name not in STATIC:
+        raise missing()
+    text = (files("grader.web") / "static" / name).read_text(encoding="utf-8")
+    if name == "app.css":
+        text = (files("grader.feedback") / "templates" / "style.css").read_text(encoding="utf-8") + text
+    return Response(text, media_type=STATIC[name], headers={"Cache-Control": "public, max-age=300"})
+
+
+def _row(call: Call, publication: Publication, student: str) -> Mapping[str, Any]:
+    """The number that the roster gives a student; empty where it gives none."""
+    roster = call.places(publication).roster
+    try:
+        rows = read_roster(roster).rows_of(student) if student and roster.is_file() else ()
+    except PlanmarkError:
+        rows = ()
+    return {"name": rows[0].name, "n": rows[0].n, "position": rows[0].position} if rows else {}

@@ -1,0 +1,212 @@
+"""Jobs that take longer than a request: a class is graded, a photo is checked.
+
+A job is a row of the data base and files; what was queued or running when the server ended begins again
+with the next start, and a class goes on where it was. A class is graded in a process of its own, which a
+person may cancel; photos are checked in workers with limits of time and memory.
+"""
+
+import logging
+import multiprocessing
+import queue
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
+from typing import Any
+
+from sqlalchemy import select, update
+
+from grader.folder.batch import Batch, grade
+from grader.folder.workers import Workers, guarded, result_of
+from grader.records import Problem
+from grader.web.places import batch_of, places_of
+from grader.web.settings import Settings
+from grader.web.store import Job, Store
+from reference.errors import PlanmarkError
+
+LOG = logging.getLogger("planmark")
+_TELL_S = 0.5
+"""Progress is written at this interval: a person cannot read faster."""
+Photo = Callable[..., dict[str, Any]]
+"""Checks a photo: its path, the assignment, n, position, language and level."""
+
+
+@dataclass(slots=True)
+class Queue:
+    """The jobs of a server.
+
+    Arguments: `photo` is the function that checks a photo, in a worker process.
+    """
+
+    settings: Settings
+    store: Store
+    photo: Photo
+    _classes: "queue.Queue[int | None]" = field(default_factory=queue.Queue)
+    _photos: "queue.Queue[int | None]" = field(default_factory=queue.Queue)
+    _threads: list[threading.Thread] = field(default_factory=list)
+    _workers: Workers | None = None
+    _running: dict[int, SpawnProcess] = field(default_factory=dict)
+
+    def start(self) -> None:
+        """Begin to work, first at what an earlier server left."""
+        self._workers = Workers(self.settings.photos, self.settings.limits, __name__).__enter__()
+        with self.store.session() as session:
+            left = session.scalars(
+                select(Job).where(Job.state.in_(("queued", "running"))).order_by(Job.id)
+            ).all()
+            session.execute(update(Job).where(Job.state == "running").values(state="queued"))
+        for job in left:
+            self.put(job)
+        self._threads = [
+            threading.Thread(target=self._work, args=(jobs, act), daemon=True)
+            for jobs, act, count in (
+                (self._classes, self._grade, 1), (self._photos, self._check, self.settings.photos)
+            )
+            for _ in range(count)
+        ]  # fmt: skip
+        for thread in self._threads:
+            thread.start()
+
+    def stop(self) -> None:
+        """End all work at once; what was running begins again with the next start."""
+        running = list(self._running.values())
+        for process in running:
+            process.terminate()
+        for jobs in (self._classes, self._photos):
+            for _ in self._threads:
+                jobs.put(None)
+        for process in running:
+            process.join()
+        if self._workers is not None:
+            self._workers.__exit__(None, None, None)
+            self._workers = None
+
+    @property
+    def workers(self) -> Workers:
+        """Processes with limits, for whatever must not run in the server itself."""
+        if self._workers is None:
+            raise _StoppedError
+        return self._workers
+
+    def put(self, job: Job) -> None:
+        """Queue a job that is committed."""
+        (self._classes if job.kind == "grade" else self._photos).put(job.id)
+
+    def cancel(self, job_id: int) -> None:
+        """End a job, wherever it is; what was marked is kept."""
+        with self.store.session() as session:
+            waiting = update(Job).where(Job.id == job_id, Job.state.in_(("queued", "running")))
+            session.execute(waiting.values(state="cancelled", ended=time.time()))
+        process = self._running.get(job_id)
+        if process is not None:
+            process.terminate()
+
+    def waiting_before(self, job: Job) -> int:
+        """How many jobs of its kind come first."""
+        with self.store.session() as session:
+            before = select(Job.id).where(Job.kind == job.kind, Job.state == "queued", Job.id < job.id)
+            return len(session.scalars(before).all())
+
+    # Work -----------------------------------------------------------------------------------------
+
+    def _work(self, jobs: "queue.Queue[int | None]", act: Callable[[Job], dict[str, Any]]) -> None:
+        while (job_id := jobs.get()) is not None:
+            if not self.store.claimed(job_id):
+                continue
+            with self.store.session() as session:
+                job = session.get_one(Job, job_id)
+            try:
+                self._end(job, "done", act(job))
+            except _StoppedError:
+                continue
+            except PlanmarkError as error:
+                self._end(job, "failed", {"code": error.code}, error.message)
+            except Exception as error:
+                LOG.exception("job %d", job_id)
+                self._end(job, "failed", {"code": "internal_error"}, f"a fault of planmark ({error})")
+
+    def _end(self, job: Job, state: str, result: dict[str, Any], message: str = "") -> None:
+        with self.store.session() as session:
+            ended = update(Job).where(Job.id == job.id, Job.state == "running")
+            session.execute(ended.values(state=state, result=result, message=message, ended=time.time()))
+
+    def _check(self, job: Job) -> dict[str, Any]:
+        """Check a photo, and delete it."""
+        path = places_of(self.settings.data, job.publication).photos / job.asked["file"]
+        try:
+            return result_of(self.workers, self.photo, path, job.asked)
+        finally:
+            if self._workers is not None:
+                path.unlink(missing_ok=True)
+
+    def _grade(self, job: Job) -> dict[str, Any]:
+        """Grade a class in a process of its own."""
+        batch = batch_of(self.settings.data, job.publication, self.settings.jobs)
+        context = multiprocessing.get_context("spawn")
+        mine, theirs = context.Pipe(duplex=False)
+        process = context.Process(target=_graded, args=(batch, theirs))
+        process.start()
+        theirs.close()
+        self._running[job.id] = process
+        try:
+            return self._followed(job, mine)
+        finally:
+            del self._running[job.id]
+            process.join()
+
+    def _followed(self, job: Job, reports: Connection) -> dict[str, Any]:
+        """What a process that grades reports, until its end."""
+        told = 0.0
+        while True:
+            try:
+                said = reports.recv()
+            except EOFError:
+                with self.store.session() as session:
+                    state = session.get_one(Job, job.id).state
+                if state != "running" or self._workers is None:
+                    raise _StoppedError from None
+                why = "the process that graded has ended; begin it again: what was marked is kept"
+                raise PlanmarkError("crashed", why) from None
+            match said:
+                case ("progress", stage, done, total):
+                    if time.monotonic() - told > _TELL_S or done == total:
+                        told = time.monotonic()
+                        with self.store.session() as session:
+                            row = update(Job).where(Job.id == job.id)
+                            session.execute(row.values(stage=stage, done=done, total=total))
+                case ("done", result):
+                    return result  # type: ignore[no-any-return]
+                case ("failed", Problem() as problem):
+                    raise PlanmarkError(problem.code, problem.message)
+
+
+class _StoppedError(Exception):
+    """The job was cancelled, or the server ends."""
+
+
+def _graded(batch: Batch, reports: Connection) -> None:
+    """Grade in a process of its own, which ends with its parent."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+
+    def tell(stage: str, done: int, total: int) -> None:
+        reports.send(("progress", stage, done, total))
+
+    results = guarded(grade, batch, tell)
+    if isinstance(results, Problem):
+        reports.send(("failed", results))
+        return
+    states = [report.status for report in results.reports]
+    counts = {state: states.count(state) for state in dict.fromkeys(states)}
+    reports.send(("done", {"states": counts, "unmatched": len(results.unmatched)}))
+
+
+def _end_with(sentinel: int) -> None:
+    import os  # noqa: PLC0415 - only in the process that grades
+    from multiprocessing.connection import wait  # noqa: PLC0415
+
+    wait([sentinel])
+    os._exit(1)

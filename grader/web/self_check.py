@@ -1,0 +1,142 @@
+"""A student's self-check of values and photos, as data: what is right or off, and the drawing as measured.
+
+Nothing in it gives the answer away: the level says how much is told, and no expected vector is drawn.
+"""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from grader.comparison.evidence import Submission
+from grader.comparison.task import task_of
+from grader.documents import ProblemDocument
+from grader.feedback.advice import RESULTS, checked_lines
+from grader.feedback.words import problem_sentence, symbols
+from grader.inputs.measurements import UNITS_OF_SCALES, columns_of, measurements_in, names_of
+from grader.language import tongue
+from grader.marking.mark import judge
+from grader.marking.self_check import Level
+from grader.outcomes import Judgement
+from grader.overlay.closeup import page_views, svg
+from grader.overlay.measured import measured_picture
+from grader.pipeline import open_page, read_pages
+from grader.records import PageRef, Problem
+from grader.rubric import rubric_of
+from reference.authored.assignment import Assignment, Variant, load_assignment
+
+_BARE = re.compile(r"\d*[.,]?\d+([eE][+-]?\d+)?", re.ASCII)
+
+
+def variant_of(assignment: Assignment, n: int | None, position: int | None) -> Variant:
+    """A variant as a student asks for it; a number that the assignment has not is passed over.
+
+    Raises CallError for one that there is not.
+    """
+    return assignment.variant(
+        None if assignment.numbers("n") is None else n,
+        None if assignment.numbers("position") is None else position,
+    )
+
+
+def form_of(assignment: Assignment, lang: str) -> dict[str, Any]:
+    """What a form asks for: fields by group, each with its name, unit and the column it stands for."""
+    speaker, names = tongue(lang), assignment.file.names
+    fields = []
+    for column, unit in columns_of(rubric_of(assignment)).items():
+        name = column.removesuffix("_deg").removesuffix("_value")
+        group = (
+            "scales" if name in {"kL", "kv", "ka"}
+            else "directions" if column.endswith("_deg")
+            else "values" if column.endswith("_value") else "lengths"
+        )  # fmt: skip
+        shown = names.get(name, name)
+        fields.append({"column": column, "name": shown, "group": group, "unit": speaker.unit(unit)})
+    ranges = {what: assignment.numbers(what) for what in ("n", "position")}
+    return {
+        "title": assignment.file.title.in_language(lang),
+        "fields": fields,
+        **{what: None if known is None else [min(known), max(known)] for what, known in ranges.items()},
+    }
+
+
+def checked_values(
+    assignment: Assignment, variant: Variant, cells: Mapping[str, str], lang: str, level: Level
+) -> dict[str, Any]:
+    """What a self-check of typed values tells; texts by the names of a measurement file's columns.
+
+    Raises CallError for a variant whose mechanism does not assemble, InputFileError for unusable columns.
+    """
+    speaker, rubric = tongue(lang), rubric_of(assignment)
+    filled = {column: _with_unit(column, text.strip()) for column, text in cells.items() if text.strip()}
+    entered = measurements_in(filled, names_of(assignment), "", lang)
+    task = task_of(assignment, rubric, variant)
+    submission = Submission(measured=entered.reading, values=entered.values, declared=entered.scales)
+    judgement = judge(task, submission)
+    outcomes = {outcome.name: outcome for outcome in judgement.outcomes}
+    names = assignment.file.names
+    picture = measured_picture("", entered.reading, task.construction, outcomes, show_expected=False)
+    views = [] if picture is None else page_views(picture, 0, names)
+    description = speaker.gettext("as measured")
+    return {
+        **_told(assignment, judgement, lang, level),
+        "problems": [
+            one.message.removeprefix(": ") for one in (*entered.problems, *entered.reading.problems)
+        ],
+        "drawing": [
+            str(svg(view, picture, description))
+            for view in views
+            if picture is not None and view.kind == "sheet"
+        ],
+    }
+
+
+def _with_unit(column: str, text: str) -> str:
+    """A scale's text with the unit that stands beside its field, where it is a bare number."""
+    return (
+        f"{text} {UNITS_OF_SCALES[column]}" if column in UNITS_OF_SCALES and _BARE.fullmatch(text) else text
+    )
+
+
+def checked_photo(path: Path, asked: Mapping[str, Any]) -> dict[str, Any]:
+    """What a self-check of a photo tells.
+
+    Arguments: `asked` has the ``assignment``, ``n``, ``position``, ``lang`` and ``level``.
+    """
+    assignment, lang = load_assignment(asked["assignment"]), asked["lang"]
+    rubric = rubric_of(assignment)
+    variant = variant_of(assignment, asked["n"], asked["position"])
+    pages = read_pages([open_page(PageRef(path.name, path=path))], assignment, variant, {}, rubric.vectors)
+    problems = [problem for page in pages for problem in page.problems]
+    readings = tuple(page.reading for page in pages if page.reading.figures)
+    told: dict[str, Any] = {"lines": [], "drawing": [], "is_right": False}
+    if readings:
+        judgement = judge(task_of(assignment, rubric, variant), Submission(readings))
+        told = {**told, **_told(assignment, judgement, lang, asked["level"])}
+    return {**told, "is_read": bool(readings), "problems": [_said(problem, lang) for problem in problems]}
+
+
+def _said(problem: Problem, lang: str) -> str:
+    document = ProblemDocument(code=problem.code, message=problem.message, file=problem.file)
+    return problem_sentence(document, tongue(lang)).text
+
+
+def _told(assignment: Assignment, judgement: Judgement, lang: str, level: Level) -> dict[str, Any]:
+    speaker = tongue(lang)
+    names, driven = assignment.file.names, assignment.mechanism_file.driver.pin
+    lines = checked_lines(judgement, level, speaker, names, driven)
+    return {
+        "lines": [
+            {
+                "name": line.name,
+                "html": str(symbols(line.name)),
+                "result": line.result,
+                "mark": RESULTS[line.result][0],
+                "word": speaker.gettext(RESULTS[line.result][1]),
+                "hint": str(symbols(line.hint)),
+                "advice": str(symbols(line.advice)),
+            }
+            for line in lines
+        ],
+        "is_right": bool(lines) and all(line.result == "right" for line in lines),
+    }

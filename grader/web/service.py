@@ -1,0 +1,126 @@
+"""What every route is given: who asks, the publication that is meant, the server's parts."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated
+
+from fastapi import Depends, Path, Request, Response
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from grader.language import LANGUAGES
+from grader.web.guard import Guard, RefusedError, Visitor, forbidden, missing
+from grader.web.places import Places, places_of
+from grader.web.queue import Queue
+from grader.web.settings import Settings
+from grader.web.store import Account, Link, Publication, Store
+
+CHANGING = frozenset({"POST", "PUT", "PATCH", "DELETE"})
+
+
+@dataclass(frozen=True, slots=True)
+class Service:
+    """The parts of a running server; one for all requests."""
+
+    settings: Settings
+    store: Store
+    guard: Guard
+    queue: Queue
+
+
+@dataclass(slots=True)
+class Call:
+    """One request: who makes it, and a session of the data base that is committed after it."""
+
+    service: Service
+    session: Session
+    visitor: Visitor
+    request: Request
+    response: Response
+
+    @property
+    def account(self) -> Account:
+        """The instructor who is signed in. Raises RefusedError where nobody is."""
+        if self.visitor.account is None:
+            raise RefusedError(401, "sign_in", "sign in first")
+        return self.visitor.account
+
+    @property
+    def admin(self) -> Account:
+        """The administrator who is signed in. Raises RefusedError for everybody else."""
+        if not self.account.is_admin:
+            raise forbidden("only an administrator may do this")
+        return self.account
+
+    @property
+    def lang(self) -> str:
+        """The language that the visitor chose, else the browser's, else English."""
+        chosen = self.request.query_params.get("lang") or self.request.cookies.get("planmark_lang", "")
+        wanted = [chosen, *self.request.headers.get("accept-language", "").split(",")]
+        codes = (one.strip()[:2].lower() for one in wanted)
+        return next((code for code in codes if code in LANGUAGES), LANGUAGES[0])
+
+    def note(self, act: str, about: str = "") -> None:
+        """Add to the audit trail."""
+        self.service.store.note(self.session, self.visitor.name, act, about)
+
+    def count(self, rate: str) -> None:
+        """Count a use of something by this visitor. Raises RefusedError where it is too often.
+
+        A cookie that is not stored says nothing of who it is: such visitors count by their address.
+        """
+        visit = self.visitor.visit
+        who = f"address {self.visitor.address}" if visit is None else f"visit {visit.id}"
+        self.service.guard.count(rate, [who])
+
+    def publication(self, key: str) -> Publication:
+        """A publication by its key. Raises RefusedError where there is none."""
+        found = self.session.scalar(select(Publication).where(Publication.key == key))
+        if found is None:
+            self.count("key")
+            raise missing("publication")
+        return found
+
+    def own(self, key: str) -> Publication:
+        """A publication that the instructor may change. Raises RefusedError for any other."""
+        account, found = self.account, self.publication(key)
+        if not self.visitor.is_member(found):
+            raise missing("publication") if account is not None else forbidden("")
+        return found
+
+    def link(self, publication: Publication) -> Link | None:
+        """The personal link by which the visitor came, while it is valid."""
+        return self.service.guard.own_link(self.session, self.visitor, publication)
+
+    def places(self, publication: Publication) -> Places:
+        """A publication's folders."""
+        return places_of(self.service.settings.data, publication)
+
+
+def called(request: Request, response: Response) -> Iterator[Call]:
+    """A request as routes take it; what changes something must come from our own page, or a program."""
+    service: Service = request.app.state.service
+    with service.store.session() as session:
+        visitor = service.guard.visitor(request, session)
+        if request.method in CHANGING:
+            service.guard.check_form(request, visitor)
+        yield Call(service, session, visitor, request, response)
+
+
+Called = Annotated[Call, Depends(called, scope="function")]
+Key = Annotated[str, Path(pattern=r"^[A-Za-z0-9_-]{1,40}$", description="the publication's key")]
+
+
+async def body_of(request: Request) -> bytes:
+    """The whole body, whose size `grader.web.guard.Rim` bounds."""
+    return await request.body()
+
+
+Body = Annotated[bytes, Depends(body_of)]
+FILE_BODY = {
+    "requestBody": {
+        "required": True,
+        "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
+"""Of routes that take a file as their body, for the OpenAPI document."""

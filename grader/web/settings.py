@@ -1,0 +1,86 @@
+"""How the web application runs: from the command line, secrets from the environment."""
+
+import os
+import secrets
+from dataclasses import dataclass, field
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from grader.files import make_folder, write_whole
+from grader.folder.workers import Limits
+from reference.errors import CallError
+
+SECRET = "PLANMARK_SECRET"  # noqa: S105 - the name of the variable
+DATABASE = "PLANMARK_DATABASE"
+LEAST_SECRET = 32
+"""Signs of the secret that signs links and forms: fewer could be tried out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """The settings of a server.
+
+    Attributes
+    ----------
+    data : the folder with all files
+    database : SQLAlchemy's URL
+    secret : signs personal links and forms; whoever has it can make them
+    address : under which students reach it, such as ``https://marks.example.org``; a cookie is for https
+        alone where this is https
+    jobs, limits : worker processes of a class that is graded, and what a file may take in one
+    photos : photos that are checked at once, each in a process with these limits
+    upload_mb, photo_mb : what a file of a class, and a photo, may have
+    keep_days : how long visits, photos' results and the audit trail are kept
+    link_days : how long a personal link is valid
+    """
+
+    data: Path
+    database: str
+    secret: str
+    address: str = "http://127.0.0.1:8000"
+    jobs: int = 1
+    limits: Limits = field(default_factory=Limits)
+    photos: int = 1
+    upload_mb: int = 200
+    photo_mb: int = 30
+    keep_days: float = 365.0
+    link_days: float = 200.0
+
+    @property
+    def is_https(self) -> bool:
+        """Whether cookies are sent over https alone."""
+        return self.address.startswith("https://")
+
+    @property
+    def host(self) -> str:
+        """The name and port that a request must be for."""
+        return urlsplit(self.address).netloc
+
+
+def settings_of(data: Path, address: str, database: str | None = None, *, jobs: int = 1) -> Settings:
+    """The settings of a data folder; its secret is made once, if the environment has none.
+
+    Raises CallError for an address without a scheme and for a short secret, OutputError where the folder
+    cannot be written.
+    """
+    parts = urlsplit(address)
+    if parts.scheme not in {"http", "https"} or not parts.netloc or parts.path.strip("/"):
+        raise CallError("address", f"--address {address}: write it as https://NAME or http://NAME:PORT")
+    make_folder(data)
+    url = database or os.environ.get(DATABASE) or f"sqlite:///{data.resolve() / 'planmark.sqlite'}"
+    return Settings(
+        data, url, _secret(data), address.rstrip("/"), jobs=jobs, photos=max(1, (os.cpu_count() or 1) - 1)
+    )
+
+
+def _secret(data: Path) -> str:
+    given = os.environ.get(SECRET, "")
+    if given:
+        if len(given) < LEAST_SECRET:
+            raise CallError("secret_short", f"{SECRET} must have {LEAST_SECRET} signs or more")
+        return given
+    path = data / "secret"
+    if not path.is_file():
+        write_whole(path, secrets.token_urlsafe(48))
+        path.chmod(0o600)
+    return path.read_text(encoding="utf-8")

@@ -1,0 +1,223 @@
+"use strict";
+// What the pages do: send forms and files to the API, show what it answers, follow jobs.
+const $ = (id) => document.getElementById(id);
+const texts = JSON.parse($("texts").textContent);
+const token = document.querySelector("meta[name=form-token]").content;
+const fill = (text, known) => text.replace(/%\((\w+)\)s/g, (_, name) => known[name]);
+const pause = (ms) => new Promise((done) => setTimeout(done, ms));
+
+/** The answer to a request; throws {message} where it is refused or there is none. */
+async function call(method, path, body, { raw = false, answer = "json" } = {}) {
+  const headers = { "X-Planmark-Form": token, "Accept-Language": document.documentElement.lang };
+  if (body !== undefined && !raw) { headers["Content-Type"] = "application/json"; body = JSON.stringify(body); }
+  else if (raw) headers["Content-Type"] = "application/octet-stream";
+  let response;
+  try { response = await fetch(path, { method, headers, body }); } catch { throw { message: texts.gone }; }
+  if (response.ok) return answer === "json" ? response.json() : response;
+  const told = await response.json().catch(() => ({}));
+  throw { message: told.message || `${response.status} ${response.statusText}`, code: told.code };
+}
+
+function tell(place, text, good = false) {
+  const there = place || $("message");
+  there.textContent = text;
+  there.classList.toggle("good", good);
+  there.hidden = !text;
+}
+
+/** Do something while its button waits; what is refused is told beside it. */
+async function doing(button, place, act) {
+  tell(place, "");
+  if (button) button.disabled = true;
+  try { await act(); } catch (error) {
+    if (!error.message) throw error;
+    tell(place, error.message);
+  } finally { if (button) button.disabled = false; }
+}
+
+const go = (then, answer) => {
+  if (then) location.assign(then.replace(/\{(\w+)\}/g, (_, name) => answer[name]));
+  else location.reload();
+};
+
+// Forms and buttons -------------------------------------------------------------------------------
+
+function valuesOf(form) {
+  const values = {};
+  for (const one of form.elements) {
+    if (!one.name) continue;
+    if (one.type === "checkbox") values[one.name] = one.checked;
+    else if (one.type === "number") values[one.name] = Number(one.value);
+    else if (one.value !== "" || form.dataset.send?.startsWith("PATCH")) values[one.name] = one.value;
+  }
+  return values;
+}
+
+for (const form of document.querySelectorAll("form[data-send]")) {
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    const [method, path] = form.dataset.send.split(" "), place = form.querySelector(".said");
+    doing(event.submitter, place, async () => {
+      const answer = await call(method, path, valuesOf(form));
+      if (form.dataset.told) { form.reset(); tell(place, texts[form.dataset.told], true); } else go(form.dataset.then, answer);
+    });
+  });
+}
+for (const form of document.querySelectorAll("form[data-query]")) {
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    const [method, path] = form.dataset.query.split(" "), place = form.querySelector(".said");
+    doing(event.submitter, place, async () => {
+      const answer = await call(method, `${path}?${new URLSearchParams(valuesOf(form))}`);
+      tell(place, answer[form.dataset.shows], true);
+    });
+  });
+}
+for (const form of document.querySelectorAll("form[data-erase]")) {
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    if (!confirm(texts.sure)) return;
+    const student = encodeURIComponent(form.elements.student.value);
+    doing(event.submitter, form.querySelector(".said"), async () => {
+      const { kept } = await call("DELETE", form.dataset.erase + student);
+      if (kept.length) tell(form.querySelector(".said"), kept.join(", ")); else go();
+    });
+  });
+}
+for (const button of document.querySelectorAll("button[data-send]")) {
+  button.addEventListener("click", () => {
+    if ("sure" in button.dataset && !confirm(texts.sure)) return;
+    const [method, path] = button.dataset.send.split(" ");
+    doing(button, null, async () => go(button.dataset.then, await call(method, path)));
+  });
+}
+for (const box of document.querySelectorAll("input[data-change]")) {
+  box.addEventListener("change", async () => {
+    const [method, path] = box.dataset.change.split(" ");
+    tell(null, "");
+    try { await call(method, path, { [box.name]: box.checked }); } catch (error) { box.checked = !box.checked; tell(null, error.message); }
+  });
+}
+
+// Files -------------------------------------------------------------------------------------------
+
+for (const input of document.querySelectorAll("input[data-put]")) {
+  input.addEventListener("change", async () => {
+    const box = document.querySelector(".upload"), bar = box?.querySelector("progress"), said = box?.querySelector("[role=status]");
+    const refused = [];
+    let done = 0;
+    if (box) { box.hidden = false; box.querySelector("ul").replaceChildren(); }
+    for (const file of input.files) {
+      const name = file.webkitRelativePath ? file.webkitRelativePath.split("/").slice(1).join("/") : file.name;
+      const path = input.dataset.put + ("fixed" in input.dataset ? "" : name.split("/").map(encodeURIComponent).join("/"));
+      try { await call("PUT", path, file, { raw: true }); } catch (error) { refused.push(`${name}: ${error.message}`); }
+      done += 1;
+      if (box) { bar.value = done / input.files.length; said.textContent = fill(texts.uploaded, { done: done - refused.length, total: input.files.length }); }
+    }
+    if (!refused.length) { location.reload(); return; }
+    const list = box ? box.querySelector("ul") : null;
+    if (list) list.replaceChildren(...refused.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
+    tell(null, `${texts.refused} ${refused.slice(0, 5).join("; ")}`);
+  });
+}
+
+// Self-check --------------------------------------------------------------------------------------
+
+const whole = (name) => { const input = $(`in-${name}`); return input && input.value.trim() !== "" ? Number(input.value.trim().replace(",", ".")) : null; };
+
+function show(told) {
+  const place = $("result"), parts = [];
+  const add = (name, html, text) => { const one = document.createElement(name); if (html) one.innerHTML = html; else one.textContent = text; parts.push(one); return one; };
+  for (const problem of told.problems || []) add("p", "", problem).className = "note";
+  if (told.is_right) add("p", "", texts.right);
+  else if (!told.lines.length) add("p", "", told.is_read === false ? texts.unread : texts.nothing);
+  for (const result of ["off", "open", "right"]) {
+    const lines = told.lines.filter((line) => line.result === result);
+    if (!lines.length) continue;
+    add("h2", "", lines[0].word.charAt(0).toUpperCase() + lines[0].word.slice(1));
+    const list = add("ul", "", "");
+    list.className = "plain card";
+    for (const line of lines) {
+      const item = document.createElement("li");
+      item.innerHTML = `<span class="badge r-${result}" aria-hidden="true">${line.mark}</span> <b>${line.html}</b> ${line.hint}${line.advice ? `<br><span class="soft">→ ${line.advice}</span>` : ""}`;
+      list.append(item);
+    }
+  }
+  for (const drawing of told.drawing || []) add("figure", drawing).className = "drawing";
+  place.replaceChildren(...parts);
+  place.hidden = false;
+  place.focus();
+  if (told.attempts_left !== null && told.attempts_left !== undefined) $("left").textContent = fill(texts.left, { count: told.attempts_left });
+}
+
+$("check")?.addEventListener("submit", (event) => {
+  event.preventDefault();
+  const form = event.target, cells = {};
+  for (const input of form.querySelectorAll("[data-column]")) if (input.value.trim()) cells[input.dataset.column] = input.value.trim();
+  doing(event.submitter, form.querySelector(".said"), async () => {
+    show(await call("POST", `/api/v1/publications/${form.dataset.key}/checks`, { n: whole("n"), position: whole("position"), cells, lang: form.dataset.lang }));
+  });
+});
+
+$("photo")?.addEventListener("submit", (event) => {
+  event.preventDefault();
+  const form = event.target, place = form.querySelector(".said"), asked = new URLSearchParams({ lang: form.dataset.lang });
+  for (const name of ["n", "position"]) if (whole(name) !== null) asked.set(name, whole(name));
+  doing(event.submitter, place, async () => {
+    tell(place, texts.sending, true);
+    let job = await call("POST", `/api/v1/publications/${form.dataset.key}/photos?${asked}`, $("picture").files[0], { raw: true });
+    while (job.state === "queued" || job.state === "running") {
+      tell(place, job.state === "queued" ? fill(texts.waits, { count: job.before }) : texts.looking, true);
+      await pause(700);
+      job = await call("GET", `/api/v1/photos/${job.key}`);
+    }
+    if (job.state !== "done") throw { message: job.message };
+    tell(place, "");
+    show(job.result);
+  });
+});
+$("hand-in")?.addEventListener("click", (event) => {
+  const form = $("photo"), place = form.querySelector(".said"), file = $("picture").files[0];
+  if (!file) { form.reportValidity(); return; }
+  doing(event.target, place, async () => {
+    const { file: name } = await call("POST", `/api/v1/publications/${form.dataset.key}/sheets`, file, { raw: true });
+    tell(place, name, true);
+  });
+});
+
+// Grading -----------------------------------------------------------------------------------------
+
+const grade = $("grade");
+async function follow(path, key) {
+  const box = $("job"), bar = box.querySelector("progress"), said = box.querySelector("[role=status]"), cancel = $("cancel");
+  grade.disabled = true; box.hidden = false; cancel.hidden = false;
+  cancel.onclick = () => call("DELETE", `${path}/${key}`).catch((error) => tell(null, error.message));
+  for (;;) {
+    const job = await call("GET", `${path}/${key}`);
+    if (job.state !== "queued" && job.state !== "running") { location.reload(); return; }
+    if (job.total) bar.value = job.done / job.total; else bar.removeAttribute("value");
+    const stage = { opening: texts.opening, looking: texts.looking_at, marking: texts.marking }[job.stage];
+    said.textContent = job.state === "queued" ? texts.queued : `${stage || ""} ${job.total ? `${job.done} / ${job.total}` : ""}`;
+    await pause(1000);
+  }
+}
+if (grade) {
+  const path = grade.dataset.job;
+  grade.addEventListener("click", () => doing(null, null, async () => follow(path, (await call("POST", path)).key)));
+  if (grade.dataset.running) doing(null, null, () => follow(path, grade.dataset.running));
+}
+
+$("export")?.addEventListener("submit", (event) => {
+  event.preventDefault();
+  const form = event.target, platform = $("platform").value, own = $("form-file").files[0];
+  doing(event.submitter, form.querySelector(".said"), async () => {
+    const path = form.dataset.api + platform;
+    const response = own
+      ? await call("POST", `${path}/files/${encodeURIComponent(own.name)}`, own, { raw: true, answer: "file" })
+      : await call("GET", path, undefined, { answer: "file" });
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(await response.blob());
+    link.download = /filename="([^"]+)"/.exec(response.headers.get("Content-Disposition"))[1];
+    link.click();
+  });
+});

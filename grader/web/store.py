@@ -1,0 +1,238 @@
+"""What the web application keeps in a data base: accounts, publications, jobs, links, requests, audit.
+
+What people hand in, and results, are files (`grader.web.places`). Times are seconds since 1970, UTC.
+"""
+
+import hashlib
+import secrets
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from sqlalchemy import JSON, ForeignKey, String, UniqueConstraint, create_engine, delete, event, update
+from sqlalchemy.engine import Engine, make_url
+from sqlalchemy.exc import ArgumentError, SQLAlchemyError
+from sqlalchemy.orm import DeclarativeBase, Mapped, Session, mapped_column, relationship, sessionmaker
+
+from reference.errors import CallError
+
+KEY_BYTES = 9
+"""Of a publication's key: 72 random bits cannot be guessed, and 12 letters can be typed."""
+
+
+def new_key() -> str:
+    """A random name for an address."""
+    return secrets.token_urlsafe(KEY_BYTES)
+
+
+def digest_of(token: str) -> str:
+    """What is stored of a secret: whoever reads the data base cannot use it."""
+    return hashlib.sha256(token.encode()).hexdigest()
+
+
+class Table(DeclarativeBase):
+    """The base of all tables."""
+
+    type_annotation_map = {dict[str, Any]: JSON, list[Any]: JSON}  # noqa: RUF012 - as SQLAlchemy wants it
+
+
+class Account(Table):
+    """An instructor; `password` is an Argon2 hash, empty until an invitation is answered."""
+
+    __tablename__ = "accounts"
+    id: Mapped[int] = mapped_column(primary_key=True)
+    name: Mapped[str] = mapped_column(String(80), unique=True)
+    password: Mapped[str] = mapped_column(String(200), default="")
+    is_admin: Mapped[bool] = mapped_column(default=False)
+    created: Mapped[float] = mapped_column(default=time.time)
+
+
+class Visit(Table):
+    """A browser's session, or a program's token; `id` is the digest of its secret."""
+
+    __tablename__ = "visits"
+    id: Mapped[str] = mapped_column(String(64), primary_key=True)
+    account_id: Mapped[int | None] = mapped_column(ForeignKey("accounts.id", ondelete="CASCADE"))
+    account: Mapped[Account | None] = relationship(lazy="joined")
+    title: Mapped[str] = mapped_column(String(80), default="")
+    """Of a program's token; empty for a browser."""
+    links: Mapped[dict[str, Any]] = mapped_column(default=dict)
+    """Personal links that were opened in it: the link's id by the publication's."""
+    created: Mapped[float] = mapped_column(default=time.time)
+    used: Mapped[float] = mapped_column(default=time.time)
+
+
+class Publication(Table):
+    """An assignment published to a group of students.
+
+    Attributes
+    ----------
+    assignment : a built-in name, or the name of an uploaded file
+    level : of hints in a self-check
+    attempts : allowed for each student and variant; None for any number
+    is_open, is_released : whether students may check, and whether they see their feedback
+    takes_sheets : whether students may hand in sheets by their personal links
+    """
+
+    __tablename__ = "publications"
+    id: Mapped[int] = mapped_column(primary_key=True)
+    key: Mapped[str] = mapped_column(String(20), unique=True, default=new_key)
+    title: Mapped[str] = mapped_column(String(120), default="")
+    term: Mapped[str] = mapped_column(String(40), default="", index=True)
+    assignment: Mapped[str] = mapped_column(String(120), default="")
+    lang: Mapped[str] = mapped_column(String(2), default="en")
+    level: Mapped[str] = mapped_column(String(10), default="hint")
+    attempts: Mapped[int | None] = mapped_column(default=None)
+    is_open: Mapped[bool] = mapped_column(default=False)
+    is_released: Mapped[bool] = mapped_column(default=False)
+    takes_sheets: Mapped[bool] = mapped_column(default=False)
+    pages_per_student: Mapped[int | None] = mapped_column(default=None)
+    created: Mapped[float] = mapped_column(default=time.time)
+    members: Mapped[list[Account]] = relationship(secondary="members", lazy="selectin")
+
+
+class Member(Table):
+    """An instructor's access to a publication."""
+
+    __tablename__ = "members"
+    publication_id: Mapped[int] = mapped_column(
+        ForeignKey("publications.id", ondelete="CASCADE"), primary_key=True
+    )
+    account_id: Mapped[int] = mapped_column(ForeignKey("accounts.id", ondelete="CASCADE"), primary_key=True)
+
+
+class Link(Table):
+    """A student's personal link; `secret` signs it, and a revoked one is never opened again."""
+
+    __tablename__ = "links"
+    id: Mapped[int] = mapped_column(primary_key=True)
+    publication_id: Mapped[int] = mapped_column(ForeignKey("publications.id", ondelete="CASCADE"), index=True)
+    publication: Mapped[Publication] = relationship(lazy="joined")
+    student_id: Mapped[str] = mapped_column(String(80), index=True)
+    expires: Mapped[float]
+    is_revoked: Mapped[bool] = mapped_column(default=False)
+    created: Mapped[float] = mapped_column(default=time.time)
+
+
+class Attempt(Table):
+    """How often somebody has checked a variant."""
+
+    __tablename__ = "attempts"
+    __table_args__ = (UniqueConstraint("publication_id", "who", "variant"),)
+    id: Mapped[int] = mapped_column(primary_key=True)
+    publication_id: Mapped[int] = mapped_column(ForeignKey("publications.id", ondelete="CASCADE"), index=True)
+    who: Mapped[str] = mapped_column(String(100))
+    """``student:ID`` of a personal link."""
+    variant: Mapped[str] = mapped_column(String(60))
+    count: Mapped[int] = mapped_column(default=0)
+
+
+class Job(Table):
+    """Something that takes longer than a request: grading a class, checking a photo."""
+
+    __tablename__ = "jobs"
+    id: Mapped[int] = mapped_column(primary_key=True)
+    key: Mapped[str] = mapped_column(String(20), unique=True, default=new_key)
+    publication_id: Mapped[int] = mapped_column(ForeignKey("publications.id", ondelete="CASCADE"), index=True)
+    publication: Mapped[Publication] = relationship(lazy="joined")
+    kind: Mapped[str] = mapped_column(String(10))
+    """``grade`` or ``photo``."""
+    state: Mapped[str] = mapped_column(String(10), default="queued", index=True)
+    """``queued``, ``running``, ``done``, ``failed`` or ``cancelled``."""
+    asked: Mapped[dict[str, Any]] = mapped_column(default=dict)
+    result: Mapped[dict[str, Any]] = mapped_column(default=dict)
+    message: Mapped[str] = mapped_column(default="")
+    stage: Mapped[str] = mapped_column(String(40), default="")
+    done: Mapped[int] = mapped_column(default=0)
+    total: Mapped[int] = mapped_column(default=0)
+    visit_id: Mapped[str] = mapped_column(String(64), default="")
+    """Whose photo it is."""
+    created: Mapped[float] = mapped_column(default=time.time)
+    started: Mapped[float | None] = mapped_column(default=None)
+    ended: Mapped[float | None] = mapped_column(default=None)
+
+
+class Regrading(Table):
+    """A student's request to look again at a mark; `criterion` is empty for the whole submission."""
+
+    __tablename__ = "regrading"
+    id: Mapped[int] = mapped_column(primary_key=True)
+    publication_id: Mapped[int] = mapped_column(ForeignKey("publications.id", ondelete="CASCADE"), index=True)
+    student_id: Mapped[str] = mapped_column(String(80), index=True)
+    position: Mapped[int | None] = mapped_column(default=None)
+    criterion: Mapped[str] = mapped_column(String(80), default="")
+    text: Mapped[str] = mapped_column(default="")
+    answer: Mapped[str] = mapped_column(default="")
+    created: Mapped[float] = mapped_column(default=time.time)
+    answered: Mapped[float | None] = mapped_column(default=None)
+
+
+class Audit(Table):
+    """Who did what, and when; nothing is ever taken out but what is older than is kept."""
+
+    __tablename__ = "audit"
+    id: Mapped[int] = mapped_column(primary_key=True)
+    at: Mapped[float] = mapped_column(default=time.time, index=True)
+    who: Mapped[str] = mapped_column(String(100))
+    act: Mapped[str] = mapped_column(String(40))
+    about: Mapped[str] = mapped_column(String(200), default="")
+
+
+class Store:
+    """The data base.
+
+    Arguments: `url` is SQLAlchemy's, ``sqlite:///FILE`` or ``postgresql+psycopg://USER@HOST/NAME``.
+
+    Raises CallError for an address that is none, or that cannot be opened.
+    """
+
+    def __init__(self, url: str) -> None:
+        try:
+            self.engine = _engine(url)
+            Table.metadata.create_all(self.engine)
+        except (ArgumentError, ImportError, SQLAlchemyError) as error:
+            why = str(getattr(error, "orig", None) or error).splitlines()[0]
+            raise CallError("data_base", f"--database: the data base cannot be opened ({why})") from error
+        self._sessions = sessionmaker(self.engine, expire_on_commit=False)
+
+    @contextmanager
+    def session(self) -> Iterator[Session]:
+        """A session that is committed at its end, and rolled back on any error."""
+        with self._sessions.begin() as session:
+            yield session
+
+    def note(self, session: Session, who: str, act: str, about: str = "") -> None:
+        """Add to the audit trail."""
+        session.add(Audit(who=who[:100], act=act, about=about[:200]))
+
+    def claimed(self, job_id: int) -> bool:
+        """Whether a queued job is now ours to run."""
+        with self.session() as session:
+            asked = update(Job).where(Job.id == job_id, Job.state == "queued")
+            taken = session.execute(asked.values(state="running", started=time.time()))
+            return bool(taken.rowcount)  # type: ignore[attr-defined]
+
+    def forget(self, *, days: float, now: float | None = None) -> None:
+        """Delete what is kept no longer: visits, jobs of photos, audit older than so many days."""
+        before = (time.time() if now is None else now) - days * 86400.0
+        with self.session() as session:
+            session.execute(delete(Visit).where(Visit.used < before, Visit.title == ""))
+            session.execute(delete(Job).where(Job.created < before, Job.kind == "photo"))
+            session.execute(delete(Audit).where(Audit.at < before))
+
+
+def _engine(url: str) -> Engine:
+    is_sqlite = make_url(url).get_backend_name() == "sqlite"
+    engine = create_engine(
+        url, pool_pre_ping=not is_sqlite, connect_args={"timeout": 30.0} if is_sqlite else {}
+    )
+    if is_sqlite:
+
+        @event.listens_for(engine, "connect")
+        def _prepare(connection: Any, _record: object) -> None:  # noqa: ANN401 - the driver's own
+            connection.execute("PRAGMA journal_mode=WAL")
+            connection.execute("PRAGMA foreign_keys=ON")
+            connection.execute("PRAGMA synchronous=FULL")
+
+    return engine

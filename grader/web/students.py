@@ -1,0 +1,345 @@
+"""What students may do: check values and photos, see their feedback, hand in, ask for regrading."""
+
+import re
+import secrets
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Query
+from fastapi.responses import FileResponse
+from pydantic import BaseModel, ConfigDict, Field
+from sqlalchemy import select
+
+from grader.documents import ReportDocument
+from grader.files import result_folders, write_whole
+from grader.lms.export import read_results
+from grader.web.guard import RefusedError, forbidden, missing
+from grader.web.places import assignment_of
+from grader.web.self_check import checked_values, form_of, variant_of
+from grader.web.service import FILE_BODY, Body, Call, Called, Key
+from grader.web.store import Attempt, Job, Link, Publication, Regrading, Visit
+from reference.authored.assignment import Variant
+
+router = APIRouter(prefix="/api/v1", tags=["students"])
+Lang = Literal["en", "ro", "ru"]
+Number = Annotated[int | None, Query(ge=0, le=1_000_000)]
+MOST_CELLS = 400
+"""Of a form: the largest assignment asks for a hundred and some."""
+_PICTURES = {
+    b"\xff\xd8\xff": ".jpg",
+    b"\x89PNG": ".png",
+    b"%PDF": ".pdf",
+    b"II*\x00": ".tif",
+    b"MM\x00*": ".tif",
+}
+"""First bytes of the files that a student may send, and how they are stored."""
+
+
+class Strict(BaseModel):
+    """A body without anything that is not known."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+class Values(Strict):
+    """Values that a student measured: texts by column; blank is not measured."""
+
+    n: int | None = Field(default=None, ge=0, le=1_000_000)
+    position: int | None = Field(default=None, ge=0, le=1_000_000)
+    cells: dict[Annotated[str, Field(max_length=60)], Annotated[str, Field(max_length=100)]] = Field(
+        max_length=MOST_CELLS
+    )
+    lang: Lang = "en"
+
+
+class Line(BaseModel):
+    """What is said of one value; `html` and the sentences are escaped HTML with indices."""
+
+    name: str
+    html: str
+    result: Literal["right", "off", "open"]
+    mark: str
+    word: str
+    hint: str
+    advice: str
+
+
+class Told(BaseModel):
+    """What a self-check says: `drawing` are SVG elements, `attempts_left` null without a limit."""
+
+    lines: list[Line]
+    problems: list[str]
+    drawing: list[str]
+    is_right: bool
+    attempts_left: int | None = None
+
+
+class JobState(BaseModel):
+    """A job; `before` are the jobs that come first, `result` is there when its state is ``done``."""
+
+    key: str
+    kind: str
+    state: Literal["queued", "running", "done", "failed", "cancelled"]
+    stage: str
+    done: int
+    total: int
+    before: int
+    message: str
+    result: dict[str, Any]
+    seconds: float | None = None
+
+
+class Request(Strict):
+    """A student's request to look again at a mark."""
+
+    text: str = Field(min_length=1, max_length=2000)
+    criterion: str = Field(default="", max_length=80)
+    position: int | None = Field(default=None, ge=0, le=1_000_000)
+
+
+@router.get("/publications/{key}/form")
+def form(call: Called, key: Key, lang: Lang = "en") -> dict[str, Any]:
+    """What a self-check asks for: fields, range of n and position, attempts that are left."""
+    publication = open_for_checks(call, key)
+    assignment = assignment_of(call.service.settings.data, publication)
+    return {**form_of(assignment, lang), "level": publication.level}
+
+
+@router.post("/publications/{key}/checks")
+def check(call: Called, key: Key, values: Values) -> Told:
+    """Check values at once."""
+    publication = open_for_checks(call, key)
+    call.count("check")
+    assignment = assignment_of(call.service.settings.data, publication)
+    variant = variant_of(assignment, values.n, values.position)
+    left = use_attempt(call, publication, variant)
+    told = checked_values(assignment, variant, values.cells, values.lang, _level(publication))
+    return Told(**told, attempts_left=left)
+
+
+@router.post("/publications/{key}/photos", status_code=202, openapi_extra=FILE_BODY)
+def check_photo(
+    call: Called, key: Key, body: Body, n: Number = None, position: Number = None, lang: Lang = "en"
+) -> JobState:
+    """Check a photo or scan of a sheet; the answer is the job's result."""
+    publication = open_for_checks(call, key)
+    call.count("photo")
+    ending = ending_of(body)
+    assignment = assignment_of(call.service.settings.data, publication)
+    variant = variant_of(assignment, n, position)
+    left = use_attempt(call, publication, variant)
+    places = call.places(publication)
+    name = f"{secrets.token_hex(12)}{ending}"
+    write_whole(places.photos / name, body)
+    asked = {
+        "file": name, "assignment": str(assignment.path), "n": n, "position": position, "lang": lang,
+        "level": _level(publication), "attempts_left": left,
+    }  # fmt: skip
+    visit = call.service.guard.begin(call.session, call.visitor)
+    job = Job(publication=publication, kind="photo", asked=asked, visit_id=visit.id)
+    return queued(call, job)
+
+
+@router.get("/photos/{job}")
+def photo(call: Called, job: Key) -> JobState:
+    """How far the check of a photo is; only who sent it may ask."""
+    found = call.session.scalar(select(Job).where(Job.key == job, Job.kind == "photo"))
+    if found is None or call.visitor.visit is None or found.visit_id != call.visitor.visit.id:
+        raise missing("photo")
+    return state_of(call, found)
+
+
+@router.get("/s/{token}")
+def open_link(call: Called, token: str) -> dict[str, str]:
+    """Open a personal link: the visit is then the student's, for that publication alone."""
+    publication = enter(call, token).publication
+    return {"publication": publication.key}
+
+
+@router.get("/publications/{key}/feedback")
+def own_feedback(call: Called, key: Key) -> list[dict[str, Any]]:
+    """The student's own reports, once they are released."""
+    return [
+        {"folder": folder, "report": report.model_dump(mode="json")}
+        for folder, report in own_reports(call, own_publication(call, key))
+    ]
+
+
+@router.get("/publications/{key}/feedback/{place}/{name}", response_class=FileResponse)
+def own_page(call: Called, key: Key, place: str, name: str) -> FileResponse:
+    """A file of the student's own feedback: the page, or a picture; `place` is the position, or ``0``."""
+    publication = own_publication(call, key)
+    top = call.places(publication).results
+    for number, (folder, report) in enumerate(own_reports(call, publication)):
+        if place == str(report.position if report.position is not None else number):
+            files = {path.name: path for path in (top / folder).iterdir()}
+            if name in files and re.fullmatch(r"feedback\.html|overlay(_\d+)?\.png", name):
+                return page_file(files[name])
+    raise missing()
+
+
+@router.get("/publications/{key}/regrading")
+def own_requests(call: Called, key: Key) -> list[dict[str, Any]]:
+    """The student's own requests, with the answers."""
+    publication = call.publication(key)
+    link = personal(call, publication)
+    asked = select(Regrading).where(
+        Regrading.publication_id == publication.id, Regrading.student_id == link.student_id
+    )
+    return [
+        {"criterion": one.criterion, "position": one.position, "text": one.text, "answer": one.answer,
+         "created": one.created, "answered": one.answered}
+        for one in call.session.scalars(asked.order_by(Regrading.id))
+    ]  # fmt: skip
+
+
+@router.post("/publications/{key}/regrading", status_code=201)
+def ask_again(call: Called, key: Key, request: Request) -> dict[str, str]:
+    """Ask for a mark to be looked at again; it waits in the instructor's queue."""
+    publication = own_publication(call, key)
+    link = personal(call, publication)
+    call.count("photo")
+    fitting = [
+        report for _, report in own_reports(call, publication)
+        if request.position in {None, report.position}
+        and (not request.criterion or any(one.id == request.criterion for one in report.criteria))
+    ]  # fmt: skip
+    if not fitting:
+        raise missing("criterion")
+    call.session.add(
+        Regrading(
+            publication_id=publication.id, student_id=link.student_id, position=request.position,
+            criterion=request.criterion, text=request.text,
+        )
+    )  # fmt: skip
+    call.note("regrading asked", f"{publication.key} {link.student_id} {request.criterion}")
+    return {"state": "waits"}
+
+
+@router.post("/publications/{key}/sheets", status_code=201, openapi_extra=FILE_BODY)
+def hand_in(call: Called, key: Key, body: Body) -> dict[str, str]:
+    """Hand in a sheet; it is one more file of the student, and none is ever replaced."""
+    publication = call.publication(key)
+    link = personal(call, publication)
+    if not publication.takes_sheets:
+        raise forbidden("sheets are not handed in here now")
+    call.count("photo")
+    folder = call.places(publication).handed_in
+    ending = ending_of(body)
+    taken = len(list(folder.glob(f"{link.student_id}_sent*")))
+    name = f"{link.student_id}_sent{taken + 1:02}{ending}"
+    write_whole(folder / name, body)
+    call.note("handed in", f"{publication.key} {name}")
+    return {"file": name}
+
+
+# What they share ----------------------------------------------------------------------------------
+
+
+def open_for_checks(call: Call, key: str) -> Publication:
+    """A publication that students may check values against; instructors may try theirs at any time."""
+    publication = call.publication(key)
+    if not publication.is_open and not call.visitor.is_member(publication):
+        raise forbidden("the self-check is not open now")
+    return publication
+
+
+def use_attempt(call: Call, publication: Publication, variant: Variant) -> int | None:
+    """Count an attempt; how many are left. Raises RefusedError where there are none."""
+    if publication.attempts is None or call.visitor.is_member(publication):
+        return None
+    link = personal(call, publication)
+    who, what = f"student:{link.student_id}", str(variant)[:60]
+    counted = select(Attempt).where(
+        Attempt.publication_id == publication.id, Attempt.who == who, Attempt.variant == what
+    )
+    attempt = call.session.scalar(counted.with_for_update())
+    if attempt is None:
+        attempt = Attempt(publication_id=publication.id, who=who, variant=what, count=0)
+        call.session.add(attempt)
+    if attempt.count >= publication.attempts:
+        raise RefusedError(403, "attempts_used", f"all {publication.attempts} attempts are used")
+    attempt.count += 1
+    call.session.flush()
+    return publication.attempts - attempt.count
+
+
+def personal(call: Call, publication: Publication) -> Link:
+    """The student's personal link. Raises RefusedError for a visitor without a valid one."""
+    link = call.link(publication)
+    if link is None:
+        raise RefusedError(401, "link_needed", "open the personal link that you were sent")
+    return link
+
+
+def own_publication(call: Call, key: str) -> Publication:
+    """A publication whose feedback the student may see."""
+    publication = call.publication(key)
+    personal(call, publication)
+    if not publication.is_released:
+        raise forbidden("the feedback is not released yet")
+    return publication
+
+
+def own_reports(call: Call, publication: Publication) -> list[tuple[str, ReportDocument]]:
+    """The student's own reports, each with its folder below the results."""
+    link = personal(call, publication)
+    results = read_results(call.places(publication).results)
+    folders = result_folders(results.reports)
+    return [
+        (folder, report)
+        for folder, report in zip(folders, results.reports, strict=True)
+        if report.student_id == link.student_id
+    ]
+
+
+def enter(call: Call, token: str) -> Link:
+    """Let a visit be a student's by a personal link."""
+    call.count("key")
+    link = call.service.guard.opened(call.session, token)
+    visit: Visit = call.service.guard.begin(call.session, call.visitor)
+    visit.links = {**visit.links, str(link.publication_id): link.id}
+    call.service.guard.set_cookie(call.response, call.visitor)
+    return link
+
+
+def ending_of(body: bytes) -> str:
+    """How a picture is stored, by its first bytes. Raises RefusedError for any other file."""
+    ending = next((one for start, one in _PICTURES.items() if body.startswith(start)), None)
+    if ending is None:
+        raise RefusedError(415, "file_type", "send a photo or scan: JPEG, PNG, TIFF or PDF")
+    return ending
+
+
+def page_file(path: Path) -> FileResponse:
+    """A page or picture that `planmark grade` wrote, which has its styles in it."""
+    policy = (
+        "default-src 'none'; img-src 'self' data:; style-src 'unsafe-inline'; frame-ancestors 'self'; sandbox"
+    )
+    return FileResponse(path, headers={"Content-Security-Policy": policy})
+
+
+def queued(call: Call, job: Job) -> JobState:
+    """A job that is stored and waits."""
+    call.session.add(job)
+    call.session.flush()
+    state = state_of(call, job)
+    call.service.guard.set_cookie(call.response, call.visitor)
+    call.session.commit()
+    call.service.queue.put(job)
+    return state
+
+
+def state_of(call: Call, job: Job) -> JobState:
+    """A job as a page shows it."""
+    before = call.service.queue.waiting_before(job) if job.state == "queued" and job.started else 0
+    seconds = None if job.started is None or job.ended is None else round(job.ended - job.started, 2)
+    return JobState(
+        key=job.key, kind=job.kind, state=job.state, stage=job.stage, done=job.done, total=job.total,
+        before=before, message=job.message, result=job.result, seconds=seconds,
+    )  # fmt: skip
+
+
+def _level(publication: Publication) -> Literal["symbol", "hint"]:
+    """Of hints; the answers are never told to students."""
+    return "symbol" if publication.level == "symbol" else "hint"
