@@ -47,6 +47,7 @@ CLASH = N_("%(who)s has decided this in the meantime: %(verdict)s. Yours was not
 TAKEN_BACK = N_("Somebody has taken this decision back in the meantime. Yours was not written.")
 SOMEBODY = N_("somebody")
 CHECKED = N_("decided by %(who)s")
+ASKED = N_("The student asks to look again: %(text)s")
 STALE = N_("%(who)s decided: %(verdict)s; what that was about has changed since")
 PROPOSED = N_("proposed: %(verdict)s")
 ACCEPT = N_("Accept: %(verdict)s")
@@ -105,6 +106,7 @@ def _row(
     order: int = 0,
 ) -> Facts:
     row = standing.of(student, criterion.id)
+    request = student.requests.get(criterion.id)
     drawn = "" if criterion.drawn in title else criterion.drawn
     return {
         "student": student.key,
@@ -116,6 +118,7 @@ def _row(
         "probability": criterion.probability,
         "stake": criterion.max_points if criterion.verdict == OPEN else 0.0,
         "decided": row is not None and criterion.decided is not None,
+        "asked": request is not None and not request.is_answered(row),
         "seen": mark_of(row),
     }
 
@@ -145,10 +148,18 @@ def question_facts(session: Session, student: Student, name: str, speaker: Tongu
         "state": _state(criterion, decision, said, speaker),
         "brief": said or speaker.gettext(VERDICTS[criterion.verdict]),
         "accept": Markup("<kbd>Enter</kbd> {}").format(speaker.gettext(accept) % {"verdict": what}),
-        "why": symbols(criterion.feedback) if criterion.verdict == OPEN else "",
+        "why": _why(student, criterion, asked=row["asked"], speaker=speaker),
         "sentence": symbols(session.sentence_if(student, criterion)) if accept != NO_PROPOSAL else "",
         "look": _look(session, student, criterion),
     }
+
+
+def _why(student: Student, criterion: CriterionDocument, *, asked: bool, speaker: Tongue) -> Markup:
+    """Why a person is asked: the doubt, or the student's request."""
+    if asked:
+        said = speaker.gettext(ASKED) % {"text": student.requests[criterion.id].text}
+        return Markup.escape(said)
+    return symbols(criterion.feedback) if criterion.verdict == OPEN else Markup()
 
 
 def per_cent(probability: float) -> str:
@@ -211,7 +222,7 @@ def _look(session: Session, student: Student, criterion: CriterionDocument) -> F
         box = seen[0] if seen else _box_of(read.get(figure), scene.page_mm)  # type: ignore[call-overload]
         facts = {
             "sheet": sheet,
-            "scan": "/scan?" + urlencode({"student": student.key, "sheet": sheet, "run": session.runs}),
+            "scan": "scan?" + urlencode({"student": student.key, "sheet": sheet, "run": session.runs}),
             "page_mm": scene.page_mm,
             "box": box,
             "marks": seen[1] if seen else "",
@@ -270,7 +281,7 @@ def pages_facts(session: Session, speaker: Tongue) -> Facts:
                 "corners": list(said.corners) if said else [],
                 "width": width,
                 "height": height,
-                "picture": "/page?" + urlencode({"file": ref.file, "page": ref.page}),
+                "picture": "page?" + urlencode({"file": ref.file, "page": ref.page}),
             }
         )
     owners = [{"key": student.key, "label": label_of(student, speaker)} for student in session.students]

@@ -72,11 +72,18 @@ class Run:
 
 @dataclass(slots=True)
 class Review:
-    """The application's handlers; `token` is asked for where the server can be reached from elsewhere."""
+    """The application's handlers.
+
+    Attributes
+    ----------
+    token : asked for where the server can be reached from elsewhere
+    by : who decides, where another application has let them in; None on the own machine
+    """
 
     session: Session
     lang: str = "en"
     token: str = ""
+    by: str | None = None
     run: Run = field(default_factory=Run)
 
     @property
@@ -91,7 +98,10 @@ class Review:
         made = environment(self.lang).overlay(loader=PackageLoader("grader.review"))
         title = self.session.batch.assignment.file.title.in_language(self.lang)
         page = made.get_template("review.html").render(
-            title=title, texts=questions.texts(self.speaker), by=_user(), verdicts=VERDICTS
+            title=title,
+            texts=questions.texts(self.speaker),
+            by=_user() if self.by is None else self.by,
+            verdicts=VERDICTS,
         )
         return Response(page, media_type="text/html")
 
@@ -230,7 +240,11 @@ class Review:
             table = out / usual_name(options)
             export(results, table, options)
             run.files = [
-                {"href": f"/out/{name}", "label": speaker.gettext(label), "path": str(out / name)}
+                {
+                    "href": f"out/{name}",
+                    "label": speaker.gettext(label),
+                    "path": str(out / name) if self.by is None else name,
+                }
                 for name, label in (("index.html", CLASS_PAGE), (table.name, TABLE))
             ]
         except PlanmarkError as error:
@@ -248,7 +262,9 @@ class Review:
                 "message": self.run.message,
                 "summary": self.speaker.gettext(UP_TO_DATE),
                 "files": self.run.files,
-                "commands": [f"planmark export {_quoted(out)} --to {name}" for name in EXPORTS],
+                "commands": []
+                if self.by is not None
+                else [f"planmark export {_quoted(out)} --to {name}" for name in EXPORTS],
             }
         )
 
@@ -319,9 +335,12 @@ def _number(value: object) -> float:
 # The application ----------------------------------------------------------------------------------
 
 
-def application(session: Session, lang: str = "en", token: str = "") -> Starlette:
-    """The web application of a class; with a `token`, only for those who have it."""
-    review = Review(session, lang, token)
+def application(session: Session, lang: str = "en", token: str = "", by: str | None = None) -> Starlette:
+    """The web application of a class; with a `token`, only for those who have it.
+
+    Arguments: `by` is who decides, where another application has let them in, and guards this one.
+    """
+    review = Review(session, lang, token, by)
     gets: dict[str, Callable[[Request], Response]] = {
         "/": review.index,
         "/api/class": review.class_facts,
@@ -408,7 +427,7 @@ def _told(review: Review, act: Callable[[], Response]) -> Response:
 
 def _guarded(review: Review, handler: Handler) -> Handler:
     async def guarded(request: Request) -> Response:
-        response = refusal(request, review.token) or await handler(request)
+        response = refusal(request, review) or await handler(request)
         for name, value in HEADERS.items():
             response.headers.setdefault(name, value)
         return response
@@ -416,10 +435,10 @@ def _guarded(review: Review, handler: Handler) -> Handler:
     return guarded
 
 
-def refusal(request: Request, token: str) -> Response | None:
+def refusal(request: Request, review: Review) -> Response | None:
     """Why a request is not answered; None where it is."""
-    host = request.headers.get("host", "")
-    if not token and urlsplit(f"//{host}").hostname not in LOOPBACK:
+    host, token, is_let_in = request.headers.get("host", ""), review.token, review.by is not None
+    if not token and not is_let_in and urlsplit(f"//{host}").hostname not in LOOPBACK:
         return JSONResponse({"message": FORBIDDEN}, 403)
     if token and not _has_token(request, token):
         given = request.query_params.get("token", "")

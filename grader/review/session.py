@@ -5,7 +5,7 @@ and pages on the disk are of the last run, and `bring_up_to_date` makes them ane
 """
 
 import threading
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Annotated
@@ -44,6 +44,21 @@ class ChangedError(PlanmarkError):
         self.there = there
 
 
+@dataclass(frozen=True, slots=True)
+class Request:
+    """A student's request to look again at a criterion; `at` in seconds since 1970."""
+
+    text: str
+    at: float
+
+    def is_answered(self, row: Decision | None) -> bool:
+        """Whether a row was decided after the request."""
+        try:
+            return row is not None and datetime.fromisoformat(row.at).timestamp() > self.at
+        except ValueError:  # people write this file, too
+            return False
+
+
 @dataclass(slots=True)
 class Student:
     """One submission under review; `number` is its place in the class, from 0."""
@@ -54,6 +69,8 @@ class Student:
     name: str
     version: int = 0
     pages: list[ScannedPage] | None = None
+    requests: Mapping[str, Request] = field(default_factory=dict)
+    """By criterion."""
 
     @property
     def key(self) -> str:
@@ -195,6 +212,15 @@ class Session:
             pages = pages_read(self.batch, self.graded.cache, student.job)
             student.pages = [replace(page, backdrop=None) for page in pages]
         return student.pages
+
+    def ask(self, requests: Mapping[tuple[str, int | None], Mapping[str, Request]]) -> None:
+        """Take in what students ask to look at again, by student and position, and criterion."""
+        with self._lock:
+            self.version += 1
+            for student in self.students:
+                own = requests.get((student.report.student_id, student.report.position), {})
+                if own != student.requests:
+                    student.requests, student.version = own, self.version
 
     # Decisions ------------------------------------------------------------------------------------
 

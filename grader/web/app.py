@@ -16,6 +16,7 @@ from grader import __version__
 from grader.web import instructors, pages, students
 from grader.web.guard import Guard, RefusedError, Rim
 from grader.web.queue import Photo, Queue
+from grader.web.reviews import Reviews
 from grader.web.self_check import checked_photo
 from grader.web.service import Call, Service
 from grader.web.settings import Settings
@@ -53,6 +54,7 @@ def application(settings: Settings, photo: Photo = checked_photo) -> FastAPI:
     app.state.service = service
     for router in (students.router, instructors.router, pages.router):
         app.include_router(router)
+    app.mount("/review", Reviews(service))
     app.add_exception_handler(PlanmarkError, _told)
     app.add_exception_handler(RequestValidationError, _invalid)
     app.add_exception_handler(HTTPException, _refused)

@@ -54,7 +54,7 @@ function element(name, attributes = {}, text = "") {
 // What there is to decide --------------------------------------------------------------------------
 
 const keyOf = (row) => `${row.student}/${row.criterion}`;
-const isOpen = (row) => row.verdict === "review";
+const isOpen = (row) => row.verdict === "review" || row.asked;
 const current = () => state.rows.get(state.list[state.at]);
 const nameOf = (student) => ($("anonymous").checked ? `${texts.sheet} ${student.number + 1}` : student.label);
 
@@ -267,7 +267,7 @@ const viewer = new Viewer($("view"), (node, x, y) => moveNode(node, x, y));
 function fetchQuestion(key) {
   if (!state.fetched.has(key)) {
     const row = state.rows.get(key);
-    const wanted = call(`/api/question?student=${row.student}&criterion=${encodeURIComponent(row.criterion)}`);
+    const wanted = call(`api/question?student=${row.student}&criterion=${encodeURIComponent(row.criterion)}`);
     wanted.catch(() => state.fetched.delete(key));
     state.fetched.set(key, wanted);
   }
@@ -354,7 +354,7 @@ async function busy(work) {
 function failed(error) {
   if (error instanceof Error) throw error;
   if (error.clash) {
-    const again = async () => { tell(""); state.fetched.clear(); take(await call("/api/class")); await refreshScreen(); };
+    const again = async () => { tell(""); state.fetched.clear(); take(await call("api/class")); await refreshScreen(); };
     tell(error.message, [[texts.look_again, () => busy(again)]]);
   } else tell(error.message, [[texts.close, () => tell("")]]);
 }
@@ -367,7 +367,7 @@ function decide(verdict) {
   return busy(async () => {
     const question = state.question;
     if (!question || !verdict) { tell(texts.choose); return; }
-    take(await call("/api/decide", { answers: [answerOf(question, verdict)] }));
+    take(await call("api/decide", { answers: [answerOf(question, verdict)] }));
     looked(); showProgress(); tell("");
     onward();
   });
@@ -384,7 +384,7 @@ function saveComment() {
   const row = current();
   if (!row || isOpen(row)) { $("comment").blur(); return; }
   busy(async () => {
-    take(await call("/api/decide", { answers: [answerOf(state.question, row.verdict)] }));
+    take(await call("api/decide", { answers: [answerOf(state.question, row.verdict)] }));
     tell(texts.saved, [[texts.close, () => tell("")]]);
     $("comment").blur();
     await showQuestion(true);
@@ -393,7 +393,7 @@ function saveComment() {
 
 function undo() {
   return busy(async () => {
-    const data = await call("/api/undo", {});
+    const data = await call("api/undo", {});
     if (!data.undone) { tell(texts.nothing_to_undo, [[texts.close, () => tell("")]]); return; }
     take(data); tell("");
     if (state.mode === "eight") { showEight(data.undone); return; }
@@ -410,7 +410,7 @@ function moveNode(node, x, y) {
   return busy(async () => {
     const question = state.question, started = performance.now();
     try {
-      take(await call("/api/node", { student: question.student, sheet: question.look.sheet, node, x, y, seen: question.look.nodes.find((one) => `${one.figure}:${one.name}` === node).seen }));
+      take(await call("api/node", { student: question.student, sheet: question.look.sheet, node, x, y, seen: question.look.nodes.find((one) => `${one.figure}:${one.name}` === node).seen }));
     } finally { await showQuestion(true); }
     document.body.dataset.nodeMs = Math.round(performance.now() - started);
   });
@@ -474,7 +474,7 @@ function decideTiles(indices, verdict) {
       student: question.student, criterion: question.criterion, verdict: verdict || question.proposed, comment: "", seen: question.seen,
     }));
     if (!answers.length) { tell(texts.choose); return; }
-    take(await call("/api/decide", { answers }));
+    take(await call("api/decide", { answers }));
     looked(); showProgress(); tell("");
     state.tiles.forEach((key, at) => $("tiles").children[at].classList.toggle("settled", !isOpen(state.rows.get(key) || {})));
     const next = state.tiles.findIndex((key) => isOpen(state.rows.get(key) || {}));
@@ -505,7 +505,7 @@ function showSure() {
 function acceptSure() {
   return busy(async () => {
     const answers = sureOnes().map((row) => ({ student: row.student, criterion: row.criterion, verdict: row.proposed, comment: "", seen: row.seen }));
-    take(await call("/api/decide", { answers }));
+    take(await call("api/decide", { answers }));
     $("sure").close();
     await refreshScreen();
   });
@@ -516,7 +516,7 @@ function acceptSure() {
 const pageViewer = { turn: 0, corners: [] };
 
 async function showPages() {
-  const data = await call("/api/pages");
+  const data = await call("api/pages");
   $("no-pages").hidden = data.pages.length > 0;
   $("read-again").hidden = !data.pages.length;
   $("page-form").hidden = true;
@@ -602,7 +602,7 @@ function turnPage(by) {
 function savePage() {
   return busy(async () => {
     const page = state.page;
-    take(await call("/api/page", {
+    take(await call("api/page", {
       file: page.file, page: page.page, seen: page.seen, owner: $("owner").value || null, turn: pageViewer.turn === page.upright ? null : pageViewer.turn,
       corners: $("corners").checked ? pageViewer.corners : [],
     }));
@@ -624,16 +624,16 @@ function finish() {
     $("finish").disabled = true;
     $("finished").hidden = true;
     try {
-      await call("/api/finish", {});
+      await call("api/finish", {});
       let data;
       do {
         await new Promise((later) => setTimeout(later, 250));
-        data = await call("/api/finish");
+        data = await call("api/finish");
         $("finish-progress").textContent = data.progress;
       } while (data.running);
       if (data.message) throw data;
       state.fetched.clear(); state.rows.clear(); state.students.clear();
-      take(await call("/api/class"));
+      take(await call("api/class"));
       $("finish-progress").textContent = data.summary;
       $("results").replaceChildren(...data.files.map((file) => {
         const item = element("li"), link = element("a", { href: file.href, target: "_blank", rel: "noopener" }, file.label);
@@ -738,7 +738,7 @@ $("read-again").onclick = () => { showMode("done"); finish(); };
 $("finish").onclick = finish;
 $("save-whole").onclick = () => busy(async () => {
   const student = state.question.student;
-  take(await call("/api/whole", { student, comment: $("remark").value.trim(), added: Number($("added").value) || 0, seen: state.students.get(student).seen }));
+  take(await call("api/whole", { student, comment: $("remark").value.trim(), added: Number($("added").value) || 0, seen: state.students.get(student).seen }));
   tell(texts.saved, [[texts.close, () => tell("")]]);
   await showQuestion(true);
 });
@@ -759,7 +759,7 @@ $("jump").onchange = () => {
 
 async function poll() {
   try {
-    const data = await call(`/api/class?since=${state.version}`);
+    const data = await call(`api/class?since=${state.version}`);
     if (data.students.length && !state.busy) {
       const shown = state.question && keyOf(state.question), before = shown && state.rows.get(shown);
       take(data);
@@ -771,7 +771,7 @@ async function poll() {
 }
 
 (async () => {
-  take(await call("/api/class"));
+  take(await call("api/class"));
   const wanted = new URLSearchParams(location.search).get("student");
   relist();
   const first = state.list.find((key) => state.rows.get(key).student === wanted);

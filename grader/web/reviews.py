@@ -1,0 +1,124 @@
+"""The pages of `planmark review`, for the publications of a server."""
+
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session as Store
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request as HttpRequest
+from starlette.responses import JSONResponse, RedirectResponse, Response
+from starlette.types import Receive, Scope, Send
+
+from grader.feedback.words import VERDICTS
+from grader.inputs.decisions import DecisionFile
+from grader.language import tongue
+from grader.review.server import application
+from grader.review.session import Request, Session
+from grader.web.guard import RefusedError
+from grader.web.instructors import last_job
+from grader.web.places import batch_of
+from grader.web.service import Call, Service
+from grader.web.store import Publication, Regrading
+from reference.errors import CallError, PlanmarkError
+
+MOST = 4
+"""Classes whose reviews are kept in memory; another one is opened again in a few seconds."""
+
+
+@dataclass(slots=True)
+class Reviews:
+    """ASGI application below ``/review/KEY/``; a class is opened when somebody asks for it."""
+
+    service: Service
+    _open: "OrderedDict[tuple[int, int | None], Session]" = field(default_factory=OrderedDict)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """ASGI."""
+        request = HttpRequest(scope, receive)
+        response: Response
+        try:
+            key, _, path = scope["path"].removeprefix(scope.get("root_path", "")).strip("/").partition("/")
+            session, name, lang = await run_in_threadpool(lambda: self._let_in(request, key))
+        except PlanmarkError as error:
+            status = error.status if isinstance(error, RefusedError) else 422
+            response = JSONResponse({"code": error.code, "message": error.message}, status)
+        else:
+            if path or scope["path"].endswith("/"):
+                app = application(session, lang, by=name)
+                await app({**scope, "path": f"/{path}", "root_path": ""}, receive, send)
+                if scope["method"] == "POST":
+                    await run_in_threadpool(lambda: self._answer(key, session, name))
+                return
+            response = RedirectResponse(f"{scope['path']}/", 307)
+        await response(scope, receive, send)
+
+    def _let_in(self, request: HttpRequest, key: str) -> tuple[Session, str, str]:
+        """The class under review, who asks, and the language. Raises RefusedError for others."""
+        with self.service.store.session() as store:
+            visitor = self.service.guard.visitor(request, store)
+            call = Call(self.service, store, visitor, request, Response())
+            publication = call.own(key)
+            job = last_job(store, publication)
+            if job is not None and job.state in {"queued", "running"}:
+                raise RefusedError(
+                    409, "job_runs", "the class is being graded: review it when that has ended"
+                )
+            requests = _requests(_waiting(store, publication))
+            name, lang = call.account.name, call.lang
+        with self._lock:
+            session = self._session(publication, None if job is None else job.id)
+        session.ask(requests)
+        return session, name, lang
+
+    def _session(self, publication: Publication, job: int | None) -> Session:
+        known = self._open.get((publication.id, job))
+        if known is None:
+            batch = batch_of(self.service.settings.data, publication)
+            if not (batch.out / "results.json").is_file():
+                raise CallError("results_missing", "grade the class first")
+            known = Session(batch, self.service.queue.workers)
+            known.bring_up_to_date(lambda *_: None)
+            self._open = OrderedDict(
+                (which, session) for which, session in self._open.items() if which[0] != publication.id
+            )
+            self._open[publication.id, job] = known
+        self._open.move_to_end((publication.id, job))
+        while len(self._open) > MOST:
+            self._open.popitem(last=False)
+        return known
+
+    def _answer(self, key: str, session: Session, name: str) -> None:
+        """Answer the requests whose criteria have been decided since."""
+        decided = DecisionFile(session.batch.decisions_path).all()
+        rows = {(row.student_id, row.criterion): row for row in decided}
+        with self.service.store.session() as store:
+            publication = store.scalar(select(Publication).where(Publication.key == key))
+            for request in _waiting(store, publication) if publication else ():
+                row = rows.get((request.student_id, request.criterion))
+                if row is None or not Request(request.text, request.created).is_answered(row):
+                    continue
+                verdict = tongue(session.batch.lang).gettext(VERDICTS.get(row.verdict, row.verdict))
+                request.answer = ". ".join(part for part in (verdict, row.comment) if part)
+                request.answered = time.time()
+                self.service.store.note(store, name, "request answered", f"{key} {request.student_id}")
+
+
+def _waiting(store: Store, publication: Publication) -> list[Regrading]:
+    """The requests that nobody has answered."""
+    own = select(Regrading).where(Regrading.publication_id == publication.id, Regrading.answered.is_(None))
+    return list(store.scalars(own).all())
+
+
+def _requests(rows: Iterable[Regrading]) -> dict[tuple[str, int | None], dict[str, Request]]:
+    found: dict[tuple[str, int | None], dict[str, Request]] = {}
+    for row in rows:
+        if row.criterion:
+            found.setdefault((row.student_id, row.position), {})[row.criterion] = Request(
+                row.text, row.created
+            )
+    return found
