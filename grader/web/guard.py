@@ -5,6 +5,7 @@ a header with the visit's own token, which a page of another site can neither re
 token in the header `Authorization` needs none, because no browser sends it by itself.
 """
 
+import contextlib
 import hashlib
 import hmac
 import secrets
@@ -280,28 +281,19 @@ class Rim:
                 raise _TooLargeError
             return message
 
-        has_begun = False
-
         async def with_headers(message: Message) -> None:
-            nonlocal has_begun
+            if taken > most:  # whatever the application answers to that
+                return
             if message["type"] == "http.response.start":
-                has_begun = True
                 known = {name for name, _ in message["headers"]}
-                message["headers"] = [
-                    *message["headers"],
-                    *(
-                        (name.lower().encode(), value.encode())
-                        for name, value in self._headers().items()
-                        if name.lower().encode() not in known
-                    ),
-                ]
+                ours = [(name.lower().encode(), value.encode()) for name, value in self._headers().items()]
+                message["headers"] = [*message["headers"], *(one for one in ours if one[0] not in known)]
             await send(message)
 
-        try:
+        with contextlib.suppress(_TooLargeError):
             await self.app(scope, bounded, with_headers)
-        except _TooLargeError:
-            if not has_begun:
-                await _plain(send, 413, f"larger than {most // 1_000_000} MB: send a smaller file")
+        if taken > most:
+            await _plain(send, 413, f"larger than {most // 1_000_000} MB: send a smaller file")
 
     def _most(self, path: str) -> int:
         megabytes = {"files": self.settings.upload_mb, "photos": self.settings.photo_mb}

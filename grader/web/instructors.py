@@ -14,7 +14,8 @@ from pydantic import Field
 from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
-from grader.authoring.lint import lint
+from grader.authoring.lint import lint, lint_document
+from grader.documents import LintDocument
 from grader.folder.workers import result_of
 from grader.inputs.roster import read_roster
 from grader.lms.export import TARGETS, export, read_results, usual_name
@@ -259,6 +260,13 @@ def publication(call: Called, key: Key) -> dict[str, Any]:
     }
 
 
+@router.get("/publications/{key}/lint")
+def lint_assignment(call: Called, key: Key) -> LintDocument:
+    """What `planmark lint` says of the assignment: every variant's figures, and findings."""
+    own, service = call.own(key), call.service
+    return result_of(service.queue.workers, linted, service.settings.data, own.key, own.assignment)
+
+
 @router.patch("/publications/{key}")
 def change(call: Called, key: Key, settings: Settings) -> dict[str, Any]:
     """Change settings."""
@@ -329,10 +337,15 @@ def change_settings(call: Call, publication: Publication, settings: Settings) ->
             publication.title = title.in_language(publication.lang)[:120]
 
 
-def check_assignment(data: pathlib.Path, key: str, name: str) -> list[str]:
-    """Load an assignment in a worker, whose limits bound hostile files; what lint finds."""
+def check_assignment(data: pathlib.Path, key: str, name: str) -> None:
+    """Load an assignment and its rubric, in a worker, whose limits bound hostile files."""
+    rubric_of(assignment_of(data, Publication(key=key, assignment=name)))
+
+
+def linted(data: pathlib.Path, key: str, name: str) -> LintDocument:
+    """What `planmark lint` finds, in a worker."""
     assignment = assignment_of(data, Publication(key=key, assignment=name))
-    return [str(finding) for finding in lint(assignment, rubric_of(assignment)).findings]
+    return lint_document(lint(assignment, rubric_of(assignment)))
 
 
 def facts(publication: Publication) -> dict[str, Any]:

@@ -12,6 +12,8 @@ from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
 from grader.documents import ProblemDocument
 from grader.feedback.advice import RESULTS, checked_lines
+from grader.feedback.sentences import PLACES
+from grader.feedback.student_page import AS_MEASURED
 from grader.feedback.words import problem_sentence, symbols
 from grader.inputs.measurements import UNITS_OF_SCALES, columns_of, measurements_in, names_of
 from grader.language import tongue
@@ -77,16 +79,15 @@ def checked_values(
     names = assignment.file.names
     picture = measured_picture("", entered.reading, task.construction, outcomes, show_expected=False)
     views = [] if picture is None else page_views(picture, 0, names)
-    description = speaker.gettext("as measured")
     return {
         **_told(assignment, judgement, lang, level),
         "problems": [
             one.message.removeprefix(": ") for one in (*entered.problems, *entered.reading.problems)
         ],
         "drawing": [
-            str(svg(view, picture, description))
+            str(svg(view, picture, f"{speaker.gettext(PLACES[view.kind])}, {speaker.gettext(AS_MEASURED)}"))
             for view in views
-            if picture is not None and view.kind == "sheet"
+            if picture is not None
         ],
     }
 

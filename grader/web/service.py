@@ -108,7 +108,7 @@ def called(request: Request, response: Response) -> Iterator[Call]:
 
 
 Called = Annotated[Call, Depends(called, scope="function")]
-Key = Annotated[str, Path(pattern=r"^[A-Za-z0-9_-]{1,40}$", description="the publication's key")]
+Key = Annotated[str, Path(pattern=r"^[A-Za-z0-9_-]{1,64}$", description="the publication's key")]
 
 
 async def body_of(request: Request) -> bytes:
