@@ -18,6 +18,7 @@ from grader.authoring.lint import lint, lint_document
 from grader.documents import LintDocument
 from grader.folder.workers import result_of
 from grader.inputs.roster import read_roster
+from grader.language import N_
 from grader.lms.export import TARGETS, export, read_results, usual_name
 from grader.lms.grades import Options, people_of
 from grader.rubric import rubric_of
@@ -79,7 +80,7 @@ def sign_in(call: Called, who: SignIn) -> dict[str, Any]:
     if not is_password(account, who.password):
         call.note("sign-in refused", who.name)
         call.session.commit()
-        raise RefusedError(401, "sign_in", "the name or the password is wrong")
+        raise RefusedError(401, "sign_in", N_("the name or the password is wrong"))
     return _entered(call, account)
 
 
@@ -108,9 +109,9 @@ def join(call: Called, who: Invited) -> dict[str, Any]:
     waiting = call.session.get(Visit, digest_of(who.token))
     account = None if waiting is None else waiting.account
     if account is None or waiting is None or waiting.title != "invitation" or account.password:
-        raise RefusedError(403, "invitation", "this invitation is not valid any more: ask for a new one")
+        raise RefusedError(403, "invitation", N_("this invitation is not valid any more: ask for a new one"))
     if time.time() - waiting.created > INVITED_S:
-        raise RefusedError(403, "invitation", "this invitation is too old: ask for a new one")
+        raise RefusedError(403, "invitation", N_("this invitation is too old: ask for a new one"))
     other = call.session.scalar(select(Account).where(Account.name == who.name, Account.id != account.id))
     if other is not None:
         raise RefusedError(409, "name_taken", "somebody has this name already: choose another")

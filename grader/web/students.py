@@ -12,6 +12,7 @@ from sqlalchemy import select
 
 from grader.documents import ReportDocument
 from grader.files import result_folders, write_whole
+from grader.language import N_
 from grader.lms.export import read_results
 from grader.web.guard import RefusedError, forbidden, missing
 from grader.web.places import assignment_of
@@ -222,7 +223,7 @@ def hand_in(call: Called, key: Key, body: Body) -> dict[str, str]:
     publication = call.publication(key)
     link = personal(call, publication)
     if not publication.takes_sheets:
-        raise forbidden("sheets are not handed in here now")
+        raise forbidden(N_("sheets are not handed in here now"))
     call.count("photo")
     folder = call.places(publication).handed_in
     ending = ending_of(body)
@@ -240,7 +241,7 @@ def open_for_checks(call: Call, key: str) -> Publication:
     """A publication that students may check values against; instructors may try theirs at any time."""
     publication = call.publication(key)
     if not publication.is_open and not call.visitor.is_member(publication):
-        raise forbidden("the self-check is not open now")
+        raise forbidden(N_("the self-check is not open now"))
     return publication
 
 
@@ -258,7 +259,9 @@ def use_attempt(call: Call, publication: Publication, variant: Variant) -> int |
         attempt = Attempt(publication_id=publication.id, who=who, variant=what, count=0)
         call.session.add(attempt)
     if attempt.count >= publication.attempts:
-        raise RefusedError(403, "attempts_used", f"all {publication.attempts} attempts are used")
+        raise RefusedError(
+            403, "attempts_used", N_("all %(count)s attempts are used"), count=publication.attempts
+        )
     attempt.count += 1
     call.session.flush()
     return publication.attempts - attempt.count
@@ -268,7 +271,7 @@ def personal(call: Call, publication: Publication) -> Link:
     """The student's personal link. Raises RefusedError for a visitor without a valid one."""
     link = call.link(publication)
     if link is None:
-        raise RefusedError(401, "link_needed", "open the personal link that you were sent")
+        raise RefusedError(401, "link_needed", N_("open the personal link that you were sent"))
     return link
 
 
@@ -277,7 +280,7 @@ def own_publication(call: Call, key: str) -> Publication:
     publication = call.publication(key)
     personal(call, publication)
     if not publication.is_released:
-        raise forbidden("the feedback is not released yet")
+        raise forbidden(N_("the feedback is not released yet"))
     return publication
 
 
@@ -307,7 +310,7 @@ def ending_of(body: bytes) -> str:
     """How a picture is stored, by its first bytes. Raises RefusedError for any other file."""
     ending = next((one for start, one in _PICTURES.items() if body.startswith(start)), None)
     if ending is None:
-        raise RefusedError(415, "file_type", "send a photo or scan: JPEG, PNG, TIFF or PDF")
+        raise RefusedError(415, "file_type", N_("send a photo or scan: JPEG, PNG, TIFF or PDF"))
     return ending
 
 
