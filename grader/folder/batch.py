@@ -13,7 +13,7 @@ from grader.documents import AlikeDocument, ReportDocument, ResultsDocument, Unm
 from grader.feedback.class_page import write_index
 from grader.feedback.sentences import Level
 from grader.feedback.student_page import About, write_feedback
-from grader.files import make_folder, remove_parts, result_folders, write_whole
+from grader.files import remove_parts, result_folders, write_whole
 from grader.folder.cache import (
     CELL_STAGE,
     CELLS_OF,
@@ -40,6 +40,7 @@ from grader.folder.changes import (
 )
 from grader.folder.decisions import ClassDecisions, class_decisions, decisions_path
 from grader.folder.inventory import FileContent, Progress, submissions, take_inventory
+from grader.folder.lock import only_run
 from grader.folder.owners import Unmatched, assign_pages
 from grader.folder.submissions import Unusable, submissions_of
 from grader.folder.title_block import with_written_numbers, written_owners
@@ -129,21 +130,34 @@ def graded(batch: Batch, progress: Progress, workers: Pool | None = None) -> Gra
 
     Raises CallError for a folder that is not there or holds nothing, AuthoredFileError for a roster
     with faults, InputFileError for a file of decisions that cannot be read, OutputError where results
-    cannot be written, InterruptedRunError for an interrupt.
+    cannot be written, InterruptedRunError for an interrupt; as `only_run` for a folder of results that
+    another run, or another class, has.
     """
     roster = _roster(batch)
     decisions = class_decisions(batch.decisions_path)
     files = _files(batch)
     if not files and roster is None:
         raise _nothing(batch)
-    make_folder(batch.out)
+    with only_run(batch.out, batch.folder, batch.assignment.id):
+        note_run(_note_of(batch), batch.out / CACHE_FOLDER)
+        return _graded(batch, (roster, decisions), files, progress, workers)
+
+
+def _graded(
+    batch: Batch,
+    listed: tuple[Roster | None, ClassDecisions],
+    files: Sequence[Path],
+    progress: Progress,
+    workers: Pool | None,
+) -> Graded:
+    decisions = listed[1]
     notes = batch.out / CACHE_FOLDER
     names, cache = names_of(batch.assignment), _page_cache(batch)
     before = earlier(batch.out / "results.json", batch.assignment.id)
     try:
         with Workers(batch.jobs, batch.limits, __name__) if workers is None else nullcontext(workers) as pool:
             contents = take_inventory(files, batch.folder, names, pool, progress, cache, decisions.place)
-            students, unmatched = _submissions(batch, (roster, decisions), contents, cache, pool)
+            students, unmatched = _submissions(batch, listed, contents, cache, pool)
             if not students and not unmatched:
                 raise _nothing(batch)
             jobs = _jobs(batch, cache, students)
@@ -172,13 +186,13 @@ def graded(batch: Batch, progress: Progress, workers: Pool | None = None) -> Gra
     )
     _write_results(batch, results, students)
     note_inputs(notes, inputs)
-    note_run(_note_of(batch), notes)
     return Graded(results, tuple(jobs), pages, cache)
 
 
 def _note_of(batch: Batch) -> RunNote:
     return RunNote(
         assignment=str(batch.assignment.path),
+        assignment_id=batch.assignment.id,
         folder=batch.folder.resolve(),
         out=batch.out.resolve(),
         roster=None if batch.roster is None else batch.roster.resolve(),
