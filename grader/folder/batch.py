@@ -1,5 +1,6 @@
 """A folder of submissions: inventory, owners, marking in parallel, results. One bad file stops nothing."""
 
+import json
 import logging
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
@@ -58,6 +59,8 @@ from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, PlanmarkError
 
 LOG = logging.getLogger("planmark")
+ALIKE_NOTE = "alike.json"
+"""The similar sheets, and a digest of what they were found in: every sheet is compared with every other."""
 _PASSING = "file_changed"
 """A problem that the next run need not have: nothing that has it is cached."""
 
@@ -77,6 +80,7 @@ class Batch:
     folder, out : where the submissions are, and where results go
     roster : path of the roster, or None (a `roster.csv` in the folder is taken)
     decisions : path of what people decided, or None (`decisions.csv` in the folder is taken)
+    growing : files that are still being written: this run passes them over
     pages_per_student : pages of each student in one class file, blank ones not counted
     jobs, limits : worker processes, and what a file or a sheet may take in one
     lang, level : of feedback, where the roster does not say
@@ -95,6 +99,12 @@ class Batch:
     level: Level = "full"
     with_ghosts: bool = True
     decisions: Path | None = None
+    growing: tuple[Path, ...] = ()
+
+    @property
+    def roster_path(self) -> Path:
+        """Where the roster is read, whether there is such a file or not."""
+        return self.roster or self.folder / "roster.csv"
 
     @property
     def decisions_path(self) -> Path:
@@ -135,7 +145,7 @@ def graded(batch: Batch, progress: Progress, workers: Pool | None = None) -> Gra
     """
     roster = _roster(batch)
     decisions = class_decisions(batch.decisions_path)
-    files = _files(batch)
+    files = files_of(batch)
     if not files and roster is None:
         raise _nothing(batch)
     with only_run(batch.out, batch.folder, batch.assignment.id):
@@ -180,7 +190,7 @@ def _graded(
         reports=reports,
         unmatched=[*unmatched, *decisions.problems()],
         moved=changes_since(before, reports, list(submitted), (noted_inputs(notes), inputs)),
-        alike=_similar(batch.assignment, jobs, reports, notes / "readings"),
+        alike=_similar(batch.assignment, jobs, reports, notes),
         stale=sorted(decisions.stale, key=lambda decision: decision.line),
         expected_wrong=_expected_wrong(reports),
     )
@@ -238,14 +248,15 @@ def needs_person(results: ResultsDocument) -> bool:
 
 
 def _roster(batch: Batch) -> Roster | None:
-    path = batch.roster or batch.folder / "roster.csv"
+    path = batch.roster_path
     return read_roster(path) if batch.roster is not None or path.is_file() else None
 
 
-def _files(batch: Batch) -> list[Path]:
+def files_of(batch: Batch) -> list[Path]:
+    """The files handed in. Raises CallError where there is no such folder."""
     if not batch.folder.is_dir():
         raise CallError("folder_missing", f"{batch.folder}: there is no such folder")
-    others = (batch.out, batch.decisions_path, *batch.assignment.own_files)
+    others = (batch.out, batch.decisions_path, *batch.growing, *batch.assignment.own_files)
     return submissions(batch.folder, batch.roster, passed_over=others)
 
 
@@ -325,9 +336,24 @@ def _authored(assignment: Assignment) -> tuple[str, str]:
 
 
 def _similar(
+    assignment: Assignment, jobs: Sequence[Job], reports: Sequence[ReportDocument], notes: Path
+) -> list[AlikeDocument]:
+    """The similar sheets among those that were marked; the last run's where it was the same class."""
+    key = digest_of([(job.key, bool(report.criteria)) for job, report in zip(jobs, reports, strict=True)])
+    try:
+        known, alike = json.loads((notes / ALIKE_NOTE).read_bytes())
+        if known == key:
+            return [AlikeDocument.model_validate(one) for one in alike]
+    except (OSError, TypeError, ValueError):
+        pass
+    similar = _compared(assignment, jobs, reports, notes / "readings")
+    write_whole(notes / ALIKE_NOTE, json.dumps((key, [one.model_dump(mode="json") for one in similar])))
+    return similar
+
+
+def _compared(
     assignment: Assignment, jobs: Sequence[Job], reports: Sequence[ReportDocument], readings: Path
 ) -> list[AlikeDocument]:
-    """The similar sheets among those that were marked."""
     marked = [
         (job, compared_submission(report, job.submission.variant, job.submission.measured))
         for job, report in zip(jobs, reports, strict=True)

@@ -143,7 +143,7 @@ def take_inventory(  # noqa: PLR0913, PLR0917 - what a folder is read with
     place : all pages with the turns and corners that people gave, in the same order
     """
     shown = [shown_name(path, folder) for path in files]
-    stamps = [_stamp(path) for path in files]
+    stamps = [stamp_of(path) for path in files]
     noted = _noted(cache)
     contents = [FileContent()] * len(files)
     anew: list[int] = []
@@ -165,7 +165,8 @@ def take_inventory(  # noqa: PLR0913, PLR0917 - what a folder is read with
         pages[index] = [page for page in contents[index].pages if page.problem]
     total = len(waiting) + sum(len(content.pages) for content in contents)
     total -= sum(len(contents[index].pages) for index in anew)
-    progress("looking", total - len(waiting), total)
+    if total:
+        progress("looking", total - len(waiting), total)
     scans = workers.run(identify_page, [(cache, page) for _, page in waiting])
     for done, (number, page) in enumerate(scans, start=total - len(waiting) + 1):
         index, ref = waiting[number]
@@ -200,7 +201,7 @@ class Noted:
     pages: tuple[PageRef, ...]
 
 
-def _stamp(path: Path) -> Stamp | None:
+def stamp_of(path: Path) -> Stamp | None:
     """By what a file is known to be unchanged without opening it; None for what cannot be opened."""
     try:
         known = path.stat()
@@ -229,7 +230,7 @@ def _note(cache: PageCache, files: Sequence[Path], seen: Mapping[str, Noted]) ->
         and noted.pages
         and not any(page.problem for page in noted.pages)
         and now - max(noted.stamp[1:3]) > _SETTLED_NS
-        and noted.stamp == _stamp(path)
+        and noted.stamp == stamp_of(path)
     }
     write_whole(cache.folder.parent / FILE_NOTES, json.dumps((cache.key, settled)))
 

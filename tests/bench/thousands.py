@@ -107,7 +107,7 @@ class Copying:
     ) -> Iterator[tuple[int, Any]]:
         """As `grader.folder.workers.Pool`."""
         del sheets
-        known = {inventory.identify_page: self._page, folder_batch._mark_one: self._mark}  # noqa: SLF001
+        known = {inventory.identify_page: self._page, folder_batch._mark_one: self._mark}
         for index, call in enumerate(calls):
             yield index, known[function](*call) if function in known else guarded(function, *call)
 
@@ -131,13 +131,13 @@ class Copying:
         student = job.submission.student_id
         sample = self.of.get(student)
         if sample is None or sample not in self.jobs:
-            report = guarded(folder_batch._mark_one, batch, scans, job)  # noqa: SLF001
+            report = guarded(folder_batch._mark_one, batch, scans, job)
             if sample is not None and not isinstance(report, Problem):
                 self.jobs[sample] = job, report
             return report
         first, known = self.jobs[sample]
         report = self._other_drawing(known.model_copy(update={"student_id": student}))
-        self._copy_files(batch, scans, first, job)
+        self._copy_files(batch, first, job)
         text = report.model_dump_json(indent=2).replace(f'"{first.folder}_', f'"{student}_')
         cache.write_whole(batch.out / job.folder / "report.json", text)
         cache.write_whole(batch.out / cache_folder() / f"{job.name}.key", job.key)
@@ -154,7 +154,7 @@ class Copying:
                     node["x_mm"], node["y_mm"] = round(node["x_mm"] + x, 3), round(node["y_mm"] + y, 3)
         return ReportDocument.model_validate(data)
 
-    def _copy_files(self, batch: Batch, scans: PageCache, first: Job, job: Job) -> None:
+    def _copy_files(self, batch: Batch, first: Job, job: Job) -> None:
         readings = batch.out / cache_folder() / "readings"
         shutil.copytree(
             batch.out / first.folder, batch.out / job.folder, dirs_exist_ok=True, copy_function=_linked
@@ -243,7 +243,8 @@ def real(count: int, jobs: Sequence[int], folder: Path) -> None:
         told = run(handed_in, out, number)
         _tell(f"--jobs {number}", told)
         print(
-            f"  {60.0 * sheets / told.seconds:.1f} sheets a minute, {told.seconds / sheets * number:.2f} s a sheet and process"
+            f"  {60.0 * sheets / told.seconds:.1f} sheets a minute,"
+            f" {told.seconds / sheets * number:.2f} s a sheet and process"
         )
         _tell(f"--jobs {number}, cached", run(handed_in, out, number))
 
