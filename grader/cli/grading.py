@@ -4,6 +4,7 @@ import json
 import math
 import os
 import shutil
+import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -19,6 +20,7 @@ from grader.feedback.class_statistics import waiting
 from grader.files import samples_folder
 from grader.folder.batch import Batch, grade
 from grader.folder.changes import standing_text
+from grader.folder.watch import arrivals
 from grader.folder.workers import Limits, Workers, result_of
 from grader.marking.report import reading_document
 from grader.pipeline import open_page, read_pages
@@ -42,8 +44,9 @@ def grade_folder(
     level: str = "full",
     with_ghosts: bool = True,
     decisions: Path | None = None,
+    watch_s: float | None = None,
 ) -> ResultsDocument:
-    """Grade a folder and print the outcome."""
+    """Grade a folder and print the outcome; with `watch_s` what comes into it too, until Ctrl+C."""
     check_language(lang)
     wanted = checked_level(level)
     if pages_per_student is not None and pages_per_student < 1:
@@ -56,10 +59,48 @@ def grade_folder(
         assignment, rubric, folder, out, roster, pages_per_student, jobs or os.cpu_count() or 1,
         limits or Limits(), lang, wanted, with_ghosts, decisions,
     )  # fmt: skip
+    if watch_s is not None:
+        return _watch(batch, watch_s)
     with progress() as tell:
         results = grade(batch, tell)
     tell_class(results, out)
     return results
+
+
+NAMED = 4
+"""Files named of those that came together."""
+
+
+def _watch(batch: Batch, seconds: float) -> ResultsDocument:
+    """Grade what comes into a folder until Ctrl+C; the class as it then is, told as after any run."""
+    results = None
+    note(f"Watching {batch.folder}; Ctrl+C ends it")
+    with Workers(batch.jobs, batch.limits, "grader.folder.batch") as workers:
+        for now, names in _until_interrupted(arrivals(batch, seconds)):
+            try:
+                with progress() as tell:
+                    results = grade(now, tell, workers)
+            except CallError as error:
+                if error.code not in {"nothing_to_grade", "results_in_use"}:
+                    raise
+                note(f"{time.strftime('%H:%M:%S')} {error.message}")
+                continue
+            more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+            note(f"{time.strftime('%H:%M:%S')} {', '.join(names[:NAMED])}{more}; {_states(results)}")
+    if results is None:
+        raise CallError("nothing_to_grade", f"{batch.folder}: nothing came that could be graded")
+    tell_class(results, batch.out)
+    return results
+
+
+def _until_interrupted(arrived: Iterator[tuple[Batch, list[str]]]) -> Iterator[tuple[Batch, list[str]]]:
+    """What comes while nobody ends the waiting for it."""
+    while True:
+        try:
+            batch = next(arrived)
+        except KeyboardInterrupt:
+            return
+        yield batch
 
 
 def demo(out: Path, lang: str, jobs: int | None) -> None:
@@ -163,9 +204,7 @@ CRITERIA = 4
 
 def tell_class(results: ResultsDocument, out: Path) -> None:
     """Print states, changes, similar sheets, what waits for a person, and the paths of the results."""
-    states = Counter(report.status for report in results.reports)
-    told = ", ".join(f"{count} {state.replace('_', ' ')}" for state, count in states.most_common())
-    note(f"{len(results.reports)} submissions: {told or 'none'}")
+    note(_states(results))
     note(_left(results))
     page = out / "index.html"
     changes = [_change_line(change) for change in results.moved]
@@ -179,6 +218,12 @@ def tell_class(results: ResultsDocument, out: Path) -> None:
     _list("Decisions that are out of date, and were not applied; decide again or remove them:", stale, page)
     _list("A person must look at:", list(_waiting(results)), page)
     note(f"Look at {page}; for programs there is {out / 'results.json'}")
+
+
+def _states(results: ResultsDocument) -> str:
+    states = Counter(report.status for report in results.reports)
+    told = ", ".join(f"{count} {state.replace('_', ' ')}" for state, count in states.most_common())
+    return f"{len(results.reports)} submissions: {told or 'none'}"
 
 
 def tell_next_of_class(results: ResultsDocument, out: Path, platform: str | None = None) -> None:
