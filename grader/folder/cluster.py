@@ -30,19 +30,22 @@ from typing import Any, Self, TypeVar
 
 import distributed
 import fsspec
+from distributed.comm.addressing import get_address_host_port
 from fsspec.implementations.local import LocalFileSystem
 
 from grader.files import write_whole
 from grader.folder.batch import Job
-from grader.folder.cache import MARK_STAGE, PageCache, stage_digest
+from grader.folder.cache import MARK_STAGE, PageCache, digest_of, stage_digest
 from grader.folder.changes import CACHE_FOLDER
-from grader.folder.inventory import identify_page
 from grader.folder.workers import Limits, Workers
+from grader.inputs.decisions import FILE_NAME as DECISIONS
 from grader.records import PageRef, Problem
 from grader.scan.decode.limits import MAX_FILE_BYTES
-from reference.errors import CallError
+from reference.errors import CallError, PlanmarkError
 
 Result = TypeVar("Result")
+_Future = Any
+"""Dask's, which has no types where it is not installed."""
 
 CONNECT_S = 10.0
 """A scheduler in the same network answers within milliseconds; one behind a slow name service in seconds."""
@@ -60,17 +63,91 @@ _RETRIES = 2
 """A storage that does not answer is asked again by so many workers."""
 _STORES = 4
 """Runs whose sheets a worker holds: several people may use a cluster at once."""
-_URL = re.compile(r"((?:[a-z0-9+]+::)*[a-z0-9+]{2,}):[/\\]+(.*)", re.DOTALL)
-"""An address as a path has it, where its two slashes are one; a single letter is a drive of Windows."""
+IMAGE = "handed-in"
+"""Below a run's notes: empty files with the names of those that lie elsewhere."""
+ADDRESS = "address"
+"""Beside it: the address of the folder that it is of."""
 
 
-def address_of(folder: Path) -> str | None:
-    """The address that was given as a folder, such as `s3://bucket/class`; None for a local folder's path."""
-    match = _URL.fullmatch(str(folder))
-    if match is None or folder.exists():
-        return None
-    scheme, rest = match.groups()
-    return f"{scheme}://{'/' if scheme.endswith('file') else ''}{rest}"
+# A folder elsewhere -------------------------------------------------------------------------------
+
+
+def image_of(address: str, out: Path) -> Path:
+    """An image of a folder elsewhere: empty files of the same names, and the roster as it is.
+
+    A file's time stands for its content: it is another one when the storage has another file under the
+    name. Decisions are copied beside the results, unless there are some. A file that `fill` has copied
+    stays while it is the same. Raises CallError for a folder that cannot be read or holds nothing.
+    """
+    image = out / CACHE_FOLDER / IMAGE
+    try:
+        files, root = fsspec.core.url_to_fs(address)
+        names = {
+            entry["name"].removeprefix(root).strip("/"): entry
+            for entry in files.find(root, detail=True).values()
+            if entry["type"] == "file"
+        }
+        for name, entry in names.items():
+            _imagine(_inside(image, name), entry)
+        for path in image.rglob("*"):
+            if path.is_file() and path.relative_to(image).as_posix() not in names:
+                path.unlink()
+        write_whole(image.with_name(ADDRESS), address)
+        if "roster.csv" in names:
+            write_whole(image / "roster.csv", files.cat_file(f"{root}/roster.csv"))
+        if DECISIONS in names and not (out / DECISIONS).exists():
+            write_whole(out / DECISIONS, files.cat_file(f"{root}/{DECISIONS}"))
+    except PlanmarkError:
+        raise
+    except Exception as error:
+        why = (
+            f"cannot be read ({type(error).__name__}: {error}); check the address, and the storage's settings"
+        )
+        raise CallError("storage_unreadable", f"{address}: {why} in the environment") from error
+    if not names:
+        raise CallError("folder_missing", f"{address}: there is no such folder, or nothing in it")
+    return image
+
+
+def _inside(folder: Path, name: str) -> Path:
+    """A file's path in a folder. Raises CallError for a name that leads out of it."""
+    if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
+        raise CallError("name_unusable", f"{name}: no name of a file below the folder; rename it")
+    return folder / name
+
+
+def _imagine(path: Path, entry: Mapping[str, Any]) -> None:
+    """An empty file whose time stands for what the storage says of the file, unless it is there already."""
+    known = {key: entry.get(key) for key in ("ETag", "etag", "LastModified", "mtime", "created", "size")}
+    says = any(value is not None for key, value in known.items() if key != "size")
+    # A time of long ago, or now where the storage does not say when the file has changed.
+    time_ns = int(digest_of([known])[:14], 16) if says else time.time_ns()
+    if not path.is_file() or path.stat().st_mtime_ns != time_ns:
+        write_whole(path, b"")
+        os.utime(path, ns=(time_ns, time_ns))
+
+
+def fill(folder: Path) -> None:
+    """Copy what an image lacks, for a review on this machine; nothing for any other folder.
+
+    Raises CallError where the storage cannot be read.
+    """
+    note = folder.with_name(ADDRESS)
+    if folder.name != IMAGE or not note.is_file():
+        return
+    address = note.read_text(encoding="utf-8")
+    try:
+        files, root = fsspec.core.url_to_fs(address)
+        for path in folder.rglob("*"):
+            if path.is_file() and not (known := path.stat()).st_size:
+                data = files.cat_file(f"{root}/{path.relative_to(folder).as_posix()}")
+                write_whole(path, data)
+                os.utime(path, ns=(known.st_mtime_ns, known.st_mtime_ns))
+    except PlanmarkError:
+        raise
+    except Exception as error:
+        why = f"cannot be read ({type(error).__name__}: {error}); grade it again, or try later"
+        raise CallError("storage_unreadable", f"{address}: {why}") from error
 
 
 # What both sides know -----------------------------------------------------------------------------
@@ -304,7 +381,7 @@ class Cluster:
     program, and a worker that cannot read the folder.
     """
 
-    def __init__(  # noqa: PLR0913, PLR0917 - a run has so many parts
+    def __init__(
         self, address: str, folder: Path, out: Path, limits: Limits, sheets: str | None = None,
         wait_s: float = WAIT_S,
     ) -> None:  # fmt: skip
@@ -312,12 +389,13 @@ class Cluster:
         self._folders = {"sheets": folder, "out": out}
         self._run = Run(secrets.token_hex(8), sheets or str(folder.absolute()), limits)
         self._versions = program()
-        self._client: distributed.Client
+        self._client: Any = None
         self._size, self._asked = 1, 0.0
 
     def __enter__(self) -> Self:
         given = f"--cluster {self._address}"
         try:
+            get_address_host_port(self._address)
             self._client = distributed.Client(self._address, timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
             why = f"no scheduler answers within {CONNECT_S:g} s; start one: dask scheduler"
@@ -327,7 +405,8 @@ class Cluster:
             self._check()
         except TimeoutError as error:
             self._client.close()
-            why = f"no worker within {CONNECT_S:g} s; start some: dask worker {self._address} --nworkers 2 --nthreads 1"
+            start = f"dask worker {self._address} --nworkers 2 --nthreads 1"
+            why = f"no worker within {CONNECT_S:g} s; start some: {start}"
             raise CallError("cluster_unreachable", f"{given}: {why}") from error
         except BaseException:
             self._client.close()
@@ -369,7 +448,7 @@ class Cluster:
         """As `grader.folder.workers.Pool.run`; raises CallError where the cluster is lost on the way."""
         counts = [*sheets, *[1] * len(calls)]
         left = iter(range(len(calls)))
-        pending: dict[distributed.Future, list[int]] = {}
+        pending: dict[_Future, list[int]] = {}
         done, started = 0, time.monotonic()
 
         def submit(indices: list[int]) -> None:
@@ -406,8 +485,12 @@ class Cluster:
     def _task(self, function: Callable[..., Any], calls: list[tuple[Any, ...]], counts: list[int]) -> Task:
         """The calls with what the cache has of their pages and readings."""
         data, found = _pickled((function, calls), self._folders)
-        suffix = ".ref" if function is identify_page else ".page"
-        paths = {cache.path_of(page).with_suffix(suffix) for cache in found.caches for page in found.pages}
+        paths = {
+            cache.path_of(page).with_suffix(suffix)
+            for cache in found.caches
+            for page in found.pages
+            for suffix in (".page", ".ref")
+        }
         paths |= {
             self._folders["out"] / CACHE_FOLDER / "readings" / f"{job.name}.reading" for job in found.jobs
         }
@@ -417,7 +500,7 @@ class Cluster:
                 files[path.relative_to(self._folders["out"]).as_posix()] = path.read_bytes()
         return Task(data, tuple(counts), files)
 
-    def _results(self, future: distributed.Future) -> list[tuple[int, Any]] | Problem:
+    def _results(self, future: _Future) -> list[tuple[int, Any]] | Problem:
         """A task's results, with the files that it wrote in their places; the Problem that it ended with."""
         try:
             answer = future.result()
@@ -436,19 +519,17 @@ class Cluster:
         data, files = answer
         # A key stands for all of a submission's files: it comes last.
         for name in sorted(files, key=lambda name: (name.endswith(".key"), name)):
-            if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
-                raise CallError(
-                    "cluster_path", f"--cluster {self._address}: a worker wrote {name}, outside of its folder"
-                )
-            write_whole(self._folders["out"] / name, files[name])
-        return _Unpickler(data, self._folders).load()
+            write_whole(_inside(self._folders["out"], name), files[name])
+        results: list[tuple[int, Any]] = _Unpickler(data, self._folders).load()
+        return results
 
-    def _ended(self, pending: Iterable[distributed.Future]) -> set[distributed.Future]:
+    def _ended(self, pending: Iterable[_Future]) -> Iterable[_Future]:
         """The tasks that have ended as soon as there are any. Raises CallError where no worker is left."""
         alive = time.monotonic()
         while True:
             with contextlib.suppress(TimeoutError), self._client.as_current():
-                return distributed.wait(list(pending), timeout=_LOOK_S, return_when="FIRST_COMPLETED").done
+                ended = distributed.wait(list(pending), timeout=_LOOK_S, return_when="FIRST_COMPLETED")
+                return set(ended.done)
             if self._workers():
                 alive = time.monotonic()
             elif time.monotonic() - alive > self._wait_s:
