@@ -16,9 +16,11 @@ import pickle
 import platform
 import re
 import secrets
+import shutil
 import tempfile
 import threading
 import time
+import weakref
 from asyncio import CancelledError
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -276,9 +278,10 @@ class _Store:
 
     def __init__(self, address: str, top: str | None) -> None:
         self.files, self._root = fsspec.core.url_to_fs(address)
-        self._copies = tempfile.TemporaryDirectory(prefix="planmark-", dir=top)
+        copies = tempfile.mkdtemp(prefix="planmark-", dir=top)
+        weakref.finalize(self, shutil.rmtree, copies, ignore_errors=True)
         is_local = isinstance(self.files, LocalFileSystem)
-        self.folder = Path(self._root) if is_local else Path(self._copies.name)
+        self.folder = Path(self._root) if is_local else Path(copies)
         self._is_local = is_local
 
     def fetch(self, name: str) -> None:
