@@ -200,6 +200,20 @@ def grade(
     memory_limit: Annotated[
         int, typer.Option("--memory-limit", min=300, help="Megabytes that a file or a sheet may take.")
     ] = 1500,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="Grade what comes into the folder, too, until Ctrl+C.")
+    ] = False,
+    every: Annotated[
+        float, typer.Option("--every", min=0.1, help="With --watch: seconds between two looks.")
+    ] = 5.0,
+    cluster: Annotated[
+        str | None,
+        typer.Option(
+            "--cluster",
+            metavar="ADDRESS",
+            help="Scheduler of a Dask cluster that does the work; FOLDER may be s3://bucket/class then.",
+        ),
+    ] = None,
     to: Annotated[
         str | None, typer.Option("--to", hidden=True, help="The platform, for the line on what is next.")
     ] = None,
@@ -212,7 +226,7 @@ def grade(
     graded = grade_folder(
         folder, assignment, out, roster=roster, pages_per_student=pages_per_student, jobs=jobs, lang=lang,
         limits=Limits(time_limit, memory_limit), level=level, with_ghosts=ghosts,
-        decisions=decisions,
+        decisions=decisions, watch_s=every if watch else None, cluster=cluster,
     )  # fmt: skip
     tell_next_of_class(graded, out, to)
     raise typer.Exit(1 if needs_person(graded) else 0)

@@ -1,12 +1,17 @@
 """``planmark grade``, ``planmark demo`` and ``planmark read``."""
 
+import importlib
 import json
 import math
 import os
+import re
 import shutil
+import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from pathlib import Path
+from types import ModuleType
 
 from grader.cli import terminal
 from grader.cli.app import check_language, new_table, progress
@@ -15,9 +20,10 @@ from grader.cli.terminal import note, tell_next
 from grader.documents import AlikeDocument, MovedDocument, ReadingDocument, ResultsDocument
 from grader.feedback.class_page import CAUSES, SIGNS, write_demo_page
 from grader.feedback.class_statistics import waiting
-from grader.files import samples_folder
+from grader.files import make_folder, samples_folder
 from grader.folder.batch import Batch, grade
 from grader.folder.changes import standing_text
+from grader.folder.watch import arrivals
 from grader.folder.workers import Limits, Workers, result_of
 from grader.marking.report import reading_document
 from grader.pipeline import open_page, read_pages
@@ -41,8 +47,14 @@ def grade_folder(
     level: str = "full",
     with_ghosts: bool = True,
     decisions: Path | None = None,
+    watch_s: float | None = None,
+    cluster: str | None = None,
 ) -> ResultsDocument:
-    """Grade a folder and print the outcome."""
+    """Grade a folder and print the outcome.
+
+    Arguments: with `watch_s` what comes into it counts too, until Ctrl+C; with `cluster`, the address of a
+    scheduler, the work is done by its workers.
+    """
     check_language(lang)
     wanted = checked_level(level)
     if pages_per_student is not None and pages_per_student < 1:
@@ -51,14 +63,95 @@ def grade_folder(
         raise CallError("file_missing", f"{decisions}: there is no such file of decisions")
     assignment = load_assignment(name)
     rubric = rubric_of(assignment)
+    address = address_of(folder)
+    if address is not None and cluster is None:
+        why = "a folder elsewhere is read by the workers of a cluster; give --cluster ADDRESS"
+        raise CallError("cluster_needed", f"{address}: {why}")
+    if cluster is not None:
+        on_cluster = _cluster_module()
+        if address is not None:
+            folder, decisions = on_cluster.image_of(address, out), decisions or out / "decisions.csv"
+        elif not folder.is_dir():
+            raise CallError("folder_missing", f"{folder}: there is no such folder")
     batch = Batch(
         assignment, rubric, folder, out, roster, pages_per_student, jobs or os.cpu_count() or 1,
         limits or Limits(), lang, wanted, with_ghosts, decisions,
     )  # fmt: skip
-    with progress() as tell:
-        results = grade(batch, tell)
+    if watch_s is not None and cluster is not None:
+        raise CallError("option_unused", "--watch looks at a folder of this machine: leave --cluster out")
+    if watch_s is not None:
+        return _watch(batch, watch_s)
+    with ExitStack() as stack:
+        pool = None
+        if cluster is not None:
+            make_folder(out)
+            pool = stack.enter_context(on_cluster.Cluster(cluster, folder, out, batch.limits, address))
+        results = grade(batch, stack.enter_context(progress()), pool)
     tell_class(results, out)
     return results
+
+
+NAMED = 4
+"""Files named of those that came together."""
+
+
+def _watch(batch: Batch, seconds: float) -> ResultsDocument:
+    """Grade what comes into a folder until Ctrl+C; the class as it then is, told as after any run."""
+    results = None
+    note(f"Watching {batch.folder}; Ctrl+C ends it")
+    with Workers(batch.jobs, batch.limits, "grader.folder.batch") as workers:
+        for now, names in _until_interrupted(arrivals(batch, seconds)):
+            try:
+                with progress() as tell:
+                    results = grade(now, tell, workers)
+            except CallError as error:
+                if error.code not in {"nothing_to_grade", "results_in_use"}:
+                    raise
+                note(f"{time.strftime('%H:%M:%S')} {error.message}")
+                continue
+            more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+            note(f"{time.strftime('%H:%M:%S')} {', '.join(names[:NAMED])}{more}; {_states(results)}")
+    if results is None:
+        raise CallError("nothing_to_grade", f"{batch.folder}: nothing came that could be graded")
+    tell_class(results, batch.out)
+    return results
+
+
+def _until_interrupted(arrived: Iterator[tuple[Batch, list[str]]]) -> Iterator[tuple[Batch, list[str]]]:
+    """What comes while nobody ends the waiting for it."""
+    while True:
+        try:
+            batch = next(arrived)
+        except KeyboardInterrupt:
+            return
+        yield batch
+
+
+_URL = re.compile(r"((?:[a-z0-9+]+::)*[a-z0-9+]{2,}):[/\\]+(.*)", re.DOTALL)
+"""An address as a path has it, with one slash for two; a single letter is a drive of Windows."""
+
+
+def address_of(folder: Path) -> str | None:
+    """The address that was given as a folder, such as `s3://bucket/class`; None for a path."""
+    match = _URL.fullmatch(str(folder))
+    if match is None or folder.exists():
+        return None
+    scheme, rest = match.groups()
+    return f"{scheme}://{'/' if scheme.endswith('file') else ''}{rest}"
+
+
+def fill_image(folder: Path) -> None:
+    """Copy what was handed in elsewhere, where this folder is only an image of it."""
+    if folder.with_name("address").is_file():
+        _cluster_module().fill(folder)
+
+
+def _cluster_module() -> ModuleType:
+    try:
+        return importlib.import_module("grader.folder.cluster")
+    except ModuleNotFoundError as error:
+        why = f"--cluster needs Dask ({error}): pip install 'planmark[cluster]'"
+        raise CallError("extra_missing", why) from error
 
 
 def demo(out: Path, lang: str, jobs: int | None) -> None:
@@ -162,9 +255,7 @@ CRITERIA = 4
 
 def tell_class(results: ResultsDocument, out: Path) -> None:
     """Print states, changes, similar sheets, what waits for a person, and the paths of the results."""
-    states = Counter(report.status for report in results.reports)
-    told = ", ".join(f"{count} {state.replace('_', ' ')}" for state, count in states.most_common())
-    note(f"{len(results.reports)} submissions: {told or 'none'}")
+    note(_states(results))
     note(_left(results))
     page = out / "index.html"
     changes = [_change_line(change) for change in results.moved]
@@ -178,6 +269,12 @@ def tell_class(results: ResultsDocument, out: Path) -> None:
     _list("Decisions that are out of date, and were not applied; decide again or remove them:", stale, page)
     _list("A person must look at:", list(_waiting(results)), page)
     note(f"Look at {page}; for programs there is {out / 'results.json'}")
+
+
+def _states(results: ResultsDocument) -> str:
+    states = Counter(report.status for report in results.reports)
+    told = ", ".join(f"{count} {state.replace('_', ' ')}" for state, count in states.most_common())
+    return f"{len(results.reports)} submissions: {told or 'none'}"
 
 
 def tell_next_of_class(results: ResultsDocument, out: Path, platform: str | None = None) -> None:

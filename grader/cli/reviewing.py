@@ -10,7 +10,7 @@ import uvicorn
 
 from grader.cli import terminal
 from grader.cli.app import check_language, progress
-from grader.cli.grading import tell_class, tell_next_of_class
+from grader.cli.grading import fill_image, tell_class, tell_next_of_class
 from grader.folder.batch import noted_batch
 from grader.review.server import LOOPBACK, application
 from grader.review.session import Session
@@ -36,6 +36,7 @@ def review_class(
     if token and len(token) < LEAST_TOKEN:
         raise CallError("token_short", f"--token must have {LEAST_TOKEN} signs or more")
     batch = replace(noted_batch(folder), jobs=jobs or os.cpu_count() or 1)
+    fill_image(batch.folder)
     listener = listener_on(host, port)
     session = Session(batch)
     with progress() as tell:

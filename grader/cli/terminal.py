@@ -98,18 +98,43 @@ def set_encoding() -> None:
             reconfigure(encoding="utf-8", errors="replace")
 
 
+class Pace:
+    """How fast each kind of work goes on, and how long it will take; what a run finds done does not count."""
+
+    def __init__(self) -> None:
+        self._first: dict[str, tuple[float, int]] = {}
+
+    def __call__(self, what: str, done: int, total: int) -> str:
+        """``24 a minute, 2 h 05 min left``; empty before anything is known of it, and at the end."""
+        now = time.monotonic()
+        began, before = self._first.setdefault(what, (now, done))
+        if done <= before or now - began < _LEAST_S or done >= total:
+            return ""
+        a_second = (done - before) / (now - began)
+        minutes, seconds = divmod(round((total - done) / a_second), 60)
+        hours, minutes = divmod(minutes, 60)
+        left = f"{hours} h {minutes:02d} min" if hours else f"{minutes} min" if minutes else f"{seconds} s"
+        return f"{60.0 * a_second:.0f} a minute, {left} left"
+
+
+_LEAST_S = 1.0
+"""Of a shorter time no pace is told: the first results come together."""
+
+
 class StepLines:
     """Progress as lines for a pipe or a file: now and then, and when a kind of work is done."""
 
     def __init__(self, seconds: float) -> None:
         self._seconds, self._last = seconds, time.monotonic()
         self._done: dict[str, int] = {}
+        self._pace = Pace()
 
     def __call__(self, what: str, done: int, total: int) -> None:
         """Tell how much of a kind of work is done, if it is time."""
         is_end = done >= total and self._done.get(what) != done
+        pace = self._pace(what, done, total)
         self._done[what] = done
         if is_end or time.monotonic() - self._last >= self._seconds:
             self._last = time.monotonic()
             if not is_quiet():
-                typer.echo(f"{what}: {done} of {total}", err=True)
+                typer.echo(f"{what}: {done} of {total}{', ' if pace else ''}{pace}", err=True)

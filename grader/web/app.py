@@ -15,12 +15,13 @@ from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 
 from grader import __version__
+from grader.language import tongue
 from grader.web import instructors, pages, students
 from grader.web.guard import Guard, RefusedError, Rim
 from grader.web.queue import Photo, Queue
 from grader.web.reviews import Reviews
 from grader.web.self_check import checked_photo
-from grader.web.service import Call, Service
+from grader.web.service import Call, Service, language_of
 from grader.web.settings import Settings
 from grader.web.store import Account, Store
 from reference.errors import PlanmarkError
@@ -90,9 +91,10 @@ def first_invitation(settings: Settings) -> str | None:
 
 
 async def _told(request: Request, error: Exception) -> Response:
-    status = error.status if isinstance(error, RefusedError) else HTTPStatus.UNPROCESSABLE_ENTITY
+    if isinstance(error, RefusedError):
+        return _answer(request, error.status, error.code, error.told(tongue(language_of(request))))
     code = error.code if isinstance(error, PlanmarkError) else "refused"
-    return _answer(request, int(status), code, str(error))
+    return _answer(request, HTTPStatus.UNPROCESSABLE_ENTITY, code, str(error))
 
 
 async def _invalid(request: Request, error: Exception) -> Response:

@@ -5,6 +5,7 @@ a header with the visit's own token, which a page of another site can neither re
 token in the header `Authorization` needs none, because no browser sends it by itself.
 """
 
+import contextlib
 import hashlib
 import hmac
 import re
@@ -26,6 +27,7 @@ from sqlalchemy.orm import Session
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from grader.language import N_, Tongue
 from grader.web.settings import Settings
 from grader.web.store import Account, Link, Publication, Store, Visit, digest_of
 from reference.errors import PlanmarkError
@@ -65,13 +67,21 @@ _NOBODY = _HASHER.hash(secrets.token_urlsafe())
 
 
 class RefusedError(PlanmarkError):
-    """A request that is not answered; `status` is HTTP's."""
+    """A request that is not answered; `status` is HTTP's, `text` a key of the catalogues where it has one."""
 
     exit_status = 1
 
-    def __init__(self, status: int, code: str, message: str) -> None:
-        super().__init__(code, message)
-        self.status = status
+    def __init__(self, status: int, code: str, text: str, /, **known: object) -> None:
+        super().__init__(code, text % known if known else text)
+        self.status, self.text, self.known = status, text, known
+
+    def told(self, speaker: Tongue) -> str:
+        """The message in a language."""
+        text = speaker.gettext(self.text)
+        return text % self.known if self.known else text
+
+
+NO_SUCH = {"page": N_("there is no such page"), "publication": N_("there is no such assignment here")}
 
 
 def forbidden(message: str) -> RefusedError:
@@ -81,14 +91,17 @@ def forbidden(message: str) -> RefusedError:
 
 def missing(what: str = "page") -> RefusedError:
     """The error for what is not there, or is not the visitor's to see: both read the same."""
-    return RefusedError(404, "not_found", f"there is no such {what}")
+    return RefusedError(404, "not_found", NO_SUCH.get(what, f"there is no such {what}"))
 
 
 def hash_of(password: str) -> str:
     """What is stored of a password. Raises RefusedError for a short one."""
     if not LEAST_PASSWORD <= len(password) <= 200:
         raise RefusedError(
-            422, "password_short", f"the password must have {LEAST_PASSWORD} to 200 signs: a sentence is good"
+            422,
+            "password_short",
+            N_("the password must have %(least)s to 200 signs: a sentence is good"),
+            least=LEAST_PASSWORD,
         )
     return _HASHER.hash(password)
 
@@ -216,7 +229,7 @@ class Guard:
         given = request.headers.get(FORM_HEADER, "")
         is_own = origin is None or origin.partition("://")[2] == request.headers.get("host", "")
         if not is_own or not hmac.compare_digest(given.encode(), self.form_token(visitor).encode()):
-            raise forbidden("the page is out of date: load it again, and repeat what you did")
+            raise forbidden(N_("the page is out of date: load it again, and repeat what you did"))
 
     # How often ------------------------------------------------------------------------------------
 
@@ -224,7 +237,9 @@ class Guard:
         """Count a use of something. Raises RefusedError where there are too many in a minute."""
         for one in who:
             if not self._limiter.hit(RATES[rate], rate, one):
-                raise RefusedError(429, "too_often", "too often in a short time: wait a minute, then go on")
+                raise RefusedError(
+                    429, "too_often", N_("too often in a short time: wait a minute, then go on")
+                )
 
     # Links ----------------------------------------------------------------------------------------
 
@@ -245,7 +260,7 @@ class Guard:
     def _valid(link: Link | None) -> Link:
         if link is None or link.is_revoked or link.expires < time.time():
             raise RefusedError(
-                404, "link", "this link is not valid any more: ask your instructor for a new one"
+                404, "link", N_("this link is not valid any more: ask your instructor for a new one")
             )
         return link
 
@@ -296,28 +311,19 @@ class Rim:
                 raise _TooLargeError
             return message
 
-        has_begun = False
-
         async def with_headers(message: Message) -> None:
-            nonlocal has_begun
+            if taken > most:  # whatever the application answers to that
+                return
             if message["type"] == "http.response.start":
-                has_begun = True
                 known = {name for name, _ in message["headers"]}
-                message["headers"] = [
-                    *message["headers"],
-                    *(
-                        (name.lower().encode(), value.encode())
-                        for name, value in self._headers().items()
-                        if name.lower().encode() not in known
-                    ),
-                ]
+                ours = [(name.lower().encode(), value.encode()) for name, value in self._headers().items()]
+                message["headers"] = [*message["headers"], *(one for one in ours if one[0] not in known)]
             await send(message)
 
-        try:
+        with contextlib.suppress(_TooLargeError):
             await self.app(scope, bounded, with_headers)
-        except _TooLargeError:
-            if not has_begun:
-                await _plain(send, 413, f"larger than {most // 1_000_000} MB: send a smaller file")
+        if taken > most:
+            await _plain(send, 413, f"larger than {most // 1_000_000} MB: send a smaller file")
 
     def _most(self, path: str) -> int:
         files = _FILES.fullmatch(path)

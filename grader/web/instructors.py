@@ -14,9 +14,11 @@ from pydantic import Field
 from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
-from grader.authoring.lint import lint
+from grader.authoring.lint import lint, lint_document
+from grader.documents import LintDocument
 from grader.folder.workers import result_of
 from grader.inputs.roster import read_roster
+from grader.language import N_
 from grader.lms.export import TARGETS, export, read_results, usual_name
 from grader.lms.grades import Options, people_of
 from grader.rubric import rubric_of
@@ -81,7 +83,7 @@ def sign_in(call: Called, who: SignIn) -> dict[str, Any]:
     if not is_password(account, who.password):
         call.note("sign-in refused", who.name)
         call.session.commit()
-        raise RefusedError(401, "sign_in", "the name or the password is wrong")
+        raise RefusedError(401, "sign_in", N_("the name or the password is wrong"))
     return _entered(call, account)
 
 
@@ -110,9 +112,9 @@ def join(call: Called, who: Invited) -> dict[str, Any]:
     waiting = call.session.get(Visit, digest_of(who.token))
     account = None if waiting is None else waiting.account
     if account is None or waiting is None or waiting.title != INVITATION or account.password:
-        raise RefusedError(403, "invitation", "this invitation is not valid any more: ask for a new one")
+        raise RefusedError(403, "invitation", N_("this invitation is not valid any more: ask for a new one"))
     if time.time() - waiting.created > INVITED_S:
-        raise RefusedError(403, "invitation", "this invitation is too old: ask for a new one")
+        raise RefusedError(403, "invitation", N_("this invitation is too old: ask for a new one"))
     other = call.session.scalar(select(Account).where(Account.name == who.name, Account.id != account.id))
     if other is not None:
         raise RefusedError(409, "name_taken", "somebody has this name already: choose another")
@@ -262,6 +264,13 @@ def publication(call: Called, key: Key) -> dict[str, Any]:
     }
 
 
+@router.get("/publications/{key}/lint")
+def lint_assignment(call: Called, key: Key) -> LintDocument:
+    """What `planmark lint` says of the assignment: every variant's figures, and findings."""
+    own, service = call.own(key), call.service
+    return result_of(service.queue.workers, linted, service.settings.data, own.key, own.assignment)
+
+
 @router.patch("/publications/{key}")
 def change(call: Called, key: Key, settings: Settings) -> dict[str, Any]:
     """Change settings."""
@@ -334,10 +343,15 @@ def change_settings(call: Call, publication: Publication, settings: Settings) ->
             publication.title = title.in_language(publication.lang)[:120]
 
 
-def check_assignment(data: pathlib.Path, key: str, name: str) -> list[str]:
-    """Load an assignment in a worker, whose limits bound hostile files; what lint finds."""
+def check_assignment(data: pathlib.Path, key: str, name: str) -> None:
+    """Load an assignment and its rubric, in a worker, whose limits bound hostile files."""
+    rubric_of(assignment_of(data, Publication(key=key, assignment=name)))
+
+
+def linted(data: pathlib.Path, key: str, name: str) -> LintDocument:
+    """What `planmark lint` finds, in a worker."""
     assignment = assignment_of(data, Publication(key=key, assignment=name))
-    return [str(finding) for finding in lint(assignment, rubric_of(assignment)).findings]
+    return lint_document(lint(assignment, rubric_of(assignment)))
 
 
 def facts(publication: Publication) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from reference.authored.assignment import Assignment, built_in, load_assignment
 from reference.authored.toml_file import MAX_BYTES
 from reference.errors import CallError
 
-AUTHORED = (".assignment.toml", ".mechanism.toml", ".rubric.toml", ".csv")
+AUTHORED = (".toml", ".csv")
 SUBMITTED = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".pdf", ".csv", ".json")
 LONGEST_NAME = 120
 """Of a file: with the folder before it a path stays within every file system's limit."""

@@ -12,9 +12,11 @@ from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
 from grader.documents import ProblemDocument
 from grader.feedback.advice import RESULTS, checked_lines
+from grader.feedback.sentences import PLACES
+from grader.feedback.student_page import AS_MEASURED
 from grader.feedback.words import problem_sentence, symbols
 from grader.inputs.measurements import UNITS_OF_SCALES, columns_of, measurements_in, names_of
-from grader.language import tongue
+from grader.language import N_, tongue
 from grader.marking.mark import judge
 from grader.marking.self_check import Level
 from grader.outcomes import Judgement
@@ -23,20 +25,28 @@ from grader.overlay.measured import measured_picture
 from grader.pipeline import open_page, read_pages
 from grader.records import PageRef, Problem
 from grader.rubric import rubric_of
+from grader.web.guard import RefusedError
 from reference.authored.assignment import Assignment, Variant, load_assignment
 
+RANGES = {
+    "n": N_("your number n is missing: give one from %(first)s to %(last)s"),
+    "position": N_("the position is missing: give one from %(first)s to %(last)s"),
+}
 _BARE = re.compile(r"\d*[.,]?\d+([eE][+-]?\d+)?", re.ASCII)
 
 
 def variant_of(assignment: Assignment, n: int | None, position: int | None) -> Variant:
     """A variant as a student asks for it; a number that the assignment has not is passed over.
 
-    Raises CallError for one that there is not.
+    Raises RefusedError for one that there is not.
     """
-    return assignment.variant(
-        None if assignment.numbers("n") is None else n,
-        None if assignment.numbers("position") is None else position,
-    )
+    chosen: list[int | None] = []
+    for what, value in (("n", n), ("position", position)):
+        known = assignment.numbers(what)
+        if known is not None and value not in known:
+            raise RefusedError(422, f"{what}_range", RANGES[what], first=known[0], last=known[-1])
+        chosen.append(None if known is None else value)
+    return assignment.variant(*chosen)
 
 
 def form_of(assignment: Assignment, lang: str) -> dict[str, Any]:
@@ -77,16 +87,15 @@ def checked_values(
     names = assignment.file.names
     picture = measured_picture("", entered.reading, task.construction, outcomes, show_expected=False)
     views = [] if picture is None else page_views(picture, 0, names)
-    description = speaker.gettext("as measured")
     return {
         **_told(assignment, judgement, lang, level),
         "problems": [
             one.message.removeprefix(": ") for one in (*entered.problems, *entered.reading.problems)
         ],
         "drawing": [
-            str(svg(view, picture, description))
+            str(svg(view, picture, f"{speaker.gettext(PLACES[view.kind])}, {speaker.gettext(AS_MEASURED)}"))
             for view in views
-            if picture is not None and view.kind == "sheet"
+            if picture is not None
         ],
     }
 

@@ -199,8 +199,9 @@ class Store:
     @contextmanager
     def session(self) -> Iterator[Session]:
         """A session that is committed at its end, and rolled back on any error."""
-        with self._sessions.begin() as session:
+        with self._sessions() as session:
             yield session
+            session.commit()
 
     def note(self, session: Session, who: str, act: str, about: str = "") -> None:
         """Add to the audit trail."""

@@ -15,6 +15,7 @@ from sqlalchemy.exc import IntegrityError
 
 from grader.documents import ReportDocument
 from grader.files import result_folders, write_whole
+from grader.language import N_
 from grader.lms.export import read_results
 from grader.web.guard import RefusedError, forbidden, missing
 from grader.web.places import assignment_of
@@ -140,7 +141,7 @@ def check_photo(
     ending = ending_of(body)
     waiting = select(func.count()).select_from(Job).where(Job.kind == "photo", Job.state == "queued")
     if call.session.scalar(waiting) >= MOST_WAITING:
-        raise RefusedError(503, "busy", "very many photos wait now: send yours again in some minutes")
+        raise RefusedError(503, "busy", N_("very many photos wait now: send yours again in some minutes"))
     assignment = assignment_of(call.service.settings.data, publication)
     variant = variant_of(assignment, n, position)
     left = use_attempt(call, publication, variant)
@@ -238,14 +239,14 @@ def hand_in(call: Called, key: Key, body: Body) -> dict[str, str]:
     publication = call.publication(key)
     link = personal(call, publication)
     if not publication.takes_sheets:
-        raise forbidden("sheets are not handed in here now")
+        raise forbidden(N_("sheets are not handed in here now"))
     call.count("photo")
     folder = call.places(publication).handed_in
     ending = ending_of(body)
     with _HANDING_IN:
         taken = len(list(folder.glob(f"{link.student_id}_sent*")))
         if taken >= MOST_SHEETS:
-            raise forbidden(f"{taken} sheets of yours are there already: ask your instructor")
+            raise RefusedError(403, "sheets", N_("%(count)s sheets of yours are there already"), count=taken)
         name = f"{link.student_id}_sent{taken + 1:02}{ending}"
         write_whole(folder / name, body)
     call.note("handed in", f"{publication.key} {name}")
@@ -259,7 +260,7 @@ def open_for_checks(call: Call, key: str) -> Publication:
     """A publication that students may check values against; instructors may try theirs at any time."""
     publication = call.publication(key)
     if not publication.is_open and not call.visitor.is_member(publication):
-        raise forbidden("the self-check is not open now")
+        raise forbidden(N_("the self-check is not open now"))
     return publication
 
 
@@ -277,7 +278,9 @@ def use_attempt(call: Call, publication: Publication, variant: Variant) -> int |
     more = update(Attempt).where(*own, Attempt.count < publication.attempts).values(count=Attempt.count + 1)
     count = call.session.scalar(more.returning(Attempt.count))
     if count is None:
-        raise RefusedError(403, "attempts_used", f"all {publication.attempts} attempts are used")
+        raise RefusedError(
+            403, "attempts_used", N_("all %(count)s attempts are used"), count=publication.attempts
+        )
     return publication.attempts - count
 
 
@@ -285,7 +288,7 @@ def personal(call: Call, publication: Publication) -> Link:
     """The student's personal link. Raises RefusedError for a visitor without a valid one."""
     link = call.link(publication)
     if link is None:
-        raise RefusedError(401, "link_needed", "open the personal link that you were sent")
+        raise RefusedError(401, "link_needed", N_("open the personal link that you were sent"))
     return link
 
 
@@ -294,7 +297,7 @@ def own_publication(call: Call, key: str) -> Publication:
     publication = call.publication(key)
     personal(call, publication)
     if not publication.is_released:
-        raise forbidden("the feedback is not released yet")
+        raise forbidden(N_("the feedback is not released yet"))
     return publication
 
 
@@ -323,7 +326,7 @@ def ending_of(body: bytes) -> str:
     """How a picture is stored, by its first bytes. Raises RefusedError for any other file."""
     ending = next((one for start, one in _PICTURES.items() if body.startswith(start)), None)
     if ending is None:
-        raise RefusedError(415, "file_type", "send a photo or scan: JPEG, PNG, TIFF or PDF")
+        raise RefusedError(415, "file_type", N_("send a photo or scan: JPEG, PNG, TIFF or PDF"))
     return ending
 
 
