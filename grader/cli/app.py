@@ -122,7 +122,7 @@ class Commands(_Help, TyperGroup):
 
     @staticmethod
     def _end(ctx: Any, message: str, status: int) -> None:  # noqa: ANN401 - as above
-        typer.secho(f"planmark: {message}", err=True, fg="red", color=terminal.color())
+        typer.secho(f"planmark: {terminal.shown(message)}", err=True, fg="red", color=terminal.color())
         terminal.LOG.debug("exit status %d: %s", status, message)
         ctx.exit(status)
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import typer
 
+from grader.cli import terminal
 from grader.cli.app import check_language
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
@@ -143,7 +144,7 @@ def _write_template(file: Path, rubric: RubricFile, variant: Variant, speaker: T
     writer.writerow([known.get(name, "") for name in columns])
     # With a byte order mark: spreadsheets take the file for UTF-8.
     write_whole(file, text.getvalue().encode("utf-8-sig"))
-    typer.echo(speaker.gettext(WRITTEN) % {"file": file})
+    terminal.say(speaker.gettext(WRITTEN) % {"file": file})
 
 
 def _write_page(
@@ -212,7 +213,7 @@ def _tell(lines: list[CheckedLine], level: Level, speaker: Tongue) -> None:
         if level == "full" and one.measured and one.expected:
             hint = f"{_number(one.measured)} / {_number(one.expected)}  {hint}"
         mark = typer.style(RESULTS[line.result][0], fg=STYLES[line.result])
-        typer.echo(f" {mark}  {line.name:{wide}}  ", nl=False)
+        terminal.say(f" {mark}  {line.name:{wide}}  ", nl=False)
         _print(hint, " " * (wide + 6), is_begun=True)
         if line.advice:
             _print(f"→ {line.advice}", " " * (wide + 6))

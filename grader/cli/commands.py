@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from grader.cli import terminal
 from grader.cli.app import (
     AssignmentArgument,
     AssignmentOption,
@@ -169,7 +170,7 @@ def schema(name: Annotated[str, typer.Argument(help="report, results, reading, m
 
     from grader.cli import exporting
 
-    typer.echo(json.dumps(exporting.schema(name), indent=2, ensure_ascii=False))
+    terminal.say(json.dumps(exporting.schema(name), indent=2, ensure_ascii=False))
 
 
 @app.command()

@@ -13,8 +13,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from types import ModuleType
 
-import typer
-
+from grader.cli import terminal
 from grader.cli.app import check_language, new_table, progress
 from grader.cli.checking import checked_level
 from grader.cli.terminal import note, tell_next
@@ -183,7 +182,7 @@ def read_scans(
         refs = [ref for path in scans for ref in result_of(workers, _refs, path)]
         documents = result_of(workers, _read, refs, assignment, variant, sheets=len(refs))
     if as_json:
-        typer.echo(json.dumps([document.model_dump(mode="json") for document in documents], indent=2))
+        terminal.say(json.dumps([document.model_dump(mode="json") for document in documents], indent=2))
     else:
         for document in documents:
             _print_reading(document)
@@ -306,11 +305,11 @@ def _left(results: ResultsDocument) -> str:
 
 def _list(title: str, lines: Sequence[str], page: Path) -> None:
     if lines:
-        typer.echo(title)
+        terminal.say(title)
         for line in lines[:SHOWN]:
-            typer.echo(f"  {line}")
+            terminal.say(f"  {line}")
         if len(lines) > SHOWN:
-            typer.echo(f"  ... and {len(lines) - SHOWN} more, all in {page}")
+            terminal.say(f"  ... and {len(lines) - SHOWN} more, all in {page}")
 
 
 def _waiting(results: ResultsDocument) -> Iterator[str]:

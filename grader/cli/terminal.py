@@ -12,6 +12,7 @@ from pathlib import Path
 import typer
 
 from grader import __version__
+from grader.files import in_one_line, log_to
 
 LOG = logging.getLogger("planmark")
 INTERRUPTED = 130
@@ -23,7 +24,7 @@ class _Screen(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Print a record."""
-        typer.echo(self.format(record), err=record.levelno < logging.INFO)
+        say(self.format(record), err=record.levelno < logging.INFO)
 
 
 _SCREEN = _Screen(logging.INFO)
@@ -41,14 +42,22 @@ def set_up(*, quiet: bool, verbose: bool, log: Path | None) -> None:
     LOG.setLevel(logging.DEBUG if verbose or log else level)
     LOG.propagate = False
     if log is not None:
-        from grader.files import log_to
-
         log_to(log)
 
 
 def is_quiet() -> bool:
     """Whether notes and progress are not wanted."""
     return _SCREEN.level > logging.INFO
+
+
+def shown(text: str) -> str:
+    """The text with escapes for the signs that a terminal would obey: names of files may have them."""
+    return "\n".join(map(in_one_line, text.split("\n")))
+
+
+def say(text: str, *, err: bool = False, nl: bool = True) -> None:
+    """Print a text."""
+    typer.echo(shown(text), err=err, nl=nl)
 
 
 def note(text: str) -> None:

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from grader.files import unguarded
 from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
 from grader.language import LANGUAGES, N_, ROOT_LANGUAGE, Tongue, tongue
 from grader.records import Problem
@@ -247,7 +248,9 @@ def _row(
         findings.append(Finding(f"line {number}", surplus))
         return None
     text = dict.fromkeys(COLUMNS, "")
-    text |= {name: cell.strip() for name, cell in zip(header, cells, strict=False) if name in COLUMNS}
+    text |= {
+        name: unguarded(cell.strip()) for name, cell in zip(header, cells, strict=False) if name in COLUMNS
+    }
     scans = [parse_scan(part.strip()) for part in text["scans"].split(";") if part.strip()]
     row = RosterRow(
         student_id=text["student_id"],

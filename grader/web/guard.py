@@ -8,6 +8,7 @@ token in the header `Authorization` needs none, because no browser sends it by i
 import contextlib
 import hashlib
 import hmac
+import re
 import secrets
 import time
 from collections.abc import Iterable
@@ -33,6 +34,8 @@ from reference.errors import PlanmarkError
 
 COOKIE = "planmark_visit"
 FORM_HEADER = "X-Planmark-Form"
+INVITATION = "invitation"
+"""The title of a visit that stands for an invitation: it makes an account, and opens nothing else."""
 IDLE_S = 12 * 3600.0
 """A working day: an instructor who was away longer signs in again."""
 LEAST_PASSWORD = 12
@@ -54,8 +57,10 @@ RATES: dict[str, RateLimitItem] = {
     "photo": RateLimitItemPerMinute(10),
     "key": RateLimitItemPerMinute(60),
     "upload": RateLimitItemPerMinute(3000),
+    "address": RateLimitItemPerMinute(600),
 }
-"""For each visitor; a class behind one address of a school is let through by the visit's cookie."""
+"""For each visitor; a class behind one address of a school is let through by the visit's cookie. All
+visits of an address count as `address`, too: new cookies cost nothing."""
 _HASHER = PasswordHasher()
 _NOBODY = _HASHER.hash(secrets.token_urlsafe())
 """Compared with where there is no such account: the time tells nothing."""
@@ -166,7 +171,7 @@ class Guard:
         kind, _, token = request.headers.get("authorization", "").partition(" ")
         if kind.lower() == "bearer":
             visit = session.get(Visit, digest_of(token.strip()))
-            if visit is None or not visit.title:
+            if visit is None or visit.title in {"", INVITATION}:
                 raise RefusedError(401, "token", "the token is not known")
             return Visitor(token, visit, is_program=True, address=address)
         secret = request.cookies.get(COOKIE, "")
@@ -177,16 +182,28 @@ class Guard:
             visit.used = time.time()
         return Visitor(secret or secrets.token_urlsafe(32), visit, address=address)
 
-    def begin(self, session: Session, visitor: Visitor, account: Account | None = None) -> Visit:
-        """The visit as stored; one that begins with a sign-in has a new secret."""
-        if account is not None:
-            if visitor.visit is not None and not visitor.is_program:
-                session.delete(visitor.visit)
+    def begin(
+        self, session: Session, visitor: Visitor, account: Account | None = None, link: Link | None = None
+    ) -> Visit:
+        """The visit as stored; a sign-in and a personal link give it a new secret.
+
+        Whoever put the cookie into a browser that many use does not know the new one.
+        """
+        before = visitor.visit
+        if account is not None or (link is not None and not visitor.is_program):
+            if before is not None and not visitor.is_program:
+                session.delete(before)
             visitor.secret, visitor.visit = secrets.token_urlsafe(32), None
         if visitor.visit is None:
-            visitor.visit = Visit(id=digest_of(visitor.secret), account=account, links={})
+            known = before if link is not None else None
+            visitor.visit = Visit(
+                id=digest_of(visitor.secret), account=account or (known.account if known else None),
+                links=dict(known.links) if known else {},
+            )  # fmt: skip
             session.add(visitor.visit)
-            session.flush()
+        if link is not None:
+            visitor.visit.links = {**visitor.visit.links, str(link.publication_id): link.id}
+        session.flush()
         return visitor.visit
 
     def set_cookie(self, response: Response, visitor: Visitor) -> None:
@@ -210,7 +227,7 @@ class Guard:
             return
         origin = request.headers.get("origin")
         given = request.headers.get(FORM_HEADER, "")
-        is_own = origin is None or urlsplit(origin).netloc == request.headers.get("host", "")
+        is_own = origin is None or origin.partition("://")[2] == request.headers.get("host", "")
         if not is_own or not hmac.compare_digest(given.encode(), self.form_token(visitor).encode()):
             raise forbidden(N_("the page is out of date: load it again, and repeat what you did"))
 
@@ -266,8 +283,7 @@ class Guard:
 class Rim:
     """Refuses requests for other hosts and bodies that are too large; adds the headers of safety.
 
-    Arguments: `bodies` are the bytes that a request's body may have, by the end of its path's last part
-    but one; `most` those of all others.
+    Arguments: `most` are the bytes of a body that is no file.
     """
 
     app: ASGIApp
@@ -281,7 +297,7 @@ class Rim:
             await self.app(scope, receive, send)
             return
         host = Headers(scope=scope).get("host", "")
-        if host != self.settings.host and urlsplit(f"//{host}").hostname not in self.hosts:
+        if host != self.settings.host and _name_of(host) not in self.hosts:
             await _plain(send, 421, "this address is not served here: open the server's own address")
             return
         most = self._most(scope["path"])
@@ -310,14 +326,29 @@ class Rim:
             await _plain(send, 413, f"larger than {most // 1_000_000} MB: send a smaller file")
 
     def _most(self, path: str) -> int:
-        megabytes = {"files": self.settings.upload_mb, "photos": self.settings.photo_mb}
-        parts = path.rstrip("/").split("/")
-        return next((megabytes[one] * 1_000_000 for one in parts[-2:] if one in megabytes), self.most)
+        files = _FILES.fullmatch(path)
+        if files is None:
+            return self.most
+        return 1_000_000 * (self.settings.photo_mb if files["photo"] else self.settings.upload_mb)
 
     def _headers(self) -> dict[str, str]:
         if self.settings.is_https:
             return {**HEADERS, "Strict-Transport-Security": "max-age=31536000"}
         return HEADERS
+
+
+_FILES = re.compile(
+    r"/api/v1/publications/[^/]+/(?:(?P<photo>photos|sheets)|(?:assignment/|roster/|exports/[^/]+/)?files/.+)/?"
+)
+"""Addresses to which files are sent."""
+
+
+def _name_of(host: str) -> str | None:
+    """The name in a host header, without its port; None where it has none."""
+    try:
+        return urlsplit(f"//{host}").hostname
+    except ValueError:
+        return None
 
 
 class _TooLargeError(Exception):

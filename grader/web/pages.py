@@ -140,6 +140,8 @@ def publication(call: Called, key: Key) -> Response:
 def result_page(call: Called, key: Key, path: str) -> Response:
     """A page of the results, as `planmark grade` wrote it."""
     top = call.places(call.own(key)).results.resolve()
+    if "\0" in path:
+        raise missing()
     wanted = (top / path).resolve()
     hidden = any(part.startswith(".") for part in path.split("/"))
     if hidden or not wanted.is_relative_to(top) or wanted.suffix not in {".html", ".png", ".csv"}:

@@ -69,6 +69,8 @@ class Call:
         visit = self.visitor.visit
         who = f"address {self.visitor.address}" if visit is None else f"visit {visit.id}"
         self.service.guard.count(rate, [who])
+        if visit is not None and visit.account_id is None:
+            self.service.guard.count("address", [self.visitor.address])
 
     def publication(self, key: str) -> Publication:
         """A publication by its key. Raises RefusedError where there is none."""
@@ -116,8 +118,10 @@ Called = Annotated[Call, Depends(called, scope="function")]
 Key = Annotated[str, Path(pattern=r"^[A-Za-z0-9_-]{1,64}$", description="the publication's key")]
 
 
-async def body_of(request: Request) -> bytes:
-    """The whole body, whose size `grader.web.guard.Rim` bounds."""
+async def body_of(request: Request, call: Called) -> bytes:
+    """The whole body, whose size `grader.web.guard.Rim` bounds; of a stranger no class's file is read."""
+    if "/files/" in request.url.path:
+        _ = call.account
     return await request.body()
 
 
