@@ -53,6 +53,10 @@ FLAWS = {
         "The sheet was photographed from one side, so that its far side is too small: hold the phone level"
         " above the middle of the sheet."
     ),
+    "not_placed": N_(
+        "The sheet's edges could not be followed: lay it flat, with a strip of a darker table around it, and"
+        " hold the phone level above its middle."
+    ),
     "no_sheet": N_(
         "No sheet was found in the picture: lay the sheet flat on a table of another colour, and photograph"
         " it from above with all four corners in view."
