@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 
 from grader.printed.layout import MARKER_CORNERS, PAGE_MM
-from grader.records import Flaw, FloatArray, GreyImage, Page, Sheet
+from grader.records import ZONE_SLACK_MM, Box, Flaw, FloatArray, Page, Sheet
 from grader.scan.pixels import (
     BoolArray,
     Flat,
@@ -58,12 +58,11 @@ def flaws(page: Page, sheet: Sheet | None) -> tuple[Flaw, ...]:
         mm_to_px = outline.mm_to_px
     else:
         mm_to_px = _whole_picture(page)
-    found = [
-        *_cut_corners(page, sheet, outline),
-        *_resolution(page, mm_to_px),
-        *_light(flat, mm_to_px),
-        *_blur(flat, mm_to_px),
-    ]
+    light = list(_light(flat, mm_to_px, sheet))
+    # In bad light the table may look like the paper.
+    is_seen = sheet is not None or not light
+    cut = list(_cut_corners(page, sheet, outline)) if is_seen else []
+    found = [*cut, *_resolution(page, mm_to_px), *light, *_blur(flat, mm_to_px)]
     if sheet is None and not found:
         share = 0.0 if outline is None else outline.share
         found.append(Flaw("no_sheet" if outline is None else "not_placed", share, _LEAST_PAPER))
@@ -72,7 +71,6 @@ def flaws(page: Page, sheet: Sheet | None) -> tuple[Flaw, ...]:
 
 # Where the sheet lies -----------------------------------------------------------------------------
 
-_FIFTH = 0.2
 _OUTLINE_PX = 480
 """Long side of the picture in which paper is told from the table: 1 px is a millimetre or two."""
 _LEAST_PAPER = 0.15
@@ -89,8 +87,6 @@ _SLACK = 0.01
 """Of the long side, 4 mm on A3: corners by the sides' lines are known no better where a lens bends them."""
 _PARALLEL = 1e-9
 """Of lines in pixels that have no crossing."""
-_INSIDE_MM = 10.0
-"""The frame lies 10 mm inside the paper (ISO 5457): whoever loses less loses nothing that is read."""
 _BESIDE_MM = 2.0
 """The map's own error, and a frame's that was ruled by hand."""
 
@@ -170,8 +166,12 @@ def _four_corners(hull: FloatArray, size: FloatArray) -> tuple[FloatArray, BoolA
         if seen[k]:
             steps = np.maximum(length[own], 1.0).astype(int)
             share = np.concatenate([np.linspace(0.0, 1.0, step) for step in steps])
-            points = np.repeat(hull[own], steps, axis=0) + share[:, None] * np.repeat(span[own], steps, axis=0)
-            vx, vy, x, y = cv2.fitLine(points.astype(np.float32), cv2.DIST_HUBER, 0, 0.01, 0.01).reshape(-1).tolist()
+            points = np.repeat(hull[own], steps, axis=0) + share[:, None] * np.repeat(
+                span[own], steps, axis=0
+            )
+            vx, vy, x, y = (
+                cv2.fitLine(points.astype(np.float32), cv2.DIST_HUBER, 0, 0.01, 0.01).reshape(-1).tolist()
+            )
             lines[k] = -vy, vx, vy * x - vx * y
         else:
             # It lies beyond the rim, nobody knows how far.
@@ -193,7 +193,9 @@ def _upright(corners: FloatArray, cut: BoolArray, turn_deg: int) -> tuple[FloatA
     order = np.argsort(np.arctan2(y, x))
     # Shown turned counter-clockwise, another corner is the upper left one.
     turn = np.radians(turn_deg)
-    shown = np.stack([x * np.cos(turn) + y * np.sin(turn), y * np.cos(turn) - x * np.sin(turn)], axis=1)[order]
+    shown = np.stack([x * np.cos(turn) + y * np.sin(turn), y * np.cos(turn) - x * np.sin(turn)], axis=1)[
+        order
+    ]
     first = int(shown.sum(axis=1).argmin())
     order = np.roll(order, -first)
     return corners[order], cut[order]
@@ -220,7 +222,7 @@ def _cut_corners(page: Page, sheet: Sheet | None, outline: _Outline | None) -> I
 # Resolution ---------------------------------------------------------------------------------------
 
 LEAST_DPI = 150.0
-"""What answer sheets and students are told; below it thin pencil lines are less than a pixel wide."""
+"""What students are asked for. Usual pencils are read at 110, thin and faint ones are not."""
 _FAR = 0.5
 """Of the picture: a sheet that fills less can be photographed from nearer."""
 _MOST_UNEVEN = 2.0
@@ -251,27 +253,36 @@ def _resolution(page: Page, mm_to_px: FloatArray) -> Iterator[Flaw]:
 
 # Light --------------------------------------------------------------------------------------------
 
+_PART = 0.2
+"""Of a shadow or reflection: a ninth of the sheet that holds less is not named."""
 _MAP_PX_PER_MM = 0.25
 """Of the map of the light: shadows and glare are larger than 4 mm."""
-_LEAST_PAPER_LEVEL = 50.0
-"""Of 255: darker paper leaves a pencil line less than the sensor's noise."""
-_SHADE, _LEAST_SHADE = 0.3, 0.04
-"""Light in a shadow over that beside it, and share of the sheet (a hand's breadth)."""
+_LEAST_PAPER_LEVEL = 85.0
+"""Of 255: with a phone's noise nearly all vectors were right at 120, a quarter at 73."""
+_SHADE, _LEAST_SHADE = 0.2, 0.04
+"""Light in a shadow over that beside it (nearly all vectors were right at 0.18, a quarter at 0.1), and
+share of the sheet: a hand's breadth."""
 _WHITE = 253
 """Of 255: a sensor that has reached it tells no lighter from lightest."""
 _MOST_WHITE = 0.5
+"""Of the sheet: what is whiter is no reflection."""
 _LEAST_INK = 0.3
-"""Contrast of the ink where the paper is white: a hard pencil's lines have 0.35 on a good picture."""
-_GLARE, _AROUND_GLARE = 0.01, 235.0
+"""Contrast of the ink where the paper is white: where it was 0.24, a quarter of the vectors was right."""
+_INK_QUANTILE = 0.995
+"""A drawing's ink covers about a hundredth of its paper."""
+_GLARE, _AROUND_GLARE = 0.005, 247.0
 """Share of the sheet that is white, within paper that is darker than this around it."""
 _AROUND_MM = 16.0
+"""The paper's brightness beside a reflection."""
 
 
-def _light(flat: Flat, mm_to_px: FloatArray) -> Iterator[Flaw]:
+def _light(flat: Flat, mm_to_px: FloatArray, sheet: Sheet | None) -> Iterator[Flaw]:
     """Too little light, too much of it, or uneven light."""
     step = np.array(flat.step)
-    to_paper = np.array([[1 / step[0], 0, 0.5 / step[0] - 0.5], [0, 1 / step[1], 0.5 / step[1] - 0.5], [0, 0, 1.0]])
-    inner = (_INSIDE_MM, _INSIDE_MM, PAGE_MM[0] - 2 * _INSIDE_MM, PAGE_MM[1] - 2 * _INSIDE_MM)
+    to_paper = np.array(
+        [[1 / step[0], 0, 0.5 / step[0] - 0.5], [0, 1 / step[1], 0.5 / step[1] - 0.5], [0, 0, 1.0]]
+    )
+    inner = (*_INNER_MM[0, 0], *(_INNER_MM[2, 0] - _INNER_MM[0, 0]))
     light = cut_out(flat.paper, to_paper @ mm_to_px, inner, _MAP_PX_PER_MM)
     if light.size == 0:
         return
@@ -284,8 +295,8 @@ def _light(flat: Flat, mm_to_px: FloatArray) -> Iterator[Flaw]:
         yield Flaw("shadow", float(np.quantile(light, 0.02) / level), _SHADE, _areas(shaded))
     white = light >= _WHITE
     if white.mean() > _MOST_WHITE:
-        contrast = flat.reduced(min(1.0, _INK_PX / max(flat.grey.shape)))
-        ink = float(np.quantile(contrast, 0.995)) / 255.0
+        boxes = [inner] if sheet is None or not sheet.zones else list(sheet.zones.values())
+        ink = max(_darkest(flat, mm_to_px, box) for box in boxes)
         if ink < _LEAST_INK:
             yield Flaw("overexposed", ink, _LEAST_INK)
     elif white.mean() > _GLARE:
@@ -295,16 +306,29 @@ def _light(flat: Flat, mm_to_px: FloatArray) -> Iterator[Flaw]:
             yield Flaw("glare", float(white.mean()), _GLARE, _areas(white))
 
 
+def _darkest(flat: Flat, mm_to_px: FloatArray, box: Box) -> float:
+    """Contrast of the ink in a box of the sheet, away from the line around it, 0..1."""
+    scale = min(1.0, _INK_PX / max(flat.grey.shape))
+    x, y, wide, high = box
+    edge = ZONE_SLACK_MM
+    within = (x + edge, y + edge, wide - 2 * edge, high - 2 * edge)
+    to_reduced = reduction(scale) @ mm_to_px
+    contrast = cut_out(flat.reduced(scale), to_reduced, within, _INK_PX / PAGE_MM[0])
+    return float(np.quantile(contrast, _INK_QUANTILE)) / 255.0 if contrast.size else 0.0
+
+
 def _areas(mask: BoolArray) -> tuple[str, ...]:
     """Where most of a mask of the sheet lies: the ninths that hold a fifth of it at least."""
     rows, columns = (np.minimum(np.arange(side) * 3 // side, 2) for side in mask.shape)
     counts = np.zeros((3, 3))
     np.add.at(counts, (rows[:, None], columns[None, :]), mask)
     names = [
-        "middle" if row == column == 1 else f"{_ROWS[row]}_{_COLUMNS[column]}" for row in range(3) for column in range(3)
+        "middle" if row == column == 1 else f"{_ROWS[row]}_{_COLUMNS[column]}"
+        for row in range(3)
+        for column in range(3)
     ]
     held = counts.reshape(-1) / counts.sum()
-    chosen = [name for name, share in zip(names, held, strict=True) if share >= _FIFTH]
+    chosen = [name for name, share in zip(names, held, strict=True) if share >= _PART]
     return tuple(chosen or [names[int(held.argmax())]])
 
 
@@ -327,7 +351,9 @@ _LEAST_EDGES = 60
 _SHARPEST = 0.25
 """Of the edges in one direction: a soft pencil's are wider than the lens made them."""
 _SECTORS = 4
+"""Directions by 45 degrees: a shake blurs the edges across it alone."""
 MOST_BLUR_MM = 0.6
+"""Sharp photos have 0.3 to 0.4; from 0.6 the share of right vectors falls, and sureness at 0.8."""
 _MOST_BLUR_PX = 3.0
 """An edge that is no wider is as sharp as these pixels allow."""
 
@@ -354,7 +380,9 @@ def _edge_width_px(flat: Flat, mm_to_px: FloatArray, px_per_mm: float) -> float:
     sector = (np.concatenate(angles) / np.pi * _SECTORS + 0.5).astype(int) % _SECTORS
     width = np.concatenate(widths)
     in_sector = [width[sector == k] for k in range(_SECTORS)]
-    return max((float(np.quantile(one, _SHARPEST)) for one in in_sector if len(one) >= _LEAST_EDGES), default=0.0)
+    return max(
+        (float(np.quantile(one, _SHARPEST)) for one in in_sector if len(one) >= _LEAST_EDGES), default=0.0
+    )
 
 
 def _inked_tiles(flat: Flat, mm_to_px: FloatArray, reach: int) -> Iterator[tuple[Float32Array, float]]:
@@ -367,7 +395,11 @@ def _inked_tiles(flat: Flat, mm_to_px: FloatArray, reach: int) -> Iterator[tuple
         cv2.fillConvexPoly(outline, np.rint(corners).astype(np.int32), 1)
     ink *= outline
     rows, columns = (side // _TILE_PX for side in ink.shape)
-    held = ink[: rows * _TILE_PX, : columns * _TILE_PX].reshape(rows, _TILE_PX, columns, _TILE_PX).mean(axis=(1, 3))
+    held = (
+        ink[: rows * _TILE_PX, : columns * _TILE_PX]
+        .reshape(rows, _TILE_PX, columns, _TILE_PX)
+        .mean(axis=(1, 3))
+    )
     # Filled areas have few edges.
     held[held > 0.5] = 0.0
     for place in held.reshape(-1).argsort()[::-1][:_TILES]:
