@@ -22,7 +22,7 @@ from grader.comparison.scales import Declarations, Source, declarations
 from grader.comparison.task import Task, task_of
 from grader.documents import ProblemDocument, ReportDocument
 from grader.feedback.advice import CheckedLine, checked_lines
-from grader.feedback.photos import PLANS_UNSEEN, flaw_sentence
+from grader.feedback.photos import PLANS_UNSEEN, flaw_problems, flaw_sentence
 from grader.feedback.redo_steps import with_mistakes_explained
 from grader.feedback.sentences import Level, criterion_feedback
 from grader.feedback.words import problem_sentence
@@ -285,6 +285,9 @@ def _readings(
 
 # One student's mark ---------------------------------------------------------------------------------
 
+_SURELY = 0.9
+"""Confidence from which a vector is not told to be doubtful."""
+
 
 def mark(
     submission: StudentSubmission,
@@ -326,6 +329,9 @@ def _marked(
     pages, astray = with_nodes(pages, submission, assignment)
     sheets = [reading_document(page, submission.student_id) for page in pages]
     problems = (*submission.problems, *(problem for page in pages for problem in page.problems), *astray)
+    problems += tuple(
+        flaw for page in pages if _is_doubtful(page.reading) for flaw in flaw_problems(page, submission.lang)
+    )
     judged = _judged(submission, assignment, rubric, [page.reading for page in pages])
     if isinstance(judged, Problem):
         is_there = submission.pages or submission.measured or submission.has_unusable
@@ -352,6 +358,12 @@ def _marked(
     return report, lambda ghosts: _pictures(
         pages, measured, task.construction, judgement, show_expected=ghosts
     )
+
+
+def _is_doubtful(reading: Reading) -> bool:
+    """Whether something that was asked for was not read surely: then what spoils the picture is told."""
+    vectors = [vector for figure in reading.figures.values() for vector in figure.vectors.values()]
+    return not vectors or bool(reading.unread) or any(one.confidence < _SURELY for one in vectors)
 
 
 def _judged(

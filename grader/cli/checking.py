@@ -72,9 +72,7 @@ def check_measured(
     if page is not None and page.suffix.lower() != ".html":
         raise _refused(speaker, "page_file", PAGE_NAME, file=page)
     wanted = checked_level(level, speaker)
-    if name not in built_in() and not name.endswith(".toml"):
-        raise _refused(speaker, "unknown_assignment", NO_ASSIGNMENT, name=name, names=", ".join(built_in()))
-    assignment = load_assignment(name)
+    assignment = _assignment(name, speaker)
     rubric = rubric_of(assignment)
     if template is not None:
         _write_template(template, rubric, _variant(assignment, None, n, position, speaker), speaker)
@@ -110,6 +108,33 @@ def check_measured(
         is_right = is_all_right(tuple(line.checked for line in lines))
         all_right = all_right and is_right and bool(lines) and not entered.problems
     return not (all_right and students)
+
+
+def check_photo(name: str, n: int | None, position: int | None, file: Path, lang: str, level: str) -> bool:
+    """Print what spoils a photo, and right or off for every value read on it; whether anything is off."""
+    from grader.folder.workers import Limits, Workers, result_of
+    from grader.pipeline import photo_check
+
+    check_language(lang)
+    speaker = tongue(lang)
+    wanted = checked_level(level, speaker)
+    assignment = _assignment(name, speaker)
+    variant = _variant(assignment, None, n, position, speaker)
+    with Workers(1, Limits(), photo_check.__module__) as workers:
+        told = result_of(workers, photo_check, file, assignment, rubric_of(assignment), variant, lang, wanted)
+    typer.secho(f"{file.name}, {variant}", bold=True)
+    for text in (*told.flaws.values(), *told.problems):
+        _print(text, "  ", "yellow")
+    if told.is_read:
+        _tell(list(told.lines), wanted, speaker)
+    return not told.is_all_right
+
+
+def _assignment(name: str, speaker: Tongue) -> Assignment:
+    """An assignment by its name or file; raises CallError for an unknown name."""
+    if name not in built_in() and not name.endswith(".toml"):
+        raise _refused(speaker, "unknown_assignment", NO_ASSIGNMENT, name=name, names=", ".join(built_in()))
+    return load_assignment(name)
 
 
 def _refused(speaker: Tongue, code: str, text: str, **known: object) -> CallError:

@@ -283,6 +283,10 @@ def check(
     measured: Annotated[
         Path | None, typer.Option("--measured", help="Measurement file, CSV or JSON.")
     ] = None,
+    photo: Annotated[
+        Path | None,
+        typer.Option("--photo", help="Photo or scan of the drawn sheet, instead of measurements."),
+    ] = None,
     n: NumberOption = None,
     position: PositionOption = None,
     lang: LanguageOption = "en",
@@ -296,9 +300,14 @@ def check(
         Path | None, typer.Option("--template", help="Write the CSV file to fill in.")
     ] = None,
 ) -> None:
-    """Check measured values: right, or off and in which way, without giving the answer away."""
-    from grader.cli.checking import check_measured
+    """Check measured values, or a photo: right, or off and in which way, without giving the answer away."""
+    from grader.cli.checking import check_measured, check_photo
+    from reference.errors import CallError
 
+    if photo is not None:
+        if measured is not None or page is not None or template is not None:
+            raise CallError("photo_alone", "--photo goes without --measured, --page and --template")
+        raise typer.Exit(1 if check_photo(assignment, n, position, photo, lang, level) else 0)
     is_off = check_measured(assignment, n, position, measured, lang, level, page, template)
     raise typer.Exit(1 if is_off else 0)
 

@@ -10,6 +10,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -20,11 +21,13 @@ from grader.cli.terminal import note, tell_next
 from grader.documents import AlikeDocument, MovedDocument, ReadingDocument, ResultsDocument
 from grader.feedback.class_page import CAUSES, SIGNS, write_demo_page
 from grader.feedback.class_statistics import waiting
+from grader.feedback.photos import flaw_problems
 from grader.files import make_folder, samples_folder
 from grader.folder.batch import Batch, grade
 from grader.folder.changes import standing_text
 from grader.folder.watch import arrivals
 from grader.folder.workers import Limits, Workers, result_of
+from grader.language import ROOT_LANGUAGE
 from grader.marking.report import reading_document
 from grader.pipeline import open_page, read_pages
 from grader.records import PageRef, ScannedPage
@@ -191,7 +194,10 @@ def read_scans(
 
 def _read(refs: Sequence[PageRef], assignment: Assignment, variant: Variant | None) -> list[ReadingDocument]:
     pages = [open_page(ref) for ref in refs]
-    read = read_pages(pages, assignment, variant, {}, rubric_of(assignment).vectors)
+    read = [
+        replace(page, problems=(*page.problems, *flaw_problems(page, ROOT_LANGUAGE)))
+        for page in read_pages(pages, assignment, variant, {}, rubric_of(assignment).vectors)
+    ]
     return [reading_document(page, _student_of(page)) for page in read]
 
 

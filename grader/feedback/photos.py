@@ -1,7 +1,7 @@
 """What a student is told of a photo that reads badly: what is wrong with it, and what to do."""
 
-from grader.language import N_, Tongue
-from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, Flaw
+from grader.language import N_, Tongue, tongue
+from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, Flaw, Problem, ScannedPage
 
 CORNERS = {
     "upper_left": N_("the upper left corner"),
@@ -26,6 +26,7 @@ CORNER_CUT = (
     N_("%(corners)s is not in the picture: step back until all four corners of the sheet are in view."),
     N_("%(corners)s are not in the picture: step back until all four corners of the sheet are in view."),
 )
+"""For one corner, and for several."""
 FLAWS = {
     "blurred": N_(
         "The picture is blurred: wipe the lens, tap on the sheet so that the camera focuses, and hold the"
@@ -53,6 +54,10 @@ FLAWS = {
         "The sheet was photographed from one side, so that its far side is too small: hold the phone level"
         " above the middle of the sheet."
     ),
+    "not_placed": N_(
+        "The sheet's edges could not be followed: lay it flat, with a strip of a darker table around it, and"
+        " hold the phone level above its middle."
+    ),
     "no_sheet": N_(
         "No sheet was found in the picture: lay the sheet flat on a table of another colour, and photograph"
         " it from above with all four corners in view."
@@ -70,7 +75,7 @@ PLANS_UNSEEN = {
 def flaw_sentence(flaw: Flaw, speaker: Tongue) -> str:
     """What is wrong with the picture, and what to do, in the student's language."""
     if flaw.code == "corner_cut":
-        text = speaker.ngettext(*CORNER_CUT, len(flaw.places)) % {
+        text = speaker.gettext(CORNER_CUT[len(flaw.places) > 1]) % {
             "corners": ", ".join(speaker.gettext(CORNERS[place]) for place in flaw.places)
         }
         return text[:1].upper() + text[1:]
@@ -80,3 +85,9 @@ def flaw_sentence(flaw: Flaw, speaker: Tongue) -> str:
         "limit": speaker.number(flaw.limit, 0),
     }
     return speaker.gettext(FLAWS[flaw.code]) % known
+
+
+def flaw_problems(page: ScannedPage, lang: str) -> tuple[Problem, ...]:
+    """The flaws of a page as problems of a report in a language."""
+    speaker = tongue(lang)
+    return tuple(Problem(flaw.code, flaw_sentence(flaw, speaker), page.ref.file) for flaw in page.flaws)

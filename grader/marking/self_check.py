@@ -47,7 +47,7 @@ class Checked:
 def checked_values(judgement: Judgement, level: Level, unread: Collection[str] = ()) -> tuple[Checked, ...]:
     """The part of a judgement that a level may show.
 
-    Arguments: `unread` are vectors that were asked for and could not be read on the sheet: open, at any level.
+    Arguments: `unread` are vectors of a drawing: those that could not be read are open, at any level.
     """
     return tuple(
         _checked(one, level if _is_handed_in(one) else "hint")
