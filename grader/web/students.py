@@ -140,7 +140,7 @@ def check_photo(
     call.count("photo")
     ending = ending_of(body)
     waiting = select(func.count()).select_from(Job).where(Job.kind == "photo", Job.state == "queued")
-    if call.session.scalar(waiting) >= MOST_WAITING:
+    if (call.session.scalar(waiting) or 0) >= MOST_WAITING:
         raise RefusedError(503, "busy", N_("very many photos wait now: send yours again in some minutes"))
     assignment = assignment_of(call.service.settings.data, publication)
     variant = variant_of(assignment, n, position)
@@ -281,7 +281,7 @@ def use_attempt(call: Call, publication: Publication, variant: Variant) -> int |
         raise RefusedError(
             403, "attempts_used", N_("all %(count)s attempts are used"), count=publication.attempts
         )
-    return publication.attempts - count
+    return publication.attempts - int(count)
 
 
 def personal(call: Call, publication: Publication) -> Link:
