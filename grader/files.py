@@ -12,6 +12,8 @@ from typing import Protocol
 
 from reference.errors import CallError, PlanmarkError
 
+CANNOT_WRITE = "cannot_write"
+
 
 class OutputError(PlanmarkError):
     """A file could not be written: folder missing, no room, no permission."""
@@ -33,7 +35,7 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.replace(path)
     except OSError as error:
         raise OutputError(
-            "cannot_write",
+            CANNOT_WRITE,
             f"{path}: cannot be written ({error.strerror or error}); choose another place or make room",
         ) from error
     finally:
@@ -45,8 +47,13 @@ def write_whole(path: Path, data: bytes | str) -> None:
 
     Text is stored as UTF-8 with its line ends as they are. Raises OutputError as `replacing` does.
     """
+    write_parts(path, [data])
+
+
+def write_parts(path: Path, parts: Iterable[bytes | str]) -> None:
+    """Write a file as `write_whole` does, part after part: no more than one of them is in memory."""
     with replacing(path) as temporary:
-        _write_new(temporary, data)
+        _write_parts(temporary, parts)
 
 
 def log_to(path: Path) -> None:
@@ -56,7 +63,7 @@ def log_to(path: Path) -> None:
         handler = logging.FileHandler(path, encoding="utf-8")
     except OSError as error:
         why = f"{error.strerror or error}; choose another place"
-        raise OutputError("cannot_write", f"{path}: the log cannot be written ({why})") from error
+        raise OutputError(CANNOT_WRITE, f"{path}: the log cannot be written ({why})") from error
     handler.setFormatter(logging.Formatter("%(asctime)s %(process)d %(message)s"))
     logging.getLogger("planmark").addHandler(handler)
 
@@ -76,17 +83,31 @@ def make_folder(path: Path) -> None:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(
-            "cannot_write",
+            CANNOT_WRITE,
             f"{path}: cannot be made ({error.strerror or error}); choose another place",
         ) from error
 
 
-def _write_new(path: Path, data: bytes | str) -> None:
+def _write_parts(path: Path, parts: Iterable[bytes | str]) -> None:
     """Write a file that is not there yet; raises FileExistsError for one that is."""
     with path.open("xb") as file:
-        file.write(data.encode("utf-8") if isinstance(data, str) else data)
+        for part in parts:
+            file.write(part.encode("utf-8") if isinstance(part, str) else part)
         file.flush()
         os.fsync(file.fileno())
+
+
+Stamp = tuple[int, int, int, int]
+"""Size, times of the last change of content and of the entry (ns), number of the file."""
+
+
+def stamp_of(path: Path) -> Stamp | None:
+    """By what a file is known to be unchanged without opening it; None for what cannot be opened."""
+    try:
+        known = path.stat()
+    except OSError:
+        return None
+    return known.st_size, known.st_mtime_ns, known.st_ctime_ns, known.st_ino
 
 
 def sync_folder(path: Path) -> None:
@@ -130,7 +151,7 @@ def create_whole(files: Mapping[Path, str]) -> None:
             raise _taken(Path(str(error.filename))) from error
         if isinstance(error, OSError):
             raise OutputError(
-                "cannot_write",
+                CANNOT_WRITE,
                 f"{error.filename}: cannot be written ({error.strerror or error}); choose another place",
             ) from error
         raise
