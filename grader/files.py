@@ -17,6 +17,7 @@ _FORMULA = re.compile("'*[ \u00a0\ufeff]*[=+\\-@\t\r\n＝＋－＠]")
 """How a text begins that a spreadsheet would run; an apostrophe before it says that it is text."""
 _CONTROL = re.compile("[\x00-\x08\x0a-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
 """Signs that move a terminal's cursor, begin a line of a log, or turn the order of what is read."""
+CANNOT_WRITE = "cannot_write"
 
 
 class OutputError(PlanmarkError):
@@ -39,7 +40,7 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.replace(path)
     except OSError as error:
         raise OutputError(
-            "cannot_write",
+            CANNOT_WRITE,
             f"{path}: cannot be written ({error.strerror or error}); choose another place or make room",
         ) from error
     finally:
@@ -51,8 +52,13 @@ def write_whole(path: Path, data: bytes | str) -> None:
 
     Text is stored as UTF-8 with its line ends as they are. Raises OutputError as `replacing` does.
     """
+    write_parts(path, [data])
+
+
+def write_parts(path: Path, parts: Iterable[bytes | str]) -> None:
+    """Write a file as `write_whole` does, part after part: no more than one of them is in memory."""
     with replacing(path) as temporary:
-        _write_new(temporary, data)
+        _write_parts(temporary, parts)
 
 
 def is_formula(text: str) -> bool:
@@ -96,6 +102,8 @@ def log_to(path: Path) -> None:
         why = f"{error.strerror or error}; choose another place"
         raise OutputError("cannot_write", f"{path}: the log cannot be written ({why})") from error
     handler.setFormatter(_Lines("%(asctime)s %(process)d %(message)s"))
+        raise OutputError(CANNOT_WRITE, f"{path}: the log cannot be written ({why})") from error
+    handler.setFormatter(logging.Formatter("%(asctime)s %(process)d %(message)s"))
     logging.getLogger("planmark").addHandler(handler)
 
 
@@ -114,17 +122,31 @@ def make_folder(path: Path) -> None:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(
-            "cannot_write",
+            CANNOT_WRITE,
             f"{path}: cannot be made ({error.strerror or error}); choose another place",
         ) from error
 
 
-def _write_new(path: Path, data: bytes | str) -> None:
+def _write_parts(path: Path, parts: Iterable[bytes | str]) -> None:
     """Write a file that is not there yet; raises FileExistsError for one that is."""
     with path.open("xb") as file:
-        file.write(data.encode("utf-8") if isinstance(data, str) else data)
+        for part in parts:
+            file.write(part.encode("utf-8") if isinstance(part, str) else part)
         file.flush()
         os.fsync(file.fileno())
+
+
+Stamp = tuple[int, int, int, int]
+"""Size, times of the last change of content and of the entry (ns), number of the file."""
+
+
+def stamp_of(path: Path) -> Stamp | None:
+    """By what a file is known to be unchanged without opening it; None for what cannot be opened."""
+    try:
+        known = path.stat()
+    except OSError:
+        return None
+    return known.st_size, known.st_mtime_ns, known.st_ctime_ns, known.st_ino
 
 
 def sync_folder(path: Path) -> None:
@@ -168,7 +190,7 @@ def create_whole(files: Mapping[Path, str]) -> None:
             raise _taken(Path(str(error.filename))) from error
         if isinstance(error, OSError):
             raise OutputError(
-                "cannot_write",
+                CANNOT_WRITE,
                 f"{error.filename}: cannot be written ({error.strerror or error}); choose another place",
             ) from error
         raise

@@ -14,7 +14,7 @@ from grader.documents import AlikeDocument, ReportDocument, ResultsDocument, Unm
 from grader.feedback.class_page import write_index
 from grader.feedback.sentences import Level
 from grader.feedback.student_page import About, write_feedback
-from grader.files import remove_parts, result_folders, write_whole
+from grader.files import remove_parts, result_folders, write_parts, write_whole
 from grader.folder.cache import (
     CELL_STAGE,
     CELLS_OF,
@@ -36,6 +36,7 @@ from grader.folder.changes import (
     inputs_of,
     note_inputs,
     note_run,
+    note_standings,
     noted_inputs,
     noted_run,
 )
@@ -45,7 +46,7 @@ from grader.folder.lock import only_run
 from grader.folder.owners import Unmatched, assign_pages
 from grader.folder.submissions import Unusable, submissions_of
 from grader.folder.title_block import with_written_numbers, written_owners
-from grader.folder.workers import ENDED, Limits, Pool, Workers
+from grader.folder.workers import ENDED, Limits, Pool, Whole, Workers
 from grader.inputs.measurements import StudentSubmission, names_of
 from grader.inputs.roster import Roster, read_roster
 from grader.lms.table import write_summary
@@ -165,7 +166,8 @@ def _graded(
     names, cache = names_of(batch.assignment), _page_cache(batch)
     before = earlier(batch.out / "results.json", batch.assignment.id)
     try:
-        with Workers(batch.jobs, batch.limits, __name__) if workers is None else nullcontext(workers) as pool:
+        with Workers(batch.jobs, batch.limits, __name__) if workers is None else nullcontext(workers) as some:
+            pool = Whole(some)
             contents = take_inventory(files, batch.folder, names, pool, progress, cache, decisions.place)
             students, unmatched = _submissions(batch, listed, contents, cache, pool)
             if not students and not unmatched:
@@ -514,7 +516,20 @@ def _write_results(batch: Batch, results: ResultsDocument, students: Sequence[St
     names = {submission.student_id: submission.name for submission in students}
     title = batch.assignment.file.title.in_language(batch.lang)
     write_index(results, batch.out, batch.lang, title=title, student_names=names)
-    write_whole(batch.out / "results.json", results.model_dump_json(indent=2))
+    write_parts(batch.out / "results.json", _results_text(batch.out, results))
+    note_standings(batch.out / "results.json", results)
+
+
+def _results_text(out: Path, results: ResultsDocument) -> Iterator[str]:
+    """The results as JSON, part after part: their reports are those in the files."""
+    none = '\n  "reports": []'
+    head, _, tail = results.model_copy(update={"reports": []}).model_dump_json(indent=2).partition(none)
+    folders = result_folders(results.reports)
+    yield head + none[:-1]
+    for index, folder in enumerate(folders):
+        text = (out / folder / "report.json").read_text(encoding="utf-8")
+        yield (",\n    " if index else "\n    ") + text.replace("\n", "\n    ")
+    yield ("\n  ]" if folders else "]") + tail
 
 
 # What need not be done again ----------------------------------------------------------------------

@@ -16,11 +16,12 @@ from grader.documents import (
     CriterionMovedDocument,
     MovedDocument,
     ReportDocument,
+    ResultsDocument,
     StandingDocument,
     Status,
     Verdict,
 )
-from grader.files import write_whole
+from grader.files import Stamp, stamp_of, write_whole
 from grader.inputs.measurements import StudentSubmission
 from reference.errors import CallError
 
@@ -28,6 +29,7 @@ Key = tuple[str, int | None]
 """Student and position."""
 CACHE_FOLDER = ".planmark"
 NOTE = "inputs.json"
+STANDINGS = "standings.json"
 COMMON = ("assignment", "rubric", "program")
 OWN = ("submission", "roster", "decision")
 
@@ -53,8 +55,12 @@ class EarlierReport(BaseModel):
 
     @field_validator("criteria", mode="before")
     @classmethod
-    def _with_known_verdicts(cls, criteria: list[dict[str, Any]]) -> list[dict[str, Any]]:
-        return [criterion for criterion in criteria if criterion["verdict"] in get_args(Verdict)]
+    def _with_known_verdicts(cls, criteria: list[Any]) -> list[Any]:
+        known = get_args(Verdict)
+        return [
+            criterion for criterion in criteria
+            if (criterion["verdict"] if isinstance(criterion, dict) else criterion.verdict) in known
+        ]  # fmt: skip
 
 
 class EarlierResults(BaseModel):
@@ -62,6 +68,13 @@ class EarlierResults(BaseModel):
 
     assignment: str
     reports: list[EarlierReport]
+
+
+class StandingsNote(BaseModel):
+    """What matters of the results that have this stamp."""
+
+    stamp: Stamp | None
+    results: EarlierResults | None = None
 
 
 class Inputs(BaseModel):
@@ -122,12 +135,25 @@ def _digest(*parts: object) -> str:
 def earlier(results: Path, assignment: str) -> Mapping[Key, EarlierReport] | None:
     """The last run's reports by student and position; None where there was no run of this assignment."""
     try:
-        before = EarlierResults.model_validate_json(results.read_bytes())
+        note = StandingsNote.model_validate_json((results.parent / CACHE_FOLDER / STANDINGS).read_bytes())
+    except (OSError, KeyError, TypeError, ValidationError):
+        note = StandingsNote(stamp=None)
+    try:
+        before = note.results
+        if before is None or note.stamp != stamp_of(results):
+            before = EarlierResults.model_validate_json(results.read_bytes())
     except (OSError, KeyError, TypeError, ValidationError):
         return None
     if before.assignment != assignment:
         return None
     return {(report.student_id, report.position): report for report in before.reports}
+
+
+def note_standings(results: Path, document: ResultsDocument) -> None:
+    """Leave what the next run needs of the results: those of thousands have hundreds of megabytes."""
+    standings = EarlierResults.model_validate(document, from_attributes=True)
+    note = StandingsNote(stamp=stamp_of(results), results=standings)
+    write_whole(results.parent / CACHE_FOLDER / STANDINGS, note.model_dump_json())
 
 
 def noted_inputs(folder: Path) -> Inputs:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.documents import UnmatchedDocument
-from grader.files import write_whole
+from grader.files import Stamp, stamp_of, write_whole
 from grader.folder.cache import PageCache, packed, unpacked
 from grader.folder.workers import ENDED, Pool
 from grader.inputs.measurements import Measurements, Names, read_measurements, students_in
@@ -189,8 +189,6 @@ def take_inventory(  # noqa: PLR0913, PLR0917 - what a folder is read with
 FILE_NOTES = "files.json"
 _SETTLED_NS = 2_000_000_000
 """A file changed more lately may change again without another time: the coarsest clock of a file system."""
-Stamp = tuple[int, int, int, int]
-"""Size, times of the last change of content and of the entry (ns), number of the file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,15 +197,6 @@ class Noted:
 
     stamp: Stamp | None
     pages: tuple[PageRef, ...]
-
-
-def stamp_of(path: Path) -> Stamp | None:
-    """By what a file is known to be unchanged without opening it; None for what cannot be opened."""
-    try:
-        known = path.stat()
-    except OSError:
-        return None
-    return known.st_size, known.st_mtime_ns, known.st_ctime_ns, known.st_ino
 
 
 def _noted(cache: PageCache) -> dict[str, Noted]:

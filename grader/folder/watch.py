@@ -5,8 +5,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from grader.files import Stamp, stamp_of
 from grader.folder.batch import Batch, files_of
-from grader.folder.inventory import Stamp, shown_name, stamp_of
+from grader.folder.inventory import shown_name
 
 
 def arrivals(

@@ -21,7 +21,7 @@ import psutil
 from pebble import ProcessExpired, ProcessPool
 from pebble.pool.process import WORKERS_NAME
 
-from grader.files import log_to
+from grader.files import CANNOT_WRITE, OutputError, log_to
 from grader.records import Problem
 from reference.errors import InputFileError, PlanmarkError
 
@@ -70,6 +70,25 @@ def result_of(pool: Pool, function: Callable[..., Result], *call: object, sheets
     if isinstance(result, Problem):
         raise InputFileError(result.code, result.message)
     return result
+
+
+@dataclass(frozen=True, slots=True)
+class Whole:
+    """A pool in which a file that cannot be written ends the run: that is no fault of what was handed in.
+
+    Raises OutputError from `run`.
+    """
+
+    pool: Pool
+
+    def run(
+        self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]], sheets: Iterable[int] = ()
+    ) -> Iterator[tuple[int, Result | Problem]]:
+        """As `Pool.run`."""
+        for index, result in self.pool.run(function, calls, sheets):
+            if isinstance(result, Problem) and result.code == CANNOT_WRITE:
+                raise OutputError(result.code, result.message)
+            yield index, result
 
 
 class Workers:

@@ -129,3 +129,8 @@ def test_several_positions_have_a_folder_each():
     handed_in = [("a", 1), ("a", 2), ("b", 1)]
     submissions = [StudentSubmission(student, Variant(position=position)) for student, position in handed_in]
     assert result_folders(submissions) == ["a/1", "a/2", "b"]
+
+
+def test_the_results_are_written_part_by_part_as_they_would_be_whole(class_folder, tmp_path):
+    results, _ = run(class_folder, tmp_path / "out")
+    assert (tmp_path / "out" / "results.json").read_text() == results.model_dump_json(indent=2)

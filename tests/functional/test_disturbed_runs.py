@@ -1,0 +1,137 @@
+"""Runs that are killed, find no room, or whose scans are replaced: nothing is lost, a rerun is as one run."""
+
+import json
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+SAMPLES = Path(__file__).resolve().parents[2] / "samples" / "pump"
+ROSTER = "student_id,name,n\ns01,A,7\ns02,B,12\ns08,C,21\ng08,D,21\n"
+
+
+def call(folder, out):
+    """The command that grades a folder."""
+    return [
+        sys.executable, "-m", "grader", "grade", str(folder), "--assignment", "pump", "--out", str(out),
+        "--jobs", "2",
+    ]  # fmt: skip
+
+
+@pytest.fixture
+def handed_in(tmp_path):
+    """Two students' scans and two students' values."""
+    folder = tmp_path / "in"
+    folder.mkdir()
+    for path in (*SAMPLES.glob("s01_*"), *SAMPLES.glob("s02_*")):
+        shutil.copy(path, folder / path.name)
+    entered = (SAMPLES / "s08.json").read_text(encoding="utf-8")
+    for student in ("s08", "g08"):
+        (folder / f"{student}.json").write_text(entered.replace("s08", student), encoding="utf-8")
+    (folder / "roster.csv").write_text(ROSTER, encoding="utf-8")
+    return folder
+
+
+def graded(folder, out):
+    """A run without disturbance; its results without times and without what the run before was."""
+    ended = subprocess.run(call(folder, out), capture_output=True, text=True, timeout=600, check=False)  # noqa: S603 - our own program
+    assert ended.returncode in {0, 1}, ended.stderr
+    return results_of(out)
+
+
+def results_of(out):
+    """The results in a folder, without times and without what has moved."""
+    results = json.loads((out / "results.json").read_text(encoding="utf-8"))
+    for report in results["reports"]:
+        for sheet in report["reading"]["sheets"]:
+            sheet["timing_ms"] = None
+    results["moved"] = []
+    assert not list(out.rglob("*.part"))
+    return results
+
+
+def wait_for(process, seen):
+    """Wait until something is seen, while the process lives."""
+    while process.poll() is None and not seen():
+        time.sleep(0.02)
+    assert process.poll() is None, "the run ended before it could be disturbed"
+
+
+def keys(out):
+    """The submissions that are done."""
+    return list((out / ".planmark").glob("*.key"))
+
+
+def test_a_run_killed_on_the_way_is_finished_by_the_next(handed_in, tmp_path):
+    undisturbed = graded(handed_in, tmp_path / "undisturbed")
+    out = tmp_path / "out"
+    with subprocess.Popen(  # noqa: S603 - our own program
+        call(handed_in, out), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    ) as process:
+        wait_for(process, lambda: keys(out))
+        process.send_signal(signal.SIGKILL)
+    assert not (out / "results.json").exists()
+    assert graded(handed_in, out) == undisturbed
+
+
+def test_a_killed_worker_costs_nothing(handed_in, tmp_path):
+    undisturbed = graded(handed_in, tmp_path / "undisturbed")
+    out = tmp_path / "out"
+    with subprocess.Popen(  # noqa: S603 - our own program
+        call(handed_in, out), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    ) as process:
+        wait_for(process, (out / ".planmark" / "pages").is_dir)
+        workers = [
+            child
+            for child in psutil.Process(process.pid).children()
+            if "spawn_main" in " ".join(child.cmdline())
+        ]
+        workers[0].kill()
+        assert process.wait(600) in {0, 1}
+    assert results_of(out) == undisturbed
+
+
+@pytest.mark.parametrize("room", [20_000, 100_000])
+def test_without_room_the_run_ends_with_a_message_and_the_next_one_completes_it(handed_in, tmp_path, room):
+    """A limit for each file stands for a full disk: first a report has no room, then the results alone."""
+    resource = pytest.importorskip("resource")
+    for path in handed_in.glob("*.jpg"):
+        path.unlink()
+    undisturbed = graded(handed_in, tmp_path / "undisturbed")
+    out = tmp_path / "out"
+    ended = subprocess.run(  # noqa: S603 - our own program
+        call(handed_in, out), capture_output=True, text=True, timeout=600, check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (room, room)),
+    )  # fmt: skip
+    assert ended.returncode == 5
+    assert "cannot be written" in ended.stderr
+    assert "Traceback" not in ended.stderr
+    assert not (out / "results.json").exists()
+    assert not list(out.rglob("*.part"))
+    assert graded(handed_in, out) == undisturbed
+
+
+def test_a_scan_replaced_on_the_way_is_told_or_read_whole_and_the_next_run_has_the_new_one(
+    handed_in, tmp_path
+):
+    out, other = tmp_path / "out", tmp_path / "other.jpg"
+    shutil.copy(SAMPLES / "s02_1.jpg", other)
+    with other.open("ab") as file:
+        file.write(b"another scan")
+    with subprocess.Popen(  # noqa: S603 - our own program
+        call(handed_in, out), stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True
+    ) as process:
+        for line in process.stderr:
+            if line.startswith("opening"):
+                other.replace(handed_in / "s02_1.jpg")
+                break
+        process.stderr.read()
+    report = next(each for each in results_of(out)["reports"] if each["student_id"] == "s02")
+    codes = {problem["code"] for problem in report["problems"]}
+    assert "file_changed" in codes or len(report["reading"]["sheets"]) == 2
+    assert graded(handed_in, out) == graded(handed_in, tmp_path / "undisturbed")
