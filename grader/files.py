@@ -3,14 +3,20 @@
 import contextlib
 import logging
 import os
+import re
 import secrets
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from importlib.resources import files
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from reference.errors import CallError, PlanmarkError
+
+_FORMULA = re.compile("'*[ \u00a0\ufeff]*[=+\\-@\t\r\n＝＋－＠]")
+"""How a text begins that a spreadsheet would run; an apostrophe before it says that it is text."""
+_CONTROL = re.compile("[\x00-\x08\x0a-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
+"""Signs that move a terminal's cursor, begin a line of a log, or turn the order of what is read."""
 
 
 class OutputError(PlanmarkError):
@@ -49,6 +55,38 @@ def write_whole(path: Path, data: bytes | str) -> None:
         _write_new(temporary, data)
 
 
+def is_formula(text: str) -> bool:
+    """Whether a spreadsheet would run this text."""
+    return _FORMULA.match(text) is not None
+
+
+def guarded(text: str) -> str:
+    """The text for a cell of a table, with an apostrophe where a spreadsheet would take it for a formula."""
+    return f"'{text}" if is_formula(text) else text
+
+
+def unguarded(text: str) -> str:
+    """The text of which `guarded` made this one."""
+    return text[1:] if text.startswith("'") and is_formula(text) else text
+
+
+def in_one_line(text: str) -> str:
+    """The text with escapes in the place of signs that a terminal or a log would obey."""
+    return _CONTROL.sub(lambda sign: sign[0].encode("unicode_escape").decode(), text)
+
+
+class _Lines(logging.Formatter):
+    """A record is one line, and what follows it is indented: no name or message makes a record."""
+
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - logging's own name
+        """The line."""
+        return in_one_line(super().formatMessage(record))
+
+    def formatException(self, ei: Any) -> str:  # noqa: ANN401, N802 - logging's own
+        """A traceback."""
+        return "\n".join(f"    {in_one_line(line)}" for line in super().formatException(ei).split("\n"))
+
+
 def log_to(path: Path) -> None:
     """Add what is logged to a file, from now on; raises OutputError with the system's reason."""
     try:
@@ -57,7 +95,7 @@ def log_to(path: Path) -> None:
     except OSError as error:
         why = f"{error.strerror or error}; choose another place"
         raise OutputError("cannot_write", f"{path}: the log cannot be written ({why})") from error
-    handler.setFormatter(logging.Formatter("%(asctime)s %(process)d %(message)s"))
+    handler.setFormatter(_Lines("%(asctime)s %(process)d %(message)s"))
     logging.getLogger("planmark").addHandler(handler)
 
 

@@ -12,21 +12,27 @@ becomes a problem of its page or report, never an error.
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from hashlib import blake2b
+from pathlib import Path
 
 from grader.comparison.evidence import Submission
 from grader.comparison.scales import Declarations, Source, declarations
 from grader.comparison.task import Task, task_of
-from grader.documents import ReportDocument
+from grader.documents import ProblemDocument, ReportDocument
+from grader.feedback.advice import CheckedLine, checked_lines
+from grader.feedback.photos import PLANS_UNSEEN, flaw_problems, flaw_sentence
 from grader.feedback.redo_steps import with_mistakes_explained
 from grader.feedback.sentences import Level, criterion_feedback
+from grader.feedback.words import problem_sentence
 from grader.inputs.measurements import NOTHING_MEASURED, Measurements, StudentSubmission
 from grader.inputs.scale_text import SURE, declared_scales, sure_texts, understood_scales
+from grader.language import Tongue, tongue
 from grader.marking.decided import decide, open_again, with_decisions, with_nodes
 from grader.marking.mark import judge
 from grader.marking.report import reading_document, report_of, unjudged_report
+from grader.marking.self_check import is_all_right
 from grader.outcomes import Judgement
 from grader.overlay.measured import measured_picture
 from grader.overlay.picture import backdrop, overlay
@@ -35,8 +41,8 @@ from grader.reading.page_scale import at_drawn_scales, is_drawn_otherwise, is_up
 from grader.reading.read import read_figures
 from grader.reading.sketch import drawings
 from grader.records import PageRef, Problem, Reading, ScannedPage, Sheet, Unread
-from grader.rubric import Asked, RubricFile
-from grader.scan.decode.pages import decode, is_blank
+from grader.rubric import Asked, RubricFile, asked_of
+from grader.scan.decode.pages import count_pages, decode, is_blank
 from grader.scan.handwriting.captions import (
     NUMBER_WORDS,
     POSITION_WORDS,
@@ -48,6 +54,7 @@ from grader.scan.handwriting.captions import (
 )
 from grader.scan.handwriting.fields import writing, written_lengths, written_scales
 from grader.scan.handwriting.letters import find_letters
+from grader.scan.quality import flaws
 from grader.scan.register.distortion import straighten
 from grader.scan.register.registration import register
 from grader.scan.strokes.ink import find_ink
@@ -100,6 +107,7 @@ def open_page(ref: PageRef, figures: Collection[str] = ()) -> ScannedPage:
         page = replace(page, ref=replace(ref, identity=identity))
         if isinstance(sheet, Sheet) and not image.damage:
             image, sheet = straighten(image, sheet)
+        page = replace(page, flaws=flaws(image, sheet if isinstance(sheet, Sheet) else None))
     if image.damage:
         damage = f"{image.damage} are damaged in the file, so that lengths read there would be wrong"
         why = f"{ref.file}: page {ref.page}: {damage}: scan the sheet again, or grade it by hand"
@@ -277,6 +285,9 @@ def _readings(
 
 # One student's mark ---------------------------------------------------------------------------------
 
+_SURELY = 0.9
+"""Confidence from which a vector is not told to be doubtful."""
+
 
 def mark(
     submission: StudentSubmission,
@@ -318,6 +329,9 @@ def _marked(
     pages, astray = with_nodes(pages, submission, assignment)
     sheets = [reading_document(page, submission.student_id) for page in pages]
     problems = (*submission.problems, *(problem for page in pages for problem in page.problems), *astray)
+    problems += tuple(
+        flaw for page in pages if _is_doubtful(page.reading) for flaw in flaw_problems(page, submission.lang)
+    )
     judged = _judged(submission, assignment, rubric, [page.reading for page in pages])
     if isinstance(judged, Problem):
         is_there = submission.pages or submission.measured or submission.has_unusable
@@ -344,6 +358,12 @@ def _marked(
     return report, lambda ghosts: _pictures(
         pages, measured, task.construction, judgement, show_expected=ghosts
     )
+
+
+def _is_doubtful(reading: Reading) -> bool:
+    """Whether something that was asked for was not read surely: then what spoils the picture is told."""
+    vectors = [vector for figure in reading.figures.values() for vector in figure.vectors.values()]
+    return not vectors or bool(reading.unread) or any(one.confidence < _SURELY for one in vectors)
 
 
 def _judged(
@@ -374,6 +394,109 @@ def _judged(
     evidence = Submission(drawn, by_hand, measured.values, declared.texts)
     judgement = judge(task, evidence)
     return task, open_again(judgement, rubric, submission) if is_empty else judgement, declared
+
+
+# A student's own check of a photo -------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class PhotoCheck:
+    """What a self-check tells of a photo, in the student's language; nothing in it gives the answer away.
+
+    Attributes
+    ----------
+    flaws : what spoils reading, by code, with what to do
+    problems : what else a student should know
+    lines : of every value that was asked for and drawn, or could not be read (`open`)
+    judgement : None where nothing was read
+    pictures : each page with what was read on it, without expected vectors
+    """
+
+    flaws: Mapping[str, str] = field(default_factory=dict)
+    problems: tuple[str, ...] = ()
+    lines: tuple[CheckedLine, ...] = ()
+    judgement: Judgement | None = None
+    pictures: tuple[Picture, ...] = ()
+
+    @property
+    def is_read(self) -> bool:
+        """Whether any figure of the assignment was read."""
+        return self.judgement is not None
+
+    @property
+    def is_all_right(self) -> bool:
+        """Whether something was read, and nothing is off or open."""
+        return bool(self.lines) and is_all_right(tuple(line.checked for line in self.lines))
+
+
+def photo_check(
+    path: Path, assignment: Assignment, rubric: RubricFile, variant: Variant, lang: str, level: Level = "hint"
+) -> PhotoCheck:
+    """What a student's own check of a photo, a scan, or a PDF of several tells.
+
+    Raises InputFileError for a file that is not there, CallError for an unknown language.
+    """
+    speaker = tongue(lang)
+    try:
+        count = count_pages(path)
+    except InputFileError as error:
+        if error.code == "file_missing":
+            raise
+        # The page will say why.
+        count = 1
+    refs = [PageRef(path.name, number, count, path=path) for number in range(1, count + 1)]
+    submission = StudentSubmission("", variant, tuple(refs), lang=lang)
+    asked = asked_of(assignment, rubric)
+    pages = read_submission(submission, [scan(ref, asked) for ref in refs], assignment, asked)
+    pages = [page.asked_only(rubric.vectors) for page in pages]
+    spoilt = {flaw.code: flaw_sentence(flaw, speaker) for page in pages for flaw in page.flaws}
+    readings = [page.reading for page in pages]
+    problems = [problem for page in pages for problem in (*page.problems, *_other_number(page, variant))]
+    judged = _judged(submission, assignment, rubric, readings)
+    if isinstance(judged, Problem):
+        known = [*problems, judged]
+        pictures = tuple(overlay(page.backdrop, page.reading, {}, {}) for page in pages if page.backdrop)
+        return PhotoCheck(spoilt, _said(known, speaker), pictures=pictures)
+    task, judgement, _ = judged
+    names, driven = assignment.file.names, assignment.mechanism_file.driver.pin
+    drawn = {figure for reading in readings for figure in reading.figures}
+    figures = {
+        name: task.construction.figure_of(vector.head) for name, vector in task.construction.vectors.items()
+    }
+    unread = {name for name, figure in figures.items() if figure in drawn}
+    absent = [
+        figure for figure in PLANS_UNSEEN if figure in {figures.get(one) for one in rubric.vectors} - drawn
+    ]
+    told = [*(speaker.gettext(PLANS_UNSEEN[figure]) for figure in absent), *_said(problems, speaker)]
+    lines = checked_lines(judgement, level, speaker, names, driven, unread)
+    pictures = _pictures(pages, NOTHING_MEASURED, task.construction, judgement, show_expected=False)
+    return PhotoCheck(spoilt, tuple(told), tuple(lines), judgement, pictures)
+
+
+_OF_NO_USE = frozenset(
+    {"resolution_wrong", "resolution_assumed", "paper_assumed", "upright_unsure", "title_block_unsure"}
+)
+"""Problems about which somebody with a phone can do nothing."""
+
+
+def _said(problems: Sequence[Problem], speaker: Tongue) -> tuple[str, ...]:
+    """What a student is told of problems, each once."""
+    documents = [
+        ProblemDocument(code=one.code, message=one.message, file=one.file)
+        for one in problems
+        if one.code not in _OF_NO_USE
+    ]
+    return tuple(dict.fromkeys(problem_sentence(one, speaker, brief=True).text for one in documents))
+
+
+def _other_number(page: ScannedPage, variant: Variant) -> Iterator[Problem]:
+    """Where the code of a printed sheet says another number or position than the student does."""
+    code = page.ref.identity
+    for what in ("n", "position"):
+        printed = None if code is None else getattr(code, what)
+        if printed is not None and printed != getattr(variant, what):
+            message = f"the sheet was printed for {what} = {printed}, not {variant}"
+            yield Problem(f"{what}_disagrees", message, page.ref.file)
 
 
 def _pictures(

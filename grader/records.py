@@ -36,6 +36,23 @@ class Problem:
 
 
 @dataclass(frozen=True, slots=True)
+class Flaw:
+    """What spoils the reading of a picture, as measured.
+
+    Attributes
+    ----------
+    code : as in `grader.scan.quality`
+    measured, limit : in the unit of the code
+    places : which corners, or where on the sheet: `upper_left`, `middle`, `lower_middle`, ...
+    """
+
+    code: str
+    measured: float
+    limit: float
+    places: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Page:
     """One page as stored in its file, before any rotation.
 
@@ -503,6 +520,7 @@ class ScannedPage:
     timing_ms : by stage
     narrowed : zones of the printed sheet were passed over because nothing in them is asked for
     backdrop : the cleaned scan to draw on; None where the page could not be decoded
+    flaws : what of the picture spoils reading
     """
 
     ref: PageRef
@@ -514,6 +532,7 @@ class ScannedPage:
     timing_ms: Mapping[str, float] = field(default_factory=dict)
     narrowed: bool = False
     backdrop: Backdrop | None = None
+    flaws: tuple[Flaw, ...] = ()
 
     def longer(self, factor: float, scale_se: float) -> "ScannedPage":
         """The same page where every length is so many times what it was taken for; before it is read."""

@@ -16,6 +16,7 @@ from typing import Literal
 
 import numpy as np
 
+from grader.files import guarded
 from grader.language import Tongue
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.drawing.canvas import (
@@ -161,7 +162,7 @@ def class_csv(plan: Plan, *, decimal_comma: bool = False) -> str:
     known = identity(plan.variants)
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\r\n", delimiter=";" if decimal_comma else ",")
-    writer.writerow([*(name for name, _ in known), *(column.key for column in columns)])
+    writer.writerow([*(name for name, _ in known), *(guarded(column.key) for column in columns)])
     for row in range(len(plan.variants)):
         figures = [_written(float(column.values[row]), decimal_comma) for column in columns]
         writer.writerow([*(numbers[row] for _, numbers in known), *figures])

@@ -46,20 +46,26 @@ def progress() -> Iterator[Callable[[str, int, int], None]]:
     A bar on a terminal, lines in a pipe or a file, nothing with `--quiet`.
     """
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
 
     console = Console(stderr=True, quiet=terminal.is_quiet())
     if not console.is_terminal or console.is_dumb_terminal:
         yield terminal.StepLines(STEP_S)
         return
-    columns = (TextColumn("{task.description:>8}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    pace = terminal.Pace()
+    columns = (
+        TextColumn("{task.description:>8}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[pace]}"),
+    )
     with Progress(*columns, console=console, transient=True) as bar:
         tasks: dict[str, TaskID] = {}
 
         def tell(what: str, done: int, total: int) -> None:
             if what not in tasks:
-                tasks[what] = bar.add_task(what, total=total)
-            bar.update(tasks[what], completed=done, total=total)
+                tasks[what] = bar.add_task(what, total=total, pace="")
+            bar.update(tasks[what], completed=done, total=total, pace=pace(what, done, total))
 
         yield tell
 
@@ -116,7 +122,7 @@ class Commands(_Help, TyperGroup):
 
     @staticmethod
     def _end(ctx: Any, message: str, status: int) -> None:  # noqa: ANN401 - as above
-        typer.secho(f"planmark: {message}", err=True, fg="red", color=terminal.color())
+        typer.secho(f"planmark: {terminal.shown(message)}", err=True, fg="red", color=terminal.color())
         terminal.LOG.debug("exit status %d: %s", status, message)
         ctx.exit(status)
 

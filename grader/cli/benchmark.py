@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import typer
 from rich.console import Console
 
+from grader.cli import terminal
 from grader.cli.app import new_table, progress
 from grader.files import samples_folder
 from grader.inputs.roster import read_roster
@@ -89,7 +89,7 @@ def show_benchmark(*, quick: bool, as_json: bool) -> None:
             reading.append(measure_reading(name, students=1 if quick else None))
             tell("reading", len(reading), len(CLASSES))
     if as_json:
-        typer.echo(json.dumps(_document(solver, reading), indent=2))
+        terminal.say(json.dumps(_document(solver, reading), indent=2))
     else:
         _print_tables(solver, reading)
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import typer
 
+from grader.cli import terminal
 from grader.cli.app import check_language
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
@@ -71,9 +72,7 @@ def check_measured(
     if page is not None and page.suffix.lower() != ".html":
         raise _refused(speaker, "page_file", PAGE_NAME, file=page)
     wanted = checked_level(level, speaker)
-    if name not in built_in() and not name.endswith(".toml"):
-        raise _refused(speaker, "unknown_assignment", NO_ASSIGNMENT, name=name, names=", ".join(built_in()))
-    assignment = load_assignment(name)
+    assignment = _assignment(name, speaker)
     rubric = rubric_of(assignment)
     if template is not None:
         _write_template(template, rubric, _variant(assignment, None, n, position, speaker), speaker)
@@ -111,6 +110,33 @@ def check_measured(
     return not (all_right and students)
 
 
+def check_photo(name: str, n: int | None, position: int | None, file: Path, lang: str, level: str) -> bool:
+    """Print what spoils a photo, and right or off for every value read on it; whether anything is off."""
+    from grader.folder.workers import Limits, Workers, result_of
+    from grader.pipeline import photo_check
+
+    check_language(lang)
+    speaker = tongue(lang)
+    wanted = checked_level(level, speaker)
+    assignment = _assignment(name, speaker)
+    variant = _variant(assignment, None, n, position, speaker)
+    with Workers(1, Limits(), photo_check.__module__) as workers:
+        told = result_of(workers, photo_check, file, assignment, rubric_of(assignment), variant, lang, wanted)
+    typer.secho(f"{file.name}, {variant}", bold=True)
+    for text in (*told.flaws.values(), *told.problems):
+        _print(text, "  ", "yellow")
+    if told.is_read:
+        _tell(list(told.lines), wanted, speaker)
+    return not told.is_all_right
+
+
+def _assignment(name: str, speaker: Tongue) -> Assignment:
+    """An assignment by its name or file; raises CallError for an unknown name."""
+    if name not in built_in() and not name.endswith(".toml"):
+        raise _refused(speaker, "unknown_assignment", NO_ASSIGNMENT, name=name, names=", ".join(built_in()))
+    return load_assignment(name)
+
+
 def _refused(speaker: Tongue, code: str, text: str, **known: object) -> CallError:
     """The error of a call, in the student's language."""
     return CallError(code, speaker.gettext(text) % known if known else speaker.gettext(text))
@@ -143,7 +169,7 @@ def _write_template(file: Path, rubric: RubricFile, variant: Variant, speaker: T
     writer.writerow([known.get(name, "") for name in columns])
     # With a byte order mark: spreadsheets take the file for UTF-8.
     write_whole(file, text.getvalue().encode("utf-8-sig"))
-    typer.echo(speaker.gettext(WRITTEN) % {"file": file})
+    terminal.say(speaker.gettext(WRITTEN) % {"file": file})
 
 
 def _write_page(
@@ -212,7 +238,7 @@ def _tell(lines: list[CheckedLine], level: Level, speaker: Tongue) -> None:
         if level == "full" and one.measured and one.expected:
             hint = f"{_number(one.measured)} / {_number(one.expected)}  {hint}"
         mark = typer.style(RESULTS[line.result][0], fg=STYLES[line.result])
-        typer.echo(f" {mark}  {line.name:{wide}}  ", nl=False)
+        terminal.say(f" {mark}  {line.name:{wide}}  ", nl=False)
         _print(hint, " " * (wide + 6), is_begun=True)
         if line.advice:
             _print(f"→ {line.advice}", " " * (wide + 6))

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from grader.cli import terminal
 from grader.cli.app import (
     AssignmentArgument,
     AssignmentOption,
@@ -169,7 +170,7 @@ def schema(name: Annotated[str, typer.Argument(help="report, results, reading, m
 
     from grader.cli import exporting
 
-    typer.echo(json.dumps(exporting.schema(name), indent=2, ensure_ascii=False))
+    terminal.say(json.dumps(exporting.schema(name), indent=2, ensure_ascii=False))
 
 
 @app.command()
@@ -199,6 +200,12 @@ def grade(
     memory_limit: Annotated[
         int, typer.Option("--memory-limit", min=300, help="Megabytes that a file or a sheet may take.")
     ] = 1500,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="Grade what comes into the folder, too, until Ctrl+C.")
+    ] = False,
+    every: Annotated[
+        float, typer.Option("--every", min=0.1, help="With --watch: seconds between two looks.")
+    ] = 5.0,
     cluster: Annotated[
         str | None,
         typer.Option(
@@ -219,7 +226,7 @@ def grade(
     graded = grade_folder(
         folder, assignment, out, roster=roster, pages_per_student=pages_per_student, jobs=jobs, lang=lang,
         limits=Limits(time_limit, memory_limit), level=level, with_ghosts=ghosts,
-        decisions=decisions, cluster=cluster,
+        decisions=decisions, watch_s=every if watch else None, cluster=cluster,
     )  # fmt: skip
     tell_next_of_class(graded, out, to)
     raise typer.Exit(1 if needs_person(graded) else 0)
@@ -276,6 +283,10 @@ def check(
     measured: Annotated[
         Path | None, typer.Option("--measured", help="Measurement file, CSV or JSON.")
     ] = None,
+    photo: Annotated[
+        Path | None,
+        typer.Option("--photo", help="Photo or scan of the drawn sheet, instead of measurements."),
+    ] = None,
     n: NumberOption = None,
     position: PositionOption = None,
     lang: LanguageOption = "en",
@@ -289,9 +300,14 @@ def check(
         Path | None, typer.Option("--template", help="Write the CSV file to fill in.")
     ] = None,
 ) -> None:
-    """Check measured values: right, or off and in which way, without giving the answer away."""
-    from grader.cli.checking import check_measured
+    """Check measured values, or a photo: right, or off and in which way, without giving the answer away."""
+    from grader.cli.checking import check_measured, check_photo
+    from reference.errors import CallError
 
+    if photo is not None:
+        if measured is not None or page is not None or template is not None:
+            raise CallError("photo_alone", "--photo goes without --measured, --page and --template")
+        raise typer.Exit(1 if check_photo(assignment, n, position, photo, lang, level) else 0)
     is_off = check_measured(assignment, n, position, measured, lang, level, page, template)
     raise typer.Exit(1 if is_off else 0)
 

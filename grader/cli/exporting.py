@@ -4,7 +4,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
-import typer
 from pydantic import BaseModel
 
 from grader.cli import terminal
@@ -97,6 +96,6 @@ def _report(delivery: Delivery, path: Path) -> None:
     terminal.note(f"{who}written to {path}")
     for reason, students in (("withheld", delivery.withheld), ("no place in the file", delivery.unplaced)):
         for student, why in students.items():
-            typer.echo(f"  {student}: {reason}: {why}")
+            terminal.say(f"  {student}: {reason}: {why}")
     for note in delivery.notes:
-        typer.echo(f"  note: {note}")
+        terminal.say(f"  note: {note}")

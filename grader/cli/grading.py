@@ -6,24 +6,28 @@ import math
 import os
 import re
 import shutil
+import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
-import typer
-
+from grader.cli import terminal
 from grader.cli.app import check_language, new_table, progress
 from grader.cli.checking import checked_level
 from grader.cli.terminal import note, tell_next
 from grader.documents import AlikeDocument, MovedDocument, ReadingDocument, ResultsDocument
 from grader.feedback.class_page import CAUSES, SIGNS, write_demo_page
 from grader.feedback.class_statistics import waiting
+from grader.feedback.photos import flaw_problems
 from grader.files import make_folder, samples_folder
 from grader.folder.batch import Batch, grade
 from grader.folder.changes import standing_text
+from grader.folder.watch import arrivals
 from grader.folder.workers import Limits, Workers, result_of
+from grader.language import ROOT_LANGUAGE
 from grader.marking.report import reading_document
 from grader.pipeline import open_page, read_pages
 from grader.records import PageRef, ScannedPage
@@ -46,9 +50,14 @@ def grade_folder(
     level: str = "full",
     with_ghosts: bool = True,
     decisions: Path | None = None,
+    watch_s: float | None = None,
     cluster: str | None = None,
 ) -> ResultsDocument:
-    """Grade a folder and print the outcome; with `cluster`, the address of a scheduler, on its workers."""
+    """Grade a folder and print the outcome.
+
+    Arguments: with `watch_s` what comes into it counts too, until Ctrl+C; with `cluster`, the address of a
+    scheduler, the work is done by its workers.
+    """
     check_language(lang)
     wanted = checked_level(level)
     if pages_per_student is not None and pages_per_student < 1:
@@ -71,6 +80,10 @@ def grade_folder(
         assignment, rubric, folder, out, roster, pages_per_student, jobs or os.cpu_count() or 1,
         limits or Limits(), lang, wanted, with_ghosts, decisions,
     )  # fmt: skip
+    if watch_s is not None and cluster is not None:
+        raise CallError("option_unused", "--watch looks at a folder of this machine: leave --cluster out")
+    if watch_s is not None:
+        return _watch(batch, watch_s)
     with ExitStack() as stack:
         pool = None
         if cluster is not None:
@@ -79,6 +92,42 @@ def grade_folder(
         results = grade(batch, stack.enter_context(progress()), pool)
     tell_class(results, out)
     return results
+
+
+NAMED = 4
+"""Files named of those that came together."""
+
+
+def _watch(batch: Batch, seconds: float) -> ResultsDocument:
+    """Grade what comes into a folder until Ctrl+C; the class as it then is, told as after any run."""
+    results = None
+    note(f"Watching {batch.folder}; Ctrl+C ends it")
+    with Workers(batch.jobs, batch.limits, "grader.folder.batch") as workers:
+        for now, names in _until_interrupted(arrivals(batch, seconds)):
+            try:
+                with progress() as tell:
+                    results = grade(now, tell, workers)
+            except CallError as error:
+                if error.code not in {"nothing_to_grade", "results_in_use"}:
+                    raise
+                note(f"{time.strftime('%H:%M:%S')} {error.message}")
+                continue
+            more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+            note(f"{time.strftime('%H:%M:%S')} {', '.join(names[:NAMED])}{more}; {_states(results)}")
+    if results is None:
+        raise CallError("nothing_to_grade", f"{batch.folder}: nothing came that could be graded")
+    tell_class(results, batch.out)
+    return results
+
+
+def _until_interrupted(arrived: Iterator[tuple[Batch, list[str]]]) -> Iterator[tuple[Batch, list[str]]]:
+    """What comes while nobody ends the waiting for it."""
+    while True:
+        try:
+            batch = next(arrived)
+        except KeyboardInterrupt:
+            return
+        yield batch
 
 
 _URL = re.compile(r"((?:[a-z0-9+]+::)*[a-z0-9+]{2,}):[/\\]+(.*)", re.DOTALL)
@@ -136,7 +185,7 @@ def read_scans(
         refs = [ref for path in scans for ref in result_of(workers, _refs, path)]
         documents = result_of(workers, _read, refs, assignment, variant, sheets=len(refs))
     if as_json:
-        typer.echo(json.dumps([document.model_dump(mode="json") for document in documents], indent=2))
+        terminal.say(json.dumps([document.model_dump(mode="json") for document in documents], indent=2))
     else:
         for document in documents:
             _print_reading(document)
@@ -145,7 +194,10 @@ def read_scans(
 
 def _read(refs: Sequence[PageRef], assignment: Assignment, variant: Variant | None) -> list[ReadingDocument]:
     pages = [open_page(ref) for ref in refs]
-    read = read_pages(pages, assignment, variant, {}, rubric_of(assignment).vectors)
+    read = [
+        replace(page, problems=(*page.problems, *flaw_problems(page, ROOT_LANGUAGE)))
+        for page in read_pages(pages, assignment, variant, {}, rubric_of(assignment).vectors)
+    ]
     return [reading_document(page, _student_of(page)) for page in read]
 
 
@@ -209,9 +261,7 @@ CRITERIA = 4
 
 def tell_class(results: ResultsDocument, out: Path) -> None:
     """Print states, changes, similar sheets, what waits for a person, and the paths of the results."""
-    states = Counter(report.status for report in results.reports)
-    told = ", ".join(f"{count} {state.replace('_', ' ')}" for state, count in states.most_common())
-    note(f"{len(results.reports)} submissions: {told or 'none'}")
+    note(_states(results))
     note(_left(results))
     page = out / "index.html"
     changes = [_change_line(change) for change in results.moved]
@@ -225,6 +275,12 @@ def tell_class(results: ResultsDocument, out: Path) -> None:
     _list("Decisions that are out of date, and were not applied; decide again or remove them:", stale, page)
     _list("A person must look at:", list(_waiting(results)), page)
     note(f"Look at {page}; for programs there is {out / 'results.json'}")
+
+
+def _states(results: ResultsDocument) -> str:
+    states = Counter(report.status for report in results.reports)
+    told = ", ".join(f"{count} {state.replace('_', ' ')}" for state, count in states.most_common())
+    return f"{len(results.reports)} submissions: {told or 'none'}"
 
 
 def tell_next_of_class(results: ResultsDocument, out: Path, platform: str | None = None) -> None:
@@ -255,11 +311,11 @@ def _left(results: ResultsDocument) -> str:
 
 def _list(title: str, lines: Sequence[str], page: Path) -> None:
     if lines:
-        typer.echo(title)
+        terminal.say(title)
         for line in lines[:SHOWN]:
-            typer.echo(f"  {line}")
+            terminal.say(f"  {line}")
         if len(lines) > SHOWN:
-            typer.echo(f"  ... and {len(lines) - SHOWN} more, all in {page}")
+            terminal.say(f"  ... and {len(lines) - SHOWN} more, all in {page}")
 
 
 def _waiting(results: ResultsDocument) -> Iterator[str]:

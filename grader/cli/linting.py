@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
 
-import typer
 from rich.console import Console
 from rich.table import Table
 
 from grader.authoring.findings import named
 from grader.authoring.lint import Lint, lint, lint_document
 from grader.authoring.round_scales import WELL_READ_MM, ratio_text
+from grader.cli import terminal
 from grader.cli.app import new_table
 from grader.documents import LintLeast, LintScales, LintVariant, LintWorst
 from grader.files import write_whole
@@ -39,7 +39,7 @@ def lint_assignment(name: str, *, as_json: bool, svg: Path | None) -> bool:
         sheets = [(*sheet.shapes, reason) for sheet in drawing]
         write_whole(svg, as_svg(sheets))
     if as_json:
-        typer.echo(lint_document(result).model_dump_json(indent=2))
+        terminal.say(lint_document(result).model_dump_json(indent=2))
         return result.needs_a_person
     console = Console()
     console.print(f"[bold]{assignment.file.title.en}[/bold]", highlight=False)
@@ -153,11 +153,11 @@ def _span(ends: tuple[float, float]) -> str:
 
 def _tell_end(result: Lint, svg: Path | None) -> None:
     if result.worst is not None and result.plan is not None:
-        typer.echo(f"hardest to draw: {_variant_of(result.worst)}: {result.worst.why}")
+        terminal.say(f"hardest to draw: {_variant_of(result.worst)}: {result.worst.why}")
         if svg is not None:
-            typer.echo(f"drawn in {svg}")
+            terminal.say(f"drawn in {svg}")
     elif svg is not None:
-        typer.echo("nothing drawn: no variant can be solved")
+        terminal.say("nothing drawn: no variant can be solved")
     counts = {
         severity: sum(finding.severity == severity for finding in result.findings)
         for severity in ("fault", "warning", "hint")
@@ -166,4 +166,4 @@ def _tell_end(result: Lint, svg: Path | None) -> None:
         f"{count} {severity}{'' if count == 1 else 's'}" for severity, count in counts.items() if count
     )
     many = "1 variant" if len(result.rows) == 1 else f"{len(result.rows)} variants"
-    typer.echo(f"{result.assignment.id}: {many}, {told or 'no findings'}")
+    terminal.say(f"{result.assignment.id}: {many}, {told or 'no findings'}")

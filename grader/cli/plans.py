@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import typer
 
+from grader.cli import terminal
 from grader.cli.app import new_table
 from grader.files import write_whole
 from grader.language import tongue
@@ -60,11 +60,11 @@ def show_plan(
     plan = exact_plan(assignment, variants, assignment.scales(variants, crank_mm=crank_mm))
     _draw(assignment, plan, drawings)
     if as_json:
-        typer.echo(plan_document(assignment, plan).model_dump_json(indent=2))
+        terminal.say(plan_document(assignment, plan).model_dump_json(indent=2))
         return
     _print_table(assignment, plan)
     for file in drawings.files:
-        typer.echo(f"Drawn in {file}")
+        terminal.say(f"Drawn in {file}")
 
 
 def check_crank(crank_mm: float | None) -> None:

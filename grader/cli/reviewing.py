@@ -6,9 +6,9 @@ import socket
 from dataclasses import replace
 from pathlib import Path
 
-import typer
 import uvicorn
 
+from grader.cli import terminal
 from grader.cli.app import check_language, progress
 from grader.cli.grading import fill_image, tell_class, tell_next_of_class
 from grader.folder.batch import noted_batch
@@ -43,8 +43,8 @@ def review_class(
         session.bring_up_to_date(tell)
     shown = f"[{host}]" if ":" in host else host
     address = f"http://{shown}:{listener.getsockname()[1]}/"
-    typer.echo(f"Review: {address}{f'?token={token}' if token else ''}")
-    typer.echo(f"Decisions go to {batch.decisions_path}; Ctrl+C ends the review.")
+    terminal.say(f"Review: {address}{f'?token={token}' if token else ''}")
+    terminal.say(f"Decisions go to {batch.decisions_path}; Ctrl+C ends the review.")
     _serve(listener, session, lang or batch.lang, token)
     if session.made:
         with progress() as tell:
@@ -73,4 +73,4 @@ def _serve(listener: socket.socket, session: Session, lang: str, token: str) -> 
     try:
         uvicorn.Server(config).run(sockets=[listener])
     except KeyboardInterrupt:
-        typer.echo("The review has ended.")
+        terminal.say("The review has ended.")

@@ -9,6 +9,7 @@ from urllib.parse import urlsplit
 import typer
 import uvicorn
 
+from grader.cli import terminal
 from grader.cli.reviewing import listener_on
 from reference.errors import CallError
 
@@ -41,9 +42,9 @@ def serve(
     )
     app = application(settings)
     invitation = first_invitation(settings)
-    typer.echo(f"planmark serves {settings.address}/ from {data}; Ctrl+C ends it.")
+    terminal.say(f"planmark serves {settings.address}/ from {data}; Ctrl+C ends it.")
     if invitation:
-        typer.echo(f"next: make your account at {invitation}")
+        terminal.say(f"next: make your account at {invitation}")
     if urlsplit(settings.address).scheme == "http" and host not in LOOPBACK:
         typer.secho("Passwords travel unencrypted: put it behind a proxy with https.", fg="yellow", err=True)
     _run(app, listener)
@@ -58,4 +59,4 @@ def _run(app: object, listener: socket.socket) -> None:
     try:
         uvicorn.Server(config).run(sockets=[listener])
     except KeyboardInterrupt:
-        typer.echo("The server has ended; what was queued goes on with the next start.")
+        terminal.say("The server has ended; what was queued goes on with the next start.")

@@ -6,10 +6,9 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-import typer
-
 from grader.authoring.lint import lint
 from grader.authoring.round_scales import suggestions
+from grader.cli import terminal
 from grader.cli.app import check_language, progress
 from grader.cli.terminal import note
 from grader.documents import CalibrationDocument
@@ -42,41 +41,41 @@ def calibrate_scans(scans: Sequence[Path], svg: Path | None, *, as_json: bool) -
             document = result_of(workers, calibrate, path, page)
             if isinstance(document, Unread):
                 unread = True
-                typer.echo(f"{path.name}, page {page}: {document.reason}", err=True)
+                terminal.say(f"{path.name}, page {page}: {document.reason}", err=True)
                 continue
             documents.append(document)
             if not as_json:
                 _print_page(document)
     if as_json:
-        typer.echo(json.dumps([document.model_dump(mode="json") for document in documents], indent=2))
+        terminal.say(json.dumps([document.model_dump(mode="json") for document in documents], indent=2))
     if svg is not None and documents:
         write_whole(svg, residual_map(documents[0]))
-        typer.echo(f"{svg}: where the page is off, magnified", err=True)
+        terminal.say(f"{svg}: where the page is off, magnified", err=True)
     return unread or any(document.advice != [ALL_IS_WELL] for document in documents)
 
 
 def _print_page(page: CalibrationDocument) -> None:
-    typer.echo(f"{page.source}, page {page.page}")
+    terminal.say(f"{page.source}, page {page.page}")
     if page.scale_x is not None and page.scale_y is not None and page.scale_se is not None:
         se = f"\N{PLUS-MINUS SIGN} {100.0 * page.scale_se:.3f}"
         along, across = 100.0 * page.scale_x, 100.0 * page.scale_y
-        typer.echo(f"  scale along the sheet {along:.3f} %, across it {across:.3f} % ({se})")
+        terminal.say(f"  scale along the sheet {along:.3f} %, across it {across:.3f} % ({se})")
     if page.unequal is not None:
-        typer.echo(
+        terminal.say(
             f"  unequal scale {100.0 * page.unequal:+.3f} %, right angles off by {page.skew_deg:+.3f} degrees"
         )
-    typer.echo(f"  markers off an even map by {page.residual_mm:.3f} mm")
+    terminal.say(f"  markers off an even map by {page.residual_mm:.3f} mm")
     segments = page.segments
-    typer.echo(f"  {segments.read} of {segments.printed} segments read")
+    terminal.say(f"  {segments.read} of {segments.printed} segments read")
     if segments.length_rms_mm is not None:
         mean, rms, worst = segments.length_mean_mm, segments.length_rms_mm, segments.length_worst_mm
-        typer.echo(
+        terminal.say(
             f"  their lengths are off by {mean:+.3f} mm on the mean, {rms:.3f} rms, {worst:.3f} at worst"
         )
         turn, place = segments.direction_rms_deg, segments.place_rms_mm
-        typer.echo(f"  directions {turn:.3f} degrees rms, places {place:.3f} mm rms")
+        terminal.say(f"  directions {turn:.3f} degrees rms, places {place:.3f} mm rms")
     for line in page.advice:
-        typer.echo(f"  {line}")
+        terminal.say(f"  {line}")
 
 
 # sheet --------------------------------------------------------------------------------------------
@@ -104,7 +103,7 @@ def print_sheets(
         write_whole(layout, sheets.layout.model_dump_json(indent=2))
         note(f"{layout}: where markers, zones and boxes are")
     for problem in sheets.problems:
-        typer.echo(f"note: {problem.message}", err=True)
+        terminal.say(f"note: {problem.message}", err=True)
     if not calibration and roster is not None:
         _suggest_scales(name, roster)
 
@@ -124,14 +123,14 @@ def _suggest_scales(name: str, roster: Path) -> None:
             lines.setdefault(variant, texts[variant])
     if not lines:
         return
-    typer.echo(
+    terminal.say(
         "note: easier to read than at the assignment's scales, and fitting the zones, would be", err=True
     )
     for variant, line in list(lines.items())[:SHOWN_VARIANTS]:
-        typer.echo(f"  {variant}: {line}", err=True)
+        terminal.say(f"  {variant}: {line}", err=True)
     if len(lines) > SHOWN_VARIANTS:
-        typer.echo(f"  ... and {len(lines) - SHOWN_VARIANTS} more variants", err=True)
-    typer.echo(
+        terminal.say(f"  ... and {len(lines) - SHOWN_VARIANTS} more variants", err=True)
+    terminal.say(
         "  to be written into the scale boxes by the student, or into the roster (kL, kv, ka)", err=True
     )
 
@@ -197,14 +196,14 @@ def draft_matches(
     for index, suggestion in enumerate(draft.suggestions):
         picture = thumbnails[index]
         if isinstance(picture, Problem):
-            typer.echo(f"{suggestion.source}: {picture.message}", err=True)
+            terminal.say(f"{suggestion.source}: {picture.message}", err=True)
         else:
             entries.append((suggestion, picture))
     sheet = out.with_suffix(".html")
     write_whole(out, draft_csv(roster, draft))
     write_whole(sheet, contact_sheet(entries, lang))
     open_ends = sum(not suggestion.sure for suggestion in draft.suggestions)
-    typer.echo(
+    terminal.say(
         f"{out}: a draft, {open_ends} of {len(draft.suggestions)} pages to be checked ({SURE} = certain)"
     )
     note(f"Look at {sheet}")

@@ -12,6 +12,7 @@ from pathlib import Path
 import typer
 
 from grader import __version__
+from grader.files import in_one_line, log_to
 
 LOG = logging.getLogger("planmark")
 INTERRUPTED = 130
@@ -23,7 +24,7 @@ class _Screen(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Print a record."""
-        typer.echo(self.format(record), err=record.levelno < logging.INFO)
+        say(self.format(record), err=record.levelno < logging.INFO)
 
 
 _SCREEN = _Screen(logging.INFO)
@@ -41,14 +42,22 @@ def set_up(*, quiet: bool, verbose: bool, log: Path | None) -> None:
     LOG.setLevel(logging.DEBUG if verbose or log else level)
     LOG.propagate = False
     if log is not None:
-        from grader.files import log_to
-
         log_to(log)
 
 
 def is_quiet() -> bool:
     """Whether notes and progress are not wanted."""
     return _SCREEN.level > logging.INFO
+
+
+def shown(text: str) -> str:
+    """The text with escapes for the signs that a terminal would obey: names of files may have them."""
+    return "\n".join(map(in_one_line, text.split("\n")))
+
+
+def say(text: str, *, err: bool = False, nl: bool = True) -> None:
+    """Print a text."""
+    typer.echo(shown(text), err=err, nl=nl)
 
 
 def note(text: str) -> None:
@@ -89,18 +98,43 @@ def set_encoding() -> None:
             reconfigure(encoding="utf-8", errors="replace")
 
 
+class Pace:
+    """How fast each kind of work goes on, and how long it will take; what a run finds done does not count."""
+
+    def __init__(self) -> None:
+        self._first: dict[str, tuple[float, int]] = {}
+
+    def __call__(self, what: str, done: int, total: int) -> str:
+        """``24 a minute, 2 h 05 min left``; empty before anything is known of it, and at the end."""
+        now = time.monotonic()
+        began, before = self._first.setdefault(what, (now, done))
+        if done <= before or now - began < _LEAST_S or done >= total:
+            return ""
+        a_second = (done - before) / (now - began)
+        minutes, seconds = divmod(round((total - done) / a_second), 60)
+        hours, minutes = divmod(minutes, 60)
+        left = f"{hours} h {minutes:02d} min" if hours else f"{minutes} min" if minutes else f"{seconds} s"
+        return f"{60.0 * a_second:.0f} a minute, {left} left"
+
+
+_LEAST_S = 1.0
+"""Of a shorter time no pace is told: the first results come together."""
+
+
 class StepLines:
     """Progress as lines for a pipe or a file: now and then, and when a kind of work is done."""
 
     def __init__(self, seconds: float) -> None:
         self._seconds, self._last = seconds, time.monotonic()
         self._done: dict[str, int] = {}
+        self._pace = Pace()
 
     def __call__(self, what: str, done: int, total: int) -> None:
         """Tell how much of a kind of work is done, if it is time."""
         is_end = done >= total and self._done.get(what) != done
+        pace = self._pace(what, done, total)
         self._done[what] = done
         if is_end or time.monotonic() - self._last >= self._seconds:
             self._last = time.monotonic()
             if not is_quiet():
-                typer.echo(f"{what}: {done} of {total}", err=True)
+                typer.echo(f"{what}: {done} of {total}{', ' if pace else ''}{pace}", err=True)

@@ -12,6 +12,7 @@ import typer
 
 from grader.authoring.variant_checks import broken_findings, broken_variants
 from grader.authoring.variant_table import class_csv
+from grader.cli import terminal
 from grader.cli.app import check_language, new_table, progress
 from grader.cli.plans import check_crank
 from grader.cycle.quantities import CycleSubject, Extreme, Selection, cycle_csv, extremes, strokes_of
@@ -71,13 +72,13 @@ def show_class(
         _print_pages(assignment, plan, pdf, drawings=drawings, lang=lang)
     if as_json:
         documents = [one.model_dump(mode="json") for one in plan_documents(assignment, plan)]
-        typer.echo(json.dumps(documents, indent=2, ensure_ascii=False))
+        terminal.say(json.dumps(documents, indent=2, ensure_ascii=False))
         return is_open
     if csv is None and pdf is None:
         _show_table(assignment, plan)
     for file in (csv, pdf):
         if file is not None:
-            typer.echo(f"{len(variants)} variants written to {file}")
+            terminal.say(f"{len(variants)} variants written to {file}")
     return is_open
 
 
@@ -164,10 +165,10 @@ def show_cycle(
     diagrams = _diagrams(assignment, variant, subject, selection, words, list(drawn_in))
     if csv is not None:
         write_whole(csv, cycle_csv(subject, selection, decimal_comma=words.decimal_mark == ","))
-        typer.echo(f"Written to {csv}")
+        terminal.say(f"Written to {csv}")
     for file, diagram in zip(drawn_in.values(), diagrams, strict=True):
         write_whole(file, diagram)
-        typer.echo(f"Drawn in {file}")
+        terminal.say(f"Drawn in {file}")
     if csv is None and not drawn_in:
         _print(assignment, variant, subject, selection)
 

@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from grader.files import guarded
 from reference.construction.derive import construction_of
 from reference.construction.graph import Construction
 from reference.errors import CallError
@@ -203,10 +204,10 @@ def cycle_csv(subject: CycleSubject, selection: Selection, *, decimal_comma: boo
         columns += [(f"x_{point} [m]", place.real), (f"y_{point} [m]", place.imag)]
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\r\n", delimiter=";" if decimal_comma else ",")
-    writer.writerow([*(heading for heading, _ in columns), "note"])
+    writer.writerow([*(guarded(heading) for heading, _ in columns), "note"])
     for row in range(cycle.driven.size):
         numbers = [_written(float(values[row]), decimal_comma) for _, values in columns]
-        writer.writerow([*numbers, cycle.undetermined.get(row, "")])
+        writer.writerow([*numbers, guarded(cycle.undetermined.get(row, ""))])
     return buffer.getvalue()
 
 

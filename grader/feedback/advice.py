@@ -3,7 +3,7 @@
 A mistake that the diagnosis names with certainty is told by the law that it breaks.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from grader.feedback.mistakes import ALONG_GUIDE, CORIOLIS_END, DRIVEN_ACROSS, DRIVEN_ALONG
@@ -81,6 +81,16 @@ ADVICE: dict[str, Mapping[str, str]] = {
     "scale_assumed": {"": _SCALE},
 }
 """What to look at, by code of the reason and kind of the value; `""` for every other kind."""
+_SCALE_ON_SHEET = N_("Write the scale that you used on the sheet, with its unit, such as 1:5 or 0.005 m/mm.")
+ON_SHEET = {
+    "unread": N_("Draw it clearly, with its arrow and letters, and photograph the sheet again."),
+    "doubtful": N_("Draw it clearly, with its arrow and letters, and photograph the sheet again."),
+    "not_drawn": N_("Draw it, with its arrow and letters."),
+    "near_limit": N_("Measure it on the sheet."),
+    "scale_refused": _SCALE_ON_SHEET,
+    "scale_assumed": _SCALE_ON_SHEET,
+}
+"""The same of a drawing, by code, where it differs from that of a file of measurements."""
 
 LAWS: dict[str, str] = {
     "parallel_for_perpendicular": N_(
@@ -146,11 +156,20 @@ class CheckedLine:
 
 
 def checked_lines(
-    judgement: Judgement, level: Level, speaker: Tongue, names: Mapping[str, str], driven: str
+    judgement: Judgement,
+    level: Level,
+    speaker: Tongue,
+    names: Mapping[str, str],
+    driven: str,
+    unread: Collection[str] | None = None,
 ) -> list[CheckedLine]:
     """The values that were handed in, each with its hint and one line of advice as the level allows.
 
-    Arguments: `names` renames what students know by another name, `driven` is the driven link's pin.
+    Arguments
+    ---------
+    names : renames what students know by another name
+    driven : the driven link's pin
+    unread : of a drawing, the vectors that could not be read on it; None for entered measurements
     """
     laws: dict[str, str] = {}
     told: dict[str, str] = {}
@@ -158,7 +177,8 @@ def checked_lines(
     for mistake in certain_mistakes(judgement) if level == "hint" else ():
         law = law_of(mistake)
         laws |= dict.fromkeys((one for one in mistake.explains if one not in laws), law)
-    for one in checked_values(judgement, level):
+    own = {} if unread is None else ON_SHEET
+    for one in checked_values(judgement, level, unread or ()):
         name = names.get(one.name, one.name)
         # What is right needs one reason: the others say what would be off, had it not been accepted.
         shown = one.reasons[:1] if one.result == "right" else one.reasons
@@ -169,7 +189,8 @@ def checked_lines(
             if law in told:
                 advice = speaker.gettext(_SAME) % {"name": told[law]}
             else:
-                advice = speaker.gettext(law or advice_on(one.reasons, one.name, driven))
+                on_sheet = next((own[reason.code] for reason in one.reasons if reason.code in own), "")
+                advice = speaker.gettext(law or on_sheet or advice_on(one.reasons, one.name, driven))
             told.update({law: name} if law and law not in told else {})
         lines.append(CheckedLine(one, name, hint, advice))
     return lines

@@ -1,5 +1,6 @@
 """A folder of submissions: inventory, owners, marking in parallel, results. One bad file stops nothing."""
 
+import json
 import logging
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
@@ -13,7 +14,7 @@ from grader.documents import AlikeDocument, ReportDocument, ResultsDocument, Unm
 from grader.feedback.class_page import write_index
 from grader.feedback.sentences import Level
 from grader.feedback.student_page import About, write_feedback
-from grader.files import make_folder, remove_parts, result_folders, write_whole
+from grader.files import remove_parts, result_folders, write_whole
 from grader.folder.cache import (
     CELL_STAGE,
     CELLS_OF,
@@ -40,6 +41,7 @@ from grader.folder.changes import (
 )
 from grader.folder.decisions import ClassDecisions, class_decisions, decisions_path
 from grader.folder.inventory import FileContent, Progress, submissions, take_inventory
+from grader.folder.lock import only_run
 from grader.folder.owners import Unmatched, assign_pages
 from grader.folder.submissions import Unusable, submissions_of
 from grader.folder.title_block import with_written_numbers, written_owners
@@ -57,6 +59,8 @@ from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, PlanmarkError
 
 LOG = logging.getLogger("planmark")
+ALIKE_NOTE = "alike.json"
+"""The similar sheets, and a digest of what they were found in: every sheet is compared with every other."""
 _PASSING = "file_changed"
 """A problem that the next run need not have: nothing that has it is cached."""
 
@@ -76,6 +80,7 @@ class Batch:
     folder, out : where the submissions are, and where results go
     roster : path of the roster, or None (a `roster.csv` in the folder is taken)
     decisions : path of what people decided, or None (`decisions.csv` in the folder is taken)
+    growing : files that are still being written: this run passes them over
     pages_per_student : pages of each student in one class file, blank ones not counted
     jobs, limits : worker processes, and what a file or a sheet may take in one
     lang, level : of feedback, where the roster does not say
@@ -94,6 +99,12 @@ class Batch:
     level: Level = "full"
     with_ghosts: bool = True
     decisions: Path | None = None
+    growing: tuple[Path, ...] = ()
+
+    @property
+    def roster_path(self) -> Path:
+        """Where the roster is read, whether there is such a file or not."""
+        return self.roster or self.folder / "roster.csv"
 
     @property
     def decisions_path(self) -> Path:
@@ -129,21 +140,34 @@ def graded(batch: Batch, progress: Progress, workers: Pool | None = None) -> Gra
 
     Raises CallError for a folder that is not there or holds nothing, AuthoredFileError for a roster
     with faults, InputFileError for a file of decisions that cannot be read, OutputError where results
-    cannot be written, InterruptedRunError for an interrupt.
+    cannot be written, InterruptedRunError for an interrupt; as `only_run` for a folder of results that
+    another run, or another class, has.
     """
     roster = _roster(batch)
     decisions = class_decisions(batch.decisions_path)
-    files = _files(batch)
+    files = files_of(batch)
     if not files and roster is None:
         raise _nothing(batch)
-    make_folder(batch.out)
+    with only_run(batch.out, batch.folder, batch.assignment.id):
+        note_run(_note_of(batch), batch.out / CACHE_FOLDER)
+        return _graded(batch, (roster, decisions), files, progress, workers)
+
+
+def _graded(
+    batch: Batch,
+    listed: tuple[Roster | None, ClassDecisions],
+    files: Sequence[Path],
+    progress: Progress,
+    workers: Pool | None,
+) -> Graded:
+    decisions = listed[1]
     notes = batch.out / CACHE_FOLDER
     names, cache = names_of(batch.assignment), _page_cache(batch)
     before = earlier(batch.out / "results.json", batch.assignment.id)
     try:
         with Workers(batch.jobs, batch.limits, __name__) if workers is None else nullcontext(workers) as pool:
             contents = take_inventory(files, batch.folder, names, pool, progress, cache, decisions.place)
-            students, unmatched = _submissions(batch, (roster, decisions), contents, cache, pool)
+            students, unmatched = _submissions(batch, listed, contents, cache, pool)
             if not students and not unmatched:
                 raise _nothing(batch)
             jobs = _jobs(batch, cache, students)
@@ -166,19 +190,19 @@ def graded(batch: Batch, progress: Progress, workers: Pool | None = None) -> Gra
         reports=reports,
         unmatched=[*unmatched, *decisions.problems()],
         moved=changes_since(before, reports, list(submitted), (noted_inputs(notes), inputs)),
-        alike=_similar(batch.assignment, jobs, reports, notes / "readings"),
+        alike=_similar(batch.assignment, jobs, reports, notes),
         stale=sorted(decisions.stale, key=lambda decision: decision.line),
         expected_wrong=_expected_wrong(reports),
     )
     _write_results(batch, results, students)
     note_inputs(notes, inputs)
-    note_run(_note_of(batch), notes)
     return Graded(results, tuple(jobs), pages, cache)
 
 
 def _note_of(batch: Batch) -> RunNote:
     return RunNote(
         assignment=str(batch.assignment.path),
+        assignment_id=batch.assignment.id,
         folder=batch.folder.resolve(),
         out=batch.out.resolve(),
         roster=None if batch.roster is None else batch.roster.resolve(),
@@ -224,14 +248,15 @@ def needs_person(results: ResultsDocument) -> bool:
 
 
 def _roster(batch: Batch) -> Roster | None:
-    path = batch.roster or batch.folder / "roster.csv"
+    path = batch.roster_path
     return read_roster(path) if batch.roster is not None or path.is_file() else None
 
 
-def _files(batch: Batch) -> list[Path]:
+def files_of(batch: Batch) -> list[Path]:
+    """The files handed in. Raises CallError where there is no such folder."""
     if not batch.folder.is_dir():
         raise CallError("folder_missing", f"{batch.folder}: there is no such folder")
-    others = (batch.out, batch.decisions_path, *batch.assignment.own_files)
+    others = (batch.out, batch.decisions_path, *batch.growing, *batch.assignment.own_files)
     return submissions(batch.folder, batch.roster, passed_over=others)
 
 
@@ -311,9 +336,24 @@ def _authored(assignment: Assignment) -> tuple[str, str]:
 
 
 def _similar(
+    assignment: Assignment, jobs: Sequence[Job], reports: Sequence[ReportDocument], notes: Path
+) -> list[AlikeDocument]:
+    """The similar sheets among those that were marked; the last run's where it was the same class."""
+    key = digest_of([(job.key, bool(report.criteria)) for job, report in zip(jobs, reports, strict=True)])
+    try:
+        known, alike = json.loads((notes / ALIKE_NOTE).read_bytes())
+        if known == key:
+            return [AlikeDocument.model_validate(one) for one in alike]
+    except (OSError, TypeError, ValueError):
+        pass
+    similar = _compared(assignment, jobs, reports, notes / "readings")
+    write_whole(notes / ALIKE_NOTE, json.dumps((key, [one.model_dump(mode="json") for one in similar])))
+    return similar
+
+
+def _compared(
     assignment: Assignment, jobs: Sequence[Job], reports: Sequence[ReportDocument], readings: Path
 ) -> list[AlikeDocument]:
-    """The similar sheets among those that were marked."""
     marked = [
         (job, compared_submission(report, job.submission.variant, job.submission.measured))
         for job, report in zip(jobs, reports, strict=True)

@@ -220,33 +220,33 @@ class PageCache:
     printed_key: str = ""
 
     def path_of(self, ref: PageRef) -> Path:
-        """Where a page's scan is; beside it, in a file that is quickly read, is what `identified` tells."""
+        """Where a page's scan is."""
         placed = (ref.turn_deg, ref.corners_px)
         return self.folder / f"{digest_of((self.key, ref.file, ref.page, ref.digest, *placed))}.page"
 
     def identified(self, ref: PageRef) -> PageRef:
         """The page with what is on it: whether it is blank, and whose by its QR code. Scans it if need be."""
-        try:
-            (page,) = _pages_in(self.path_of(ref).with_suffix(".ref"), "", "")
-        except (OSError, ValueError):
-            page = self._scanned(ref)
-        return replace(page.ref, pages=ref.pages, path=ref.path)
+        known = self._known(ref).ref
+        return replace(
+            ref, blank=known.blank, identity=known.identity, content=known.content, problem=known.problem
+        )
 
     def page(self, ref: PageRef) -> ScannedPage:
         """The page as scanned by this run or an earlier one."""
+        return replace(self._known(ref), ref=ref)
+
+    def _known(self, ref: PageRef) -> ScannedPage:
         try:
             (page,) = _pages_in(self.path_of(ref), "", self.printed_key)
         except (OSError, ValueError):
             page = self._scanned(ref)
-        return replace(page, ref=ref)
+        return page
 
     def _scanned(self, ref: PageRef) -> ScannedPage:
         """The page scanned now, and stored unless it has a problem."""
         page = scan(ref, self.asked)
         if page.ref.problem is None:
-            path = self.path_of(ref)
-            write_whole(path, dumped(("", self.printed_key, [page])))
-            write_whole(path.with_suffix(".ref"), dumped(("", "", [ScannedPage(page.ref)])))
+            write_whole(self.path_of(ref), dumped(("", self.printed_key, [page])))
         return page
 
     def drop_others(self, refs: Iterable[PageRef]) -> None:

@@ -152,6 +152,8 @@ class RunNote(BaseModel):
     """What `planmark grade` was called with last; all paths absolute."""
 
     assignment: str
+    assignment_id: str = ""
+    """Empty in notes of earlier versions."""
     folder: Path
     out: Path
     roster: Path | None = None
@@ -176,11 +178,11 @@ def noted_run(folder: Path) -> RunNote:
     """
     if not folder.is_dir():
         raise CallError("folder_missing", f"{folder}: there is no such folder")
-    own, here = _read_note(folder), folder.resolve()
+    own, here = earlier_run(folder), folder.resolve()
     if own is None:
         places = (here, here.parent, here.parent.parent, Path.cwd())
         outs = {path.parents[1] for top in places for path in top.glob(f"*/{CACHE_FOLDER}/{RUN_NOTE}")}
-        notes = {out: note for out in outs if (note := _read_note(out)) is not None and note.folder == here}
+        notes = {out: note for out in outs if (note := earlier_run(out)) is not None and note.folder == here}
         last = max(notes, default=None, key=lambda out: (out / CACHE_FOLDER / RUN_NOTE).stat().st_mtime_ns)
         own = None if last is None else notes[last]
     if own is None:
@@ -192,8 +194,8 @@ def noted_run(folder: Path) -> RunNote:
     return own
 
 
-def _read_note(out: Path) -> RunNote | None:
-    """The note in a folder of results, which may have been moved since; None without one."""
+def earlier_run(out: Path) -> RunNote | None:
+    """The last run into a folder of results, which may have been moved since; None where nothing says."""
     try:
         note = RunNote.model_validate_json((out / CACHE_FOLDER / RUN_NOTE).read_bytes())
     except (OSError, ValidationError):

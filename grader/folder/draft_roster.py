@@ -21,6 +21,7 @@ from html import escape
 import numpy as np
 import simplejpeg
 
+from grader.files import guarded
 from grader.folder.owners import How, Owned, assign_pages
 from grader.inputs.roster import COLUMNS, DRAFT_COLUMNS, Roster, RosterRow
 from grader.language import N_, Tongue, tongue
@@ -203,7 +204,7 @@ def draft_csv(roster: Roster, draft: RosterDraft) -> str:
     writer.writerow([*COLUMNS, *DRAFT_COLUMNS])
     for row in roster.rows:
         mine = [suggestion for suggestion in draft.suggestions if suggestion.row is row]
-        writer.writerow([*_cells(row), *_judged(row, mine)])
+        writer.writerow(map(guarded, [*_cells(row), *_judged(row, mine)]))
     return text.getvalue()
 
 

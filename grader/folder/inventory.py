@@ -5,14 +5,17 @@ file is opened and each page is decoded in a worker: a page that ends its worker
 alone. The contents of files that an earlier run has read are taken from the cache.
 """
 
+import json
 import os
 import re
-from collections.abc import Callable, Iterable, Sequence
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.documents import UnmatchedDocument
-from grader.folder.cache import PageCache
+from grader.files import write_whole
+from grader.folder.cache import PageCache, packed, unpacked
 from grader.folder.workers import ENDED, Pool
 from grader.inputs.measurements import Measurements, Names, read_measurements, students_in
 from grader.records import PageRef, Problem
@@ -139,24 +142,39 @@ def take_inventory(  # noqa: PLR0913, PLR0917 - what a folder is read with
     cache : takes the pages as scanned; pages that are not there any more are dropped from it
     place : all pages with the turns and corners that people gave, in the same order
     """
+    shown = [shown_name(path, folder) for path in files]
+    stamps = [stamp_of(path) for path in files]
+    noted = _noted(cache)
     contents = [FileContent()] * len(files)
-    calls = [(path, shown_name(path, folder), names) for path in files]
-    for done, (index, result) in enumerate(workers.run(open_file, calls), start=1):
-        contents[index] = _failed(calls[index][1], result) if isinstance(result, Problem) else result
-        progress("opening", done, len(calls))
-    waiting = [
-        (index, page) for index, content in enumerate(contents) for page in content.pages if not page.problem
-    ]
-    pages = {
-        index: [page for page in content.pages if page.problem] for index, content in enumerate(contents)
-    }
+    anew: list[int] = []
+    for index, (name, stamp) in enumerate(zip(shown, stamps, strict=True)):
+        known = noted.get(name)
+        if known is not None and stamp is not None and known.stamp == stamp:
+            contents[index] = FileContent(tuple(replace(page, path=files[index]) for page in known.pages))
+        else:
+            anew.append(index)
+    progress("opening", len(files) - len(anew), len(files))
+    opened = workers.run(open_file, [(files[index], shown[index], names) for index in anew])
+    for done, (number, result) in enumerate(opened, start=len(files) - len(anew) + 1):
+        index = anew[number]
+        contents[index] = _failed(shown[index], result) if isinstance(result, Problem) else result
+        progress("opening", done, len(files))
+    waiting = [(index, page) for index in anew for page in contents[index].pages if not page.problem]
+    pages = {index: list(content.pages) for index, content in enumerate(contents)}
+    for index in anew:
+        pages[index] = [page for page in contents[index].pages if page.problem]
+    total = len(waiting) + sum(len(content.pages) for content in contents)
+    total -= sum(len(contents[index].pages) for index in anew)
+    if total:
+        progress("looking", total - len(waiting), total)
     scans = workers.run(identify_page, [(cache, page) for _, page in waiting])
-    for done, (number, page) in enumerate(scans, start=1):
+    for done, (number, page) in enumerate(scans, start=total - len(waiting) + 1):
         index, ref = waiting[number]
         pages[index].append(_with_problem(ref, page, workers) if isinstance(page, Problem) else page)
-        progress("looking", done, len(waiting))
+        progress("looking", done, total)
     ordered = [sorted(pages[index], key=lambda page: page.page) for index in range(len(contents))]
     scanned = [page for several in ordered for page in several]
+    _note(cache, files, dict(zip(shown, map(Noted, stamps, map(tuple, ordered)), strict=True)))
     placed = iter(place(scanned))
     contents = [
         replace(content, pages=tuple(next(placed) for _ in several))
@@ -164,6 +182,60 @@ def take_inventory(  # noqa: PLR0913, PLR0917 - what a folder is read with
     ]
     cache.drop_others([*scanned, *(page for content in contents for page in content.pages)])
     return contents
+
+
+# Files as they were at the last run -----------------------------------------------------------------
+
+FILE_NOTES = "files.json"
+_SETTLED_NS = 2_000_000_000
+"""A file changed more lately may change again without another time: the coarsest clock of a file system."""
+Stamp = tuple[int, int, int, int]
+"""Size, times of the last change of content and of the entry (ns), number of the file."""
+
+
+@dataclass(frozen=True, slots=True)
+class Noted:
+    """A file as it was when its pages were looked at."""
+
+    stamp: Stamp | None
+    pages: tuple[PageRef, ...]
+
+
+def stamp_of(path: Path) -> Stamp | None:
+    """By what a file is known to be unchanged without opening it; None for what cannot be opened."""
+    try:
+        known = path.stat()
+    except OSError:
+        return None
+    return known.st_size, known.st_mtime_ns, known.st_ctime_ns, known.st_ino
+
+
+def _noted(cache: PageCache) -> dict[str, Noted]:
+    """What the last run noted of each file, by the file's name; empty where it was another program's."""
+    try:
+        key, files = json.loads((cache.folder.parent / FILE_NOTES).read_bytes())
+        known = {name: Noted(tuple(stamp), unpacked(pages, ())) for name, (stamp, pages) in files.items()}
+    except (OSError, KeyError, TypeError, ValueError):
+        return {}
+    return known if key == cache.key else {}
+
+
+def _note(cache: PageCache, files: Sequence[Path], seen: Mapping[str, Noted]) -> None:
+    """Note the pages of all files that did not change while they were read, and have no problem."""
+    now = time.time_ns()
+    settled = {
+        name: (noted.stamp, packed([replace(page, path=Path()) for page in noted.pages], []))
+        for path, (name, noted) in zip(files, seen.items(), strict=True)
+        if noted.stamp is not None
+        and noted.pages
+        and not any(page.problem for page in noted.pages)
+        and now - max(noted.stamp[1:3]) > _SETTLED_NS
+        and noted.stamp == stamp_of(path)
+    }
+    write_whole(cache.folder.parent / FILE_NOTES, json.dumps((cache.key, settled)))
+
+
+# Opening -------------------------------------------------------------------------------------------
 
 
 def open_file(path: Path, name: str, names: Names) -> FileContent:

@@ -18,7 +18,7 @@ Codes of the problems:
 """
 
 import difflib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import PurePath
@@ -135,12 +135,11 @@ def assign_pages(  # noqa: PLR0913 - a source of owners each
     return PageOwners(tuple(owned), tuple(unmatched), tuple(blank), tuple(_missing_scans(pages, listed)))
 
 
-def student_of_name(file: str, student_ids: Iterable[str]) -> str | None:
+def student_of_name(file: str, student_ids: Container[str]) -> str | None:
     """The student whom a file's name tells: its stem, or its longest part before a ``_``, is an id."""
-    known = set(student_ids)
     part = PurePath(file).stem
     while part:
-        if part in known:
+        if part in student_ids:
             return part
         part = part.rpartition("_")[0]
     return None
@@ -153,9 +152,11 @@ def _improvised(pages: Sequence[PageRef], student_ids: Iterable[str]) -> Roster:
     """
     rows: dict[tuple[str, int | None], RosterRow] = {}
     spelled: dict[str, str] = {}
+    ids: set[str] = set()
 
     def add(row: RosterRow) -> None:
         other = spelled.setdefault(row.student_id.lower(), row.student_id)
+        ids.add(other)
         if other == row.student_id and why_no_id(row.student_id) is None:
             rows[row.student_id, row.position] = row
 
@@ -170,7 +171,7 @@ def _improvised(pages: Sequence[PageRef], student_ids: Iterable[str]) -> Roster:
     stems = {PurePath(page.file).stem for page in pages if page.identity is None and not page.blank}
     for stem in sorted(stems, key=lambda stem: (len(stem), stem)):
         # A second sheet's s07_2 belongs to s07 where there is one.
-        if student_of_name(f"{stem}.x", spelled.values()) is None:
+        if student_of_name(f"{stem}.x", ids) is None:
             add(RosterRow(stem))
     return Roster("", tuple(rows.values()))
 
@@ -180,11 +181,15 @@ def _certain_claims(page: PageRef, roster: Roster) -> list[_Claim]:
     claims: list[_Claim] = []
     if page.identity is not None:
         claims.append(_code_claim(page.identity, roster))
-    rows = tuple(row for row in roster.rows if any(ref.covers(page.file, page.page) for ref in row.scans))
+    rows = tuple(
+        row
+        for row in roster.by_scan.get(page.file, ())
+        if any(ref.covers(page.file, page.page) for ref in row.scans)
+    )
     if rows:
         lines = " and ".join(_who(row) for row in rows)
         claims.append(_Claim(How.SCANS, rows, f"the roster's scans: {lines}"))
-    student = student_of_name(page.file, roster.student_ids)
+    student = student_of_name(page.file, roster.by_student)
     if student is not None:
         claims.append(_Claim(How.NAME, roster.rows_of(student), f"the file's name: {student}"))
     return claims

@@ -11,9 +11,11 @@ those of `grader.folder.owners`:
 """
 
 import re
+from collections import ChainMap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
+from typing import Any
 
 from grader.documents import UnmatchedDocument
 from grader.folder.owners import How, Owned, PageOwners, student_of_name
@@ -63,6 +65,8 @@ class _Submissions:
     """Ids by their letters in lower case: folders whose names differ in case only may be one."""
     said: dict[str, set[str]] = field(default_factory=dict)
     """The students whom each measurement file names in itself."""
+    everybody: dict[str, None] = field(default_factory=dict)
+    """The students whom any measurement file names."""
     named: dict[str, str | None] = field(default_factory=dict)
     """The student whom each file's name tells."""
 
@@ -103,7 +107,7 @@ class _Submissions:
         """
         said = self.said.get(file, set())
         if file not in self.named:
-            ids = set(self.keys).union(*(() if self.roster is not None else self.said.values()))
+            ids = self.keys if self.roster is not None else ChainMap[str, Any](self.keys, self.everybody)
             self.named[file] = student_of_name(file, ids) if len(said) <= 1 else None
             stem = PurePath(file).stem
             is_json = file.lower().endswith(".json") and self.roster is None and why_no_id(stem) is None
@@ -172,6 +176,7 @@ def submissions_of(
     for entered in measured:
         said = submissions.said.setdefault(entered.source, set())
         said.update([] if entered.student_id is None else [entered.student_id])
+        submissions.everybody.update(dict.fromkeys(said))
     unusable = [refusal for refusal in map(submissions.take, measured) if refusal is not None]
     pages = [Unusable((page.problem,), page.students) for page in owners.unmatched]
     for refusal in (*unusable, *(_by_name(submissions, file) for file in refused), *pages):
@@ -189,6 +194,7 @@ def _by_name(submissions: _Submissions, refused: Unusable) -> Unusable:
     """A file that cannot be used, with the student whom its name tells among those whose it may be."""
     file = refused.problems[0].file or ""
     submissions.said[file] = set(refused.students)
+    submissions.everybody.update(dict.fromkeys(refused.students))
     named = submissions.student_of_file(file)
     students = [named] if named is not None and named not in refused.students else []
     return replace(refused, students=(*students, *refused.students))
@@ -209,7 +215,7 @@ def _blank_only(owners: PageOwners, roster: Roster | None) -> list[Owned]:
     for source in owners.blank:
         stem = PurePath(source.file).stem
         improvised = [stem] if why_no_id(stem) is None else []
-        student = student_of_name(source.file, improvised if roster is None else roster.student_ids)
+        student = student_of_name(source.file, improvised if roster is None else roster.by_student)
         if student is not None and student not in having:
             rows = () if roster is None else roster.rows_of(student)
             position = rows[0].position if len(rows) == 1 else None

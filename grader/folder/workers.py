@@ -7,6 +7,7 @@ import multiprocessing
 import os
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -35,6 +36,8 @@ _LOOK_S = 0.5
 """Windows tells an interrupt only between waits: Ctrl+C ends a run within this time."""
 _STALLED_S = 30.0
 """Past every time limit without any result: a worker was killed while it took its task, which is lost."""
+_AHEAD = 4
+"""Tasks of each process that the pool holds: it never waits for one, and thousands are not held at once."""
 _ROUNDS = 3
 """Pools started one after the other without a single result: then what is left has the problem `crashed`."""
 _KILLED = -9
@@ -122,12 +125,12 @@ class Workers:
         rounds = _ROUNDS
         while left and rounds:
             rounds -= 1
-            pool = self._started_pool()
-            futures: dict[Future[Any], int] = {
-                pool.schedule(guarded, tasks[index], timeout=seconds[index]): index for index in sorted(left)
-            }
+            waiting, futures = deque(sorted(left)), dict[Future[Any], int]()
             longest = max(seconds[index] for index in left)
-            while futures:
+            while waiting or futures:
+                self._fill(futures, waiting, tasks, seconds)
+                if not futures:
+                    break
                 ended = _ended(futures, longest + _STALLED_S)
                 if not ended:
                     break
@@ -142,6 +145,20 @@ class Workers:
                 self._end_pool()
         for index in sorted(left):
             yield index, Problem("crashed", "the process that worked on it was killed; grade again")
+
+    def _fill(
+        self,
+        futures: dict[Future[Any], int],
+        waiting: deque[int],
+        tasks: Sequence[tuple[Any, ...]],
+        seconds: Sequence[float],
+    ) -> None:
+        """Give the pool some of the tasks that wait, unless it is broken: what it has will tell so."""
+        pool = self._started_pool()
+        with contextlib.suppress(RuntimeError):
+            while waiting and len(futures) < self._jobs * _AHEAD:
+                future = pool.schedule(guarded, tasks[waiting[0]], timeout=seconds[waiting[0]])
+                futures[future] = waiting.popleft()
 
     def _result(self, future: "Future[Any]") -> Any:  # noqa: ANN401 - whatever the function returns
         """A finished call's result or Problem; None where it was ended from outside, or the pool broke."""

@@ -27,7 +27,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
-from grader.files import OutputError, make_folder, sync_folder, write_whole
+from grader.files import OutputError, guarded, make_folder, sync_folder, unguarded, write_whole
 from grader.inputs.decision_texts import LARGEST, PageDecision, page_decision, place
 from grader.inputs.roster import (
     ScanRef,
@@ -58,8 +58,6 @@ _REMEMBERED = 20_000
 """Lines understood before: a file is read again at every decision, and differs in one."""
 _LOCK_S = 20.0
 """A write takes some milliseconds; one that waits longer than this waits for a process that hangs."""
-_FORMULA = re.compile(r"'*[=+\-@]")
-"""How a text begins that a spreadsheet would run; an apostrophe before it says that it is text."""
 _NO_TEXT = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff]")
 _POINTS = re.compile(r"[+-]?(?:[0-9]+(?:[.][0-9]*)?|[.][0-9]+)")
 
@@ -262,8 +260,8 @@ def _line(
         criterion=text["criterion"],
         verdict=text["verdict"],
         points=points,
-        comment=_unguarded(text["comment"]),
-        by=_unguarded(text["by"]),
+        comment=unguarded(text["comment"]),
+        by=unguarded(text["by"]),
         at=text["at"],
         basis=text["basis"],
         line=number,
@@ -495,15 +493,7 @@ def _cells(row: Decision, delimiter: str) -> tuple[str, ...]:
     texts = {
         "position": "" if row.position is None else str(row.position),
         "points": points.replace(".", ",") if delimiter == ";" else points,
-        "comment": _guarded(row.comment),
-        "by": _guarded(row.by),
+        "comment": guarded(row.comment),
+        "by": guarded(row.by),
     }
     return tuple(texts[name] if name in texts else str(getattr(row, name)) for name in COLUMNS)
-
-
-def _guarded(text: str) -> str:
-    return f"'{text}" if _FORMULA.match(text) else text
-
-
-def _unguarded(text: str) -> str:
-    return text[1:] if text.startswith("'") and _FORMULA.match(text) else text

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from grader.files import unguarded
 from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
 from grader.language import LANGUAGES, N_, ROOT_LANGUAGE, Tongue, tongue
 from grader.records import Problem
@@ -80,20 +81,34 @@ class Roster:
     file : name of the file
     rows : a row per student and position
     problems : what a person should know, such as columns passed over
+    by_student, by_scan : the rows of each student, and of each file among the scans
     """
 
     file: str
     rows: tuple[RosterRow, ...]
     problems: tuple[Problem, ...] = ()
+    by_student: dict[str, tuple[RosterRow, ...]] = field(init=False, repr=False, compare=False)
+    by_scan: dict[str, tuple[RosterRow, ...]] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """Sort the rows: a class may have thousands, and each of its pages asks for some."""
+        by_student: dict[str, list[RosterRow]] = {}
+        by_scan: dict[str, list[RosterRow]] = {}
+        for row in self.rows:
+            by_student.setdefault(row.student_id, []).append(row)
+            for file in dict.fromkeys(ref.file for ref in row.scans):
+                by_scan.setdefault(file, []).append(row)
+        for name, rows in (("by_student", by_student), ("by_scan", by_scan)):
+            object.__setattr__(self, name, {key: tuple(of_key) for key, of_key in rows.items()})
 
     @property
     def student_ids(self) -> tuple[str, ...]:
         """Every student once, in the roster's order."""
-        return tuple(dict.fromkeys(row.student_id for row in self.rows))
+        return tuple(self.by_student)
 
     def rows_of(self, student_id: str) -> tuple[RosterRow, ...]:
         """The rows of one student."""
-        return tuple(row for row in self.rows if row.student_id == student_id)
+        return self.by_student.get(student_id, ())
 
 
 def why_no_id(text: str) -> str | None:
@@ -233,7 +248,9 @@ def _row(
         findings.append(Finding(f"line {number}", surplus))
         return None
     text = dict.fromkeys(COLUMNS, "")
-    text |= {name: cell.strip() for name, cell in zip(header, cells, strict=False) if name in COLUMNS}
+    text |= {
+        name: unguarded(cell.strip()) for name, cell in zip(header, cells, strict=False) if name in COLUMNS
+    }
     scans = [parse_scan(part.strip()) for part in text["scans"].split(";") if part.strip()]
     row = RosterRow(
         student_id=text["student_id"],

@@ -26,6 +26,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self
 
+from grader.files import is_formula
 from grader.lms.grades import Delivery, Grade, Options, Person, ready
 from grader.lms.marks import plain_comment
 from grader.lms.moodle import pages
@@ -35,7 +36,6 @@ from grader.lms.table import (
     bytes_of,
     csv_text,
     fill_in,
-    is_formula,
     match_rows,
     number,
     parse,

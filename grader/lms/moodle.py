@@ -20,6 +20,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Self
 
+from grader.files import is_formula
 from grader.lms.grades import Delivery, Grade, Options, Person, ready
 from grader.lms.marks import comment
 from grader.lms.table import (
@@ -30,7 +31,6 @@ from grader.lms.table import (
     bytes_of,
     csv_text,
     fill_in,
-    is_formula,
     number,
     parse,
 )

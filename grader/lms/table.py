@@ -15,15 +15,13 @@ from pathlib import Path
 from typing import ClassVar, Self
 
 from grader.documents import CriterionDocument, ReportDocument, ResultsDocument
-from grader.files import OutputError, write_whole
+from grader.files import OutputError, guarded, write_whole
 from grader.lms.grades import Delivery, Grade, Options, Person, in_a_row, ready
 from reference.authored.variant_table import delimiter_of
 from reference.errors import CallError, InputFileError, lines_of
 
 Cell = str | int | float | None
 
-FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
-"""Characters that make a spreadsheet take a text for a formula; their full-width forms do so too."""
 NO_GRADE = {"", "-"}
 """How platforms write that there is no grade."""
 
@@ -54,16 +52,6 @@ def _cell_text(cell: Cell) -> str:
         case int():
             return str(cell)
     return guarded(cell)
-
-
-def guarded(text: str) -> str:
-    """The text, with an apostrophe where a spreadsheet would take it for a formula."""
-    return f"'{text}" if is_formula(text) else text
-
-
-def is_formula(text: str) -> bool:
-    """Whether a spreadsheet would run this text."""
-    return text.lstrip(" \u00a0\ufeff").startswith(FORMULA_STARTS)
 
 
 def number(value: float, decimals: int = 5) -> str:

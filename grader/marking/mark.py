@@ -6,16 +6,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grader.comparison.criteria import NOT_DRAWN, Comparison, compare
-from grader.comparison.evidence import Submission
+from grader.comparison.evidence import DrawnVector, Submission
 from grader.comparison.task import Task
 from grader.documents import Verdict
-from grader.marking.confirming import confirmed
-from grader.marking.diagnosis import LEAST_CONFIDENCE, Lost, explained, named
+from grader.marking.diagnosis import LEAST_CONFIDENCE, Lost, drawn_instead, explained, named
 from grader.marking.drawn import case_of, explain
 from grader.marking.settling import at_stake, charged_where_made, of_another
 from grader.outcomes import Judgement, NamedMistake, Outcome, Score
+from grader.records import Figure
 from grader.rubric import CriterionTable, RubricFile
 from reference.authored.assignment import SCALE_NAMES
+from reference.construction.graph import evaluate
 from reference.construction.mistakes import Mistake
 from reference.geometry import ComplexArray
 from reference.plan import exact_plan
@@ -24,12 +25,14 @@ from reference.replay.replay import Replay
 CHARGED = frozenset({"none", "partial"})
 LOST = CHARGED | {"follow_through", "review"}
 """Verdicts for which the diagnosis seeks a cause, also where a person has still to decide."""
+AGREES, BY_CHANCE = 0.95, 0.03
+"""Probabilities that a vector lies where it is predicted: of one read rightly, and of another stroke."""
 
 
 def judge(task: Task, submission: Submission) -> Judgement:
     """Verdicts, mistakes and points of one submission for one variant."""
     comparison = compare(task, submission, explain)
-    surer = confirmed(task, submission, comparison)
+    surer = _confirmed(task, submission, comparison)
     if surer is not None:
         submission, comparison = surer, compare(task, surer, explain)
     mistakes = _named(task, comparison)
@@ -277,3 +280,68 @@ class _Total:
     def ends(self) -> tuple[float, float, float]:
         """The points it gives at worst, at best, and in the mean."""
         return self.low * self.scale, self.high * self.scale, self.expected * self.scale
+
+
+# Vectors read in doubt that the explanation of the drawing predicts --------------------------------
+
+
+def _confirmed(task: Task, submission: Submission, comparison: Comparison) -> Submission | None:
+    """The submission, surer of what its explanation predicts; None where that changes nothing.
+
+    Where it is nearly certain what was done, the explanation predicts every vector of the drawing. One that
+    was read in doubt and lies just where it is predicted was read rightly, however wrong it is.
+    """
+    explanations = () if comparison.explanation is None else comparison.explanation.explanations
+    least, evidence = task.rubric.least_confidence, comparison.evidence
+    doubtful = {name: one for name, one in evidence.drawn.items() if one.confidence < least}
+    if not doubtful or not explanations:
+        return None
+    instead, wrong = drawn_instead(explanations, case_of(task, evidence, comparison.settled))
+    if not wrong:
+        return None
+    own = {name: np.asarray(place) for name, place in evidence.nodes.items()}
+    nodes = evaluate(instead.construction, instead.parameters, given=own)
+    surer = {}
+    for name, drawn in doubtful.items():
+        vector = task.construction.vectors.get(name)
+        if vector is not None and vector.tail in nodes and vector.head in nodes:
+            predicted = complex(np.ravel(nodes[vector.head] - nodes[vector.tail])[0])
+            if _lies_there(task, name, drawn, predicted):
+                right = drawn.confidence * AGREES
+                surer[name] = right / (right + (1.0 - drawn.confidence) * BY_CHANCE)
+    if not surer:
+        return None
+    ends = {
+        node: max(sure for name, sure in surer.items() if node in _ends(task, name))
+        for node in {end for name in surer for end in _ends(task, name)}
+    }
+    readings = tuple(
+        replace(one, figures={plan: _surer(figure, surer, ends) for plan, figure in one.figures.items()})
+        for one in submission.readings
+    )
+    return replace(submission, readings=readings)
+
+
+def _ends(task: Task, name: str) -> tuple[str, str]:
+    vector = task.construction.vectors[name]
+    return vector.tail, vector.head
+
+
+def _lies_there(task: Task, name: str, drawn: DrawnVector, predicted: complex) -> bool:
+    """Whether a vector was read within the tolerance of a length of where its end is predicted."""
+    at, tolerance = drawn.as_complex, task.rubric.tolerance_of(name)
+    is_long = abs(predicted) >= tolerance.least_mm
+    return at is not None and is_long and abs(at - predicted) <= 2.0 * tolerance.length_at(abs(predicted))
+
+
+def _surer(figure: Figure, surer: Mapping[str, float], ends: Mapping[str, float]) -> Figure:
+    """A figure whose vectors and nodes have at least these confidences."""
+    vectors = {
+        name: replace(one, confidence=max(one.confidence, surer.get(name, 0.0)))
+        for name, one in figure.vectors.items()
+    }
+    nodes = {
+        name: replace(one, confidence=max(one.confidence, ends.get(name, 0.0)))
+        for name, one in figure.nodes.items()
+    }
+    return Figure(nodes, vectors)

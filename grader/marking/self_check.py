@@ -5,6 +5,7 @@ for instructors, has the numbers and the most likely mistake. A result holds not
 not show.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal
 
@@ -43,9 +44,16 @@ class Checked:
     mistake: str | None = None
 
 
-def checked_values(judgement: Judgement, level: Level) -> tuple[Checked, ...]:
-    """The part of a judgement that a level may show."""
-    return tuple(_checked(one, level) for one in judgement.outcomes if _is_handed_in(one))
+def checked_values(judgement: Judgement, level: Level, unread: Collection[str] = ()) -> tuple[Checked, ...]:
+    """The part of a judgement that a level may show.
+
+    Arguments: `unread` are vectors of a drawing: those that could not be read are open, at any level.
+    """
+    return tuple(
+        _checked(one, level if _is_handed_in(one) else "hint")
+        for one in judgement.outcomes
+        if _is_handed_in(one) or (one.name in unread and one.reasons[0].code == "unread")
+    )
 
 
 def likely_mistakes(judgement: Judgement, level: Level) -> tuple[NamedMistake, ...]:

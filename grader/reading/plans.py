@@ -235,7 +235,7 @@ def _anywhere(problem: PlanProblem, hypotheses: Sequence[PlanHypothesis]) -> lis
     return sorted(_read(cases, problem.lines), key=lambda plan: -plan.score)
 
 
-def _poses(expected: Expected, lines: Lines, count: int = 2) -> list[Pose]:
+def _poses(expected: Expected, lines: Lines) -> list[Pose]:
     """Where the plan may lie: upright at the size expected, upright at any size, turned by quarters.
 
     Each search has poses of its own: a plan of nearly parallel vectors fits a bundle at any size.
@@ -250,7 +250,7 @@ def _poses(expected: Expected, lines: Lines, count: int = 2) -> list[Pose]:
     turned = replace(any_size, turns_rad=QUARTERS, sizes=(1.0, 0.0))
     searches = (Search(), any_size, turned)
     long = lines.take(lines.length > LEAST_LAID_MM)
-    laid = [pose for search in searches for pose in poses(expected, long, search, count=count)]
+    laid = [pose for search in searches for pose in poses(expected, long, search, count=2)]
     best = max((pose.score for pose in laid), default=0.0)
     return [pose for pose in laid if pose.score > best - WORSE]
 

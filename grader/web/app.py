@@ -1,5 +1,6 @@
 """The application of ``planmark serve``: its routes, its errors, its start and end."""
 
+import asyncio
 import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -10,21 +11,24 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
 from sqlalchemy import func, select
+from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 
 from grader import __version__
+from grader.language import tongue
 from grader.web import instructors, pages, students
 from grader.web.guard import Guard, RefusedError, Rim
 from grader.web.queue import Photo, Queue
 from grader.web.reviews import Reviews
 from grader.web.self_check import checked_photo
-from grader.web.service import Call, Service
+from grader.web.service import Call, Service, language_of
 from grader.web.settings import Settings
 from grader.web.store import Account, Store
 from reference.errors import PlanmarkError
 
 LOG = logging.getLogger("planmark")
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
+DAY_S = 86400.0
 DESCRIPTION = """
 Everything that the pages of planmark do. A program sends a token, made on the account's page, as
 `Authorization: Bearer TOKEN`. Errors are `{"code", "message"}`: what is wrong, where, and what to do.
@@ -41,9 +45,10 @@ def application(settings: Settings, photo: Photo = checked_photo) -> FastAPI:
 
     @asynccontextmanager
     async def running(_app: FastAPI) -> AsyncIterator[None]:
-        store.forget(days=settings.keep_days)
         service.queue.start()
+        forgetting = asyncio.create_task(_forget(store, settings.keep_days))
         yield
+        forgetting.cancel()
         service.queue.stop()
 
     app = FastAPI(
@@ -64,6 +69,13 @@ def application(settings: Settings, photo: Photo = checked_photo) -> FastAPI:
     return app
 
 
+async def _forget(store: Store, days: float) -> None:
+    """Delete day by day what is kept no longer."""
+    while True:
+        await run_in_threadpool(store.forget, days=days)
+        await asyncio.sleep(DAY_S)
+
+
 def first_invitation(settings: Settings) -> str | None:
     """The address at which the first administrator makes the account; None once there is one."""
     store = Store(settings.database)
@@ -79,9 +91,10 @@ def first_invitation(settings: Settings) -> str | None:
 
 
 async def _told(request: Request, error: Exception) -> Response:
-    status = error.status if isinstance(error, RefusedError) else HTTPStatus.UNPROCESSABLE_ENTITY
+    if isinstance(error, RefusedError):
+        return _answer(request, error.status, error.code, error.told(tongue(language_of(request))))
     code = error.code if isinstance(error, PlanmarkError) else "refused"
-    return _answer(request, int(status), code, str(error))
+    return _answer(request, HTTPStatus.UNPROCESSABLE_ENTITY, code, str(error))
 
 
 async def _invalid(request: Request, error: Exception) -> Response:
@@ -103,7 +116,7 @@ async def _fault(request: Request, error: Exception) -> Response:
 
 def _answer(request: Request, status: int, code: str, message: str) -> Response:
     """An error as JSON; on the pages as a page, with the way to sign in where that helps."""
-    path = request.url.path
+    path, message = request.url.path, message.encode(errors="replace").decode()
     if path.startswith(("/api/", "/lti/", "/static/")):
         return JSONResponse({"code": code, "message": message}, status)
     service: Service = request.app.state.service

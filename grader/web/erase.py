@@ -1,18 +1,24 @@
 """Everything of one student deleted from a publication: rows, files, results."""
 
+import csv
+import io
 import shutil
+from collections.abc import Iterable
+from pathlib import Path
 
-from sqlalchemy import delete, func, update
+from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
 from grader.documents import ResultsDocument
 from grader.files import result_folders, write_whole
-from grader.folder.changes import CACHE_FOLDER
+from grader.folder.changes import CACHE_FOLDER, NOTE
 from grader.inputs.decisions import DecisionFile
+from grader.inputs.measurements import students_in
 from grader.inputs.roster import read_roster
 from grader.lms.export import read_results
 from grader.web.places import Places
 from grader.web.store import Attempt, Audit, Link, Publication, Regrading, digest_of
+from reference.authored.variant_table import delimiter_of
 
 PAGES = ("index.html", "summary.csv")
 """Of the whole class: they name the student, and the next run writes them anew."""
@@ -29,15 +35,14 @@ def erase_student(session: Session, publication: Publication, places: Places, st
         )
     of_student = Attempt.who == f"student:{student}"
     session.execute(delete(Attempt).where(Attempt.publication_id == publication.id, of_student))
-    anonymous = f"({digest_of(student)[:8]})"
-    told = Audit.about.startswith(publication.key, autoescape=True)
-    of_name = Audit.about.contains(student, autoescape=True)
-    session.execute(
-        update(Audit).where(told, of_name).values(about=func.replace(Audit.about, student, anonymous))
-    )
+    rows = read_roster(places.roster).rows if places.roster.is_file() else ()
+    students = {student, *(row.student_id for row in rows)}
+    _erase_audit(session, publication, student, students)
     owners = _owners(places)
-    own = {path for path in places.submitted() if owners.get(path.name) == {student}}
-    own |= {path for path in places.submitted() if _is_named(path.stem, student) and path.name not in owners}
+    own = {
+        path for path in places.submitted()
+        if owners.get(path.name, {_student_named(path.stem, students)}) == {student}
+    }  # fmt: skip
     shared = [name for name, students in owners.items() if student in students and len(students) > 1]
     for path in own:
         path.unlink(missing_ok=True)
@@ -47,11 +52,14 @@ def erase_student(session: Session, publication: Publication, places: Places, st
 
 
 def _owners(places: Places) -> dict[str, set[str]]:
-    """Whose each file is, as the last run found it."""
+    """Whose each file is, as the last run found it, or as the table says."""
     owners: dict[str, set[str]] = {}
     for report in _reports(places).reports:
         for sheet in report.reading.sheets:
             owners.setdefault(sheet.source, set()).add(report.student_id)
+    for path in places.submitted():
+        if path.suffix.lower() in {".csv", ".json"} and (students := students_in(path)):
+            owners[path.name] = set(students)
     return owners
 
 
@@ -61,16 +69,34 @@ def _reports(places: Places) -> ResultsDocument:
     return read_results(places.results)
 
 
-def _is_named(stem: str, student: str) -> bool:
-    return stem == student or stem.startswith(f"{student}_")
+def _student_named(stem: str, students: Iterable[str]) -> str | None:
+    """The student with whose id a file's name begins: of ``s1`` and ``s1_2`` the longer one."""
+    return max((one for one in students if f"{stem}_".startswith(f"{one}_")), key=len, default=None)
+
+
+def _erase_audit(session: Session, publication: Publication, student: str, students: Iterable[str]) -> None:
+    """Put a digest in the place of the student's id, and of names of files that begin with it."""
+    told = Audit.about.startswith(f"{publication.key} ", autoescape=True)
+    for entry in session.scalars(select(Audit).where(told, Audit.about.contains(student, autoescape=True))):
+        entry.about = " ".join(
+            f"({digest_of(student)[:8]})"
+            if student in {word, _student_named(Path(word).stem, students)}
+            else word
+            for word in entry.about.split(" ")
+        )
 
 
 def _erase_rows(places: Places, student: str) -> None:
     """Take the student's lines out of the roster and of the decisions."""
     if places.roster.is_file():
-        lines = places.roster.read_text(encoding="utf-8-sig").splitlines(keepends=True)
+        text = places.roster.read_bytes().decode("utf-8-sig")
+        lines = list(io.StringIO(text, newline=""))
         gone = {row.line for row in read_roster(places.roster).rows_of(student)}
-        kept = [line for number, line in enumerate(lines, start=1) if number not in gone]
+        kept, begin = list[str](), 0
+        reader = csv.reader(lines, delimiter=delimiter_of(text))
+        for _ in reader:  # a record may have several lines
+            kept += [] if begin + 1 in gone else lines[begin : reader.line_num]
+            begin = reader.line_num
         write_whole(places.roster, "".join(kept))
     decisions = DecisionFile(places.handed_in / "decisions.csv")
     if decisions.path.is_file():
@@ -95,6 +121,6 @@ def _erase_results(places: Places, student: str) -> None:
             "stale": [one for one in results.stale if one.student_id != student],
         }
     )
-    for name in PAGES:
+    for name in (*PAGES, f"{CACHE_FOLDER}/{NOTE}"):
         (places.results / name).unlink(missing_ok=True)
     write_whole(places.results / "results.json", kept.model_dump_json(indent=2))

@@ -5,8 +5,10 @@ a header with the visit's own token, which a page of another site can neither re
 token in the header `Authorization` needs none, because no browser sends it by itself.
 """
 
+import contextlib
 import hashlib
 import hmac
+import re
 import secrets
 import time
 from collections.abc import Iterable
@@ -25,12 +27,15 @@ from sqlalchemy.orm import Session
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from grader.language import N_, Tongue
 from grader.web.settings import Settings
 from grader.web.store import Account, Link, Publication, Store, Visit, digest_of
 from reference.errors import PlanmarkError
 
 COOKIE = "planmark_visit"
 FORM_HEADER = "X-Planmark-Form"
+INVITATION = "invitation"
+"""The title of a visit that stands for an invitation: it makes an account, and opens nothing else."""
 IDLE_S = 12 * 3600.0
 """A working day: an instructor who was away longer signs in again."""
 LEAST_PASSWORD = 12
@@ -52,21 +57,31 @@ RATES: dict[str, RateLimitItem] = {
     "photo": RateLimitItemPerMinute(10),
     "key": RateLimitItemPerMinute(60),
     "upload": RateLimitItemPerMinute(3000),
+    "address": RateLimitItemPerMinute(600),
 }
-"""For each visitor; a class behind one address of a school is let through by the visit's cookie."""
+"""For each visitor; a class behind one address of a school is let through by the visit's cookie. All
+visits of an address count as `address`, too: new cookies cost nothing."""
 _HASHER = PasswordHasher()
 _NOBODY = _HASHER.hash(secrets.token_urlsafe())
 """Compared with where there is no such account: the time tells nothing."""
 
 
 class RefusedError(PlanmarkError):
-    """A request that is not answered; `status` is HTTP's."""
+    """A request that is not answered; `status` is HTTP's, `text` a key of the catalogues where it has one."""
 
     exit_status = 1
 
-    def __init__(self, status: int, code: str, message: str) -> None:
-        super().__init__(code, message)
-        self.status = status
+    def __init__(self, status: int, code: str, text: str, /, **known: object) -> None:
+        super().__init__(code, text % known if known else text)
+        self.status, self.text, self.known = status, text, known
+
+    def told(self, speaker: Tongue) -> str:
+        """The message in a language."""
+        text = speaker.gettext(self.text)
+        return text % self.known if self.known else text
+
+
+NO_SUCH = {"page": N_("there is no such page"), "publication": N_("there is no such assignment here")}
 
 
 def forbidden(message: str) -> RefusedError:
@@ -76,14 +91,17 @@ def forbidden(message: str) -> RefusedError:
 
 def missing(what: str = "page") -> RefusedError:
     """The error for what is not there, or is not the visitor's to see: both read the same."""
-    return RefusedError(404, "not_found", f"there is no such {what}")
+    return RefusedError(404, "not_found", NO_SUCH.get(what, f"there is no such {what}"))
 
 
 def hash_of(password: str) -> str:
     """What is stored of a password. Raises RefusedError for a short one."""
     if not LEAST_PASSWORD <= len(password) <= 200:
         raise RefusedError(
-            422, "password_short", f"the password must have {LEAST_PASSWORD} to 200 signs: a sentence is good"
+            422,
+            "password_short",
+            N_("the password must have %(least)s to 200 signs: a sentence is good"),
+            least=LEAST_PASSWORD,
         )
     return _HASHER.hash(password)
 
@@ -153,7 +171,7 @@ class Guard:
         kind, _, token = request.headers.get("authorization", "").partition(" ")
         if kind.lower() == "bearer":
             visit = session.get(Visit, digest_of(token.strip()))
-            if visit is None or not visit.title:
+            if visit is None or visit.title in {"", INVITATION}:
                 raise RefusedError(401, "token", "the token is not known")
             return Visitor(token, visit, is_program=True, address=address)
         secret = request.cookies.get(COOKIE, "")
@@ -164,16 +182,28 @@ class Guard:
             visit.used = time.time()
         return Visitor(secret or secrets.token_urlsafe(32), visit, address=address)
 
-    def begin(self, session: Session, visitor: Visitor, account: Account | None = None) -> Visit:
-        """The visit as stored; one that begins with a sign-in has a new secret."""
-        if account is not None:
-            if visitor.visit is not None and not visitor.is_program:
-                session.delete(visitor.visit)
+    def begin(
+        self, session: Session, visitor: Visitor, account: Account | None = None, link: Link | None = None
+    ) -> Visit:
+        """The visit as stored; a sign-in and a personal link give it a new secret.
+
+        Whoever put the cookie into a browser that many use does not know the new one.
+        """
+        before = visitor.visit
+        if account is not None or (link is not None and not visitor.is_program):
+            if before is not None and not visitor.is_program:
+                session.delete(before)
             visitor.secret, visitor.visit = secrets.token_urlsafe(32), None
         if visitor.visit is None:
-            visitor.visit = Visit(id=digest_of(visitor.secret), account=account, links={})
+            known = before if link is not None else None
+            visitor.visit = Visit(
+                id=digest_of(visitor.secret), account=account or (known.account if known else None),
+                links=dict(known.links) if known else {},
+            )  # fmt: skip
             session.add(visitor.visit)
-            session.flush()
+        if link is not None:
+            visitor.visit.links = {**visitor.visit.links, str(link.publication_id): link.id}
+        session.flush()
         return visitor.visit
 
     def set_cookie(self, response: Response, visitor: Visitor) -> None:
@@ -197,9 +227,9 @@ class Guard:
             return
         origin = request.headers.get("origin")
         given = request.headers.get(FORM_HEADER, "")
-        is_own = origin is None or urlsplit(origin).netloc == request.headers.get("host", "")
+        is_own = origin is None or origin.partition("://")[2] == request.headers.get("host", "")
         if not is_own or not hmac.compare_digest(given.encode(), self.form_token(visitor).encode()):
-            raise forbidden("the page is out of date: load it again, and repeat what you did")
+            raise forbidden(N_("the page is out of date: load it again, and repeat what you did"))
 
     # How often ------------------------------------------------------------------------------------
 
@@ -207,7 +237,9 @@ class Guard:
         """Count a use of something. Raises RefusedError where there are too many in a minute."""
         for one in who:
             if not self._limiter.hit(RATES[rate], rate, one):
-                raise RefusedError(429, "too_often", "too often in a short time: wait a minute, then go on")
+                raise RefusedError(
+                    429, "too_often", N_("too often in a short time: wait a minute, then go on")
+                )
 
     # Links ----------------------------------------------------------------------------------------
 
@@ -228,7 +260,7 @@ class Guard:
     def _valid(link: Link | None) -> Link:
         if link is None or link.is_revoked or link.expires < time.time():
             raise RefusedError(
-                404, "link", "this link is not valid any more: ask your instructor for a new one"
+                404, "link", N_("this link is not valid any more: ask your instructor for a new one")
             )
         return link
 
@@ -251,8 +283,7 @@ class Guard:
 class Rim:
     """Refuses requests for other hosts and bodies that are too large; adds the headers of safety.
 
-    Arguments: `bodies` are the bytes that a request's body may have, by the end of its path's last part
-    but one; `most` those of all others.
+    Arguments: `most` are the bytes of a body that is no file.
     """
 
     app: ASGIApp
@@ -266,7 +297,7 @@ class Rim:
             await self.app(scope, receive, send)
             return
         host = Headers(scope=scope).get("host", "")
-        if host != self.settings.host and urlsplit(f"//{host}").hostname not in self.hosts:
+        if host != self.settings.host and _name_of(host) not in self.hosts:
             await _plain(send, 421, "this address is not served here: open the server's own address")
             return
         most = self._most(scope["path"])
@@ -280,38 +311,44 @@ class Rim:
                 raise _TooLargeError
             return message
 
-        has_begun = False
-
         async def with_headers(message: Message) -> None:
-            nonlocal has_begun
+            if taken > most:  # whatever the application answers to that
+                return
             if message["type"] == "http.response.start":
-                has_begun = True
                 known = {name for name, _ in message["headers"]}
-                message["headers"] = [
-                    *message["headers"],
-                    *(
-                        (name.lower().encode(), value.encode())
-                        for name, value in self._headers().items()
-                        if name.lower().encode() not in known
-                    ),
-                ]
+                ours = [(name.lower().encode(), value.encode()) for name, value in self._headers().items()]
+                message["headers"] = [*message["headers"], *(one for one in ours if one[0] not in known)]
             await send(message)
 
-        try:
+        with contextlib.suppress(_TooLargeError):
             await self.app(scope, bounded, with_headers)
-        except _TooLargeError:
-            if not has_begun:
-                await _plain(send, 413, f"larger than {most // 1_000_000} MB: send a smaller file")
+        if taken > most:
+            await _plain(send, 413, f"larger than {most // 1_000_000} MB: send a smaller file")
 
     def _most(self, path: str) -> int:
-        megabytes = {"files": self.settings.upload_mb, "photos": self.settings.photo_mb}
-        parts = path.rstrip("/").split("/")
-        return next((megabytes[one] * 1_000_000 for one in parts[-2:] if one in megabytes), self.most)
+        files = _FILES.fullmatch(path)
+        if files is None:
+            return self.most
+        return 1_000_000 * (self.settings.photo_mb if files["photo"] else self.settings.upload_mb)
 
     def _headers(self) -> dict[str, str]:
         if self.settings.is_https:
             return {**HEADERS, "Strict-Transport-Security": "max-age=31536000"}
         return HEADERS
+
+
+_FILES = re.compile(
+    r"/api/v1/publications/[^/]+/(?:(?P<photo>photos|sheets)|(?:assignment/|roster/|exports/[^/]+/)?files/.+)/?"
+)
+"""Addresses to which files are sent."""
+
+
+def _name_of(host: str) -> str | None:
+    """The name in a host header, without its port; None where it has none."""
+    try:
+        return urlsplit(f"//{host}").hostname
+    except ValueError:
+        return None
 
 
 class _TooLargeError(Exception):

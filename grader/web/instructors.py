@@ -14,14 +14,16 @@ from pydantic import Field
 from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
-from grader.authoring.lint import lint
+from grader.authoring.lint import lint, lint_document
+from grader.documents import LintDocument
 from grader.folder.workers import result_of
 from grader.inputs.roster import read_roster
+from grader.language import N_
 from grader.lms.export import TARGETS, export, read_results, usual_name
 from grader.lms.grades import Options, people_of
 from grader.rubric import rubric_of
 from grader.web.erase import erase_student
-from grader.web.guard import RefusedError, hash_of, is_password, missing
+from grader.web.guard import INVITATION, RefusedError, hash_of, is_password, missing
 from grader.web.places import (
     AUTHORED,
     SUBMITTED,
@@ -41,7 +43,7 @@ from grader.web.store import (
     Visit,
     digest_of,
 )
-from grader.web.students import JobState, Lang, Strict, queued, state_of
+from grader.web.students import WITHOUT_NUL, JobState, Lang, Strict, queued, state_of
 from reference.authored.assignment import built_in
 from reference.errors import PlanmarkError
 
@@ -50,6 +52,9 @@ Name = Annotated[str, Field(min_length=1, max_length=80, pattern=r"^[^\x00-\x1f\
 Password = Annotated[str, Field(min_length=1, max_length=200)]
 FileName = Annotated[str, Path(max_length=200)]
 StudentId = Annotated[str, Path(pattern=r"^[A-Za-z0-9._-]{1,80}$")]
+LARGEST_ROW = 2**31 - 1
+"""The largest number of a row in PostgreSQL."""
+Row = Annotated[int, Path(ge=1, le=LARGEST_ROW)]
 INVITED_S = 7 * 86400.0
 """An invitation is valid for a week."""
 
@@ -78,7 +83,7 @@ def sign_in(call: Called, who: SignIn) -> dict[str, Any]:
     if not is_password(account, who.password):
         call.note("sign-in refused", who.name)
         call.session.commit()
-        raise RefusedError(401, "sign_in", "the name or the password is wrong")
+        raise RefusedError(401, "sign_in", N_("the name or the password is wrong"))
     return _entered(call, account)
 
 
@@ -106,10 +111,10 @@ def join(call: Called, who: Invited) -> dict[str, Any]:
     call.service.guard.count("sign_in", [f"address {call.visitor.address}"])
     waiting = call.session.get(Visit, digest_of(who.token))
     account = None if waiting is None else waiting.account
-    if account is None or waiting is None or waiting.title != "invitation" or account.password:
-        raise RefusedError(403, "invitation", "this invitation is not valid any more: ask for a new one")
+    if account is None or waiting is None or waiting.title != INVITATION or account.password:
+        raise RefusedError(403, "invitation", N_("this invitation is not valid any more: ask for a new one"))
     if time.time() - waiting.created > INVITED_S:
-        raise RefusedError(403, "invitation", "this invitation is too old: ask for a new one")
+        raise RefusedError(403, "invitation", N_("this invitation is too old: ask for a new one"))
     other = call.session.scalar(select(Account).where(Account.name == who.name, Account.id != account.id))
     if other is not None:
         raise RefusedError(409, "name_taken", "somebody has this name already: choose another")
@@ -131,7 +136,7 @@ def accounts(call: Called) -> list[dict[str, Any]]:
 
 
 @router.delete("/accounts/{number}")
-def remove_account(call: Called, number: int) -> dict[str, str]:
+def remove_account(call: Called, number: Row) -> dict[str, str]:
     """Remove an instructor; the publications stay."""
     if call.admin.id == number:
         raise RefusedError(409, "own_account", "nobody removes the own account: let another do it")
@@ -148,7 +153,7 @@ def remove_account(call: Called, number: int) -> dict[str, str]:
 def new_token(call: Called, title: Annotated[Name, Query()]) -> dict[str, str]:
     """A token for a program, shown once: it may do what its instructor may."""
     account, token = call.account, secrets.token_urlsafe(32)
-    if title == "invitation":
+    if title == INVITATION:
         raise RefusedError(422, "title", "choose another title")
     call.session.add(Visit(id=digest_of(token), account=account, title=title, links={}))
     call.note("token made", title)
@@ -158,7 +163,7 @@ def new_token(call: Called, title: Annotated[Name, Query()]) -> dict[str, str]:
 @router.get("/tokens")
 def tokens(call: Called) -> list[dict[str, Any]]:
     """The instructor's tokens, without their secrets."""
-    own = select(Visit).where(Visit.account_id == call.account.id, Visit.title.not_in(("", "invitation")))
+    own = select(Visit).where(Visit.account_id == call.account.id, Visit.title.not_in(("", INVITATION)))
     return [{"id": one.id, "title": one.title, "created": one.created} for one in call.session.scalars(own)]
 
 
@@ -180,7 +185,7 @@ def invitation(session: Session, name: str, *, is_admin: bool) -> str:
         raise RefusedError(409, "name_taken", f"there is an account '{name}' already")
     account = account or Account(name=name, is_admin=is_admin)
     token = secrets.token_urlsafe(32)
-    session.add_all([account, Visit(id=digest_of(token), account=account, title="invitation", links={})])
+    session.add_all([account, Visit(id=digest_of(token), account=account, title=INVITATION, links={})])
     return token
 
 
@@ -197,9 +202,9 @@ def _entered(call: Call, account: Account | None) -> dict[str, Any]:
 class Settings(Strict):
     """What an instructor sets of a publication; what is left out stays."""
 
-    title: Annotated[str, Field(max_length=120)] | None = None
+    title: Annotated[str, Field(max_length=120, pattern=WITHOUT_NUL)] | None = None
     term: Annotated[str, Field(max_length=40, pattern=r"^[^\x00-\x1f\x7f]*$")] | None = None
-    assignment: Annotated[str, Field(max_length=120)] | None = None
+    assignment: Annotated[str, Field(max_length=120, pattern=WITHOUT_NUL)] | None = None
     lang: Lang | None = None
     level: Literal["symbol", "hint"] | None = None
     attempts: Annotated[int, Field(ge=0, le=1000)] | None = Field(
@@ -259,6 +264,13 @@ def publication(call: Called, key: Key) -> dict[str, Any]:
     }
 
 
+@router.get("/publications/{key}/lint")
+def lint_assignment(call: Called, key: Key) -> LintDocument:
+    """What `planmark lint` says of the assignment: every variant's figures, and findings."""
+    own, service = call.own(key), call.service
+    return result_of(service.queue.workers, linted, service.settings.data, own.key, own.assignment)
+
+
 @router.patch("/publications/{key}")
 def change(call: Called, key: Key, settings: Settings) -> dict[str, Any]:
     """Change settings."""
@@ -277,7 +289,9 @@ def remove(call: Called, key: Key) -> dict[str, str]:
 
 
 @router.delete("/terms/{term}")
-def remove_term(call: Called, term: Annotated[str, Path(max_length=40)]) -> dict[str, int]:
+def remove_term(
+    call: Called, term: Annotated[str, Path(max_length=40, pattern=WITHOUT_NUL)]
+) -> dict[str, int]:
     """Delete all publications of a term that are the instructor's own."""
     account = call.account
     found = call.session.scalars(select(Publication).where(Publication.term == term)).all()
@@ -290,7 +304,7 @@ def remove_term(call: Called, term: Annotated[str, Path(max_length=40)]) -> dict
 
 
 @router.put("/publications/{key}/members/{number}")
-def add_member(call: Called, key: Key, number: int) -> dict[str, Any]:
+def add_member(call: Called, key: Key, number: Row) -> dict[str, Any]:
     """Let a colleague in."""
     own, account = call.own(key), call.session.get(Account, number)
     if account is None:
@@ -302,7 +316,7 @@ def add_member(call: Called, key: Key, number: int) -> dict[str, Any]:
 
 
 @router.delete("/publications/{key}/members/{number}")
-def remove_member(call: Called, key: Key, number: int) -> dict[str, Any]:
+def remove_member(call: Called, key: Key, number: Row) -> dict[str, Any]:
     """Let a colleague out; one always stays."""
     own = call.own(key)
     left = [one for one in own.members if one.id != number]
@@ -329,10 +343,15 @@ def change_settings(call: Call, publication: Publication, settings: Settings) ->
             publication.title = title.in_language(publication.lang)[:120]
 
 
-def check_assignment(data: pathlib.Path, key: str, name: str) -> list[str]:
-    """Load an assignment in a worker, whose limits bound hostile files; what lint finds."""
+def check_assignment(data: pathlib.Path, key: str, name: str) -> None:
+    """Load an assignment and its rubric, in a worker, whose limits bound hostile files."""
+    rubric_of(assignment_of(data, Publication(key=key, assignment=name)))
+
+
+def linted(data: pathlib.Path, key: str, name: str) -> LintDocument:
+    """What `planmark lint` finds, in a worker."""
     assignment = assignment_of(data, Publication(key=key, assignment=name))
-    return [str(finding) for finding in lint(assignment, rubric_of(assignment)).findings]
+    return lint_document(lint(assignment, rubric_of(assignment)))
 
 
 def facts(publication: Publication) -> dict[str, Any]:
@@ -571,7 +590,7 @@ def links(call: Called, key: Key) -> list[dict[str, Any]]:
 
 
 @router.delete("/publications/{key}/links/{number}")
-def revoke(call: Called, key: Key, number: int) -> dict[str, str]:
+def revoke(call: Called, key: Key, number: Row) -> dict[str, str]:
     """Revoke a personal link at once."""
     own, link = call.own(key), call.session.get(Link, number)
     if link is None or link.publication_id != own.id:
@@ -584,7 +603,7 @@ def revoke(call: Called, key: Key, number: int) -> dict[str, str]:
 class Answer(Strict):
     """An instructor's answer to a request."""
 
-    answer: Annotated[str, Field(min_length=1, max_length=2000)]
+    answer: Annotated[str, Field(min_length=1, max_length=2000, pattern=WITHOUT_NUL)]
 
 
 @router.get("/publications/{key}/requests")
@@ -598,7 +617,7 @@ def requests(call: Called, key: Key) -> list[dict[str, Any]]:
 
 
 @router.put("/publications/{key}/requests/{number}")
-def answer(call: Called, key: Key, number: int, said: Answer) -> dict[str, str]:
+def answer(call: Called, key: Key, number: Row, said: Answer) -> dict[str, str]:
     """Answer a request."""
     own, request = call.own(key), call.session.get(Regrading, number)
     if request is None or request.publication_id != own.id:
@@ -621,7 +640,9 @@ def remove_student(call: Called, key: Key, student: StudentId) -> dict[str, Any]
 
 
 @router.get("/audit")
-def audit(call: Called, before: int | None = None) -> list[dict[str, Any]]:
+def audit(
+    call: Called, before: Annotated[int | None, Query(ge=1, le=LARGEST_ROW)] = None
+) -> list[dict[str, Any]]:
     """The audit trail, 200 entries a call, the newest first."""
     _ = call.admin
     asked = select(Audit).order_by(Audit.id.desc()).limit(200)

@@ -34,12 +34,9 @@ TEXTS = {
     "right": N_("All that you entered is right."),
     "nothing": N_("Nothing that this assignment asks for was entered."),
     "unread": N_("The drawing could not be read."),
-    "graded": N_("The class is graded."),
-    "stopped": N_("Cancelled. What was marked is kept."),
     "uploaded": N_("%(done)s of %(total)s files are there"),
     "refused": N_("These files were not taken:"),
     "sure": N_("This cannot be undone. Go on?"),
-    "copied": N_("Copied"),
     "sent": N_("Your request waits for the instructor."),
     "queued": N_("Waiting ..."),
     "opening": N_("Opening files"),
@@ -143,6 +140,8 @@ def publication(call: Called, key: Key) -> Response:
 def result_page(call: Called, key: Key, path: str) -> Response:
     """A page of the results, as `planmark grade` wrote it."""
     top = call.places(call.own(key)).results.resolve()
+    if "\0" in path:
+        raise missing()
     wanted = (top / path).resolve()
     hidden = any(part.startswith(".") for part in path.split("/"))
     if hidden or not wanted.is_relative_to(top) or wanted.suffix not in {".html", ".png", ".csv"}:

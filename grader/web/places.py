@@ -6,6 +6,7 @@ for among the files that are there.
 
 import re
 import shutil
+import tomllib
 import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,9 +18,10 @@ from grader.folder.inventory import is_tool_file
 from grader.rubric import rubric_of
 from grader.web.store import Publication
 from reference.authored.assignment import Assignment, built_in, load_assignment
+from reference.authored.toml_file import MAX_BYTES
 from reference.errors import CallError
 
-AUTHORED = (".assignment.toml", ".mechanism.toml", ".rubric.toml", ".csv")
+AUTHORED = (".toml", ".csv")
 SUBMITTED = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".pdf", ".csv", ".json")
 LONGEST_NAME = 120
 """Of a file: with the folder before it a path stays within every file system's limit."""
@@ -124,7 +126,29 @@ def assignment_of(data: Path, publication: Publication) -> Assignment:
         raise CallError("assignment_missing", "no assignment is chosen yet")
     if publication.assignment in built_in():
         return load_assignment(publication.assignment)
-    return load_assignment(stored(places_of(data, publication).authored, publication.assignment))
+    path = stored(places_of(data, publication).authored, publication.assignment)
+    if far := _names_elsewhere(path):
+        raise CallError(
+            "file_elsewhere", f"{path.name}: '{far[:60]}' is not in its own folder; upload it beside it"
+        )
+    return load_assignment(path)
+
+
+def _names_elsewhere(path: Path) -> str | None:
+    """A file that an uploaded assignment names by a path: it may be another instructor's."""
+    try:
+        text = path.read_bytes()[: MAX_BYTES + 1].decode("utf-8-sig")
+        known = tomllib.loads(text)
+    except (ValueError, RecursionError):
+        return None  # told when it is loaded
+    variant = known.get("variant")
+    table = variant.get("table") if isinstance(variant, dict) else None
+    names = [
+        known.get("mechanism"),
+        known.get("rubric"),
+        table.get("file") if isinstance(table, dict) else None,
+    ]
+    return next((name for name in names if isinstance(name, str) and re.search(r"[\\/:]", name)), None)
 
 
 def batch_of(data: Path, publication: Publication, jobs: int = 1) -> Batch:

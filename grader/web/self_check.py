@@ -4,39 +4,47 @@ Nothing in it gives the answer away: the level says how much is told, and no exp
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
-from grader.documents import ProblemDocument
-from grader.feedback.advice import RESULTS, checked_lines
-from grader.feedback.words import problem_sentence, symbols
+from grader.feedback.advice import RESULTS, CheckedLine, checked_lines
+from grader.feedback.sentences import PLACES
+from grader.feedback.student_page import AS_MEASURED, SHEET
+from grader.feedback.words import symbols
 from grader.inputs.measurements import UNITS_OF_SCALES, columns_of, measurements_in, names_of
-from grader.language import tongue
+from grader.language import N_, Tongue, tongue
 from grader.marking.mark import judge
 from grader.marking.self_check import Level
-from grader.outcomes import Judgement
-from grader.overlay.closeup import page_views, svg
+from grader.overlay.closeup import page_views, scan_element, svg
 from grader.overlay.measured import measured_picture
-from grader.pipeline import open_page, read_pages
-from grader.records import PageRef, Problem
+from grader.overlay.scene import Picture
+from grader.pipeline import photo_check
 from grader.rubric import rubric_of
+from grader.web.guard import RefusedError
 from reference.authored.assignment import Assignment, Variant, load_assignment
 
+RANGES = {
+    "n": N_("your number n is missing: give one from %(first)s to %(last)s"),
+    "position": N_("the position is missing: give one from %(first)s to %(last)s"),
+}
 _BARE = re.compile(r"\d*[.,]?\d+([eE][+-]?\d+)?", re.ASCII)
 
 
 def variant_of(assignment: Assignment, n: int | None, position: int | None) -> Variant:
     """A variant as a student asks for it; a number that the assignment has not is passed over.
 
-    Raises CallError for one that there is not.
+    Raises RefusedError for one that there is not.
     """
-    return assignment.variant(
-        None if assignment.numbers("n") is None else n,
-        None if assignment.numbers("position") is None else position,
-    )
+    chosen: list[int | None] = []
+    for what, value in (("n", n), ("position", position)):
+        known = assignment.numbers(what)
+        if known is not None and value not in known:
+            raise RefusedError(422, f"{what}_range", RANGES[what], first=known[0], last=known[-1])
+        chosen.append(None if known is None else value)
+    return assignment.variant(*chosen)
 
 
 def form_of(assignment: Assignment, lang: str) -> dict[str, Any]:
@@ -76,18 +84,14 @@ def checked_values(
     outcomes = {outcome.name: outcome for outcome in judgement.outcomes}
     names = assignment.file.names
     picture = measured_picture("", entered.reading, task.construction, outcomes, show_expected=False)
-    views = [] if picture is None else page_views(picture, 0, names)
-    description = speaker.gettext("as measured")
+    lines = checked_lines(judgement, level, speaker, names, assignment.mechanism_file.driver.pin)
     return {
-        **_told(assignment, judgement, lang, level),
+        "lines": _lines(lines, lang),
+        "is_right": bool(lines) and all(line.result == "right" for line in lines),
         "problems": [
             one.message.removeprefix(": ") for one in (*entered.problems, *entered.reading.problems)
         ],
-        "drawing": [
-            str(svg(view, picture, description))
-            for view in views
-            if picture is not None and view.kind == "sheet"
-        ],
+        "drawing": [] if picture is None else _drawings([picture], assignment, lang),
     }
 
 
@@ -104,39 +108,49 @@ def checked_photo(path: Path, asked: Mapping[str, Any]) -> dict[str, Any]:
     Arguments: `asked` has the ``assignment``, ``n``, ``position``, ``lang`` and ``level``.
     """
     assignment, lang = load_assignment(asked["assignment"]), asked["lang"]
-    rubric = rubric_of(assignment)
     variant = variant_of(assignment, asked["n"], asked["position"])
-    pages = read_pages([open_page(PageRef(path.name, path=path))], assignment, variant, {}, rubric.vectors)
-    problems = [problem for page in pages for problem in page.problems]
-    readings = tuple(page.reading for page in pages if page.reading.figures)
-    told: dict[str, Any] = {"lines": [], "drawing": [], "is_right": False}
-    if readings:
-        judgement = judge(task_of(assignment, rubric, variant), Submission(readings))
-        told = {**told, **_told(assignment, judgement, lang, asked["level"])}
-    return {**told, "is_read": bool(readings), "problems": [_said(problem, lang) for problem in problems]}
-
-
-def _said(problem: Problem, lang: str) -> str:
-    document = ProblemDocument(code=problem.code, message=problem.message, file=problem.file)
-    return problem_sentence(document, tongue(lang)).text
-
-
-def _told(assignment: Assignment, judgement: Judgement, lang: str, level: Level) -> dict[str, Any]:
-    speaker = tongue(lang)
-    names, driven = assignment.file.names, assignment.mechanism_file.driver.pin
-    lines = checked_lines(judgement, level, speaker, names, driven)
+    check = photo_check(path, assignment, rubric_of(assignment), variant, lang, asked["level"])
     return {
-        "lines": [
-            {
-                "name": line.name,
-                "html": str(symbols(line.name)),
-                "result": line.result,
-                "mark": RESULTS[line.result][0],
-                "word": speaker.gettext(RESULTS[line.result][1]),
-                "hint": str(symbols(line.hint)),
-                "advice": str(symbols(line.advice)),
-            }
-            for line in lines
-        ],
-        "is_right": bool(lines) and all(line.result == "right" for line in lines),
+        "lines": _lines(check.lines, lang),
+        "is_right": check.is_all_right,
+        "is_read": check.is_read,
+        "problems": [*check.flaws.values(), *check.problems],
+        "drawing": _drawings(check.pictures, assignment, lang),
+        "attempts_left": asked.get("attempts_left"),
     }
+
+
+def _drawings(pictures: Sequence[Picture], assignment: Assignment, lang: str) -> list[str]:
+    """The plans as drawn, or the sheet where it has none, each an SVG element with its own scan in it."""
+    speaker, names = tongue(lang), assignment.file.names
+    drawings = []
+    for index, picture in enumerate(pictures):
+        views = page_views(picture, index, names)
+        wanted = [view for view in views if view.kind != "sheet"] or views
+        shared = "" if picture.scan else f", {speaker.gettext(AS_MEASURED)}"
+        scan = (
+            f'<svg width="0" height="0" aria-hidden="true"><defs>{scan_element(picture, index)}</defs></svg>'
+        )
+        drawings += [scan] if picture.scan else []
+        drawings += [str(svg(view, picture, _description(view.kind, speaker) + shared)) for view in wanted]
+    return drawings
+
+
+def _description(kind: str, speaker: Tongue) -> str:
+    return speaker.gettext(PLACES.get(kind, SHEET))
+
+
+def _lines(lines: Sequence[CheckedLine], lang: str) -> list[dict[str, str]]:
+    speaker = tongue(lang)
+    return [
+        {
+            "name": line.name,
+            "html": str(symbols(line.name)),
+            "result": line.result,
+            "mark": RESULTS[line.result][0],
+            "word": speaker.gettext(RESULTS[line.result][1]),
+            "hint": str(symbols(line.hint)),
+            "advice": str(symbols(line.advice)),
+        }
+        for line in lines
+    ]

@@ -8,7 +8,7 @@ from fastapi import Depends, Path, Request, Response
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from grader.language import LANGUAGES
+from grader.language import LANGUAGES, N_
 from grader.web.guard import Guard, RefusedError, Visitor, forbidden, missing
 from grader.web.places import Places, places_of
 from grader.web.queue import Queue
@@ -42,7 +42,7 @@ class Call:
     def account(self) -> Account:
         """The instructor who is signed in. Raises RefusedError where nobody is."""
         if self.visitor.account is None:
-            raise RefusedError(401, "sign_in", "sign in first")
+            raise RefusedError(401, "sign_in", N_("sign in first"))
         return self.visitor.account
 
     @property
@@ -54,11 +54,8 @@ class Call:
 
     @property
     def lang(self) -> str:
-        """The language that the visitor chose, else the browser's, else English."""
-        chosen = self.request.query_params.get("lang") or self.request.cookies.get("planmark_lang", "")
-        wanted = [chosen, *self.request.headers.get("accept-language", "").split(",")]
-        codes = (one.strip()[:2].lower() for one in wanted)
-        return next((code for code in codes if code in LANGUAGES), LANGUAGES[0])
+        """The visitor's language."""
+        return language_of(self.request)
 
     def note(self, act: str, about: str = "") -> None:
         """Add to the audit trail."""
@@ -72,6 +69,8 @@ class Call:
         visit = self.visitor.visit
         who = f"address {self.visitor.address}" if visit is None else f"visit {visit.id}"
         self.service.guard.count(rate, [who])
+        if visit is not None and visit.account_id is None:
+            self.service.guard.count("address", [self.visitor.address])
 
     def publication(self, key: str) -> Publication:
         """A publication by its key. Raises RefusedError where there is none."""
@@ -97,6 +96,14 @@ class Call:
         return places_of(self.service.settings.data, publication)
 
 
+def language_of(request: Request) -> str:
+    """The language that a visitor chose, else the browser's, else English."""
+    chosen = request.query_params.get("lang") or request.cookies.get("planmark_lang", "")
+    wanted = [chosen, *request.headers.get("accept-language", "").split(",")]
+    codes = (one.strip()[:2].lower() for one in wanted)
+    return next((code for code in codes if code in LANGUAGES), LANGUAGES[0])
+
+
 def called(request: Request, response: Response) -> Iterator[Call]:
     """A request as routes take it; what changes something must come from our own page, or a program."""
     service: Service = request.app.state.service
@@ -108,11 +115,13 @@ def called(request: Request, response: Response) -> Iterator[Call]:
 
 
 Called = Annotated[Call, Depends(called, scope="function")]
-Key = Annotated[str, Path(pattern=r"^[A-Za-z0-9_-]{1,40}$", description="the publication's key")]
+Key = Annotated[str, Path(pattern=r"^[A-Za-z0-9_-]{1,64}$", description="the publication's key")]
 
 
-async def body_of(request: Request) -> bytes:
-    """The whole body, whose size `grader.web.guard.Rim` bounds."""
+async def body_of(request: Request, call: Called) -> bytes:
+    """The whole body, whose size `grader.web.guard.Rim` bounds; of a stranger no class's file is read."""
+    if "/files/" in request.url.path:
+        _ = call.account
     return await request.body()
 
 

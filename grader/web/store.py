@@ -199,8 +199,9 @@ class Store:
     @contextmanager
     def session(self) -> Iterator[Session]:
         """A session that is committed at its end, and rolled back on any error."""
-        with self._sessions.begin() as session:
+        with self._sessions() as session:
             yield session
+            session.commit()
 
     def note(self, session: Session, who: str, act: str, about: str = "") -> None:
         """Add to the audit trail."""
@@ -214,11 +215,12 @@ class Store:
             return bool(taken.rowcount)  # type: ignore[attr-defined]
 
     def forget(self, *, days: float, now: float | None = None) -> None:
-        """Delete what is kept no longer: visits, jobs of photos, audit older than so many days."""
-        before = (time.time() if now is None else now) - days * 86400.0
+        """Delete visits and audit entries older than so many days, and what photos gave a day ago."""
+        moment = time.time() if now is None else now
+        before = moment - days * 86400.0
         with self.session() as session:
             session.execute(delete(Visit).where(Visit.used < before, Visit.title == ""))
-            session.execute(delete(Job).where(Job.created < before, Job.kind == "photo"))
+            session.execute(delete(Job).where(Job.created < moment - 86400.0, Job.kind == "photo"))
             session.execute(delete(Audit).where(Audit.at < before))
 
 

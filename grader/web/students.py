@@ -1,23 +1,27 @@
 """What students may do: check values and photos, see their feedback, hand in, ask for regrading."""
 
+import contextlib
 import re
 import secrets
+import threading
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, ConfigDict, Field
-from sqlalchemy import select
+from sqlalchemy import func, select, update
+from sqlalchemy.exc import IntegrityError
 
 from grader.documents import ReportDocument
 from grader.files import result_folders, write_whole
+from grader.language import N_
 from grader.lms.export import read_results
 from grader.web.guard import RefusedError, forbidden, missing
 from grader.web.places import assignment_of
 from grader.web.self_check import checked_values, form_of, variant_of
 from grader.web.service import FILE_BODY, Body, Call, Called, Key
-from grader.web.store import Attempt, Job, Link, Publication, Regrading, Visit
+from grader.web.store import Attempt, Job, Link, Publication, Regrading
 from reference.authored.assignment import Variant
 
 router = APIRouter(prefix="/api/v1", tags=["students"])
@@ -25,6 +29,12 @@ Lang = Literal["en", "ro", "ru"]
 Number = Annotated[int | None, Query(ge=0, le=1_000_000)]
 MOST_CELLS = 400
 """Of a form: the largest assignment asks for a hundred and some."""
+MOST_WAITING = 200
+"""Photos in the queue: at two seconds each the last one would wait for seven minutes."""
+MOST_SHEETS = 40
+"""That one student may hand in: ten times a plan of four pages."""
+_HANDING_IN = threading.Lock()
+"""Two sheets sent at once have two names."""
 _PICTURES = {
     b"\xff\xd8\xff": ".jpg",
     b"\x89PNG": ".png",
@@ -33,6 +43,10 @@ _PICTURES = {
     b"MM\x00*": ".tif",
 }
 """First bytes of the files that a student may send, and how they are stored."""
+
+
+WITHOUT_NUL = r"^[^\x00]*$"
+"""PostgreSQL stores no such sign."""
 
 
 class Strict(BaseModel):
@@ -92,7 +106,7 @@ class JobState(BaseModel):
 class Request(Strict):
     """A student's request to look again at a mark."""
 
-    text: str = Field(min_length=1, max_length=2000)
+    text: str = Field(min_length=1, max_length=2000, pattern=WITHOUT_NUL)
     criterion: str = Field(default="", max_length=80)
     position: int | None = Field(default=None, ge=0, le=1_000_000)
 
@@ -125,6 +139,9 @@ def check_photo(
     publication = open_for_checks(call, key)
     call.count("photo")
     ending = ending_of(body)
+    waiting = select(func.count()).select_from(Job).where(Job.kind == "photo", Job.state == "queued")
+    if (call.session.scalar(waiting) or 0) >= MOST_WAITING:
+        raise RefusedError(503, "busy", N_("very many photos wait now: send yours again in some minutes"))
     assignment = assignment_of(call.service.settings.data, publication)
     variant = variant_of(assignment, n, position)
     left = use_attempt(call, publication, variant)
@@ -222,13 +239,16 @@ def hand_in(call: Called, key: Key, body: Body) -> dict[str, str]:
     publication = call.publication(key)
     link = personal(call, publication)
     if not publication.takes_sheets:
-        raise forbidden("sheets are not handed in here now")
+        raise forbidden(N_("sheets are not handed in here now"))
     call.count("photo")
     folder = call.places(publication).handed_in
     ending = ending_of(body)
-    taken = len(list(folder.glob(f"{link.student_id}_sent*")))
-    name = f"{link.student_id}_sent{taken + 1:02}{ending}"
-    write_whole(folder / name, body)
+    with _HANDING_IN:
+        taken = len(list(folder.glob(f"{link.student_id}_sent*")))
+        if taken >= MOST_SHEETS:
+            raise RefusedError(403, "sheets", N_("%(count)s sheets of yours are there already"), count=taken)
+        name = f"{link.student_id}_sent{taken + 1:02}{ending}"
+        write_whole(folder / name, body)
     call.note("handed in", f"{publication.key} {name}")
     return {"file": name}
 
@@ -240,7 +260,7 @@ def open_for_checks(call: Call, key: str) -> Publication:
     """A publication that students may check values against; instructors may try theirs at any time."""
     publication = call.publication(key)
     if not publication.is_open and not call.visitor.is_member(publication):
-        raise forbidden("the self-check is not open now")
+        raise forbidden(N_("the self-check is not open now"))
     return publication
 
 
@@ -250,25 +270,25 @@ def use_attempt(call: Call, publication: Publication, variant: Variant) -> int |
         return None
     link = personal(call, publication)
     who, what = f"student:{link.student_id}", str(variant)[:60]
-    counted = select(Attempt).where(
-        Attempt.publication_id == publication.id, Attempt.who == who, Attempt.variant == what
-    )
-    attempt = call.session.scalar(counted.with_for_update())
-    if attempt is None:
-        attempt = Attempt(publication_id=publication.id, who=who, variant=what, count=0)
-        call.session.add(attempt)
-    if attempt.count >= publication.attempts:
-        raise RefusedError(403, "attempts_used", f"all {publication.attempts} attempts are used")
-    attempt.count += 1
-    call.session.flush()
-    return publication.attempts - attempt.count
+    own = (Attempt.publication_id == publication.id, Attempt.who == who, Attempt.variant == what)
+    if call.session.scalar(select(Attempt.id).where(*own)) is None:
+        with contextlib.suppress(IntegrityError), call.session.begin_nested():  # somebody was faster
+            call.session.add(Attempt(publication_id=publication.id, who=who, variant=what, count=0))
+    # One statement: attempts that are made at once are counted one after the other.
+    more = update(Attempt).where(*own, Attempt.count < publication.attempts).values(count=Attempt.count + 1)
+    count = call.session.scalar(more.returning(Attempt.count))
+    if count is None:
+        raise RefusedError(
+            403, "attempts_used", N_("all %(count)s attempts are used"), count=publication.attempts
+        )
+    return publication.attempts - int(count)
 
 
 def personal(call: Call, publication: Publication) -> Link:
     """The student's personal link. Raises RefusedError for a visitor without a valid one."""
     link = call.link(publication)
     if link is None:
-        raise RefusedError(401, "link_needed", "open the personal link that you were sent")
+        raise RefusedError(401, "link_needed", N_("open the personal link that you were sent"))
     return link
 
 
@@ -277,7 +297,7 @@ def own_publication(call: Call, key: str) -> Publication:
     publication = call.publication(key)
     personal(call, publication)
     if not publication.is_released:
-        raise forbidden("the feedback is not released yet")
+        raise forbidden(N_("the feedback is not released yet"))
     return publication
 
 
@@ -297,8 +317,7 @@ def enter(call: Call, token: str) -> Link:
     """Let a visit be a student's by a personal link."""
     call.count("key")
     link = call.service.guard.opened(call.session, token)
-    visit: Visit = call.service.guard.begin(call.session, call.visitor)
-    visit.links = {**visit.links, str(link.publication_id): link.id}
+    call.service.guard.begin(call.session, call.visitor, link=link)
     call.service.guard.set_cookie(call.response, call.visitor)
     return link
 
@@ -307,7 +326,7 @@ def ending_of(body: bytes) -> str:
     """How a picture is stored, by its first bytes. Raises RefusedError for any other file."""
     ending = next((one for start, one in _PICTURES.items() if body.startswith(start)), None)
     if ending is None:
-        raise RefusedError(415, "file_type", "send a photo or scan: JPEG, PNG, TIFF or PDF")
+        raise RefusedError(415, "file_type", N_("send a photo or scan: JPEG, PNG, TIFF or PDF"))
     return ending
 
 

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from grader.files import guarded
 from grader.lms import table
 from grader.lms.grades import Person
 from grader.lms.table import (
     criteria_text,
     csv_text,
-    guarded,
     match_rows,
     number,
     parse,

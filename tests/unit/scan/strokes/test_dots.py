@@ -7,7 +7,7 @@ import pytest
 from grader.records import Page
 from grader.scan.decode.pages import is_blank
 from grader.scan.pixels import is_dotted
-from grader.scan.strokes.dots import joined_dots
+from grader.scan.strokes.ink import joined_dots
 from grader.scan.strokes.seeds import find_seeds
 
 PX_PER_MM = 11.81

@@ -1,0 +1,434 @@
+"""What of a picture spoils the reading of a sheet: cut corners, blur, bad light, too few pixels.
+
+Each flaw has its measured figure and the limit that it passes:
+
+- `corner_cut`: mm by which the farthest cut corner lies outside the picture
+- `blurred`: mm across an edge of ink, in the direction in which edges are widest
+- `too_coarse`, `far_away`: dots per inch of paper
+- `too_tilted`: largest over smallest resolution on the sheet
+- `too_dark`: brightness of the paper, 0..255
+- `shadow`: brightness of the darkest part of the paper over that of the brightest
+- `overexposed`: contrast of the ink, 0..1
+- `glare`: share of the sheet
+- `no_sheet`, `not_placed`: share of the picture that could be paper
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from grader.printed.layout import MARKER_CORNERS, PAGE_MM
+from grader.records import ZONE_SLACK_MM, Box, Flaw, FloatArray, Page, Sheet
+from grader.scan.pixels import (
+    BoolArray,
+    Flat,
+    Float32Array,
+    at_full_size,
+    connected,
+    cut_out,
+    flatten,
+    local_axes,
+    mapped,
+    reduction,
+    sampled,
+    shrink,
+    through_corners,
+)
+from reference.drawing.canvas import MM_PER_INCH
+
+_CORNERS_MM = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]) * PAGE_MM
+_INNER_MM = (_CORNERS_MM + np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)]) * 10.0)[:, None]
+"""(4, 1, 2) the corners of the drawing frame: it lies 10 mm inside the paper (ISO 5457)."""
+_CORNERS = ("upper_left", "upper_right", "lower_right", "lower_left")
+_ROWS, _COLUMNS = ("upper", "middle", "lower"), ("left", "middle", "right")
+
+
+def flaws(page: Page, sheet: Sheet | None) -> tuple[Flaw, ...]:
+    """What spoils the reading of a decoded page, the worst first.
+
+    Arguments: `sheet` is its registration, None where it was refused: the paper's outline must do then.
+    """
+    flat = flatten(page.grey)
+    outline = None if sheet is not None else _paper(page)
+    if sheet is not None:
+        mm_to_px = sheet.mm_to_px
+    elif outline is not None:
+        mm_to_px = outline.mm_to_px
+    else:
+        mm_to_px = _whole_picture(page)
+    light = list(_light(flat, mm_to_px, sheet))
+    # In bad light the table may look like the paper.
+    is_seen = sheet is not None or not light
+    cut = list(_cut_corners(page, sheet, outline)) if is_seen else []
+    found = [*cut, *_resolution(page, mm_to_px), *light, *_blur(flat, mm_to_px)]
+    if sheet is None and not found:
+        share = 0.0 if outline is None else outline.share
+        found.append(Flaw("no_sheet" if outline is None else "not_placed", share, _LEAST_PAPER))
+    return tuple(found)
+
+
+# Where the sheet lies -----------------------------------------------------------------------------
+
+_OUTLINE_PX = 480
+"""Long side of the picture in which paper is told from the table: 1 px is a millimetre or two."""
+_LEAST_PAPER = 0.15
+"""Of the picture: a smaller bright patch is no sheet that could be read."""
+_FULL = 0.9
+"""Of its hull: a bright patch with more holes or bays is no sheet."""
+_RIM_PX = 1
+"""A patch that comes so near to the picture's rim runs on beyond it."""
+_LEAST_SIDE = 0.12
+"""Of the patch's size: a side's line needs so many points."""
+_BEYOND = 0.1
+"""Of the sheet: a side that is not in the picture is taken to lie so far beyond the rim."""
+_SLACK = 0.01
+"""Of the long side, 4 mm on A3: corners by the sides' lines are known no better where a lens bends them."""
+_PARALLEL = 1e-9
+"""Of lines in pixels that have no crossing."""
+_BESIDE_MM = 2.0
+"""The map's own error, and a frame's that was ruled by hand."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Outline:
+    """The paper in a picture by its brightness; corners beyond the picture are where its sides meet.
+
+    `share`: of the picture that it fills; `cut`: numbers of the corners that are not in the picture.
+    """
+
+    mm_to_px: FloatArray
+    share: float
+    cut: tuple[int, ...]
+
+
+def _whole_picture(page: Page) -> FloatArray:
+    """The map of a sheet that fills the picture."""
+    high, wide = page.grey.shape
+    corners = np.array([(0.0, 0.0), (wide, 0.0), (wide, high), (0.0, high)]) - 0.5
+    if high > wide:
+        corners = np.roll(corners, 1, axis=0)
+    return through_corners(_CORNERS_MM, corners)
+
+
+def _paper(page: Page) -> _Outline | None:
+    """The paper's outline, None where no bright patch has the shape of a sheet."""
+    scale = min(1.0, _OUTLINE_PX / max(page.grey.shape))
+    small = shrink(page.grey, scale)
+    soft = cv2.medianBlur(small, 5)
+    _, bright = cv2.threshold(soft, 0, 1, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
+    labels, boxes = connected(np.ascontiguousarray(bright, dtype=np.uint8))
+    if len(boxes) == 0:
+        return None
+    sizes = np.bincount(labels.reshape(-1), minlength=len(boxes) + 1)[1:]
+    patch = (labels == 1 + int(sizes.argmax())).astype(np.uint8)
+    share = float(sizes.max()) / patch.size
+    contours, _ = cv2.findContours(patch, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    hull = cv2.convexHull(max(contours, key=cv2.contourArea))
+    if share < _LEAST_PAPER or cv2.contourArea(hull) * _FULL > sizes.max():
+        return None
+    high, wide = patch.shape
+    found = _four_corners(hull[:, 0].astype(np.float64), np.array([wide, high], dtype=np.float64))
+    if found is None:
+        return None
+    corners, cut = found
+    full = np.array(page.grey.shape[::-1], dtype=np.float64)
+    corners, cut = _upright(at_full_size(corners, np.array([wide, high]) / full), cut, page.turn_deg)
+    matrix = through_corners(_CORNERS_MM, corners)
+    if not np.all(np.isfinite(matrix)):
+        return None
+    return _Outline(matrix, share, tuple(np.flatnonzero(cut).tolist()))
+
+
+def _four_corners(hull: FloatArray, size: FloatArray) -> tuple[FloatArray, BoolArray] | None:
+    """Where the sides of a convex patch (n, 2) meet, (4, 2) around it, and which corners were not seen.
+
+    None where no side is in the picture, or the patch is no quadrangle.
+    """
+    span = np.roll(hull, -1, axis=0) - hull
+    length = np.hypot(*span.T)
+    middle = hull.mean(axis=0)
+    at = hull + span / 2.0
+    inside = np.all((at > _RIM_PX) & (at < size - 1.0 - _RIM_PX), axis=1)
+    box = cv2.boxPoints(cv2.minAreaRect(hull.astype(np.float32))).astype(np.float64)
+    sides = np.roll(box, -1, axis=0) - box
+    outward = np.stack([sides[:, 1], -sides[:, 0]], axis=1) / np.hypot(*sides.T)[:, None]
+    outward *= np.sign(((box - middle) * outward).sum(axis=1))[:, None]
+    normal = np.stack([span[:, 1], -span[:, 0]], axis=1)
+    normal *= np.sign(((at - middle) * normal).sum(axis=1))[:, None]
+    side_of = (normal @ outward.T).argmax(axis=1)
+    lines = np.empty((4, 3))
+    seen = np.zeros(4, dtype=bool)
+    for k in range(4):
+        own = inside & (side_of == k)
+        seen[k] = length[own].sum() > _LEAST_SIDE * np.hypot(*sides[k])
+        if seen[k]:
+            steps = np.maximum(length[own], 1.0).astype(int)
+            share = np.concatenate([np.linspace(0.0, 1.0, step) for step in steps])
+            points = np.repeat(hull[own], steps, axis=0) + share[:, None] * np.repeat(
+                span[own], steps, axis=0
+            )
+            vx, vy, x, y = (
+                cv2.fitLine(points.astype(np.float32), cv2.DIST_HUBER, 0, 0.01, 0.01).reshape(-1).tolist()
+            )
+            lines[k] = -vy, vx, vy * x - vx * y
+        else:
+            # It lies beyond the rim, nobody knows how far.
+            lines[k] = *outward[k], -(outward[k] @ (box[k] + _BEYOND * np.hypot(*sides[k - 1]) * outward[k]))
+    if not seen.any():
+        return None
+    crossing = np.cross(np.roll(lines, 1, axis=0), lines)
+    if np.any(np.abs(crossing[:, 2]) < _PARALLEL):
+        return None
+    corners = crossing[:, :2] / crossing[:, 2:]
+    slack = _SLACK * size.max()
+    cut = np.any((corners < -slack) | (corners > size - 1.0 + slack), axis=1)
+    return corners, cut
+
+
+def _upright(corners: FloatArray, cut: BoolArray, turn_deg: int) -> tuple[FloatArray, BoolArray]:
+    """Corners around a sheet, from the upper left one of the picture as it is shown, clockwise."""
+    x, y = (corners - corners.mean(axis=0)).T
+    order = np.argsort(np.arctan2(y, x))
+    # Shown turned counter-clockwise, another corner is the upper left one.
+    turn = np.radians(turn_deg)
+    shown = np.stack([x * np.cos(turn) + y * np.sin(turn), y * np.cos(turn) - x * np.sin(turn)], axis=1)[
+        order
+    ]
+    first = int(shown.sum(axis=1).argmin())
+    order = np.roll(order, -first)
+    return corners[order], cut[order]
+
+
+def _cut_corners(page: Page, sheet: Sheet | None, outline: _Outline | None) -> Iterator[Flaw]:
+    """The corners that are not in the picture."""
+    size = np.array(page.grey.shape[::-1], dtype=np.float64)
+    if sheet is None:
+        if outline is not None and outline.cut:
+            at = mapped(outline.mm_to_px, _CORNERS_MM)
+            beyond = np.maximum(-at, at - (size - 1.0)).max(axis=1) / _px_per_mm(outline.mm_to_px)
+            yield Flaw("corner_cut", float(beyond.max()), 0.0, tuple(_CORNERS[k] for k in outline.cut))
+        return
+    # The frame, or the markers, of which all four corners are to be seen.
+    must = _INNER_MM if not sheet.zones else MARKER_CORNERS[[0, 3, 7, 4]].reshape(4, 4, 2)
+    at = mapped(sheet.mm_to_px, must)
+    beyond = np.maximum(-at, at - (size - 1.0)).max(axis=(1, 2)) / sheet.px_per_mm
+    cut = np.flatnonzero(beyond > _BESIDE_MM)
+    if len(cut):
+        yield Flaw("corner_cut", float(beyond.max()), _BESIDE_MM, tuple(_CORNERS[k] for k in cut))
+
+
+# Resolution ---------------------------------------------------------------------------------------
+
+LEAST_DPI = 150.0
+"""What students are asked for. Usual pencils are read at 110, thin and faint ones are not."""
+_FAR = 0.5
+"""Of the picture: a sheet that fills less can be photographed from nearer."""
+_MOST_UNEVEN = 2.0
+"""Largest over smallest resolution: one side of the sheet then has half the pixels of the other."""
+
+
+def _axes(mm_to_px: FloatArray) -> FloatArray:
+    """(4,) pixels per mm at the sheet's corners."""
+    right, down = local_axes(mm_to_px, _INNER_MM[:, 0])
+    return np.asarray(np.sqrt(np.abs(right[:, 0] * down[:, 1] - right[:, 1] * down[:, 0])))
+
+
+def _px_per_mm(mm_to_px: FloatArray) -> float:
+    return float(np.exp(np.log(np.maximum(_axes(mm_to_px), 1e-6)).mean()))
+
+
+def _resolution(page: Page, mm_to_px: FloatArray) -> Iterator[Flaw]:
+    """Too few pixels on the sheet, or on a part of it."""
+    axes = _axes(mm_to_px)
+    dpi = _px_per_mm(mm_to_px) * MM_PER_INCH
+    if dpi < LEAST_DPI:
+        area = cv2.contourArea(mapped(mm_to_px, _CORNERS_MM).astype(np.float32)) / page.grey.size
+        yield Flaw("far_away" if area < _FAR else "too_coarse", dpi, LEAST_DPI)
+    uneven = float(axes.max() / max(axes.min(), 1e-6))
+    if uneven > _MOST_UNEVEN:
+        yield Flaw("too_tilted", uneven, _MOST_UNEVEN)
+
+
+# Light --------------------------------------------------------------------------------------------
+
+_PART = 0.2
+"""Of a shadow or reflection: a ninth of the sheet that holds less is not named."""
+_MAP_PX_PER_MM = 0.25
+"""Of the map of the light: shadows and glare are larger than 4 mm."""
+_LEAST_PAPER_LEVEL = 85.0
+"""Of 255: with a phone's noise nearly all vectors were right at 120, a quarter at 73."""
+_SHADE, _LEAST_SHADE = 0.2, 0.04
+"""Light in a shadow over that beside it (nearly all vectors were right at 0.18, a quarter at 0.1), and
+share of the sheet: a hand's breadth."""
+_WHITE = 253
+"""Of 255: a sensor that has reached it tells no lighter from lightest."""
+_MOST_WHITE = 0.5
+"""Of the sheet: what is whiter is no reflection."""
+_LEAST_INK = 0.3
+"""Contrast of the ink where the paper is white: where it was 0.24, a quarter of the vectors was right."""
+_INK_QUANTILE = 0.995
+"""A drawing's ink covers about a hundredth of its paper."""
+_GLARE, _AROUND_GLARE = 0.005, 247.0
+"""Share of the sheet that is white, within paper that is darker than this around it."""
+_AROUND_MM = 16.0
+"""The paper's brightness beside a reflection."""
+
+
+def _light(flat: Flat, mm_to_px: FloatArray, sheet: Sheet | None) -> Iterator[Flaw]:
+    """Too little light, too much of it, or uneven light."""
+    step = np.array(flat.step)
+    to_paper = np.array(
+        [[1 / step[0], 0, 0.5 / step[0] - 0.5], [0, 1 / step[1], 0.5 / step[1] - 0.5], [0, 0, 1.0]]
+    )
+    inner = (*_INNER_MM[0, 0], *(_INNER_MM[2, 0] - _INNER_MM[0, 0]))
+    light = cut_out(flat.paper, to_paper @ mm_to_px, inner, _MAP_PX_PER_MM)
+    if light.size == 0:
+        return
+    level = float(np.quantile(light, 0.9))
+    if level < _LEAST_PAPER_LEVEL:
+        yield Flaw("too_dark", level, _LEAST_PAPER_LEVEL)
+        return
+    shaded = light < _SHADE * level
+    if shaded.mean() > _LEAST_SHADE:
+        yield Flaw("shadow", float(np.quantile(light, 0.02) / level), _SHADE, _areas(shaded))
+    white = light >= _WHITE
+    if white.mean() > _MOST_WHITE:
+        boxes = [inner] if sheet is None or not sheet.zones else list(sheet.zones.values())
+        ink = max(_darkest(flat, mm_to_px, box) for box in boxes)
+        if ink < _LEAST_INK:
+            yield Flaw("overexposed", ink, _LEAST_INK)
+    elif white.mean() > _GLARE:
+        side = 2 * round(_AROUND_MM * _MAP_PX_PER_MM) + 1
+        around = (cv2.dilate(white.astype(np.uint8), np.ones((side, side), np.uint8)) > 0) & ~white
+        if np.median(light[around]) < _AROUND_GLARE:
+            yield Flaw("glare", float(white.mean()), _GLARE, _areas(white))
+
+
+def _darkest(flat: Flat, mm_to_px: FloatArray, box: Box) -> float:
+    """Contrast of the ink in a box of the sheet, away from the line around it, 0..1."""
+    scale = min(1.0, _INK_PX / max(flat.grey.shape))
+    x, y, wide, high = box
+    edge = ZONE_SLACK_MM
+    within = (x + edge, y + edge, wide - 2 * edge, high - 2 * edge)
+    to_reduced = reduction(scale) @ mm_to_px
+    contrast = cut_out(flat.reduced(scale), to_reduced, within, _INK_PX / PAGE_MM[0])
+    return float(np.quantile(contrast, _INK_QUANTILE)) / 255.0 if contrast.size else 0.0
+
+
+def _areas(mask: BoolArray) -> tuple[str, ...]:
+    """Where most of a mask of the sheet lies: the ninths that hold a fifth of it at least."""
+    rows, columns = (np.minimum(np.arange(side) * 3 // side, 2) for side in mask.shape)
+    counts = np.zeros((3, 3))
+    np.add.at(counts, (rows[:, None], columns[None, :]), mask)
+    names = [
+        "middle" if row == column == 1 else f"{_ROWS[row]}_{_COLUMNS[column]}"
+        for row in range(3)
+        for column in range(3)
+    ]
+    held = counts.reshape(-1) / counts.sum()
+    chosen = [name for name, share in zip(names, held, strict=True) if share >= _PART]
+    return tuple(chosen or [names[int(held.argmax())]])
+
+
+# Blur ---------------------------------------------------------------------------------------------
+
+_INK_PX = 1200
+"""Long side of the picture on which ink is looked for."""
+_INK = 38
+"""Contrast of 255: paper's texture and show-through stay below."""
+_TILE_PX = 24
+"""Of that picture: 8 mm of the sheet."""
+_TILES = 48
+"""With most ink: some thousand edges in every direction."""
+_ACROSS_MM = 1.2
+"""To either side of an edge: past the stroke's middle, and to the paper beside it."""
+_LEAST_STEP = 0.15
+"""Of the paper's brightness: texture and noise make smaller steps."""
+_LEAST_EDGES = 60
+"""In a direction, for its width to be known to a tenth."""
+_SHARPEST = 0.25
+"""Of the edges in one direction: a soft pencil's are wider than the lens made them."""
+_SECTORS = 4
+"""Directions by 45 degrees: a shake blurs the edges across it alone."""
+MOST_BLUR_MM = 0.6
+"""Sharp photos have 0.3 to 0.4; from 0.6 the share of right vectors falls, and sureness at 0.8."""
+_MOST_BLUR_PX = 3.0
+"""An edge that is no wider is as sharp as these pixels allow."""
+
+
+def _blur(flat: Flat, mm_to_px: FloatArray) -> Iterator[Flaw]:
+    """Edges of the ink wider than the reader can follow."""
+    px_per_mm = _px_per_mm(mm_to_px)
+    width = _edge_width_px(flat, mm_to_px, px_per_mm)
+    if width > max(MOST_BLUR_MM * px_per_mm, _MOST_BLUR_PX):
+        yield Flaw("blurred", width / px_per_mm, MOST_BLUR_MM)
+
+
+def _edge_width_px(flat: Flat, mm_to_px: FloatArray, px_per_mm: float) -> float:
+    """Width of the sharpest edges of ink in the direction in which they are widest; 0 without edges."""
+    reach = max(4, round(_ACROSS_MM * px_per_mm))
+    angles: list[FloatArray] = []
+    widths: list[FloatArray] = []
+    for tile, paper in _inked_tiles(flat, mm_to_px, reach):
+        angle, width = _edges(tile, paper, reach)
+        angles.append(angle)
+        widths.append(width)
+    if not angles:
+        return 0.0
+    sector = (np.concatenate(angles) / np.pi * _SECTORS + 0.5).astype(int) % _SECTORS
+    width = np.concatenate(widths)
+    in_sector = [width[sector == k] for k in range(_SECTORS)]
+    return max(
+        (float(np.quantile(one, _SHARPEST)) for one in in_sector if len(one) >= _LEAST_EDGES), default=0.0
+    )
+
+
+def _inked_tiles(flat: Flat, mm_to_px: FloatArray, reach: int) -> Iterator[tuple[Float32Array, float]]:
+    """Pieces of the page at full resolution with most ink, and the paper's brightness there."""
+    scale = min(1.0, _INK_PX / max(flat.grey.shape))
+    ink = (flat.reduced(scale) > _INK).astype(np.float32)
+    outline = np.zeros(ink.shape, np.uint8)
+    corners = mapped(reduction(scale) @ mm_to_px, _INNER_MM[:, 0])
+    if np.all(np.abs(corners) < 1e6):
+        cv2.fillConvexPoly(outline, np.rint(corners).astype(np.int32), 1)
+    ink *= outline
+    rows, columns = (side // _TILE_PX for side in ink.shape)
+    held = (
+        ink[: rows * _TILE_PX, : columns * _TILE_PX]
+        .reshape(rows, _TILE_PX, columns, _TILE_PX)
+        .mean(axis=(1, 3))
+    )
+    # Filled areas have few edges.
+    held[held > 0.5] = 0.0
+    for place in held.reshape(-1).argsort()[::-1][:_TILES]:
+        row, column = divmod(int(place), columns)
+        if held[row, column] <= 0.0:
+            return
+        top, left, side = (round(value * _TILE_PX / scale) for value in (row, column, 1))
+        tile = flat.grey[max(0, top - reach) : top + side + reach, max(0, left - reach) : left + side + reach]
+        yield tile.astype(np.float32), float(np.quantile(tile, 0.9))
+
+
+def _edges(tile: Float32Array, paper: float, reach: int) -> tuple[FloatArray, FloatArray]:
+    """(n,) direction across each edge of a piece, radians 0..pi, and its width in pixels."""
+    soft = cv2.GaussianBlur(tile, (0, 0), 0.7)
+    gx, gy = (cv2.Sobel(soft, cv2.CV_32F, dx, 1 - dx, scale=0.125) for dx in (1, 0))
+    slope = np.hypot(gx, gy)
+    inner = slope[reach:-reach, reach:-reach]
+    if inner.size == 0:
+        return np.zeros(0), np.zeros(0)
+    steep = np.argwhere(inner > max(0.03 * paper, 0.35 * float(inner.max()))) + reach
+    y, x = steep.T.astype(np.float32)
+    at = slope[steep[:, 0], steep[:, 1]]
+    ux, uy = gx[steep[:, 0], steep[:, 1]] / at, gy[steep[:, 0], steep[:, 1]] / at
+    beside = sampled(slope, x[:, None] + ux[:, None] * [-1.0, 1.0], y[:, None] + uy[:, None] * [-1.0, 1.0])
+    top = at >= beside.max(axis=1)
+    x, y, ux, uy, at = x[top], y[top], ux[top], uy[top], at[top]
+    along = np.arange(-reach, reach + 1, dtype=np.float32)
+    across = sampled(soft, x[:, None] + ux[:, None] * along, y[:, None] + uy[:, None] * along)
+    step = across[:, reach:].max(axis=1) - across[:, : reach + 1].min(axis=1)
+    enough = step > _LEAST_STEP * paper
+    angle = np.arctan2(uy[enough], ux[enough]) % np.pi
+    return angle.astype(np.float64), (step[enough] / at[enough]).astype(np.float64)

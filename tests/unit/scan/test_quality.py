@@ -1,0 +1,174 @@
+"""What spoils a picture is found where it is, and nowhere else."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from grader.records import Flaw, GreyImage, Page, Sheet
+from grader.scan.decode.pages import page_of
+from grader.scan.quality import LEAST_DPI, MOST_BLUR_MM, flaws
+from grader.scan.register.registration import register
+from tests.bench.reading_scenes import ReadingScene, work
+
+REAL = Path(__file__).parents[4] / "shared" / "real"
+PRINTED = ReadingScene("photo", "", device="phone", dpi=None, printed=True, hardship=0.0)
+PLAIN = ReadingScene("photo", "", device="phone", dpi=None, hardship=0.0)
+
+
+def photo(scene: ReadingScene, seed: int) -> tuple[Page, float]:
+    """A photo, as the camera stored it, and its pixels per mm."""
+    sheet = work(scene, seed).sheets[0]
+    grey = sheet.image if sheet.image.ndim == 2 else cv2.cvtColor(sheet.image, cv2.COLOR_RGB2GRAY)
+    turn = round(-sheet.truth["rotation_deg"] / 90.0) * 90 % 360
+    return Page("photo.jpg", 1, np.asarray(grey, dtype=np.uint8), turn_deg=turn), sheet.truth["px_per_mm"]
+
+
+@pytest.fixture(scope="module")
+def good() -> tuple[Page, float]:
+    return photo(PRINTED, 1)
+
+
+def flaws_of(page: Page) -> dict[str, Flaw]:
+    """Of a page, registered where it can be."""
+    sheet, _ = register(page)
+    return {flaw.code: flaw for flaw in flaws(page, sheet if isinstance(sheet, Sheet) else None)}
+
+
+def defocused(grey: GreyImage, px_per_mm: float) -> GreyImage:
+    side = 2 * round(0.75 * px_per_mm) + 1
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)).astype(np.float32)
+    return np.asarray(cv2.filter2D(grey, -1, disc / disc.sum()), dtype=np.uint8)
+
+
+def shaken(grey: GreyImage, px_per_mm: float) -> GreyImage:
+    return np.asarray(cv2.blur(grey, (1, round(1.8 * px_per_mm))), dtype=np.uint8)
+
+
+def underexposed(grey: GreyImage, _px_per_mm: float) -> GreyImage:
+    return np.asarray(255.0 * (grey / 255.0) ** 8 * 0.3, dtype=np.uint8)
+
+
+def shaded(grey: GreyImage, px_per_mm: float) -> GreyImage:
+    """A hard-edged shadow over a corner."""
+    high, wide = grey.shape
+    mask = np.ones(grey.shape, np.float32)
+    cv2.fillPoly(mask, [np.array([(0, 0), (0.6 * wide, 0), (0, 0.7 * high)], np.int32)], 0.1)
+    return np.asarray(grey * cv2.GaussianBlur(mask, (0, 0), 3.0 * px_per_mm), dtype=np.uint8)
+
+
+def reflecting(grey: GreyImage, px_per_mm: float) -> GreyImage:
+    spot = np.zeros(grey.shape, np.float32)
+    high, wide = grey.shape
+    cv2.ellipse(spot, (wide // 2, high // 2), (wide // 7, high // 11), 30.0, 0.0, 360.0, 255.0, -1)
+    return np.asarray(np.clip(grey + cv2.GaussianBlur(spot, (0, 0), 2.0 * px_per_mm), 0, 255), dtype=np.uint8)
+
+
+def reduced(grey: GreyImage, _px_per_mm: float) -> GreyImage:
+    """As a messenger sends it: 1600 pixels."""
+    scale = 1600.0 / max(grey.shape)
+    return np.asarray(
+        cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_LINEAR), dtype=np.uint8
+    )
+
+
+def far_away(grey: GreyImage, _px_per_mm: float) -> GreyImage:
+    small = cv2.resize(grey, None, fx=0.55, fy=0.55, interpolation=cv2.INTER_AREA)
+    table = np.full(grey.shape, 70, np.uint8)
+    table[200 : 200 + small.shape[0], 300 : 300 + small.shape[1]] = small
+    return table
+
+
+def slanted(grey: GreyImage, _px_per_mm: float) -> GreyImage:
+    high, wide = grey.shape
+    corners = np.array([(0, 0), (wide, 0), (wide, high), (0, high)], np.float32)
+    onto = np.array([(0.3 * wide, 0.1 * high), (0.7 * wide, 0.1 * high), (wide, high), (0, high)], np.float32)
+    matrix = cv2.getPerspectiveTransform(corners, onto)
+    return np.asarray(cv2.warpPerspective(grey, matrix, (wide, high), borderValue=70), dtype=np.uint8)
+
+
+SPOILT: dict[str, Callable[[GreyImage, float], GreyImage]] = {
+    "too_dark": underexposed,
+    "shadow": shaded,
+    "glare": reflecting,
+    "too_coarse": reduced,
+    "far_away": far_away,
+    "too_tilted": slanted,
+}
+
+
+@pytest.mark.parametrize("code", SPOILT)
+def test_a_photo_that_is_spoilt_is_told_what_spoils_it(good: tuple[Page, float], code: str) -> None:
+    page, px_per_mm = good
+    assert code in flaws_of(replace(page, grey=SPOILT[code](page.grey, px_per_mm)))
+
+
+@pytest.mark.parametrize("spoil", [defocused, shaken])
+def test_blur_is_measured_in_the_direction_in_which_it_is_worst(
+    good: tuple[Page, float], spoil: Callable[[GreyImage, float], GreyImage]
+) -> None:
+    page, px_per_mm = good
+    flaw = flaws_of(replace(page, grey=spoil(page.grey, px_per_mm)))["blurred"]
+    assert MOST_BLUR_MM < flaw.measured < 3.0
+
+
+def test_faded_lines_of_an_overexposed_photo_are_told_on_plain_and_printed_sheets(
+    good: tuple[Page, float],
+) -> None:
+    for page in (good[0], photo(PLAIN, 1)[0]):
+        bright = np.clip(page.grey.astype(np.float32) * 2.2, 0, 255).astype(np.uint8)
+        assert "overexposed" in flaws_of(replace(page, grey=bright))
+
+
+@pytest.mark.parametrize("scene", [PRINTED, PLAIN])
+def test_the_corners_that_are_not_in_the_picture_are_named(scene: ReadingScene) -> None:
+    page, _ = photo(scene, 3)
+    assert page.turn_deg == 0
+    high, wide = page.grey.shape
+    for keep, corners in {
+        (slice(0, round(0.82 * high)), slice(0, wide)): {"lower_left", "lower_right"},
+        (slice(0, high), slice(round(0.2 * wide), wide)): {"upper_left", "lower_left"},
+    }.items():
+        flaw = flaws_of(replace(page, grey=np.ascontiguousarray(page.grey[keep])))["corner_cut"]
+        assert set(flaw.places) == corners
+
+
+def test_a_picture_without_a_sheet_is_told_and_a_turned_sheet_is_none() -> None:
+    rng = np.random.default_rng(1)
+    soft = cv2.GaussianBlur(rng.uniform(0, 255, (1500, 2000)).astype(np.float32), (0, 0), 25.0)
+    noise = cv2.normalize(soft, None, 0, 255, cv2.NORM_MINMAX)
+    assert set(flaws_of(Page("garden.jpg", 1, np.asarray(noise, dtype=np.uint8)))) == {"no_sheet"}
+    page, _ = photo(PRINTED, 2)
+    assert not flaws_of(replace(page, grey=np.ascontiguousarray(np.rot90(page.grey)), turn_deg=270))
+
+
+@pytest.mark.parametrize("seed", range(40, 44))
+def test_good_photos_have_no_flaw(seed: int) -> None:
+    for scene in (PRINTED, PLAIN):
+        assert not flaws_of(photo(scene, seed)[0])
+
+
+@pytest.mark.parametrize("device", ["flatbed", "copier"])
+def test_scans_and_copies_have_no_flaw(device: str) -> None:
+    scene = ReadingScene("scan", "", device=device, dpi=200.0, hardship=0.0)  # type: ignore[arg-type]
+    for seed in (1, 2):
+        assert not flaws_of(photo(scene, seed)[0])
+
+
+def test_a_scan_at_a_low_resolution_is_told_its_dots_per_inch() -> None:
+    page, _ = photo(ReadingScene("scan", "", dpi=100.0, hardship=0.0), 1)
+    flaw = flaws_of(page)["too_coarse"]
+    assert flaw.measured == pytest.approx(100.0, rel=0.03)
+    assert flaw.limit == LEAST_DPI
+
+
+@pytest.mark.skipif(not REAL.is_dir(), reason="real pictures are not in the repository")
+@pytest.mark.parametrize(
+    "name", ["ruled/t16-p5.png", "hdBPMN/ex07_writer0049.jpg", "noteshrink/graph-paper-front.jpg"]
+)
+def test_real_scans_of_pencil_and_print_are_not_blurred(name: str) -> None:
+    page = page_of(REAL / name, 1)
+    assert "blurred" not in {flaw.code for flaw in flaws(page, None)}

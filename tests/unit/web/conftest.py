@@ -1,0 +1,142 @@
+import json
+import re
+import time
+
+import pytest
+from starlette.testclient import TestClient
+
+from grader.files import samples_folder
+from grader.folder.batch import grade
+from grader.folder.workers import Limits
+from grader.web import queue
+from grader.web.app import application, first_invitation
+from grader.web.places import batch_of
+from grader.web.settings import Settings
+from tests.inline import Inline
+
+ADDRESS = "http://127.0.0.1:8000"
+PASSWORD = "four words make one"  # noqa: S105 - of a test
+SAMPLES = samples_folder() / "pump"
+
+
+class Workers(Inline):
+    """The pool in the test itself."""
+
+    def __init__(self, *_arguments):
+        """Nothing is limited."""
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_error):
+        """Nothing to end."""
+
+
+class Browser(TestClient):
+    """A browser with cookies of its own that sends what our script sends."""
+
+    def __init__(self, app):
+        super().__init__(app, base_url=ADDRESS, raise_server_exceptions=False)
+
+    @property
+    def token(self):
+        return re.search(r'name="form-token" content="(\w+)"', self.get("/").text)[1]
+
+    def act(self, method, path, **known):
+        headers = {"X-Planmark-Form": self.token, "Origin": ADDRESS, **known.pop("headers", {})}
+        return self.request(method, f"/api/v1{path}", headers=headers, **known)
+
+    def join(self, address, name):
+        token = address.partition("token=")[2]
+        return self.act("POST", "/accounts/join", json={"token": token, "name": name, "password": PASSWORD})
+
+    def sign_in(self, name, password=PASSWORD):
+        return self.act("POST", "/session", json={"name": name, "password": password})
+
+    def publish(self, **settings):
+        settings = {"assignment": "pump", "is_open": True, **settings}
+        return self.act("POST", "/publications", json=settings).json()["key"]
+
+    def ended(self, path, job):
+        """The job when it has ended."""
+        for _ in range(600):
+            job = self.get(f"/api/v1{path}/{job['key']}").json()
+            if job["state"] not in {"queued", "running"}:
+                return job
+            time.sleep(0.1)
+        raise AssertionError("it does not end")
+
+
+@pytest.fixture
+def settings(tmp_path):
+    return Settings(
+        tmp_path / "data", f"sqlite:///{tmp_path / 'test.sqlite'}", "s" * 40, ADDRESS,
+        limits=Limits(60.0, 3000), upload_mb=2, photo_mb=1,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def app(settings, monkeypatch):
+    monkeypatch.setattr(queue, "Workers", Workers)
+    settings.data.mkdir(exist_ok=True)
+    made = application(settings)
+    with TestClient(made, base_url=ADDRESS):
+        yield made
+
+
+@pytest.fixture
+def service(app):
+    return app.state.service
+
+
+@pytest.fixture
+def admin(app, settings):
+    browser = Browser(app)
+    assert browser.join(first_invitation(settings), "Ana").status_code == 200
+    return browser
+
+
+@pytest.fixture
+def colleague(app, admin):
+    """Another instructor, who is no administrator."""
+    invited = admin.act("POST", "/accounts?name=Ion").json()
+    browser = Browser(app)
+    assert browser.join(invited["address"], "Ion").status_code == 200
+    return browser
+
+
+@pytest.fixture
+def visitor(app):
+    return Browser(app)
+
+
+def graded_here(_queue, job):
+    """Grades in the test itself: a process of its own takes seconds to start."""
+    grade(batch_of(_queue.settings.data, job.publication), lambda *_: None, Inline())
+    return {"states": {}, "unmatched": 0}
+
+
+@pytest.fixture
+def graded(admin, monkeypatch):
+    """A publication with two students, who entered measurements, graded and released; and their links."""
+    key = admin.publish()
+    roster = b"student_id,name,n\ns09,Student 9,27\ns11,Student 11,5\n"
+    assert admin.act("PUT", f"/publications/{key}/roster/files/roster.csv", content=roster).status_code == 200
+    for student, n in (("s09", 27), ("s11", 5)):
+        entered = {"student_id": student, "n": n, "scales": {"kL": "1:5"}, "segments_mm": {"v_A": 60}}
+        admin.act("PUT", f"/publications/{key}/files/{student}.json", content=json.dumps(entered).encode())
+    with monkeypatch.context() as patched:
+        patched.setattr(queue.Queue, "_grade", graded_here)
+        job = admin.act("POST", f"/publications/{key}/jobs").json()
+        assert admin.ended(f"/publications/{key}/jobs", job)["state"] == "done"
+    admin.act("PATCH", f"/publications/{key}", json={"is_released": True, "takes_sheets": True})
+    links = admin.act("POST", f"/publications/{key}/links").json()
+    return key, {one["student_id"]: one["address"].removeprefix(ADDRESS) for one in links}
+
+
+@pytest.fixture
+def student(app, graded):
+    """A student who has opened the personal link."""
+    browser = Browser(app)
+    assert browser.get(graded[1]["s09"]).status_code == 200
+    return browser

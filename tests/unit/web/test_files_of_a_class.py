@@ -1,0 +1,130 @@
+"""Files that instructors upload: names, kinds, sizes; rosters and assignments with faults."""
+
+import pytest
+
+from grader.authoring.new import new_assignment
+from grader.web.places import AUTHORED, SUBMITTED, safe_name
+from reference.errors import CallError
+
+
+@pytest.mark.parametrize(
+    ("name", "stored"),
+    [
+        ("s01.jpg", "s01.jpg"),
+        ("../../etc/s01.jpg", "etc_s01.jpg"),
+        ("group 3/s01 scan.PDF", "group-3_s01-scan.pdf"),
+        ("C:\\scans\\s01.png", "C-_scans_s01.png"),
+        ("..jpg.jpg", "jpg.jpg"),
+        ("Ștefan.jpg", "Stefan.jpg"),
+        ("a" * 300 + ".jpg", "a" * 116 + ".jpg"),
+        ("s01\r\nX: y.jpg", "s01-X-y.jpg"),
+    ],
+)
+def test_a_name_never_reaches_a_path_as_it_is(name, stored):
+    assert safe_name(name, SUBMITTED) == stored
+
+
+@pytest.mark.parametrize(
+    "name", ["s01.exe", "s01.html", "s01.svg", ".jpg", "..", "", "/", "шрифт.jpg", "a.toml"]
+)
+def test_other_kinds_of_files_are_refused(name):
+    with pytest.raises(CallError, match="must end in"):
+        safe_name(name, SUBMITTED)
+
+
+def test_an_assignments_files_keep_their_double_endings():
+    assert safe_name("my own.assignment.toml", AUTHORED) == "my-own.assignment.toml"
+
+
+def test_a_file_goes_into_the_class_and_nowhere_else(admin, settings):
+    key = admin.publish()
+    sent = admin.act("PUT", f"/publications/{key}/files/..%2F..%2Fout%2Fs01.jpg", content=b"\xff\xd8\xffabc")
+    assert sent.json() == {"name": "out_s01.jpg", "is_same": False}
+    files = list(settings.data.rglob("*.jpg"))
+    assert files == [settings.data / "publications" / key / "handed-in" / "out_s01.jpg"]
+
+
+def test_nothing_is_replaced_unless_asked_for(admin, settings):
+    key = admin.publish()
+    path = f"/publications/{key}/files/s01.jpg"
+    admin.act("PUT", path, content=b"one")
+    assert admin.act("PUT", path, content=b"one").json()["is_same"] is True
+    refused = admin.act("PUT", path, content=b"two")
+    assert (refused.status_code, refused.json()["code"]) == (422, "file_exists")
+    assert admin.act("PUT", f"{path}?replace=true", content=b"two").status_code == 200
+    (stored,) = settings.data.rglob("s01.jpg")
+    assert stored.read_bytes() == b"two"
+
+
+def test_a_body_that_is_too_large_is_refused_and_not_stored(admin, settings):
+    key = admin.publish()
+    answer = admin.act("PUT", f"/publications/{key}/files/s01.jpg", content=b"x" * 2_000_001)
+    assert answer.status_code == 413
+    assert not list(settings.data.rglob("s01.jpg"))
+    pieces = (b"x" * 100_000 for _ in range(30))
+    assert admin.act("PUT", f"/publications/{key}/files/s01.jpg", content=pieces).status_code == 413
+    assert admin.act("POST", "/publications", content=b"{" + b" " * 1_000_001).status_code == 413
+
+
+def test_decisions_and_rosters_are_not_uploaded_as_files(admin):
+    key = admin.publish()
+    for name in ("decisions.csv", "roster.csv", "Decisions.CSV"):
+        assert admin.act("PUT", f"/publications/{key}/files/{name}", content=b"a").status_code == 422
+
+
+def test_a_roster_with_faults_is_refused_and_the_old_one_stays(admin, settings):
+    key = admin.publish()
+    path = f"/publications/{key}/roster/files/roster.csv"
+    assert admin.act("PUT", path, content=b"student_id,name\ns01,One\n").json() == {"lines": 1}
+    answer = admin.act("PUT", path, content=b"student_id,name\n../x,Two\n")
+    assert answer.status_code == 422
+    assert "line 2" in answer.json()["message"]
+    assert str(settings.data) not in answer.text
+    (kept,) = settings.data.rglob("roster*.csv")
+    assert b"One" in kept.read_bytes()
+
+
+def test_a_file_is_deleted_by_its_name_alone(admin, settings):
+    key = admin.publish()
+    admin.act("PUT", f"/publications/{key}/files/s01.jpg", content=b"one")
+    admin.act("PUT", f"/publications/{key}/roster/files/roster.csv", content=b"student_id\ns01\n")
+    for name in ("..%2F..%2Fsecret", "roster.csv", "nothing.jpg"):
+        assert admin.act("DELETE", f"/publications/{key}/files/{name}").status_code in {404, 422}, name
+    assert admin.act("DELETE", f"/publications/{key}/files/s01.jpg").status_code == 200
+    assert not list(settings.data.rglob("s01.jpg"))
+
+
+def test_an_own_assignment_is_published_from_its_files(admin, tmp_path):
+    new_assignment(tmp_path / "own.toml", mechanism="slider-crank")
+    key = admin.publish(assignment=None, is_open=False)
+    for path in tmp_path.glob("*.toml"):
+        url = f"/publications/{key}/assignment/files/{path.name}"
+        assert admin.act("PUT", url, content=path.read_bytes()).status_code == 200
+    chosen = {"assignment": "own.toml", "is_open": True}
+    answer = admin.act("PATCH", f"/publications/{key}", json=chosen)
+    assert answer.status_code == 200, answer.text
+    assert admin.get(f"/api/v1/publications/{key}/form").json()["fields"]
+
+
+def test_an_assignment_with_faults_is_told_and_not_chosen(admin):
+    key = admin.publish(assignment=None, is_open=False)
+    body = b'title = "x"\nmechanism = "/etc/passwd"\n'
+    admin.act("PUT", f"/publications/{key}/assignment/files/bad.assignment.toml", content=body)
+    answer = admin.act("PATCH", f"/publications/{key}", json={"assignment": "bad.assignment.toml"})
+    assert answer.status_code == 422
+    assert "root:" not in answer.text
+    assert admin.get(f"/api/v1/publications/{key}").json()["assignment"] == ""
+    for name in ("nowhere.assignment.toml", "../../x.assignment.toml", "/etc/passwd"):
+        answer = admin.act("PATCH", f"/publications/{key}", json={"assignment": name})
+        assert answer.status_code == 422, name
+
+
+def test_a_publication_and_a_term_are_deleted_with_all_their_files(admin, settings):
+    keys = [admin.publish(term="2026 autumn") for _ in range(3)]
+    for key in keys:
+        admin.act("PUT", f"/publications/{key}/files/s01.jpg", content=b"one")
+    assert admin.act("DELETE", f"/publications/{keys[0]}").status_code == 200
+    assert len(list(settings.data.rglob("s01.jpg"))) == 2
+    assert admin.act("DELETE", "/terms/2026%20autumn").json() == {"removed": 2}
+    assert not list(settings.data.rglob("s01.jpg"))
+    assert admin.act("DELETE", "/terms/2026%20autumn").status_code == 404
