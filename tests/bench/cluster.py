@@ -66,6 +66,8 @@ def _dask(*arguments: str) -> subprocess.Popen[bytes]:
 
 
 def _measured(workers: int, sheets: int, seconds: float, folder: Path | None, port: int) -> Run:
+    from tests.bench.cluster import sheet  # noqa: PLC0415 - by a name that workers know, not __main__
+
     address = f"tcp://127.0.0.1:{port}"
     scheduler = _dask("scheduler", "--host", "127.0.0.1", "--port", str(port))
     hands = _dask("worker", address, "--nworkers", str(workers), "--nthreads", "1", "--host", "127.0.0.1")
@@ -82,7 +84,8 @@ def _measured(workers: int, sheets: int, seconds: float, folder: Path | None, po
                 before = sum(known.cpu_times()[:2])
                 start, own = time.monotonic(), time.process_time()
                 if folder is None:
-                    list(pool.run(sheet, [(out, number, seconds, SHEET_BYTES) for number in range(sheets)]))
+                    calls = [(out, number, seconds, SHEET_BYTES) for number in range(sheets)]
+                    assert dict(pool.run(sheet, calls)) == {number: number for number in range(sheets)}
                 else:
                     assignment = load_assignment("pump")
                     batch = Batch(assignment, rubric_of(assignment), folder, out)

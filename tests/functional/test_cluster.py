@@ -1,4 +1,4 @@
-"""A class graded on a Dask cluster: as on this machine, also with a worker killed and with a folder elsewhere."""
+"""A class graded on a Dask cluster: as on this machine, with a worker killed, with a folder elsewhere."""
 
 import functools
 import http.server
@@ -73,7 +73,9 @@ def dask(*arguments):
     """A process started as the page on clusters says."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
     words = [sys.executable, "-m", "dask", *arguments, "--no-dashboard"]
-    return subprocess.Popen(words, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    return subprocess.Popen(  # noqa: S603 - our own call
+        words, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
 
 
 @pytest.fixture(scope="module")
@@ -146,7 +148,7 @@ def test_a_folder_that_workers_do_not_see_is_refused(address, tmp_path):
         cluster.Cluster(address, image, tmp_path, PATIENT, "memory://class").__enter__()
 
 
-def test_no_scheduler(handed_in, tmp_path, planmark, monkeypatch):
+def test_no_scheduler(handed_in, tmp_path, planmark):
     call = ("grade", handed_in, "--assignment", "pump", "--out", tmp_path / "out", "--cluster")
     ran = planmark(*call, f"127.0.0.1:{free_port()}")
     assert ran.returncode == 2
