@@ -39,7 +39,7 @@ def app(tmp_path_factory):
         top / "data",
         f"sqlite:///{top / 'test.sqlite'}",
         "s" * 40,
-        "http://127.0.0.1",
+        "http://testserver",
         limits=Limits(60.0, 3000),
     )
     settings.data.mkdir()
