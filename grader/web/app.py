@@ -10,6 +10,7 @@ from http import HTTPStatus
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
+from pydantic import BaseModel
 from sqlalchemy import func, select
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
@@ -34,6 +35,16 @@ Everything that the pages of planmark do. A program sends a token, made on the a
 `Authorization: Bearer TOKEN`. Errors are `{"code", "message"}`: what is wrong, where, and what to do.
 """
 
+REFUSALS = (400, 401, 403, 404, 409, 413, 415, 421, 422, 429)
+"""Statuses of what is not answered, each with a `Fault`."""
+
+
+class Fault(BaseModel):
+    """What is wrong, where, and what to do."""
+
+    code: str
+    message: str
+
 
 def application(settings: Settings, photo: Photo = checked_photo) -> FastAPI:
     """The web application.
@@ -54,7 +65,7 @@ def application(settings: Settings, photo: Photo = checked_photo) -> FastAPI:
     app = FastAPI(
         title="planmark", version=__version__, description=DESCRIPTION, lifespan=running,
         docs_url=None, redoc_url=None, openapi_url="/api/v1/openapi.json",
-        responses={code: {"description": HTTPStatus(code).phrase} for code in (400, 401, 403, 404, 409, 429)},
+        responses={code: {"description": HTTPStatus(code).phrase, "model": Fault} for code in REFUSALS},
     )  # fmt: skip
     app.state.service = service
     for router in (students.router, instructors.router, pages.router):

@@ -8,6 +8,7 @@ token in the header `Authorization` needs none, because no browser sends it by i
 import contextlib
 import hashlib
 import hmac
+import json
 import re
 import secrets
 import time
@@ -298,7 +299,7 @@ class Rim:
             return
         host = Headers(scope=scope).get("host", "")
         if host != self.settings.host and _name_of(host) not in self.hosts:
-            await _plain(send, 421, "this address is not served here: open the server's own address")
+            await _refuse(send, 421, "this address is not served here: open the server's own address")
             return
         most = self._most(scope["path"])
         taken = 0
@@ -323,7 +324,7 @@ class Rim:
         with contextlib.suppress(_TooLargeError):
             await self.app(scope, bounded, with_headers)
         if taken > most:
-            await _plain(send, 413, f"larger than {most // 1_000_000} MB: send a smaller file")
+            await _refuse(send, 413, f"larger than {most // 1_000_000} MB: send a smaller file")
 
     def _most(self, path: str) -> int:
         files = _FILES.fullmatch(path)
@@ -355,7 +356,9 @@ class _TooLargeError(Exception):
     pass
 
 
-async def _plain(send: Send, status: int, text: str) -> None:
-    head = [(b"content-type", b"text/plain; charset=utf-8"), (b"connection", b"close")]
+async def _refuse(send: Send, status: int, text: str) -> None:
+    head = [(b"content-type", b"application/json"), (b"connection", b"close")]
     await send({"type": "http.response.start", "status": status, "headers": head})
-    await send({"type": "http.response.body", "body": text.encode()})
+    await send(
+        {"type": "http.response.body", "body": json.dumps({"code": "refused", "message": text}).encode()}
+    )

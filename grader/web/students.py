@@ -355,7 +355,7 @@ def queued(call: Call, job: Job) -> JobState:
 
 def state_of(call: Call, job: Job) -> JobState:
     """A job as a page shows it."""
-    before = call.service.queue.waiting_before(job) if job.state == "queued" and job.started else 0
+    before = call.service.queue.waiting_before(job) if job.state == "queued" else 0
     seconds = None if job.started is None or job.ended is None else round(job.ended - job.started, 2)
     return JobState(
         key=job.key, kind=job.kind, state=job.state, stage=job.stage, done=job.done, total=job.total,

@@ -1,0 +1,240 @@
+"""Load on `planmark serve`, on loopback: ``python -m tests.bench.serving``.
+
+Measures 200 students who check values at once, 20 photos at once with the memory of the server and its
+workers, and what is left of a class that is graded and of photos that wait when the server is killed.
+"""
+
+import argparse
+import asyncio
+import re
+import statistics
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import aiohttp
+import psutil
+
+from grader.files import samples_folder
+from reference.authored.assignment import Variant, load_assignment
+from reference.plan import exact_plan
+
+SAMPLES = samples_folder() / "pump"
+PASSWORD = "four words make one"  # noqa: S105 - of a server that lasts a minute
+SECONDS_FOR_ALL = 1200.0
+"""After which a measurement has failed."""
+
+
+class Server:
+    """`planmark serve` in a process of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.peak_mb = folder, 0.0
+        self.start(0)
+
+    def start(self, port: int) -> None:
+        """Start, at a port that is free or known."""
+        command = [sys.executable, "-u", "-m", "grader", "serve", str(self.folder), "--port", str(port)]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)  # noqa: S603 - our own
+        assert self.process.stdout is not None
+        said = self.process.stdout.readline()
+        self.address = str(re.search(r"http://[^/]+", said)[0])  # type: ignore[index]
+        if port == 0:
+            self.invitation = self.process.stdout.readline().strip().rpartition(" ")[2]
+        threading.Thread(target=self._watch, args=(psutil.Process(self.process.pid),), daemon=True).start()
+
+    def _watch(self, server: psutil.Process) -> None:
+        while server.is_running():
+            total = 0
+            for one in _family(server):
+                try:
+                    total += one.memory_info().rss
+                except psutil.Error:
+                    continue
+            self.peak_mb = max(self.peak_mb, total / 1e6)
+            time.sleep(0.1)
+
+    def kill(self) -> None:
+        """As by a power cut: the server and its workers."""
+        for one in _family(psutil.Process(self.process.pid)):
+            one.kill()
+        self.process.wait()
+
+
+def _family(server: psutil.Process) -> list[psutil.Process]:
+    try:
+        return [server, *server.children(recursive=True)]
+    except psutil.Error:
+        return []
+
+
+class Client:
+    """A browser, or a program with a token."""
+
+    def __init__(self, session: aiohttp.ClientSession, address: str, token: str = "") -> None:
+        self.session, self.address = session, address
+        self.headers = {"Authorization": f"Bearer {token}"} if token else {}
+
+    async def open(self, page: str) -> None:
+        """Open a page, whose forms are then this browser's."""
+        async with self.session.get(self.address + page) as answer:
+            found = re.search(r'name="form-token" content="(\w+)"', await answer.text())
+        assert found is not None, page
+        self.headers = {"X-Planmark-Form": found[1]}
+
+    async def act(self, method: str, path: str, **known: Any) -> Any:
+        """What the API answers."""
+        url = f"{self.address}/api/v1{path}"
+        async with self.session.request(method, url, headers=self.headers, **known) as answer:
+            answer.raise_for_status()
+            return await answer.json(content_type=None)
+
+
+def browser() -> aiohttp.ClientSession:
+    """A session with cookies of its own."""
+    return aiohttp.ClientSession(cookie_jar=aiohttp.CookieJar(unsafe=True))
+
+
+async def prepared(server: Server) -> tuple[str, str]:
+    """A token of the first administrator, and an open publication of the pump."""
+    async with browser() as session:
+        client = Client(session, server.address)
+        await client.open("/join")
+        who = {"token": server.invitation.partition("token=")[2], "name": "admin", "password": PASSWORD}
+        await client.act("POST", "/accounts/join", json=who)
+        await client.open("/")
+        token = (await client.act("POST", "/tokens?title=bench"))["token"]
+        asked = {"assignment": "pump", "is_open": True}
+        return token, (await client.act("POST", "/publications", json=asked))["key"]
+
+
+def cells_of(n: int) -> dict[str, str]:
+    """20 values that a student with a number measured."""
+    plan = exact_plan(load_assignment("pump"), [Variant(n=n)])
+    drawn = {name: f"{one.drawn_mm + 0.3:.1f}".replace(".", ",") for name, one in plan.vectors.items()}
+    return dict(list(drawn.items())[:20])
+
+
+async def measured(name: str, count: int, one: Callable[[int], Awaitable[Any]]) -> None:
+    """Do something so many times at once, and print how long each took."""
+    took: list[float] = []
+    failed: list[str] = []
+
+    async def timed(index: int) -> None:
+        began = time.perf_counter()
+        try:
+            await one(index)
+        except (aiohttp.ClientError, RuntimeError) as error:
+            failed.append(str(error))
+        else:
+            took.append(time.perf_counter() - began)
+
+    began = time.perf_counter()
+    await asyncio.gather(*(timed(index) for index in range(count)))
+    whole = time.perf_counter() - began
+    cuts = statistics.quantiles(took, n=100)
+    print(
+        f"{name}: {len(took)} answered, {len(failed)} failed {failed[:1]}, p50 {cuts[49]:.2f} s,"
+        f" p99 {cuts[98]:.2f} s, {len(took) / whole:.1f} a second"
+    )
+
+
+async def checks(server: Server, key: str, students: int) -> None:
+    """So many students check values at once; each has opened the page before."""
+    numbers = load_assignment("pump").numbers("n") or [0]
+    sessions = [browser() for _ in range(students)]
+    clients = [Client(session, server.address) for session in sessions]
+    await measured("pages opened", students, lambda index: clients[index].open(f"/c/{key}"))
+    bodies = [{"n": n, "cells": cells_of(n)} for n in (numbers[i % len(numbers)] for i in range(students))]
+
+    async def one(index: int) -> None:
+        await clients[index].act("POST", f"/publications/{key}/checks", json=bodies[index])
+
+    await measured("values checked", students, one)
+    await measured("values checked again", students, one)
+    for session in sessions:
+        await session.close()
+
+
+async def photo_ended(client: Client, job: dict[str, Any]) -> dict[str, Any]:
+    """The job of a photo when it has ended."""
+    until = time.monotonic() + SECONDS_FOR_ALL
+    while job["state"] in {"queued", "running"}:
+        if time.monotonic() > until:
+            raise RuntimeError("a photo does not end")
+        await asyncio.sleep(0.5)
+        job = await client.act("GET", f"/photos/{job['key']}")
+    return job
+
+
+async def photos(server: Server, key: str, count: int, picture: bytes) -> None:
+    """So many students send a photo at once."""
+    sessions = [browser() for _ in range(count)]
+    clients = [Client(session, server.address) for session in sessions]
+    for client in clients:
+        await client.open(f"/c/{key}")
+    server.peak_mb = 0.0
+
+    async def one(index: int) -> None:
+        job = await clients[index].act("POST", f"/publications/{key}/photos?n=7", data=picture)
+        if (await photo_ended(clients[index], job))["state"] != "done":
+            raise RuntimeError("a photo failed")
+
+    await measured("photos", count, one)
+    print(f"photos: server and workers took {server.peak_mb:.0f} MB at most")
+    for session in sessions:
+        await session.close()
+
+
+async def killed(server: Server, key: str, token: str, picture: bytes) -> None:
+    """Kill the server while a class is graded and photos wait; start it again, and count what is there."""
+    async with browser() as session, browser() as other:
+        client, student = Client(session, server.address, token), Client(other, server.address)
+        sent_in = [f"files/{one}" for one in ("s01_1.jpg", "s02_1.jpg", "s08.json")]
+        for name in ("roster/files/roster.csv", *sent_in):
+            content = (SAMPLES / name.rpartition("/")[2]).read_bytes()
+            await client.act("PUT", f"/publications/{key}/{name}", data=content)
+        await student.open(f"/c/{key}")
+        path = f"/publications/{key}/photos?n=7"
+        sent = [await student.act("POST", path, data=picture) for _ in range(3)]
+        job = await client.act("POST", f"/publications/{key}/jobs")
+        while job["done"] == 0:
+            await asyncio.sleep(0.2)
+            job = await client.act("GET", f"/publications/{key}/jobs/{job['key']}")
+        print(f"killed: a class at {job['stage']} {job['done']} of {job['total']}, {len(sent)} photos sent")
+        server.kill()
+        server.start(int(server.address.rpartition(":")[2]))
+        states = [(await photo_ended(student, one))["state"] for one in sent]
+        while job["state"] in {"queued", "running"}:
+            await asyncio.sleep(0.5)
+            job = await client.act("GET", f"/publications/{key}/jobs/{job['key']}")
+        results = await client.act("GET", f"/publications/{key}/results")
+        there = sum(report["status"] != "missing" for report in results["reports"])
+        print(f"after the next start: class {job['state']}, {there} of 3 submissions there, photos {states}")
+
+
+async def main() -> None:
+    """Measure all, and print it."""
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--students", type=int, default=200)
+    arguments.add_argument("--photos", type=int, default=20)
+    asked = arguments.parse_args()
+    picture = (SAMPLES / "s01_1.jpg").read_bytes()
+    with tempfile.TemporaryDirectory() as folder:
+        server = Server(Path(folder) / "data")
+        try:
+            token, key = await prepared(server)
+            await checks(server, key, asked.students)
+            await photos(server, key, asked.photos, picture)
+            await killed(server, key, token, picture)
+        finally:
+            server.kill()
+
+
+if __name__ == "__main__":
+    asyncio.run(main())

@@ -1,0 +1,271 @@
+"""The web application in a real browser: what an instructor and a student do, on a phone and on a screen."""
+
+import os
+import shutil
+import socket
+import threading
+import time
+from pathlib import Path
+
+import pytest
+import uvicorn
+
+from grader.files import samples_folder
+from grader.folder.batch import grade
+from grader.folder.workers import Limits
+from grader.web.app import application, first_invitation
+from grader.web.places import batch_of, places_of
+from grader.web.settings import Settings
+from grader.web.store import Link, Publication
+from tests.inline import Inline
+
+pytestmark = pytest.mark.slow
+SAMPLES = samples_folder() / "pump"
+PASSWORD = "four words make one"  # noqa: S105 - of a test
+WIDTHS = (320, 390, 1400)
+"""Pixels: the narrowest that WCAG 2.2 asks for (1.4.10), a phone, a screen."""
+RULES = {"runOnly": {"type": "tag", "values": ["wcag2a", "wcag2aa", "wcag21aa", "wcag22aa"]}}
+PATIENCE_MS = 240_000
+SHOTS = "PLANMARK_SCREENSHOTS"
+"""Names the folder that is given the screenshots."""
+
+
+class Served:
+    """The application in a thread of the test, on a port of its own."""
+
+    def __init__(self, top):
+        listener = socket.create_server(("127.0.0.1", 0))
+        self.address = f"http://127.0.0.1:{listener.getsockname()[1]}"
+        self.settings = Settings(
+            top / "data", f"sqlite:///{top / 'test.sqlite'}", "s" * 40, self.address,
+            limits=Limits(240.0, 3000),
+        )  # fmt: skip
+        self.settings.data.mkdir()
+        app = application(self.settings)
+        self.store = app.state.service.store
+        config = uvicorn.Config(app, log_level="warning", ws="none", timeout_graceful_shutdown=1)
+        self.uvicorn = uvicorn.Server(config)
+        self.thread = threading.Thread(target=self.uvicorn.run, args=([listener],))
+        self.thread.start()
+
+    def stop(self):
+        self.uvicorn.should_exit = True
+        self.thread.join()
+
+    def graded_class(self, lang):
+        """A released class of one student with a scan: its key and the student's personal link."""
+        with self.store.session() as session:
+            one = Publication(
+                assignment="pump", title="Pump, group 3", lang=lang, is_open=True, is_released=True,
+                takes_sheets=True, attempts=20,
+            )  # fmt: skip
+            link = Link(publication=one, student_id="s01", expires=time.time() + 1e5)
+            session.add_all([one, link])
+            session.flush()
+            folder = places_of(self.settings.data, one).handed_in
+            copied(folder, "roster.csv", "s01_1.jpg")
+            grade(batch_of(self.settings.data, one), lambda *_: None, Inline())
+            token = application_link(self.settings, link)
+            return one.key, token
+
+
+def application_link(settings, link):
+    """The personal link as the server makes it."""
+    from itsdangerous import URLSafeSerializer  # noqa: PLC0415
+
+    return f"{settings.address}/s/{URLSafeSerializer(settings.secret, salt='personal link').dumps(link.id)}"
+
+
+def copied(folder, *names):
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in names:
+        shutil.copy(SAMPLES / name, folder)
+
+
+class Visit:
+    """A person's browser: whatever it finds wrong with a page is a fault."""
+
+    def __init__(self, chromium, served, shots, locale):
+        self.context = chromium.new_context(viewport={"width": 1400, "height": 900}, locale=locale)
+        self.page, self.faults, self.shots = self.context.new_page(), [], shots
+        self.page.set_default_timeout(PATIENCE_MS)
+        self.page.on("pageerror", lambda error: self.faults.append(f"{self.page.url}: {error}"))
+        self.page.on("console", self._said)
+        self.page.on("dialog", lambda dialog: dialog.accept())
+        self.served, self.axe = served, locale.startswith("en")
+
+    def _said(self, message):
+        if message.type == "error":
+            self.faults.append(f"{self.page.url}: {message.text}")
+
+    def look(self, name, *, axe=True):
+        """Look at the page at every width, in light and dark."""
+        page = self.page
+        for width in WIDTHS:
+            page.set_viewport_size({"width": width, "height": 900})
+            wide = page.evaluate("document.documentElement.scrollWidth")
+            if wide > width:
+                self.faults.append(f"{name} at {width} px is {wide} px wide")
+            page.screenshot(path=self.shots / f"{name}-{width}.png", full_page=True)
+            if axe and self.axe and width != 390:
+                scheme = "light" if width == 320 else "dark"
+                page.emulate_media(color_scheme=scheme)
+                self.faults += [f"{name} ({scheme}) {fault}" for fault in violations(page)]
+        page.screenshot(path=self.shots / f"{name}-dark.png", full_page=True)
+        page.emulate_media(color_scheme="light")
+
+    def end(self):
+        self.context.close()
+        assert not self.faults, "\n".join(self.faults)
+
+
+def violations(page):
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    found = axe.run(page, options=RULES).response["violations"]
+    return [
+        f"{one['id']}: {node['html'][:160]} {node['failureSummary'][:300]}"
+        for one in found
+        for node in one["nodes"]
+    ]
+
+
+@pytest.fixture
+def served(tmp_path):
+    running = Served(tmp_path)
+    yield running
+    running.stop()
+
+
+@pytest.fixture
+def visit(chromium, served, tmp_path):
+    """Opens browsers; their faults fail the test at its end."""
+    shots = Path(os.environ.get(SHOTS, tmp_path))
+    visits = []
+
+    def opened(locale="en-US"):
+        visits.append(Visit(chromium, served, shots, locale))
+        return visits[-1]
+
+    yield opened
+    for one in visits:
+        one.end()
+
+
+LOCALES = ("en-US", "ro-RO", "ru-RU")
+
+
+@pytest.mark.parametrize("locale", LOCALES)
+def test_a_student_checks_values_and_a_photo_and_asks_again(served, visit, locale):
+    lang = locale[:2]
+    key, link = served.graded_class(lang)
+    student = visit(locale)
+    page, name = student.page, f"student-{lang}"
+    page.goto(link)
+    assert page.url.endswith(f"/c/{key}")
+    assert page.input_value("#in-n") == "7"
+    student.look(f"{name}-page")
+    for column, text in (("v_A", "60,0"), ("v_B", "12,5"), ("kv", "0,193732 (m/s)/mm")):
+        page.fill(f"#f-{column}", text)
+    page.click("#check button")
+    page.wait_for_selector("#result:not([hidden])")
+    assert page.evaluate("document.activeElement.id") == "result"
+    assert page.get_attribute("#result", "aria-live") == "polite"
+    assert page.locator("#result .r-off, #result .r-open").count()
+    assert "19" in page.inner_text("#left")
+    student.look(f"{name}-checked")
+    page.fill("#in-n", "999")
+    page.click("#check button")
+    page.wait_for_selector("#check .said:not(:empty)")
+    student.faults = [fault for fault in student.faults if "422" not in fault]
+    page.fill("#in-n", "7")
+    page.set_input_files("#picture", SAMPLES / "s01_1.jpg")
+    page.evaluate("document.getElementById('result').replaceChildren()")
+    page.click("#photo button")
+    page.locator("#result h2").first.wait_for()
+    student.look(f"{name}-photo")
+    page.click("#hand-in")
+    page.wait_for_selector("#photo .said.good:not(:empty)")
+    assert "s01_sent01" in page.inner_text("#photo .said")
+    page.click("main summary >> nth=0")
+    page.fill("#why", "The arrow of a_B is there.")
+    student.look(f"{name}-asks")
+    page.click("form[data-told] button")
+    page.wait_for_selector("form[data-told] .said.good:not(:empty)")
+    page.click("main a[href*=feedback]")
+    page.wait_for_url("**/feedback.html")
+    student.look(f"{name}-feedback")
+
+
+@pytest.mark.parametrize("locale", LOCALES)
+def test_an_instructor_publishes_grades_and_gives_back(served, visit, locale):  # noqa: PLR0915 - one story
+    lang = locale[:2]
+    instructor, name = visit(locale), f"instructor-{lang}"
+    page = instructor.page
+    page.goto(first_invitation(served.settings))
+    instructor.look(f"{name}-join")
+    page.fill("#name", "admin")
+    page.fill("#password", PASSWORD)
+    page.click("main form button")
+    page.wait_for_url(f"{served.address}/")
+    instructor.look(f"{name}-empty")
+    page.select_option("#assignment", "pump")
+    page.fill("#title", "Pump, group 3")
+    page.click("main form button")
+    page.wait_for_url("**/publications/*")
+    address, key = page.url, page.url.rpartition("/")[2]
+    instructor.look(f"{name}-published")
+    with page.expect_response(f"**/api/v1/publications/{key}"):
+        page.check("[name=is_open]")
+    with page.expect_navigation():
+        page.set_input_files("#roster", SAMPLES / "roster.csv")
+    with page.expect_navigation():
+        page.set_input_files("#files", [SAMPLES / "s01_1.jpg", SAMPLES / "s08.json"])
+    page.click("#grade")
+    page.wait_for_selector("#job:not([hidden])")
+    instructor.look(f"{name}-grading", axe=False)
+    page.wait_for_selector(f"a[href='/publications/{key}/results/index.html']")
+    with page.expect_response(f"**/api/v1/publications/{key}"):
+        page.check("[name=is_released]")
+    with page.expect_navigation():
+        page.click(f"[data-send='POST /api/v1/publications/{key}/links']")
+    page.locator("summary:has(+ .wide)").click()
+    personal = page.locator("table code").first.inner_text()
+    instructor.look(f"{name}-graded")
+    page.click(f"a[href='/publications/{key}/results/index.html']")
+    page.wait_for_url("**/index.html")
+    instructor.look(f"{name}-results")
+
+    student = visit(locale)
+    student.page.goto(personal)
+    student.page.locator("main summary").first.click()
+    student.page.fill("#why", "The arrow of a_B is there.")
+    student.page.click("form[data-told] button")
+    student.page.wait_for_selector("form[data-told] .said.good:not(:empty)")
+
+    page.goto(address)
+    page.fill(".request textarea", "You are right: one point more.")
+    instructor.look(f"{name}-request")
+    with page.expect_navigation():
+        page.click(".request button")
+    assert "You are right" in page.inner_text(".request")
+    page.select_option("#platform", "csv")
+    with page.expect_download() as download:
+        page.click("#export button")
+    assert "s08" in Path(download.value.path()).read_text(encoding="utf-8")
+    page.select_option("#student", "s08")
+    with page.expect_navigation():
+        page.click("[data-erase] button")
+    assert page.locator("#student option[value=s08], #student option:text-is('s08')").count() == 0
+    page.goto(f"{served.address}/account")
+    page.fill("#title", "script")
+    page.click("[data-shows=token] button")
+    page.wait_for_selector("[data-shows=token] .said.good:not(:empty)")
+    instructor.look(f"{name}-account")
+    page.goto(f"{served.address}/")
+    instructor.look(f"{name}-list")
+    page.click("[data-send='DELETE /api/v1/session']")
+    page.wait_for_selector("main a[href='/sign-in']")
+    instructor.look(f"{name}-home")
+    page.goto(f"{served.address}/publications/{key}")
+    instructor.look(f"{name}-refused")
+    instructor.faults = [fault for fault in instructor.faults if "401" not in fault]

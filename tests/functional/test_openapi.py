@@ -1,0 +1,101 @@
+"""The OpenAPI document, tried out with what a generator makes of it: no answer is a fault."""
+
+import time
+
+import hypothesis
+import pytest
+
+from grader.folder.workers import Limits
+from grader.web import queue
+from grader.web.app import application
+from grader.web.settings import Settings
+from grader.web.store import Account, Link, Publication, Visit, digest_of
+from tests.inline import Inline
+
+pytestmark = pytest.mark.slow
+schemathesis = pytest.importorskip("schemathesis")
+TOKEN = "t" * 43
+EXAMPLES = 10
+"""For each operation: the whole document is tried in a minute."""
+
+
+class Workers(Inline):
+    """The pool in the test itself."""
+
+    def __init__(self, *_arguments):
+        """Nothing is limited."""
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_error):
+        """Nothing to end."""
+
+
+@pytest.fixture(scope="module")
+def app(tmp_path_factory):
+    top = tmp_path_factory.mktemp("served")
+    settings = Settings(
+        top / "data",
+        f"sqlite:///{top / 'test.sqlite'}",
+        "s" * 40,
+        "http://testserver",
+        limits=Limits(60.0, 3000),
+    )
+    settings.data.mkdir()
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(queue, "Workers", Workers)
+        patched.setattr(queue.Queue, "_grade", lambda *_: {"states": {}, "unmatched": 0})
+        patched.setattr("grader.web.guard.Guard.count", lambda *_: None)
+        made = application(settings, photo=lambda *_: {"lines": [], "problems": [], "is_right": False})
+        store = made.state.service.store
+        with store.session() as session:
+            account = Account(name="Ana", is_admin=True)
+            one = Publication(
+                key="class", assignment="pump", is_open=True, takes_sheets=True, members=[account]
+            )
+            visit = Visit(id=digest_of(TOKEN), account=account, title="script", links={})
+            session.add_all([account, one, visit])
+            session.flush()
+            link = Link(publication=one, student_id="s01", expires=time.time() + 1e5)
+            session.add(link)
+            session.flush()
+            visit.links = {str(one.id): link.id}
+        made.state.service.queue.start()
+        yield made
+        made.state.service.queue.stop()
+
+
+@pytest.fixture(scope="module")
+def document(app):
+    loaded = schemathesis.openapi.from_asgi("/api/v1/openapi.json", app)
+
+    @loaded.hook
+    def map_path_parameters(_context, known):
+        """Half of the requests are for the class that is there."""
+        return {**known, "key": "class"} if known and "key" in known and len(str(known)) % 2 else known
+
+    return loaded
+
+
+schema = schemathesis.pytest.from_fixture("document")
+ENDS = r"/(tokens|publications)/\{[a-z]+\}$|/(session|accounts/.*|terms/.*)$"
+"""With DELETE these end what the other requests need."""
+tried = hypothesis.settings(
+    max_examples=EXAMPLES, deadline=None, derandomize=True, database=None,
+    suppress_health_check=list(hypothesis.HealthCheck),
+)  # fmt: skip
+CHECKS = [schemathesis.checks.not_a_server_error, schemathesis.checks.status_code_conformance]
+
+
+@schema.exclude(method="DELETE", path_regex=ENDS).parametrize()
+@tried
+def test_no_request_of_a_program_is_a_fault(case):
+    response = case.call(headers={"Authorization": f"Bearer {TOKEN}"})
+    case.validate_response(response, checks=CHECKS)
+
+
+@schema.parametrize()
+@tried
+def test_no_request_of_nobody_is_a_fault(case):
+    case.validate_response(case.call(), checks=CHECKS)
