@@ -393,7 +393,9 @@ def _contrast_across(
     return flat.contrast(x.reshape(k * n, m), y.reshape(k * n, m)).reshape(k, n, m)
 
 
-def sampled(image: GreyImage, x: FloatArray | Float32Array, y: FloatArray | Float32Array) -> Float32Array:
+def sampled(
+    image: GreyImage | Float32Array, x: FloatArray | Float32Array, y: FloatArray | Float32Array
+) -> Float32Array:
     """Bilinear values of an image at (r, m) points, in blocks that a remap can take."""
     x, y = np.ascontiguousarray(x, dtype=np.float32), np.ascontiguousarray(y, dtype=np.float32)
     result = np.empty(x.shape, dtype=np.float32)

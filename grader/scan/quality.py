@@ -418,9 +418,9 @@ def _inked_tiles(flat: Flat, mm_to_px: FloatArray, reach: int) -> Iterator[tuple
 
 def _edges(tile: Float32Array, paper: float, reach: int) -> tuple[FloatArray, FloatArray]:
     """(n,) direction across each edge of a piece, radians 0..pi, and its width in pixels."""
-    soft = cv2.GaussianBlur(tile, (0, 0), 0.7)
+    soft = np.asarray(cv2.GaussianBlur(tile, (0, 0), 0.7), dtype=np.float32)
     gx, gy = (cv2.Sobel(soft, cv2.CV_32F, dx, 1 - dx, scale=0.125) for dx in (1, 0))
-    slope = np.hypot(gx, gy)
+    slope = np.asarray(np.hypot(gx, gy), dtype=np.float32)
     inner = slope[reach:-reach, reach:-reach]
     if inner.size == 0:
         return np.zeros(0), np.zeros(0)
