@@ -260,10 +260,15 @@ def averaged(grey: GreyImage, side: int) -> GreyImage:
     return np.asarray(cv2.resize(squares, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
+def is_black_and_white(grey: GreyImage) -> bool:
+    """Whether a page has no tones between."""
+    rows = grey[::_SAMPLED_ROWS]
+    return not np.any((rows > 0) & (rows < 255))
+
+
 def is_dotted(grey: GreyImage) -> bool:
     """Whether a page is black and white, and much of its ink single dots."""
-    rows = grey[::_SAMPLED_ROWS]
-    if np.any((rows > 0) & (rows < 255)):
+    if not is_black_and_white(grey):
         return False
     # A strip narrower than two rims has no more than its middle.
     rim = min(round(_RIM * max(grey.shape)), (min(grey.shape) - 1) // 2)
@@ -388,7 +393,9 @@ def _contrast_across(
     return flat.contrast(x.reshape(k * n, m), y.reshape(k * n, m)).reshape(k, n, m)
 
 
-def sampled(image: GreyImage, x: FloatArray | Float32Array, y: FloatArray | Float32Array) -> Float32Array:
+def sampled(
+    image: GreyImage | Float32Array, x: FloatArray | Float32Array, y: FloatArray | Float32Array
+) -> Float32Array:
     """Bilinear values of an image at (r, m) points, in blocks that a remap can take."""
     x, y = np.ascontiguousarray(x, dtype=np.float32), np.ascontiguousarray(y, dtype=np.float32)
     result = np.empty(x.shape, dtype=np.float32)

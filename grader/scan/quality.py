@@ -29,6 +29,7 @@ from grader.scan.pixels import (
     connected,
     cut_out,
     flatten,
+    is_black_and_white,
     local_axes,
     mapped,
     reduction,
@@ -223,6 +224,8 @@ def _cut_corners(page: Page, sheet: Sheet | None, outline: _Outline | None) -> I
 
 LEAST_DPI = 150.0
 """What students are asked for. Usual pencils are read at 110, thin and faint ones are not."""
+_DPI_SHARE = 0.97
+"""Of that: a scan at 150 dpi may come out at 149, and a photo's resolution is known to a few per cent."""
 _FAR = 0.5
 """Of the picture: a sheet that fills less can be photographed from nearer."""
 _MOST_UNEVEN = 2.0
@@ -243,7 +246,7 @@ def _resolution(page: Page, mm_to_px: FloatArray) -> Iterator[Flaw]:
     """Too few pixels on the sheet, or on a part of it."""
     axes = _axes(mm_to_px)
     dpi = _px_per_mm(mm_to_px) * MM_PER_INCH
-    if dpi < LEAST_DPI:
+    if dpi < _DPI_SHARE * LEAST_DPI:
         area = cv2.contourArea(mapped(mm_to_px, _CORNERS_MM).astype(np.float32)) / page.grey.size
         yield Flaw("far_away" if area < _FAR else "too_coarse", dpi, LEAST_DPI)
     uneven = float(axes.max() / max(axes.min(), 1e-6))
@@ -293,6 +296,8 @@ def _light(flat: Flat, mm_to_px: FloatArray, sheet: Sheet | None) -> Iterator[Fl
     shaded = light < _SHADE * level
     if shaded.mean() > _LEAST_SHADE:
         yield Flaw("shadow", float(np.quantile(light, 0.02) / level), _SHADE, _areas(shaded))
+    if is_black_and_white(flat.grey):
+        return  # its brightness was settled by the copier
     white = light >= _WHITE
     if white.mean() > _MOST_WHITE:
         boxes = [inner] if sheet is None or not sheet.zones else list(sheet.zones.values())
@@ -413,9 +418,9 @@ def _inked_tiles(flat: Flat, mm_to_px: FloatArray, reach: int) -> Iterator[tuple
 
 def _edges(tile: Float32Array, paper: float, reach: int) -> tuple[FloatArray, FloatArray]:
     """(n,) direction across each edge of a piece, radians 0..pi, and its width in pixels."""
-    soft = cv2.GaussianBlur(tile, (0, 0), 0.7)
+    soft = np.asarray(cv2.GaussianBlur(tile, (0, 0), 0.7), dtype=np.float32)
     gx, gy = (cv2.Sobel(soft, cv2.CV_32F, dx, 1 - dx, scale=0.125) for dx in (1, 0))
-    slope = np.hypot(gx, gy)
+    slope = np.asarray(np.hypot(gx, gy), dtype=np.float32)
     inner = slope[reach:-reach, reach:-reach]
     if inner.size == 0:
         return np.zeros(0), np.zeros(0)
