@@ -100,10 +100,8 @@ def log_to(path: Path) -> None:
         handler = logging.FileHandler(path, encoding="utf-8")
     except OSError as error:
         why = f"{error.strerror or error}; choose another place"
-        raise OutputError("cannot_write", f"{path}: the log cannot be written ({why})") from error
-    handler.setFormatter(_Lines("%(asctime)s %(process)d %(message)s"))
         raise OutputError(CANNOT_WRITE, f"{path}: the log cannot be written ({why})") from error
-    handler.setFormatter(logging.Formatter("%(asctime)s %(process)d %(message)s"))
+    handler.setFormatter(_Lines("%(asctime)s %(process)d %(message)s"))
     logging.getLogger("planmark").addHandler(handler)
 
 
