@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import aiohttp
+import numpy as np
 import psutil
 
 from grader.files import samples_folder
@@ -116,8 +117,12 @@ async def prepared(server: Server) -> tuple[str, str]:
 def cells_of(n: int) -> dict[str, str]:
     """20 values that a student with a number measured."""
     plan = exact_plan(load_assignment("pump"), [Variant(n=n)])
-    drawn = {name: f"{one.drawn_mm + 0.3:.1f}".replace(".", ",") for name, one in plan.vectors.items()}
-    return dict(list(drawn.items())[:20])
+    cells = {}
+    for name, real in plan.vectors_si.items():
+        scale = plan.scales.kv if name.startswith("v") else plan.scales.ka
+        length = float(np.abs(real).item() / np.asarray(scale).item())
+        cells[name] = f"{length + 0.3:.1f}".replace(".", ",")
+    return dict(list(cells.items())[:20])
 
 
 async def measured(name: str, count: int, one: Callable[[int], Awaitable[Any]]) -> None:
