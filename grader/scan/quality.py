@@ -185,6 +185,8 @@ def _four_corners(hull: FloatArray, size: FloatArray) -> tuple[FloatArray, BoolA
     corners = crossing[:, :2] / crossing[:, 2:]
     slack = _SLACK * size.max()
     cut = np.any((corners < -slack) | (corners > size - 1.0 + slack), axis=1)
+    # Both ends of a side that was not seen are beyond the rim.
+    cut |= ~seen | ~np.roll(seen, 1)
     return corners, cut
 
 
