@@ -84,6 +84,8 @@ _LEAST_SIDE = 0.12
 """Of the patch's size: a side's line needs so many points."""
 _BEYOND = 0.1
 """Of the sheet: a side that is not in the picture is taken to lie so far beyond the rim."""
+_NO_VIEW = 4.0
+"""Largest over smallest resolution: nobody photographs a sheet from so far aside."""
 _SLACK = 0.01
 """Of the long side, 4 mm on A3: corners by the sides' lines are known no better where a lens bends them."""
 _PARALLEL = 1e-9
@@ -139,6 +141,9 @@ def _paper(page: Page) -> _Outline | None:
     matrix = through_corners(_CORNERS_MM, corners)
     if not np.all(np.isfinite(matrix)):
         return None
+    axes = _axes(matrix)
+    if axes.max() > _NO_VIEW * axes.min():
+        return None  # a shadow on the sheet was taken for its edge
     return _Outline(matrix, share, tuple(np.flatnonzero(cut).tolist()))
 
 
@@ -185,6 +190,8 @@ def _four_corners(hull: FloatArray, size: FloatArray) -> tuple[FloatArray, BoolA
     corners = crossing[:, :2] / crossing[:, 2:]
     slack = _SLACK * size.max()
     cut = np.any((corners < -slack) | (corners > size - 1.0 + slack), axis=1)
+    # Both ends of a side that was not seen are beyond the rim.
+    cut |= ~seen | ~np.roll(seen, 1)
     return corners, cut
 
 
