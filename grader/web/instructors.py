@@ -52,6 +52,9 @@ Name = Annotated[str, Field(min_length=1, max_length=80, pattern=r"^[^\x00-\x1f\
 Password = Annotated[str, Field(min_length=1, max_length=200)]
 FileName = Annotated[str, Path(max_length=200)]
 StudentId = Annotated[str, Path(pattern=r"^[A-Za-z0-9._-]{1,80}$")]
+MOST_ROWS = 2**31 - 1
+"""The largest number of a row: PostgreSQL's integers have 32 bits."""
+RowId = Annotated[int, Path(ge=0, le=MOST_ROWS)]
 INVITED_S = 7 * 86400.0
 """An invitation is valid for a week."""
 
@@ -133,7 +136,7 @@ def accounts(call: Called) -> list[dict[str, Any]]:
 
 
 @router.delete("/accounts/{number}")
-def remove_account(call: Called, number: int) -> dict[str, str]:
+def remove_account(call: Called, number: RowId) -> dict[str, str]:
     """Remove an instructor; the publications stay."""
     if call.admin.id == number:
         raise RefusedError(409, "own_account", "nobody removes the own account: let another do it")
@@ -299,7 +302,7 @@ def remove_term(call: Called, term: Annotated[str, Path(max_length=40)]) -> dict
 
 
 @router.put("/publications/{key}/members/{number}")
-def add_member(call: Called, key: Key, number: int) -> dict[str, Any]:
+def add_member(call: Called, key: Key, number: RowId) -> dict[str, Any]:
     """Let a colleague in."""
     own, account = call.own(key), call.session.get(Account, number)
     if account is None:
@@ -311,7 +314,7 @@ def add_member(call: Called, key: Key, number: int) -> dict[str, Any]:
 
 
 @router.delete("/publications/{key}/members/{number}")
-def remove_member(call: Called, key: Key, number: int) -> dict[str, Any]:
+def remove_member(call: Called, key: Key, number: RowId) -> dict[str, Any]:
     """Let a colleague out; one always stays."""
     own = call.own(key)
     left = [one for one in own.members if one.id != number]
@@ -585,7 +588,7 @@ def links(call: Called, key: Key) -> list[dict[str, Any]]:
 
 
 @router.delete("/publications/{key}/links/{number}")
-def revoke(call: Called, key: Key, number: int) -> dict[str, str]:
+def revoke(call: Called, key: Key, number: RowId) -> dict[str, str]:
     """Revoke a personal link at once."""
     own, link = call.own(key), call.session.get(Link, number)
     if link is None or link.publication_id != own.id:
@@ -612,7 +615,7 @@ def requests(call: Called, key: Key) -> list[dict[str, Any]]:
 
 
 @router.put("/publications/{key}/requests/{number}")
-def answer(call: Called, key: Key, number: int, said: Answer) -> dict[str, str]:
+def answer(call: Called, key: Key, number: RowId, said: Answer) -> dict[str, str]:
     """Answer a request."""
     own, request = call.own(key), call.session.get(Regrading, number)
     if request is None or request.publication_id != own.id:
@@ -635,7 +638,9 @@ def remove_student(call: Called, key: Key, student: StudentId) -> dict[str, Any]
 
 
 @router.get("/audit")
-def audit(call: Called, before: int | None = None) -> list[dict[str, Any]]:
+def audit(
+    call: Called, before: Annotated[int | None, Query(ge=0, le=MOST_ROWS)] = None
+) -> list[dict[str, Any]]:
     """The audit trail, 200 entries a call, the newest first."""
     _ = call.admin
     asked = select(Audit).order_by(Audit.id.desc()).limit(200)

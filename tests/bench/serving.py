@@ -21,6 +21,7 @@ import aiohttp
 import psutil
 
 from grader.files import samples_folder
+from grader.solution.document import plan_document
 from reference.authored.assignment import Variant, load_assignment
 from reference.plan import exact_plan
 
@@ -115,7 +116,8 @@ async def prepared(server: Server) -> tuple[str, str]:
 
 def cells_of(n: int) -> dict[str, str]:
     """20 values that a student with a number measured."""
-    plan = exact_plan(load_assignment("pump"), [Variant(n=n)])
+    pump = load_assignment("pump")
+    plan = plan_document(pump, exact_plan(pump, [Variant(n=n)]))
     drawn = {name: f"{one.drawn_mm + 0.3:.1f}".replace(".", ",") for name, one in plan.vectors.items()}
     return dict(list(drawn.items())[:20])
 
