@@ -55,7 +55,8 @@ EXAMPLES: Mapping[str, str] = {
     "instead": "v_CA", "share": "62\u00a0%", "file": "class.csv", "most": "1000", "names": "v_A, v_B",
     "error": "line 3", "fields": "5", "column": "v_BB", "columns": "4", "mark": ",", "point": "O1",
     "mechanism": "crank-rocker", "level": "all", "what": "n", "last": "30", "value": "31", "called": "7",
-    "filed": "8",
+    "filed": "8", "areas": "lower left", "corners": "the lower left corner", "files": "38", "limit": "150",
+    "students": "30",
 }  # fmt: skip
 """Parameters by name: after ``@`` a number with its unit; other texts of the catalogues are translated."""
 OTHERWISE: Mapping[str, Mapping[str, str]] = {

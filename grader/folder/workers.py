@@ -42,6 +42,8 @@ _ROUNDS = 3
 """Pools started one after the other without a single result: then what is left has the problem `crashed`."""
 _KILLED = -9
 """Exit code of a process that somebody else killed: the system for want of memory, or a person."""
+_LOST = object()
+"""In the place of a result that there is not; None is a result."""
 _MEGABYTE = 1_000_000
 _ADVICE = "scan or export it again"
 
@@ -156,7 +158,7 @@ class Workers:
                 for future in ended:
                     index = futures.pop(future)
                     result = self._result(future)
-                    if result is not None:
+                    if result is not _LOST:
                         left.discard(index)
                         rounds = _ROUNDS
                         yield index, result
@@ -180,7 +182,7 @@ class Workers:
                 futures[future] = waiting.popleft()
 
     def _result(self, future: "Future[Any]") -> Any:  # noqa: ANN401 - whatever the function returns
-        """A finished call's result or Problem; None where it was ended from outside, or the pool broke."""
+        """A finished call's result or Problem; `_LOST` where it was ended from outside, or the pool broke."""
         try:
             return future.result()
         except TimeoutError:
@@ -191,12 +193,12 @@ class Workers:
             if error.pid in self._over_memory:
                 return self._too_much_memory()
             if error.exitcode == _KILLED:
-                return None
+                return _LOST
             return Problem("crashed", f"the program crashed on it (exit code {error.exitcode}); {_ADVICE}")
         except MemoryError:
             return self._too_much_memory()
         except BrokenProcessPool:
-            return None
+            return _LOST
 
     def _too_much_memory(self) -> Problem:
         asked = f"needs more than {self._limits.memory_mb} MB of memory"

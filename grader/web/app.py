@@ -17,7 +17,7 @@ from starlette.exceptions import HTTPException
 
 from grader import __version__
 from grader.language import tongue
-from grader.web import instructors, pages, students
+from grader.web import instructors, lti, pages, students
 from grader.web.guard import Guard, RefusedError, Rim
 from grader.web.queue import Photo, Queue
 from grader.web.reviews import Reviews
@@ -68,7 +68,7 @@ def application(settings: Settings, photo: Photo = checked_photo) -> FastAPI:
         responses={code: {"description": HTTPStatus(code).phrase, "model": Fault} for code in REFUSALS},
     )  # fmt: skip
     app.state.service = service
-    for router in (students.router, instructors.router, pages.router):
+    for router in (students.router, instructors.router, lti.router, pages.router):
         app.include_router(router)
     app.mount("/review", Reviews(service))
     app.add_exception_handler(PlanmarkError, _told)

@@ -38,6 +38,7 @@ from grader.web.store import (
     Audit,
     Job,
     Link,
+    LtiActivity,
     Publication,
     Regrading,
     Visit,
@@ -250,6 +251,7 @@ def publication(call: Called, key: Key) -> dict[str, Any]:
     own = call.own(key)
     places = call.places(own)
     job = last_job(call.session, own)
+    of_own = LtiActivity.publication_id == own.id
     waiting = call.session.scalars(
         select(Regrading).where(Regrading.publication_id == own.id, Regrading.answered.is_(None))
     ).all()
@@ -261,6 +263,7 @@ def publication(call: Called, key: Key) -> dict[str, Any]:
         "job": None if job is None else state_of(call, job).model_dump(),
         "requests": len(waiting),
         "has_results": (places.results / "results.json").is_file(),
+        "has_activities": call.session.scalar(select(LtiActivity.id).where(of_own).limit(1)) is not None,
     }
 
 

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from datetime import UTC, datetime
 from functools import cache
 from importlib.resources import files
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Query
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from jinja2 import Environment, PackageLoader
 
@@ -14,8 +14,8 @@ from grader.feedback.words import STATES, environment
 from grader.inputs.roster import read_roster
 from grader.language import LANGUAGES, N_, tongue
 from grader.lms.export import TARGETS
-from grader.web import instructors, students
-from grader.web.guard import missing
+from grader.web import instructors, lti, students
+from grader.web.guard import HEADERS, missing
 from grader.web.places import assignment_of
 from grader.web.self_check import form_of
 from grader.web.service import Call, Called, Key
@@ -159,6 +159,15 @@ def account(call: Called) -> Response:
         call, "account.html", tokens=instructors.tokens(call), accounts=instructors.accounts(call),
         audit=instructors.audit(call) if own.is_admin else [],
     )  # fmt: skip
+
+
+@router.get("/lti/choose")
+def choose(call: Called, asked: Annotated[str, Query(alias="for", max_length=100)] = "") -> Response:
+    """The choice of what a platform's activity shows; its answer may be posted to the platform."""
+    response = page(call, "choose.html", choices=lti.choices(call, asked), name=asked)
+    policy = HEADERS["Content-Security-Policy"].replace("form-action 'self'", "form-action https: http:")
+    response.headers["Content-Security-Policy"] = policy
+    return response
 
 
 @router.get("/static/{name}")

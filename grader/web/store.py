@@ -168,6 +168,62 @@ class Regrading(Table):
     answered: Mapped[float | None] = mapped_column(default=None)
 
 
+class LtiPlatform(Table):
+    """A learning platform from which people come; addresses as `grader.web.lti.Platform` has them."""
+
+    __tablename__ = "lti_platforms"
+    __table_args__ = (UniqueConstraint("issuer", "client_id"),)
+    id: Mapped[int] = mapped_column(primary_key=True)
+    issuer: Mapped[str] = mapped_column(String(500))
+    client_id: Mapped[str] = mapped_column(String(200))
+    auth_login_url: Mapped[str] = mapped_column(String(500))
+    auth_token_url: Mapped[str] = mapped_column(String(500))
+    key_set_url: Mapped[str] = mapped_column(String(500))
+    deployments: Mapped[list[Any]]
+
+
+class LtiUser(Table):
+    """Somebody who came from a platform: an instructor's account, or a student's ids by publication."""
+
+    __tablename__ = "lti_users"
+    __table_args__ = (UniqueConstraint("platform_id", "subject"),)
+    id: Mapped[int] = mapped_column(primary_key=True)
+    platform_id: Mapped[int] = mapped_column(ForeignKey("lti_platforms.id", ondelete="CASCADE"))
+    subject: Mapped[str] = mapped_column(String(255))
+    account_id: Mapped[int | None] = mapped_column(ForeignKey("accounts.id", ondelete="SET NULL"))
+    account: Mapped[Account | None] = relationship(lazy="joined")
+    students: Mapped[dict[str, Any]] = mapped_column(default=dict)
+
+
+class LtiActivity(Table):
+    """An activity of a platform's course, what it shows, and where its grades go.
+
+    Attributes
+    ----------
+    grades : the platform's claim on its grade service
+    sent : digests of the grades that it has taken, by student
+    """
+
+    __tablename__ = "lti_activities"
+    __table_args__ = (UniqueConstraint("platform_id", "deployment", "resource_link"),)
+    id: Mapped[int] = mapped_column(primary_key=True)
+    platform_id: Mapped[int] = mapped_column(ForeignKey("lti_platforms.id", ondelete="CASCADE"))
+    deployment: Mapped[str] = mapped_column(String(200))
+    resource_link: Mapped[str] = mapped_column(String(255))
+    publication_id: Mapped[int | None] = mapped_column(ForeignKey("publications.id", ondelete="SET NULL"))
+    grades: Mapped[dict[str, Any]] = mapped_column(default=dict)
+    sent: Mapped[dict[str, Any]] = mapped_column(default=dict)
+
+
+class LtiState(Table):
+    """A nonce of a launch, or what an instructor is asked about; good for minutes, and once."""
+
+    __tablename__ = "lti_states"
+    id: Mapped[str] = mapped_column(String(64), primary_key=True)
+    expires: Mapped[float]
+    what: Mapped[dict[str, Any]] = mapped_column(default=dict)
+
+
 class Audit(Table):
     """Who did what, and when; nothing is ever taken out but what is older than is kept."""
 

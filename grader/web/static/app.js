@@ -59,7 +59,8 @@ for (const form of document.querySelectorAll("form[data-send]")) {
     const [method, path] = form.dataset.send.split(" "), place = form.querySelector(".said");
     doing(event.submitter, place, async () => {
       const answer = await call(method, path, valuesOf(form));
-      if (form.dataset.told) { form.reset(); tell(place, texts[form.dataset.told], true); } else go(form.dataset.then, answer);
+      if (form.dataset.shows) tell(place, `${answer.sent.length} ✓ ${Object.entries({ ...answer.refused, ...answer.withheld }).map(([who, why]) => `${who}: ${why}`).join("; ")}`, !Object.keys(answer.refused).length);
+      else if (form.dataset.told) { form.reset(); tell(place, texts[form.dataset.told], true); } else go(form.dataset.then, answer);
     });
   });
 }
@@ -219,5 +220,20 @@ $("export")?.addEventListener("submit", (event) => {
     link.href = URL.createObjectURL(await response.blob());
     link.download = /filename="([^"]+)"/.exec(response.headers.get("Content-Disposition"))[1];
     link.click();
+  });
+});
+
+// A platform's activity ----------------------------------------------------------------------------
+
+$("choose")?.addEventListener("submit", (event) => {
+  event.preventDefault();
+  const form = event.target, key = encodeURIComponent($("publication").value);
+  doing(event.submitter, form.querySelector(".said"), async () => {
+    const { address, JWT } = await call("POST", `/api/v1/lti/chosen/${form.dataset.name}?key=${key}`);
+    if (!JWT) { location.assign(address); return; }
+    const back = Object.assign(document.createElement("form"), { method: "post", action: address });
+    back.append(Object.assign(document.createElement("input"), { type: "hidden", name: "JWT", value: JWT }));
+    document.body.append(back);
+    back.submit();
   });
 });

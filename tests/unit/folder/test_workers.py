@@ -63,6 +63,11 @@ def test_a_call_that_ended_its_process_is_tried_once_more(tmp_path):
     assert codes(1, [("crashes_once", str(path))]) == ["answered"]
 
 
+def test_a_call_that_gives_none_has_ended():
+    with Workers(1, LIMITS, calls.__name__) as workers:
+        assert dict(workers.run(print, [(), ()])) == {0: None, 1: None}
+
+
 def test_processes_killed_at_any_moment_lose_no_call():
     """Also between two calls, and while one is handed over."""
     dice, stop = random.Random(7), threading.Event()
