@@ -82,6 +82,15 @@ def _symbol(match: re.Match[str]) -> Markup:
 # Templates ----------------------------------------------------------------------------------------
 
 
+TURNING = (*range(0x202A, 0x202F), *range(0x2066, 0x206A))
+"""Unicode's marks of direction that hold until they are ended."""
+
+
+def _in_order(value: object) -> object:
+    """A text without the signs that turn the order of what follows it on the page: names may have them."""
+    return value.translate(dict.fromkeys(TURNING)) if isinstance(value, str) else value
+
+
 @cache
 def environment(lang: str) -> Environment:
     """Templates with the sentences and numbers of a language."""
@@ -93,6 +102,7 @@ def environment(lang: str) -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
         extensions=["jinja2.ext.i18n"],
+        finalize=_in_order,
     )
     made.install_gettext_callables(  # type: ignore[attr-defined]
         speaker.gettext, speaker.ngettext, newstyle=True

@@ -20,23 +20,33 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from grader.folder.workers import Limits, Workers
+from grader.inputs.class_file import read_class_file
 from grader.inputs.decisions import Decision, DecisionFile
 from grader.inputs.measurements import names_of, read_measurements
 from grader.inputs.roster import read_roster
+from grader.inputs.scale_text import parse_scale
+from grader.lms.export import TARGETS
+from grader.lms.gradebooks import Gradebook
+from grader.lms.moodle import Worksheet
 from grader.records import Problem
 from grader.rubric import load_rubric
 from grader.scan.decode.pages import count_pages, is_blank, page_of
 from grader.scan.register.registration import register
 from reference.authored.assignment import load_assignment
+from reference.authored.variant_table import DataTable, read_rows
 from reference.errors import PlanmarkError
 from tests.fuzz.seeds import seeds
 
 CORPUS = Path(__file__).parent / "corpus"
-DOORS = ("pictures", "measurements", "roster", "decisions", "authored")
+DOORS = (
+    "pictures", "measurements", "roster", "decisions", "authored", "variants", "settings", "scales",
+    "worksheet", "gradebook",
+)  # fmt: skip
 LIMITS = Limits(seconds=60.0, memory_mb=1500)
 SLOW_S = 20.0
 """One input may take this long: a third of a worker's limit, on a busy machine."""
-BATCH = {"pictures": 100, "measurements": 400, "roster": 400, "decisions": 400, "authored": 150}
+BATCH = {"pictures": 100, "measurements": 400, "roster": 400, "decisions": 400, "authored": 150,
+         "variants": 200, "settings": 400, "scales": 2000, "worksheet": 400, "gradebook": 400}  # fmt: skip
 MOST_PAGES = 3
 _WORDS = (
     b"", b"0", b"-1", b"1e400", b"nan", b"inf", b"NaN", b"999999999999999999999", b"1_0", b"0x10",
@@ -76,7 +86,8 @@ def _name(door: str, data: bytes) -> str:
                 "input.assignment.toml"}.get(table[1] if table else b"", "input.mechanism.toml")  # fmt: skip
     if door == "measurements":
         return "input.json" if data.lstrip()[:1] in {b"{", b"["} else "input.csv"
-    return "input.csv" if door in {"roster", "decisions"} else "input.bin"
+    names = {"pictures": "input.bin", "settings": "planmark.toml", "scales": "input.txt"}
+    return names.get(door, "input.csv")
 
 
 def _pictures(path: Path) -> str:
@@ -132,9 +143,34 @@ def _authored(path: Path) -> str:
     return f"{len(variants)} variants of {len(assignment.mechanism(variants[:3]).joints)} joints"
 
 
+def _variants(path: Path) -> str:
+    table = read_rows(DataTable(file=path.name), path.with_name("input.assignment.toml"), 0.001)[0]
+    return f"{len(table.rows or ())} rows of {len(table.columns or ())} columns"
+
+
+def _settings(path: Path) -> str:
+    return " ".join(read_class_file(path, TARGETS).keys)
+
+
+def _scales(path: Path) -> str:
+    text = path.read_bytes().decode(errors="replace")
+    return " ".join(type(parse_scale(name, text)).__name__ for name in ("kL", "kv", "ka"))
+
+
+def _worksheet(path: Path) -> str:
+    form = Worksheet.opened(path.read_bytes(), path.name)
+    return f"{len(form.people)} people, {len(form.columns)} columns"
+
+
+def _gradebook(path: Path) -> str:
+    form = Gradebook.opened(path.read_bytes(), path.name, "Plan 1")
+    return f"{form.platform}: {len(form.people)} people"
+
+
 _ENTER = {
     "pictures": _pictures, "measurements": _measurements, "roster": _roster, "authored": _authored,
-    "decisions": _decisions,
+    "decisions": _decisions, "variants": _variants, "settings": _settings, "scales": _scales,
+    "worksheet": _worksheet, "gradebook": _gradebook,
 }  # fmt: skip
 
 

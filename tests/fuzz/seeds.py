@@ -16,7 +16,7 @@ SHAPE = (120, 170)
 
 
 def seeds(door: str) -> list[bytes]:
-    """Healthy files for a door: `pictures`, `measurements`, `roster`, `decisions` or `authored`."""
+    """Healthy files for a door, one of `tests.fuzz.doors.DOORS`."""
     return _SEEDS[door]()
 
 
@@ -148,7 +148,51 @@ def _decisions() -> list[bytes]:
     ]
 
 
+def _variants() -> list[bytes]:
+    return [
+        b"n,AB,phi,n1\n1,40,30,60\n2,45,32,70\n",
+        "n;position;AB\n1;1;40,5\n1;2;40,5\n".encode("utf-8-sig"),
+    ]
+
+
+def _settings() -> list[bytes]:
+    paths = b'assignment = "pump"\nroster = "lists/roster.csv"\nout = "results"\nlog = "log.txt"\n'
+    return [paths + b'language = "ro"\npages = 2\nplatform = "moodle"\n']
+
+
+def _scales() -> list[bytes]:
+    texts = (
+        "1:5", "5 cm/cm", "0.036 (m/s)/mm", "0,036 (м/с)/мм", "kv = omega kL", "0.036 m/s·mm", "1 mm = 5 mm",
+        "kL = 1:5 = 0.005 m/mm", "7.5 (m/s^2)/mm", "2·10^-3 м/мм",
+    )  # fmt: skip
+    return [text.encode() for text in texts]
+
+
+def _worksheet() -> list[bytes]:
+    head = (
+        "Identifier,Full name,Email address,Status,Grade,Maximum grade,Grade can be changed,"
+        "Last modified (submission),Last modified (grade),Feedback comments"
+    )
+    row = 'Participant 101,"Popa, Ana",ana@example.org,Submitted,7.50,10.00,Yes,-,-,"<p>a ""b""</p>"'
+    return [f"{head}\r\n{row}\r\n".encode(), f"{head}\n{row}\n".replace(",", ";").encode("utf-8-sig")]
+
+
+def _gradebook() -> list[bytes]:
+    return [
+        (
+            b"Student,ID,SIS User ID,SIS Login ID,Section,Plan 1 (77),Final Score\r\n"
+            b"    Points Possible,,,,,10.00,(read only)\r\n"
+            b'"Popa, Ana",12,s1,ana,Group 3,7.5,75\r\n'
+        ),
+        (
+            b"OrgDefinedId\tUsername\tLast Name\tFirst Name\tPlan 1 Points Grade <Numeric MaxPoints:10>\t"
+            b"End-of-Line Indicator\n#s1\t#ana\tPopa\tAna\t7\t#\n"
+        ),
+    ]
+
+
 _SEEDS = {
     "pictures": _pictures, "measurements": _measurements, "roster": _roster, "authored": _authored,
-    "decisions": _decisions,
+    "decisions": _decisions, "variants": _variants, "settings": _settings, "scales": _scales,
+    "worksheet": _worksheet, "gradebook": _gradebook,
 }  # fmt: skip

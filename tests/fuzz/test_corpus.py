@@ -37,6 +37,8 @@ def made_to_break():
     assert endless != pump
     yield "authored", "10^12 variants", endless
     yield "authored", "a formula of towers", pump.replace(b"30 + 2*n", b"9**9**9**9")
+    yield "variants", "csv of a million columns", b"n" + b",a" * 1_000_000 + b"\n1" + b",1" * 1_000_000
+    yield "settings", "tables in tables", b"a = " + b"{a = " * 2000
     yield "authored", "tables in tables", b"a = " + b"{a = " * 2000
 
 
