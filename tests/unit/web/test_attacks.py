@@ -132,7 +132,8 @@ def test_an_assignment_names_no_file_outside_its_own_folder(admin, tmp_path, set
     for far in ("../../../other/", f"{settings.data}/other/"):
         text = own
         for path in tmp_path.glob("own.*.toml"):
-            text = text.replace(f'"{path.name}"', f'"{far}{path.name}"')
+            name = path.name.split(".")[0]
+            text = text.replace(f'"{name}"', f'"{far}{path.name}"')
         assert text != own
         admin.act("PUT", f"/publications/{key}/assignment/files/own.toml", content=text.encode())
         answer = admin.act("PATCH", f"/publications/{key}", json={"assignment": "own.toml"})
@@ -159,7 +160,6 @@ def test_an_origin_that_is_none_is_refused(admin):
     [
         ("PATCH", "/publications/files"),
         ("POST", "/publications/photos/checks"),
-        ("DELETE", "/publications/files"),
     ],
 )
 def test_a_long_body_is_for_files_alone(admin, method, path):
@@ -256,7 +256,7 @@ def test_sheets_handed_in_at_once_are_all_kept_and_not_without_end(graded, stude
 def test_photos_that_wait_are_bounded(graded, app, service, monkeypatch):
     key, _ = graded
     monkeypatch.setattr(students, "MOST_WAITING", 2)
-    monkeypatch.setattr(service.queue, "put", lambda _job: None)
+    monkeypatch.setattr(type(service.queue), "put", lambda *_: None)
     browser = Browser(app)
     path = f"/publications/{key}/photos?n=7"
     answers = [browser.act("POST", path, content=b"\xff\xd8\xff").status_code for _ in range(3)]
