@@ -101,6 +101,10 @@ def join(call: Called, token: str = "") -> Response:
 def self_check(call: Called, key: Key) -> Response:
     """A student's page: check values or a photo, own feedback, requests."""
     publication = call.publication(key)
+    if call.visitor.visit is None:
+        # From now on a student counts by the own visit, not with all others behind the school's address.
+        call.service.guard.count("address", [call.visitor.address])
+        call.service.guard.begin(call.session, call.visitor)
     link = call.link(publication)
     if link is None:
         students.open_for_checks(call, key)

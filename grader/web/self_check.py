@@ -14,7 +14,13 @@ from grader.feedback.advice import RESULTS, CheckedLine, checked_lines
 from grader.feedback.sentences import PLACES
 from grader.feedback.student_page import AS_MEASURED, SHEET
 from grader.feedback.words import symbols
-from grader.inputs.measurements import UNITS_OF_SCALES, columns_of, measurements_in, names_of
+from grader.inputs.measurements import (
+    NOTHING_MEASURED,
+    UNITS_OF_SCALES,
+    columns_of,
+    measurements_in,
+    names_of,
+)
 from grader.language import N_, Tongue, tongue
 from grader.marking.mark import judge
 from grader.marking.self_check import Level
@@ -27,8 +33,8 @@ from grader.web.guard import RefusedError
 from reference.authored.assignment import Assignment, Variant, load_assignment
 
 RANGES = {
-    "n": N_("your number n is missing: give one from %(first)s to %(last)s"),
-    "position": N_("the position is missing: give one from %(first)s to %(last)s"),
+    "n": N_("give your number n, from %(first)s to %(last)s"),
+    "position": N_("give the position, from %(first)s to %(last)s"),
 }
 _BARE = re.compile(r"\d*[.,]?\d+([eE][+-]?\d+)?", re.ASCII)
 
@@ -77,7 +83,7 @@ def checked_values(
     """
     speaker, rubric = tongue(lang), rubric_of(assignment)
     filled = {column: _with_unit(column, text.strip()) for column, text in cells.items() if text.strip()}
-    entered = measurements_in(filled, names_of(assignment), "", lang)
+    entered = measurements_in(filled, names_of(assignment), "", lang) if filled else NOTHING_MEASURED
     task = task_of(assignment, rubric, variant)
     submission = Submission(measured=entered.reading, values=entered.values, declared=entered.scales)
     judgement = judge(task, submission)

@@ -66,6 +66,15 @@ def test_a_closed_self_check_is_the_instructors_alone(admin, visitor):
     assert checked(admin, key, CELLS).status_code == 200
 
 
+def test_students_behind_one_address_do_not_count_as_one(admin, app):
+    key = admin.publish()
+    for _ in range(5):
+        student = Browser(app)
+        assert student.get(f"/c/{key}").status_code == 200
+        statuses = {checked(student, key, {}).status_code for _ in range(15)}
+        assert statuses == {200}
+
+
 def test_there_is_no_list_of_publications_for_visitors(visitor, admin):
     admin.publish()
     assert visitor.get("/api/v1/publications/wrong/form").status_code == 404
