@@ -82,9 +82,10 @@ class Call:
 
     def own(self, key: str) -> Publication:
         """A publication that the instructor may change. Raises RefusedError for any other."""
-        account, found = self.account, self.publication(key)
+        _ = self.account
+        found = self.publication(key)
         if not self.visitor.is_member(found):
-            raise missing("publication") if account is not None else forbidden("")
+            raise missing("publication")
         return found
 
     def link(self, publication: Publication) -> Link | None:
