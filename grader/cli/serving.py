@@ -32,22 +32,24 @@ def serve(
     if address is None and host not in LOOPBACK:
         why = "say under which name students reach it: --address https://NAME"
         raise CallError("address_needed", f"--host {host} opens the server to other machines: {why}")
-    listener = listener_on(host, port)
-    shown = f"[{host}]" if ":" in host else host
-    settings = settings_of(
-        data,
-        address or f"http://{shown}:{listener.getsockname()[1]}",
-        database,
-        jobs=jobs or os.cpu_count() or 1,
-    )
-    app = application(settings)
-    invitation = first_invitation(settings)
-    terminal.say(f"planmark serves {settings.address}/ from {data}; Ctrl+C ends it.")
-    if invitation:
-        terminal.say(f"next: make your account at {invitation}")
-    if urlsplit(settings.address).scheme == "http" and host not in LOOPBACK:
-        typer.secho("Passwords travel unencrypted: put it behind a proxy with https.", fg="yellow", err=True)
-    _run(app, listener)
+    with listener_on(host, port) as listener:
+        shown = f"[{host}]" if ":" in host else host
+        settings = settings_of(
+            data,
+            address or f"http://{shown}:{listener.getsockname()[1]}",
+            database,
+            jobs=jobs or os.cpu_count() or 1,
+        )
+        app = application(settings)
+        invitation = first_invitation(settings)
+        terminal.say(f"planmark serves {settings.address}/ from {data}; Ctrl+C ends it.")
+        if invitation:
+            terminal.say(f"next: make your account at {invitation}")
+        if urlsplit(settings.address).scheme == "http" and host not in LOOPBACK:
+            typer.secho(
+                "Passwords travel unencrypted: put it behind a proxy with https.", fg="yellow", err=True
+            )
+        _run(app, listener)
 
 
 def _run(app: object, listener: socket.socket) -> None:
