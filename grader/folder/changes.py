@@ -9,7 +9,7 @@ from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from pydantic import BaseModel, ValidationError, field_validator
+from pydantic import BaseModel, Field, ValidationError, field_validator
 
 from grader.documents import (
     Cause,
@@ -182,6 +182,8 @@ class RunNote(BaseModel):
     """Empty in notes of earlier versions."""
     folder: Path
     out: Path
+    was_at: Path | None = Field(default=None, exclude=True)
+    """Where the results were when the note was written."""
     roster: Path | None = None
     decisions: Path | None = None
     pages_per_student: int | None = None
@@ -226,7 +228,7 @@ def earlier_run(out: Path) -> RunNote | None:
         note = RunNote.model_validate_json((out / CACHE_FOLDER / RUN_NOTE).read_bytes())
     except (OSError, ValidationError):
         return None
-    return note.model_copy(update={"out": out.resolve()})
+    return note.model_copy(update={"out": out.resolve(), "was_at": note.out})
 
 
 # Changes ---------------------------------------------------------------------------------------

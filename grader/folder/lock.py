@@ -74,5 +74,6 @@ def _check_same_class(out: Path, folder: Path, assignment: str) -> None:
     if before.assignment_id not in {"", assignment}:
         what = f"the results of the assignment {before.assignment_id}, not of {assignment}"
         raise CallError("results_of_another", f"{out}: holds {what}; {advice}")
-    if before.folder != folder.resolve() and before.folder.is_dir():
+    # A class that was copied with its results is no other class.
+    if before.was_at == before.out and before.folder != folder.resolve() and before.folder.is_dir():
         raise CallError("results_of_another", f"{out}: holds the results of {before.folder}; {advice}")
