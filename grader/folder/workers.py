@@ -107,6 +107,7 @@ class Workers:
         self._pool: ProcessPool | None = None
         self._over_memory: set[int] = set()
         self._closed = threading.Event()
+        self._starting = threading.Lock()
 
     def __enter__(self) -> Self:
         threading.Thread(target=self._watch_memory, daemon=True).start()
@@ -144,7 +145,7 @@ class Workers:
         """Results of the chosen tasks; what a broken pool or a killed worker left is done by a new pool."""
         left = set(indices)
         rounds = _ROUNDS
-        while left and rounds:
+        while left and rounds and not self._closed.is_set():
             rounds -= 1
             waiting, futures = deque(sorted(left)), dict[Future[Any], int]()
             longest = max(seconds[index] for index in left)
@@ -205,15 +206,17 @@ class Workers:
         return Problem("too_much_memory", f"{asked}; {_ADVICE}, or raise --memory-limit")
 
     def _started_pool(self) -> ProcessPool:
-        if self._pool is None:
-            context = multiprocessing.get_context("spawn")
-            prepared = (self._module, _log_file(), LOG.isEnabledFor(logging.DEBUG))
-            self._pool = ProcessPool(self._jobs, initializer=_start, initargs=prepared, context=context)
-        return self._pool
+        with self._starting:
+            if self._pool is None:
+                context = multiprocessing.get_context("spawn")
+                prepared = (self._module, _log_file(), LOG.isEnabledFor(logging.DEBUG))
+                self._pool = ProcessPool(self._jobs, initializer=_start, initargs=prepared, context=context)
+            return self._pool
 
     def _end_pool(self) -> None:
         """Kill the workers, whatever they do: a polite end would wait for native code."""
-        pool, self._pool = self._pool, None
+        with self._starting:
+            pool, self._pool = self._pool, None
         if pool is not None:
             for worker in _workers():
                 worker.kill()

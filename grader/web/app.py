@@ -3,7 +3,7 @@
 import asyncio
 import logging
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, closing, suppress
 from dataclasses import replace
 from http import HTTPStatus
 
@@ -57,10 +57,13 @@ def application(settings: Settings, photo: Photo = checked_photo) -> FastAPI:
     @asynccontextmanager
     async def running(_app: FastAPI) -> AsyncIterator[None]:
         service.queue.start()
-        forgetting = asyncio.create_task(_forget(store, settings.keep_days))
+        ended = asyncio.Event()
+        forgetting = asyncio.create_task(_forget(store, settings.keep_days, ended))
         yield
-        forgetting.cancel()
+        ended.set()
+        await forgetting
         service.queue.stop()
+        store.close()
 
     app = FastAPI(
         title="planmark", version=__version__, description=DESCRIPTION, lifespan=running,
@@ -80,17 +83,17 @@ def application(settings: Settings, photo: Photo = checked_photo) -> FastAPI:
     return app
 
 
-async def _forget(store: Store, days: float) -> None:
-    """Delete day by day what is kept no longer."""
-    while True:
+async def _forget(store: Store, days: float, ended: asyncio.Event) -> None:
+    """Delete day by day what is kept no longer, until the server ends."""
+    while not ended.is_set():
         await run_in_threadpool(store.forget, days=days)
-        await asyncio.sleep(DAY_S)
+        with suppress(TimeoutError):
+            await asyncio.wait_for(ended.wait(), DAY_S)
 
 
 def first_invitation(settings: Settings) -> str | None:
     """The address at which the first administrator makes the account; None once there is one."""
-    store = Store(settings.database)
-    with store.session() as session:
+    with closing(Store(settings.database)) as store, store.session() as session:
         joined = select(func.count()).select_from(Account).where(Account.password != "")
         if session.scalar(joined):
             return None

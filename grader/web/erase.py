@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 
 from grader.documents import ResultsDocument
 from grader.files import result_folders, write_whole
-from grader.folder.changes import CACHE_FOLDER, NOTE
+from grader.folder.changes import CACHE_FOLDER, RUN_NOTE
 from grader.inputs.decisions import DecisionFile
 from grader.inputs.measurements import students_in
 from grader.inputs.roster import read_roster
@@ -121,6 +121,7 @@ def _erase_results(places: Places, student: str) -> None:
             "stale": [one for one in results.stale if one.student_id != student],
         }
     )
-    for name in (*PAGES, f"{CACHE_FOLDER}/{NOTE}"):
-        (places.results / name).unlink(missing_ok=True)
+    notes = (note for note in (places.results / CACHE_FOLDER).glob("*.json") if note.name != RUN_NOTE)
+    for path in (*(places.results / page for page in PAGES), *notes):
+        path.unlink(missing_ok=True)
     write_whole(places.results / "results.json", kept.model_dump_json(indent=2))

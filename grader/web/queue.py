@@ -71,6 +71,7 @@ class Queue:
 
     def stop(self) -> None:
         """End all work at once; what was running begins again with the next start."""
+        workers, self._workers = self._workers, None
         running = list(self._running.values())
         for process in running:
             process.terminate()
@@ -79,9 +80,10 @@ class Queue:
                 jobs.put(None)
         for process in running:
             process.join()
-        if self._workers is not None:
-            self._workers.__exit__(None, None, None)
-            self._workers = None
+        if workers is not None:
+            workers.__exit__(None, None, None)
+        for thread in self._threads:
+            thread.join()
 
     @property
     def workers(self) -> Workers:
@@ -137,6 +139,10 @@ class Queue:
         path = places_of(self.settings.data, job.publication).photos / job.asked["file"]
         try:
             return result_of(self.workers, self.photo, path, job.asked)
+        except PlanmarkError:
+            if self._workers is None:
+                raise _StoppedError from None
+            raise
         finally:
             if self._workers is not None:
                 path.unlink(missing_ok=True)

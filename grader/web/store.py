@@ -252,6 +252,10 @@ class Store:
             raise CallError("data_base", f"--database: the data base cannot be opened ({why})") from error
         self._sessions = sessionmaker(self.engine, expire_on_commit=False)
 
+    def close(self) -> None:
+        """Close the connections that nobody uses."""
+        self.engine.dispose()
+
     @contextmanager
     def session(self) -> Iterator[Session]:
         """A session that is committed at its end, and rolled back on any error."""

@@ -66,6 +66,7 @@ def app(tmp_path_factory):
         made.state.service.queue.start()
         yield made
         made.state.service.queue.stop()
+        store.close()
 
 
 @pytest.fixture(scope="module")

@@ -52,6 +52,7 @@ def test_a_link_signed_by_another_server_opens_nothing(graded, app, settings):
     foreign = web.application(replace(settings, secret="t" * 40, database="sqlite://"))
     _, links = graded
     assert TestClient(foreign, base_url=ADDRESS).get(links["s09"]).status_code in {404, 500}
+    foreign.state.service.store.close()
     token = links["s09"].rpartition("/")[2]
     assert Browser(app).get(f"/s/{token[:-1]}{'A' if token[-1] != 'A' else 'B'}").status_code == 404
 

@@ -19,7 +19,8 @@ def store(settings):
     made = Store(settings.database)
     with made.session() as session:
         session.add(Publication(id=1, key="publication1", assignment="pump"))
-    return made
+    yield made
+    made.close()
 
 
 def photo_job(store, settings, state="queued"):

@@ -18,6 +18,7 @@ def served(monkeypatch):
 
     def run(app, listener):
         apps.append(app)
+        app.state.service.store.close()
         listener.close()
 
     monkeypatch.setattr(serving, "_run", run)
