@@ -12,27 +12,22 @@ becomes a problem of its page or report, never an error.
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 from hashlib import blake2b
-from pathlib import Path
 
 from grader.comparison.evidence import Submission
 from grader.comparison.scales import Declarations, Source, declarations
 from grader.comparison.task import Task, task_of
-from grader.documents import ProblemDocument, ReportDocument
-from grader.feedback.advice import CheckedLine, checked_lines
-from grader.feedback.photos import PLANS_UNSEEN, flaw_problems, flaw_sentence
+from grader.documents import ReportDocument
+from grader.feedback.photos import flaw_problems
 from grader.feedback.redo_steps import with_mistakes_explained
 from grader.feedback.sentences import Level, criterion_feedback
-from grader.feedback.words import problem_sentence
 from grader.inputs.measurements import NOTHING_MEASURED, Measurements, StudentSubmission
 from grader.inputs.scale_text import SURE, declared_scales, sure_texts, understood_scales
-from grader.language import Tongue, tongue
 from grader.marking.decided import decide, open_again, with_decisions, with_nodes
 from grader.marking.mark import judge
 from grader.marking.report import reading_document, report_of, unjudged_report
-from grader.marking.self_check import is_all_right
 from grader.outcomes import Judgement
 from grader.overlay.measured import measured_picture
 from grader.overlay.picture import backdrop, overlay
@@ -41,8 +36,8 @@ from grader.reading.page_scale import at_drawn_scales, is_drawn_otherwise, is_up
 from grader.reading.read import read_figures
 from grader.reading.sketch import drawings
 from grader.records import PageRef, Problem, Reading, ScannedPage, Sheet, Unread
-from grader.rubric import Asked, RubricFile, asked_of
-from grader.scan.decode.pages import count_pages, decode, is_blank
+from grader.rubric import Asked, RubricFile
+from grader.scan.decode.pages import decode, is_blank
 from grader.scan.handwriting.captions import (
     NUMBER_WORDS,
     POSITION_WORDS,
@@ -332,17 +327,17 @@ def _marked(
     problems += tuple(
         flaw for page in pages if _is_doubtful(page.reading) for flaw in flaw_problems(page, submission.lang)
     )
-    judged = _judged(submission, assignment, rubric, [page.reading for page in pages])
-    if isinstance(judged, Problem):
+    answer = judged(submission, assignment, rubric, [page.reading for page in pages])
+    if isinstance(answer, Problem):
         is_there = submission.pages or submission.measured or submission.has_unusable
         report = unjudged_report(
             assignment, rubric, submission.variant or Variant(), submission.student_id,
-            "unreadable" if is_there else "missing", problems=(*problems, judged), sheets=sheets,
+            "unreadable" if is_there else "missing", problems=(*problems, answer), sheets=sheets,
         )  # fmt: skip
         plain = [(page.backdrop, page.reading) for page in pages if page.backdrop]
         report = with_decisions(report, submission)
         return report, lambda _ghosts: tuple(overlay(scan, reading, {}, {}) for scan, reading in plain)
-    task, own, declared = judged
+    task, own, declared = answer
     judgement = decide(own, rubric, submission.decided)
     names, lang, measured = assignment.file.names, submission.lang, submission.measured or NOTHING_MEASURED
     report = report_of(
@@ -355,7 +350,7 @@ def _marked(
     )  # fmt: skip
     report = with_mistakes_explained(report, judgement, assignment, task.variant, lang, level)
     report = with_decisions(report, submission, own, task.construction)
-    return report, lambda ghosts: _pictures(
+    return report, lambda ghosts: pictures_of(
         pages, measured, task.construction, judgement, show_expected=ghosts
     )
 
@@ -366,7 +361,7 @@ def _is_doubtful(reading: Reading) -> bool:
     return not vectors or bool(reading.unread) or any(one.confidence < _SURELY for one in vectors)
 
 
-def _judged(
+def judged(
     submission: StudentSubmission, assignment: Assignment, rubric: RubricFile, readings: Sequence[Reading]
 ) -> tuple[Task, Judgement, Declarations] | Problem:
     """The judgement and the scales that counted as declared, or why there is none."""
@@ -396,110 +391,7 @@ def _judged(
     return task, open_again(judgement, rubric, submission) if is_empty else judgement, declared
 
 
-# A student's own check of a photo -------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class PhotoCheck:
-    """What a self-check tells of a photo, in the student's language; nothing in it gives the answer away.
-
-    Attributes
-    ----------
-    flaws : what spoils reading, by code, with what to do
-    problems : what else a student should know
-    lines : of every value that was asked for and drawn, or could not be read (`open`)
-    judgement : None where nothing was read
-    pictures : each page with what was read on it, without expected vectors
-    """
-
-    flaws: Mapping[str, str] = field(default_factory=dict)
-    problems: tuple[str, ...] = ()
-    lines: tuple[CheckedLine, ...] = ()
-    judgement: Judgement | None = None
-    pictures: tuple[Picture, ...] = ()
-
-    @property
-    def is_read(self) -> bool:
-        """Whether any figure of the assignment was read."""
-        return self.judgement is not None
-
-    @property
-    def is_all_right(self) -> bool:
-        """Whether something was read, and nothing is off or open."""
-        return bool(self.lines) and is_all_right(tuple(line.checked for line in self.lines))
-
-
-def photo_check(
-    path: Path, assignment: Assignment, rubric: RubricFile, variant: Variant, lang: str, level: Level = "hint"
-) -> PhotoCheck:
-    """What a student's own check of a photo, a scan, or a PDF of several tells.
-
-    Raises InputFileError for a file that is not there, CallError for an unknown language.
-    """
-    speaker = tongue(lang)
-    try:
-        count = count_pages(path)
-    except InputFileError as error:
-        if error.code == "file_missing":
-            raise
-        # The page will say why.
-        count = 1
-    refs = [PageRef(path.name, number, count, path=path) for number in range(1, count + 1)]
-    submission = StudentSubmission("", variant, tuple(refs), lang=lang)
-    asked = asked_of(assignment, rubric)
-    pages = read_submission(submission, [scan(ref, asked) for ref in refs], assignment, asked)
-    pages = [page.asked_only(rubric.vectors) for page in pages]
-    spoilt = {flaw.code: flaw_sentence(flaw, speaker) for page in pages for flaw in page.flaws}
-    readings = [page.reading for page in pages]
-    problems = [problem for page in pages for problem in (*page.problems, *_other_number(page, variant))]
-    judged = _judged(submission, assignment, rubric, readings)
-    if isinstance(judged, Problem):
-        known = [*problems, judged]
-        pictures = tuple(overlay(page.backdrop, page.reading, {}, {}) for page in pages if page.backdrop)
-        return PhotoCheck(spoilt, _said(known, speaker), pictures=pictures)
-    task, judgement, _ = judged
-    names, driven = assignment.file.names, assignment.mechanism_file.driver.pin
-    drawn = {figure for reading in readings for figure in reading.figures}
-    figures = {
-        name: task.construction.figure_of(vector.head) for name, vector in task.construction.vectors.items()
-    }
-    unread = {name for name, figure in figures.items() if figure in drawn}
-    absent = [
-        figure for figure in PLANS_UNSEEN if figure in {figures.get(one) for one in rubric.vectors} - drawn
-    ]
-    told = [*(speaker.gettext(PLANS_UNSEEN[figure]) for figure in absent), *_said(problems, speaker)]
-    lines = checked_lines(judgement, level, speaker, names, driven, unread)
-    pictures = _pictures(pages, NOTHING_MEASURED, task.construction, judgement, show_expected=False)
-    return PhotoCheck(spoilt, tuple(told), tuple(lines), judgement, pictures)
-
-
-_OF_NO_USE = frozenset(
-    {"resolution_wrong", "resolution_assumed", "paper_assumed", "upright_unsure", "title_block_unsure"}
-)
-"""Problems about which somebody with a phone can do nothing."""
-
-
-def _said(problems: Sequence[Problem], speaker: Tongue) -> tuple[str, ...]:
-    """What a student is told of problems, each once."""
-    documents = [
-        ProblemDocument(code=one.code, message=one.message, file=one.file)
-        for one in problems
-        if one.code not in _OF_NO_USE
-    ]
-    return tuple(dict.fromkeys(problem_sentence(one, speaker, brief=True).text for one in documents))
-
-
-def _other_number(page: ScannedPage, variant: Variant) -> Iterator[Problem]:
-    """Where the code of a printed sheet says another number or position than the student does."""
-    code = page.ref.identity
-    for what in ("n", "position"):
-        printed = None if code is None else getattr(code, what)
-        if printed is not None and printed != getattr(variant, what):
-            message = f"the sheet was printed for {what} = {printed}, not {variant}"
-            yield Problem(f"{what}_disagrees", message, page.ref.file)
-
-
-def _pictures(
+def pictures_of(
     pages: Sequence[ScannedPage],
     measured: Measurements,
     construction: Construction,

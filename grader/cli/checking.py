@@ -113,7 +113,7 @@ def check_measured(
 def check_photo(name: str, n: int | None, position: int | None, file: Path, lang: str, level: str) -> bool:
     """Print what spoils a photo, and right or off for every value read on it; whether anything is off."""
     from grader.folder.workers import Limits, Workers, result_of
-    from grader.pipeline import photo_check
+    from grader.photo import photo_check
 
     check_language(lang)
     speaker = tongue(lang)

@@ -27,7 +27,7 @@ from grader.marking.self_check import Level
 from grader.overlay.closeup import page_views, scan_element, svg
 from grader.overlay.measured import measured_picture
 from grader.overlay.scene import Picture
-from grader.pipeline import photo_check
+from grader.photo import photo_check
 from grader.rubric import rubric_of
 from grader.web.guard import RefusedError
 from reference.authored.assignment import Assignment, Variant, load_assignment

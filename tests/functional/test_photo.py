@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from grader.folder.workers import Limits, Workers, result_of
-from grader.pipeline import PhotoCheck, photo_check
+from grader.photo import PhotoCheck, photo_check
 from tests.bench.reading_scenes import ReadingScene, SceneWork, work
 from tests.functional.conftest import Run
 

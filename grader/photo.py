@@ -1,0 +1,123 @@
+"""A student's own check of a photo: what is right, off or not read, and what spoils the picture."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from grader.documents import ProblemDocument
+from grader.feedback.advice import CheckedLine, checked_lines
+from grader.feedback.photos import PLANS_UNSEEN, flaw_sentence
+from grader.feedback.sentences import Level
+from grader.feedback.words import problem_sentence
+from grader.inputs.measurements import NOTHING_MEASURED, StudentSubmission
+from grader.language import Tongue, tongue
+from grader.marking.self_check import is_all_right
+from grader.outcomes import Judgement
+from grader.overlay.picture import overlay
+from grader.overlay.scene import Picture
+from grader.pipeline import judged, pictures_of, read_submission, scan
+from grader.records import PageRef, Problem, ScannedPage
+from grader.rubric import RubricFile, asked_of
+from grader.scan.decode.pages import count_pages
+from reference.authored.assignment import Assignment, Variant
+from reference.errors import InputFileError
+
+
+@dataclass(frozen=True, slots=True)
+class PhotoCheck:
+    """What a self-check tells of a photo, in the student's language; nothing in it gives the answer away.
+
+    Attributes
+    ----------
+    flaws : what spoils reading, by code, with what to do
+    problems : what else a student should know
+    lines : of every value that was asked for and drawn, or could not be read (`open`)
+    judgement : None where nothing was read
+    pictures : each page with what was read on it, without expected vectors
+    """
+
+    flaws: Mapping[str, str] = field(default_factory=dict)
+    problems: tuple[str, ...] = ()
+    lines: tuple[CheckedLine, ...] = ()
+    judgement: Judgement | None = None
+    pictures: tuple[Picture, ...] = ()
+
+    @property
+    def is_read(self) -> bool:
+        """Whether any figure of the assignment was read."""
+        return self.judgement is not None
+
+    @property
+    def is_all_right(self) -> bool:
+        """Whether something was read, and nothing is off or open."""
+        return bool(self.lines) and is_all_right(tuple(line.checked for line in self.lines))
+
+
+def photo_check(
+    path: Path, assignment: Assignment, rubric: RubricFile, variant: Variant, lang: str, level: Level = "hint"
+) -> PhotoCheck:
+    """What a student's own check of a photo, a scan, or a PDF of several tells.
+
+    Raises InputFileError for a file that is not there, CallError for an unknown language.
+    """
+    speaker = tongue(lang)
+    try:
+        count = count_pages(path)
+    except InputFileError as error:
+        if error.code == "file_missing":
+            raise
+        # The page will say why.
+        count = 1
+    refs = [PageRef(path.name, number, count, path=path) for number in range(1, count + 1)]
+    submission = StudentSubmission("", variant, tuple(refs), lang=lang)
+    asked = asked_of(assignment, rubric)
+    pages = read_submission(submission, [scan(ref, asked) for ref in refs], assignment, asked)
+    pages = [page.asked_only(rubric.vectors) for page in pages]
+    spoilt = {flaw.code: flaw_sentence(flaw, speaker) for page in pages for flaw in page.flaws}
+    readings = [page.reading for page in pages]
+    problems = [problem for page in pages for problem in (*page.problems, *_other_number(page, variant))]
+    answer = judged(submission, assignment, rubric, readings)
+    if isinstance(answer, Problem):
+        known = [*problems, answer]
+        pictures = tuple(overlay(page.backdrop, page.reading, {}, {}) for page in pages if page.backdrop)
+        return PhotoCheck(spoilt, _said(known, speaker), pictures=pictures)
+    task, judgement, _ = answer
+    names, driven = assignment.file.names, assignment.mechanism_file.driver.pin
+    drawn = {figure for reading in readings for figure in reading.figures}
+    figures = {
+        name: task.construction.figure_of(vector.head) for name, vector in task.construction.vectors.items()
+    }
+    unread = {name for name, figure in figures.items() if figure in drawn}
+    absent = [
+        figure for figure in PLANS_UNSEEN if figure in {figures.get(one) for one in rubric.vectors} - drawn
+    ]
+    told = [*(speaker.gettext(PLANS_UNSEEN[figure]) for figure in absent), *_said(problems, speaker)]
+    lines = checked_lines(judgement, level, speaker, names, driven, unread)
+    pictures = pictures_of(pages, NOTHING_MEASURED, task.construction, judgement, show_expected=False)
+    return PhotoCheck(spoilt, tuple(told), tuple(lines), judgement, pictures)
+
+
+_OF_NO_USE = frozenset(
+    {"resolution_wrong", "resolution_assumed", "paper_assumed", "upright_unsure", "title_block_unsure"}
+)
+"""Problems about which somebody with a phone can do nothing."""
+
+
+def _said(problems: Sequence[Problem], speaker: Tongue) -> tuple[str, ...]:
+    """What a student is told of problems, each once."""
+    documents = [
+        ProblemDocument(code=one.code, message=one.message, file=one.file)
+        for one in problems
+        if one.code not in _OF_NO_USE
+    ]
+    return tuple(dict.fromkeys(problem_sentence(one, speaker, brief=True).text for one in documents))
+
+
+def _other_number(page: ScannedPage, variant: Variant) -> Iterator[Problem]:
+    """Where the code of a printed sheet says another number or position than the student does."""
+    code = page.ref.identity
+    for what in ("n", "position"):
+        printed = None if code is None else getattr(code, what)
+        if printed is not None and printed != getattr(variant, what):
+            message = f"the sheet was printed for {what} = {printed}, not {variant}"
+            yield Problem(f"{what}_disagrees", message, page.ref.file)
