@@ -467,7 +467,7 @@ def _taught(call: Call, message: _Launch, user: LtiUser, data: Mapping[str, Any]
     call.note("launched")
     if message.is_deep_link_launch():
         waiting = {
-            "settings": dict(data["https://purl.imsglobal.org/spec/lti-dl/claim/deep_linking_settings"])
+            "settings": dict(data[DEEP])
         }
         waiting |= {"platform": user.platform_id, "deployment": data[f"{CLAIM}deployment_id"]}  # type: ignore[dict-item]
         return _led(call, f"/lti/choose?for={_kept(call, waiting)}")

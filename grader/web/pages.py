@@ -161,7 +161,8 @@ def account(call: Called) -> Response:
     own = call.account
     return page(
         call, "account.html", tokens=instructors.tokens(call), accounts=instructors.accounts(call),
-        audit=instructors.audit(call) if own.is_admin else [],
+        audit=instructors.audit(call) if own.is_admin else [], tool=lti.config(call),
+        lti_platforms=lti.platforms(call) if own.is_admin else [],
     )  # fmt: skip
 
 

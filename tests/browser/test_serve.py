@@ -30,6 +30,15 @@ SHOTS = "PLANMARK_SCREENSHOTS"
 """Names the folder that is given the screenshots."""
 
 
+CONTROLS = """[...document.querySelectorAll("a[href], button, input, select, textarea, summary, [tabindex='0']")]
+    .filter((one) => !one.disabled && one.checkVisibility({ visibilityProperty: true }))"""
+FOCUSABLE = f"{CONTROLS}.length"
+FOCUSED = f"""(() => {{
+    const one = document.activeElement, style = getComputedStyle(one);
+    return [{CONTROLS}.indexOf(one), style.outlineStyle !== "none" && parseFloat(style.outlineWidth) >= 1];
+}})()"""
+
+
 class Served:
     """The application in a thread of the test, on a port of its own."""
 
@@ -114,6 +123,22 @@ class Visit:
         page.screenshot(path=self.shots / f"{name}-dark.png", full_page=True)
         page.emulate_media(color_scheme="light")
 
+    def tab_through(self):
+        """Every link, button and field is reached by the keyboard alone, in the page's order, and shows it."""
+        page = self.page
+        page.evaluate("document.activeElement.blur(); scrollTo(0, 0)")
+        wanted, reached = page.evaluate(FOCUSABLE), []
+        for _ in range(2 * wanted + 10):
+            page.keyboard.press("Tab")
+            place, is_shown = page.evaluate(FOCUSED)
+            if place < 0 or place in reached:
+                break
+            reached.append(place)
+            if not is_shown:
+                self.faults.append(f"{page.url}: the focus on control {place} is not seen")
+        if reached != list(range(wanted)):
+            self.faults.append(f"{page.url}: of {wanted} controls Tab reaches {reached}")
+
     def end(self):
         self.context.close()
         assert not self.faults, "\n".join(self.faults)
@@ -152,6 +177,12 @@ def visit(chromium, served, tmp_path):
 
 
 LOCALES = ("en-US", "ro-RO", "ru-RU")
+PLATFORM = {
+    "issuer": "https://moodle.example.org", "client_id": "planmark", "deployments": "1\n2",
+    "auth_login_url": "https://moodle.example.org/mod/lti/auth.php",
+    "auth_token_url": "https://moodle.example.org/mod/lti/token.php",
+    "key_set_url": "https://moodle.example.org/mod/lti/certs.php",
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("locale", LOCALES)
@@ -164,6 +195,7 @@ def test_a_student_checks_values_and_a_photo_and_asks_again(served, visit, local
     assert page.url.endswith(f"/c/{key}")
     assert page.input_value("#in-n") == "7"
     student.look(f"{name}-page")
+    student.tab_through()
     for column, text in (("v_A", "60,0"), ("v_B", "12,5"), ("kv", "0,193732 (m/s)/mm")):
         page.fill(f"#f-{column}", text)
     page.click("#check button")
@@ -234,6 +266,8 @@ def test_an_instructor_publishes_grades_and_gives_back(served, visit, locale):  
     page.click(f"a[href='/publications/{key}/results/index.html']")
     page.wait_for_url("**/index.html")
     instructor.look(f"{name}-results")
+    page.goto(address)
+    instructor.tab_through()
 
     student = visit(locale)
     student.page.goto(personal)
@@ -260,7 +294,13 @@ def test_an_instructor_publishes_grades_and_gives_back(served, visit, locale):  
     page.fill("#title", "script")
     page.click("[data-shows=token] button")
     page.wait_for_selector("[data-shows=token] .said.good:not(:empty)")
+    for name_of_field, text in PLATFORM.items():
+        page.fill(f"#lti-{name_of_field}", text)
+    with page.expect_navigation():
+        page.click("[data-send='POST /api/v1/lti/platforms'] button")
+    assert "moodle.example.org" in page.inner_text("main li:has([data-send^='DELETE /api/v1/lti/'])")
     instructor.look(f"{name}-account")
+    instructor.tab_through()
     page.goto(f"{served.address}/")
     instructor.look(f"{name}-list")
     page.click("[data-send='DELETE /api/v1/session']")

@@ -47,6 +47,7 @@ function valuesOf(form) {
   for (const one of form.elements) {
     if (!one.name) continue;
     if (one.type === "checkbox") values[one.name] = one.checked;
+    else if ("list" in one.dataset) values[one.name] = one.value.split("\n").map((line) => line.trim()).filter(Boolean);
     else if (one.type === "number") values[one.name] = Number(one.value);
     else if (one.value !== "" || form.dataset.send?.startsWith("PATCH")) values[one.name] = one.value;
   }
