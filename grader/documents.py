@@ -24,6 +24,10 @@ Sign = Literal["hand_errors", "same_place", "same_numbers", "same_picture", "oth
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
+_GIVEN: dict[tuple[type, frozenset[str]], set[str]] = {}
+"""Which fields documents of each kind were given; nobody changes a document's fields."""
+
+
 class Document(BaseModel):
     """A table of a JSON document: frozen, nothing unknown, only finite numbers.
 
@@ -33,6 +37,12 @@ class Document(BaseModel):
     model_config = ConfigDict(
         frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True, from_attributes=True
     )
+
+    def model_post_init(self, _context: object) -> None:
+        """Share the set of given fields with others of the kind: it is half of a document's memory."""
+        given = self.__pydantic_fields_set__
+        shared = _GIVEN.setdefault((type(self), frozenset(given)), given)
+        object.__setattr__(self, "__pydantic_fields_set__", shared)
 
 
 # Measurements: what a student measured ------------------------------------------------------------
