@@ -2,7 +2,7 @@
 
 import re
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
@@ -58,6 +58,7 @@ _NAME = re.compile(
 )
 
 
+@lru_cache(4096)
 def symbols(text: str) -> Markup:
     """Text with names of vectors, rates and scales set with their indices; everything else escaped."""
     parts: list[Markup] = []

@@ -54,7 +54,7 @@ from grader.marking.report import unjudged_report
 from grader.pipeline import mark, missing_scales, read_submission
 from grader.records import PageRef, Problem, ScannedPage
 from grader.rubric import RubricFile, asked_of, rubric_of
-from grader.similarity.groups import find_similar
+from grader.similarity.groups import by_chance, compared_together, find_similar
 from grader.similarity.submission import compared_submission
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, PlanmarkError
@@ -361,8 +361,12 @@ def _compared(
         for job, report in zip(jobs, reports, strict=True)
         if job.submission.variant is not None and report.criteria
     ]
-    maps = [cached_maps(readings, job.name) for job, _ in marked]
-    return find_similar(assignment, [submission for _, submission in marked], maps)
+    similar: list[AlikeDocument] = []
+    for part in compared_together([submission.variant for _, submission in marked]):
+        some = [marked[k] for k in part]
+        maps = [cached_maps(readings, job.name) for job, _ in some]
+        similar += find_similar(assignment, [submission for _, submission in some], maps)
+    return sorted(similar, key=by_chance)
 
 
 # Marking ------------------------------------------------------------------------------------------

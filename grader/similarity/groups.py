@@ -12,6 +12,7 @@ out, and the usual similarity of independent drawings is estimated on the class 
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
 from math import exp, log
 
 import numpy as np
@@ -22,7 +23,7 @@ from grader.records import FloatArray, GreyImage
 from grader.similarity.drawings import DrawingSimilarity, compare_drawings
 from grader.similarity.numbers import NumberSimilarity, compare_numbers
 from grader.similarity.submission import ComparedSubmission
-from reference.authored.assignment import Assignment
+from reference.authored.assignment import Assignment, Variant
 
 FALSE_ALARMS = 0.001
 """Mean number of independent pairs that each kind of evidence names in a class by chance."""
@@ -30,6 +31,8 @@ NOTED = log(0.05)
 """Chance below which a part of the evidence is named."""
 MOST_OWNERS = 3
 """A number that more students share does not show whose drawing it is."""
+MOST_TOGETHER = 1500
+"""Sheets that are compared with each other: time and memory grow with the square of their number."""
 Maps = Sequence[Sequence[NDArray[np.uint8]]]
 
 
@@ -65,6 +68,23 @@ class _Pair:
             self.measure, self.share, self.compared = measure, share, compared
 
 
+def compared_together(variants: Sequence[Variant]) -> list[list[int]]:
+    """Which sheets are compared with each other: all of a class, of a very large one those of like variants.
+
+    Returns: indices, in parts of `MOST_TOGETHER` at most, in which the sheets of a variant stay together.
+    """
+    parts: list[list[int]] = [[]]
+    order = sorted(range(len(variants)), key=lambda k: (variants[k].n or 0, variants[k].position or 0))
+    for _, group in groupby(order, key=variants.__getitem__):
+        same = list(group)
+        for begin in range(0, len(same), MOST_TOGETHER):
+            some = same[begin : begin + MOST_TOGETHER]
+            if len(parts[-1]) + len(some) > MOST_TOGETHER:
+                parts.append([])
+            parts[-1] += some
+    return [sorted(part) for part in parts]
+
+
 def find_similar(
     assignment: Assignment, submissions: Sequence[ComparedSubmission], maps: Maps = ()
 ) -> list[AlikeDocument]:
@@ -91,7 +111,12 @@ def find_similar(
     entries = [
         _document(submissions, members, strangers) for members in _groups([(i, j) for i, j, _ in strangers])
     ]
-    return sorted(entries, key=lambda entry: (entry.measure is None, entry.measure or 0.0, entry.students))
+    return sorted(entries, key=by_chance)
+
+
+def by_chance(entry: AlikeDocument) -> tuple[bool, float, list[str]]:
+    """The order of entries: the least expected of independent hands first."""
+    return entry.measure is None, entry.measure or 0.0, entry.students
 
 
 def _rare(log_chance: FloatArray, pairs: int) -> Iterator[tuple[int, int, float]]:

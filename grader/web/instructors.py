@@ -32,7 +32,7 @@ from grader.web.places import (
     store,
     stored,
 )
-from grader.web.service import FILE_BODY, Body, Call, Called, Key
+from grader.web.service import FILE_BODY, Body, Call, Called, Key, Route
 from grader.web.store import (
     Account,
     Audit,
@@ -48,7 +48,7 @@ from grader.web.students import WITHOUT_NUL, JobState, Lang, Strict, queued, sta
 from reference.authored.assignment import built_in
 from reference.errors import PlanmarkError
 
-router = APIRouter(prefix="/api/v1", tags=["instructors"])
+router = APIRouter(route_class=Route, prefix="/api/v1", tags=["instructors"])
 Name = Annotated[str, Field(min_length=1, max_length=80, pattern=r"^[^\x00-\x1f\x7f]+$")]
 Password = Annotated[str, Field(min_length=1, max_length=200)]
 FileName = Annotated[str, Path(max_length=200)]

@@ -42,7 +42,7 @@ from grader.language import N_
 from grader.lms.export import draft, read_results
 from grader.lms.grades import Options, Person
 from grader.web.guard import RefusedError, missing
-from grader.web.service import Call, Called, Key
+from grader.web.service import Call, Called, Key, Route
 from grader.web.settings import Settings
 from grader.web.store import (
     Account,
@@ -57,7 +57,7 @@ from grader.web.store import (
 from grader.web.students import Strict
 from reference.errors import PlanmarkError
 
-router = APIRouter(tags=["lti"])
+router = APIRouter(route_class=Route, tags=["lti"])
 CLAIM = "https://purl.imsglobal.org/spec/lti/claim/"
 AGS = "https://purl.imsglobal.org/spec/lti-ags/claim/endpoint"
 DEEP = "https://purl.imsglobal.org/spec/lti-dl/claim/deep_linking_settings"

@@ -18,12 +18,12 @@ from grader.web import instructors, lti, students
 from grader.web.guard import HEADERS, missing
 from grader.web.places import assignment_of
 from grader.web.self_check import form_of
-from grader.web.service import Call, Called, Key
+from grader.web.service import Call, Called, Key, Route
 from grader.web.store import Publication
 from reference.authored.assignment import built_in
 from reference.errors import PlanmarkError
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(route_class=Route, include_in_schema=False)
 STATIC = {"app.js": "text/javascript", "app.css": "text/css"}
 TEXTS = {
     "gone": N_("The server does not answer. Try again in a moment."),

@@ -60,12 +60,9 @@ class Queue:
         for job in left:
             self.put(job)
         self._threads = [
-            threading.Thread(target=self._work, args=(jobs, act), daemon=True)
-            for jobs, act, count in (
-                (self._classes, self._grade, 1), (self._photos, self._check, self.settings.photos)
-            )
-            for _ in range(count)
-        ]  # fmt: skip
+            threading.Thread(target=self._work, args=(jobs,), daemon=True)
+            for jobs in (self._classes, *[self._photos] * self.settings.photos)
+        ]
         for thread in self._threads:
             thread.start()
 
@@ -113,14 +110,14 @@ class Queue:
 
     # Work -----------------------------------------------------------------------------------------
 
-    def _work(self, jobs: "queue.Queue[int | None]", act: Callable[[Job], dict[str, Any]]) -> None:
+    def _work(self, jobs: "queue.Queue[int | None]") -> None:
         while (job_id := jobs.get()) is not None:
             if not self.store.claimed(job_id):
                 continue
             with self.store.session() as session:
                 job = session.get_one(Job, job_id)
             try:
-                self._end(job, "done", act(job))
+                self._end(job, "done", self._grade(job) if job.kind == "grade" else self._check(job))
             except _StoppedError:
                 continue
             except PlanmarkError as error:

@@ -1,10 +1,12 @@
 """What every route is given: who asks, the publication that is meant, the server's parts."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Annotated
+from functools import wraps
+from typing import Annotated, Any
 
 from fastapi import Depends, Path, Request, Response
+from fastapi.routing import APIRoute
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
@@ -97,6 +99,23 @@ class Call:
         return places_of(self.service.settings.data, publication)
 
 
+class Route(APIRoute):
+    """A route that commits in the thread that runs it: between threads a request holds no connection.
+
+    Threads that wait for a connection would otherwise keep those that hold one from going on.
+    """
+
+    def __init__(self, path: str, endpoint: Callable[..., Any], **known: Any) -> None:  # noqa: ANN401 - FastAPI's
+        @wraps(endpoint)
+        def committed(**asked: Any) -> Any:  # noqa: ANN401 - whatever the endpoint takes and gives
+            answer = endpoint(**asked)
+            if "call" in asked:
+                asked["call"].session.commit()
+            return answer
+
+        super().__init__(path, committed, **known)
+
+
 def language_of(request: Request) -> str:
     """The language that a visitor chose, else the browser's, else English."""
     chosen = request.query_params.get("lang") or request.cookies.get("planmark_lang", "")
@@ -113,6 +132,7 @@ def called(request: Request, response: Response) -> Iterator[Call]:
         # A platform's launch has a state and a signature of its own.
         if request.method in CHANGING and not request.url.path.startswith("/lti/"):
             service.guard.check_form(request, visitor)
+        session.commit()
         yield Call(service, session, visitor, request, response)
 
 
@@ -124,6 +144,7 @@ async def body_of(request: Request, call: Called) -> bytes:
     """The whole body, whose size `grader.web.guard.Rim` bounds; of a stranger no class's file is read."""
     if "/files/" in request.url.path:
         _ = call.account
+        call.session.commit()
     return await request.body()
 
 

@@ -235,6 +235,10 @@ class Audit(Table):
     about: Mapped[str] = mapped_column(String(200), default="")
 
 
+CONNECTIONS = 60
+"""More than all threads that may want one: 40 that answer requests, those of the queue, the server's own."""
+
+
 class Store:
     """The data base.
 
@@ -247,7 +251,7 @@ class Store:
         try:
             self.engine = _engine(url)
             Table.metadata.create_all(self.engine)
-        except (ArgumentError, ImportError, SQLAlchemyError) as error:
+        except (ArgumentError, ImportError, SQLAlchemyError, TypeError) as error:
             why = str(getattr(error, "orig", None) or error).splitlines()[0]
             raise CallError("data_base", f"--database: the data base cannot be opened ({why})") from error
         self._sessions = sessionmaker(self.engine, expire_on_commit=False)
@@ -287,8 +291,9 @@ class Store:
 def _engine(url: str) -> Engine:
     is_sqlite = make_url(url).get_backend_name() == "sqlite"
     engine = create_engine(
-        url, pool_pre_ping=not is_sqlite, connect_args={"timeout": 30.0} if is_sqlite else {}
-    )
+        url, pool_size=CONNECTIONS, max_overflow=0, pool_pre_ping=not is_sqlite,
+        connect_args={"timeout": 30.0} if is_sqlite else {},
+    )  # fmt: skip
     if is_sqlite:
 
         @event.listens_for(engine, "connect")

@@ -20,11 +20,11 @@ from grader.lms.export import read_results
 from grader.web.guard import RefusedError, forbidden, missing
 from grader.web.places import assignment_of
 from grader.web.self_check import checked_values, form_of, variant_of
-from grader.web.service import FILE_BODY, Body, Call, Called, Key
+from grader.web.service import FILE_BODY, Body, Call, Called, Key, Route
 from grader.web.store import Attempt, Job, Link, Publication, Regrading
 from reference.authored.assignment import Variant
 
-router = APIRouter(prefix="/api/v1", tags=["students"])
+router = APIRouter(route_class=Route, prefix="/api/v1", tags=["students"])
 Lang = Literal["en", "ro", "ru"]
 Number = Annotated[int | None, Query(ge=0, le=1_000_000)]
 MOST_CELLS = 400

@@ -30,8 +30,9 @@ SHOTS = "PLANMARK_SCREENSHOTS"
 """Names the folder that is given the screenshots."""
 
 
-CONTROLS = """[...document.querySelectorAll("a[href], button, input, select, textarea, summary, [tabindex='0']")]
-    .filter((one) => !one.disabled && one.checkVisibility({ visibilityProperty: true }))"""
+CONTROLS = """[...document.querySelectorAll(
+        "a[href], button, input, select, textarea, summary, [tabindex='0']"
+    )].filter((one) => !one.disabled && one.checkVisibility({ visibilityProperty: true }))"""
 FOCUSABLE = f"{CONTROLS}.length"
 FOCUSED = f"""(() => {{
     const one = document.activeElement, style = getComputedStyle(one);
@@ -124,7 +125,7 @@ class Visit:
         page.emulate_media(color_scheme="light")
 
     def tab_through(self):
-        """Every link, button and field is reached by the keyboard alone, in the page's order, and shows it."""
+        """Every link, button and field is reached by keys alone, in the page's order, and shows it."""
         page = self.page
         page.evaluate("document.activeElement.blur(); scrollTo(0, 0)")
         wanted, reached = page.evaluate(FOCUSABLE), []

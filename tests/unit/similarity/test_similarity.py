@@ -6,9 +6,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from grader.similarity import groups
 from grader.similarity.drawings import compare_drawings, log_chance
-from grader.similarity.groups import CELLS, find_similar, ink_map
-from reference.authored.assignment import built_in, load_assignment
+from grader.similarity.groups import CELLS, compared_together, find_similar, ink_map
+from reference.authored.assignment import Variant, built_in, load_assignment
 from samples.simulation import PERFECT
 from tests.unit.similarity import classes
 from tests.unit.similarity.classes import any_drawing, changed, drawing, measured, scanned, scanned_class
@@ -321,6 +322,18 @@ def test_any_assignment_and_any_reading_can_be_compared(name):
             replace(one, sheets=(kept,), numbers={"v_A": 5.0 * k, "a_A_deg": 1.0, "odd_value": 2.0})
         )
     assert found(name, submissions) == {}
+
+
+def test_a_very_large_class_is_compared_in_parts_that_keep_variants_together(monkeypatch):
+    monkeypatch.setattr(groups, "MOST_TOGETHER", 10)
+    variants = [Variant(n=k % 7) for k in range(40)] + [Variant(n=9)] * 23
+    parts = compared_together(variants)
+    assert sorted(k for part in parts for k in part) == list(range(len(variants)))
+    assert max(map(len, parts)) <= 10
+    for n in range(7):
+        assert sum(any(variants[k].n == n for k in part) for part in parts) == 1
+    assert compared_together(variants[:8]) == [list(range(8))]
+    assert compared_together([]) == [[]]
 
 
 @pytest.mark.parametrize("printed", [False, True])

@@ -37,6 +37,7 @@ class Browser(TestClient):
 
     def __init__(self, app):
         super().__init__(app, base_url=ADDRESS, raise_server_exceptions=False)
+        self.portal = app.state.portal
 
     @property
     def token(self):
@@ -80,7 +81,9 @@ def app(settings, monkeypatch):
     monkeypatch.setattr(queue, "Workers", Workers)
     settings.data.mkdir(exist_ok=True)
     made = application(settings)
-    with TestClient(made, base_url=ADDRESS):
+    with TestClient(made, base_url=ADDRESS) as server:
+        # All browsers share the server's loop and its threads.
+        made.state.portal = server.portal
         yield made
 
 

@@ -49,7 +49,7 @@ def test_a_link_that_was_made_up_opens_nothing(visitor, token):
 
 
 def test_a_link_signed_by_another_server_opens_nothing(graded, app, settings):
-    foreign = web.application(replace(settings, secret="t" * 40, database="sqlite://"))
+    foreign = web.application(replace(settings, secret="t" * 40, database=f"{settings.database}-2"))
     _, links = graded
     assert TestClient(foreign, base_url=ADDRESS).get(links["s09"]).status_code in {404, 500}
     foreign.state.service.store.close()

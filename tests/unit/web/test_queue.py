@@ -121,6 +121,6 @@ def test_a_class_goes_on_with_the_next_server(graded, settings, service):
 
 
 def test_a_data_base_that_cannot_be_opened_is_told():
-    for url in ("nonsense", "sqlite:////nowhere/at/all.sqlite", "mysql://x/y"):
+    for url in ("nonsense", "sqlite://", "sqlite:////nowhere/at/all.sqlite", "mysql://x/y"):
         with pytest.raises(CallError, match="--database"):
             Store(url)

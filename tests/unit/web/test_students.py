@@ -1,9 +1,12 @@
 """What students may do: checks, attempts, personal links, feedback, requests, sheets."""
 
 import time
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import pytest
 
+from grader.web import store
 from grader.web.store import Link, Regrading
 from tests.unit.web.conftest import SAMPLES, Browser
 
@@ -73,6 +76,23 @@ def test_students_behind_one_address_do_not_count_as_one(admin, app):
         assert student.get(f"/c/{key}").status_code == 200
         statuses = {checked(student, key, {}).status_code for _ in range(15)}
         assert statuses == {200}
+
+
+@pytest.fixture
+def one_connection(monkeypatch):
+    """A data base that answers one request at a time."""
+    monkeypatch.setattr(store, "create_engine", partial(store.create_engine, pool_timeout=20.0))
+    monkeypatch.setattr(store, "CONNECTIONS", 1)
+
+
+@pytest.mark.usefixtures("one_connection")
+def test_requests_do_not_keep_a_connection_while_they_wait_for_each_other(admin, app):
+    key = admin.publish()
+    students = [Browser(app) for _ in range(60)]
+    with ThreadPoolExecutor(60) as crowd:
+        pages = list(crowd.map(lambda one: one.get(f"/c/{key}").status_code, students))
+        checks = list(crowd.map(lambda one: checked(one, key, CELLS).status_code, students))
+    assert set(pages) == set(checks) == {200}
 
 
 def test_there_is_no_list_of_publications_for_visitors(visitor, admin):
