@@ -35,7 +35,7 @@ Everything that the pages of planmark do. A program sends a token, made on the a
 `Authorization: Bearer TOKEN`. Errors are `{"code", "message"}`: what is wrong, where, and what to do.
 """
 
-REFUSALS = (400, 401, 403, 404, 409, 413, 415, 421, 422, 429)
+REFUSALS = (400, 401, 403, 404, 409, 413, 415, 421, 422, 429, 503)
 """Statuses of what is not answered, each with a `Fault`."""
 
 
@@ -130,10 +130,11 @@ async def _fault(request: Request, error: Exception) -> Response:
 
 def _answer(request: Request, status: int, code: str, message: str) -> Response:
     """An error as JSON; on the pages as a page, with the way to sign in where that helps."""
-    path, message = request.url.path, message.encode(errors="replace").decode()
+    service: Service = request.app.state.service
+    path = request.url.path
+    message = service.settings.without_folder(message.encode(errors="replace").decode())
     if path.startswith(("/api/", "/lti/", "/static/")):
         return JSONResponse({"code": code, "message": message}, status)
-    service: Service = request.app.state.service
     with service.store.session() as session:
         visitor = service.guard.visitor(_without_token(request), session)
         call = Call(service, session, visitor, request, Response())

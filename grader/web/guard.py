@@ -285,13 +285,15 @@ class Guard:
 class Rim:
     """Refuses requests for other hosts and bodies that are too large; adds the headers of safety.
 
-    Arguments: `most` are the bytes of a body that is no file.
+    Arguments: `most` are the bytes of a body that is no file, `room` those of all bodies at one time.
     """
 
     app: ASGIApp
     settings: Settings
     most: int = 1_000_000
+    room: int = 1_000_000_000
     hosts: frozenset[str] = field(default_factory=frozenset)
+    _held: int = 0
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """ASGI."""
@@ -303,18 +305,20 @@ class Rim:
             await _refuse(send, 421, "this address is not served here: open the server's own address")
             return
         most = self._most(scope["path"])
-        taken = 0
+        taken, is_refused = 0, False
 
         async def bounded() -> Message:
-            nonlocal taken
+            nonlocal taken, is_refused
             message = await receive()
             taken += len(message.get("body", b""))
-            if taken > most:
+            self._held += len(message.get("body", b""))
+            is_refused = taken > most or self._held > self.room
+            if is_refused:
                 raise _TooLargeError
             return message
 
         async def with_headers(message: Message) -> None:
-            if taken > most:  # whatever the application answers to that
+            if is_refused:  # whatever the application answers to that
                 return
             if message["type"] == "http.response.start":
                 known = {name for name, _ in message["headers"]}
@@ -322,10 +326,15 @@ class Rim:
                 message["headers"] = [*message["headers"], *(one for one in ours if one[0] not in known)]
             await send(message)
 
-        with contextlib.suppress(_TooLargeError):
-            await self.app(scope, bounded, with_headers)
+        try:
+            with contextlib.suppress(_TooLargeError):
+                await self.app(scope, bounded, with_headers)
+        finally:
+            self._held -= taken
         if taken > most:
             await _refuse(send, 413, f"larger than {most // 1_000_000} MB: send a smaller file")
+        elif is_refused:
+            await _refuse(send, 503, "too many files are being sent: wait a minute, then send it again")
 
     def _most(self, path: str) -> int:
         files = _FILES.fullmatch(path)

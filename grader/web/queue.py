@@ -127,6 +127,7 @@ class Queue:
                 self._end(job, "failed", {"code": "internal_error"}, f"a fault of planmark ({error})")
 
     def _end(self, job: Job, state: str, result: dict[str, Any], message: str = "") -> None:
+        message = self.settings.without_folder(message)
         with self.store.session() as session:
             ended = update(Job).where(Job.id == job.id, Job.state == "running")
             session.execute(ended.values(state=state, result=result, message=message, ended=time.time()))

@@ -56,6 +56,10 @@ class Settings:
         """The name and port that a request must be for."""
         return urlsplit(self.address).netloc
 
+    def without_folder(self, text: str) -> str:
+        """A message for people elsewhere: where the data folder lies is not for them."""
+        return text.replace(f"{self.data.resolve()}{os.sep}", "").replace(f"{self.data}{os.sep}", "")
+
 
 def settings_of(data: Path, address: str, database: str | None = None, *, jobs: int = 1) -> Settings:
     """The settings of a data folder; its secret is made once, if the environment has none.

@@ -156,6 +156,7 @@ $("check")?.addEventListener("submit", (event) => {
   event.preventDefault();
   const form = event.target, cells = {};
   for (const input of form.querySelectorAll("[data-column]")) if (input.value.trim()) cells[input.dataset.column] = input.value.trim();
+  $("result").hidden = true;
   doing(event.submitter, form.querySelector(".said"), async () => {
     show(await call("POST", `/api/v1/publications/${form.dataset.key}/checks`, { n: whole("n"), position: whole("position"), cells, lang: form.dataset.lang }));
   });
@@ -165,6 +166,7 @@ $("photo")?.addEventListener("submit", (event) => {
   event.preventDefault();
   const form = event.target, place = form.querySelector(".said"), asked = new URLSearchParams({ lang: form.dataset.lang });
   for (const name of ["n", "position"]) if (whole(name) !== null) asked.set(name, whole(name));
+  $("result").hidden = true;
   doing(event.submitter, place, async () => {
     tell(place, texts.sending, true);
     let job = await call("POST", `/api/v1/publications/${form.dataset.key}/photos?${asked}`, $("picture").files[0], { raw: true });

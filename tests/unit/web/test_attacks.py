@@ -1,5 +1,6 @@
 """Requests that are made to harm: each is refused in words, and nothing of others is told or lost."""
 
+import asyncio
 import threading
 import time
 from dataclasses import replace
@@ -10,7 +11,7 @@ from starlette.testclient import TestClient
 from grader.authoring.new import new_assignment
 from grader.web import app as web
 from grader.web import students
-from grader.web.guard import COOKIE
+from grader.web.guard import COOKIE, Rim
 from grader.web.store import Visit
 from tests.unit.web.conftest import ADDRESS, Browser
 
@@ -165,6 +166,38 @@ def test_an_origin_that_is_none_is_refused(admin):
 )
 def test_a_long_body_is_for_files_alone(admin, method, path):
     assert admin.act(method, path, content=b"[" * 1_500_000).status_code == 413
+
+
+def test_all_bodies_together_have_a_bound(settings):
+    """Of three that are sent at once two find room; whoever comes when they have gone finds it again."""
+
+    async def application(_scope, receive, send):
+        message = {"more_body": True}
+        while message["more_body"]:
+            message = await receive()
+        await asyncio.sleep(0.05)
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        await send({"type": "http.response.body", "body": b""})
+
+    async def sent():
+        parts, statuses = iter([True, True, False]), []
+
+        async def receive():
+            await asyncio.sleep(0.01)
+            return {"type": "http.request", "body": bytes(200), "more_body": next(parts)}
+
+        async def send(message):
+            statuses.append(message.get("status"))
+
+        head = [(b"host", settings.host.encode())]
+        await rim({"type": "http", "path": "/api/v1/publications/x/photos", "headers": head}, receive, send)
+        return statuses[0]
+
+    async def all_sent():
+        return sorted(await asyncio.gather(*(sent() for _ in range(3)))), await sent()
+
+    rim = Rim(application, settings, room=1500)
+    assert asyncio.run(all_sent()) == ([200, 200, 503], 200)
 
 
 def test_files_in_folders_and_sheets_may_be_long(graded, admin, student):

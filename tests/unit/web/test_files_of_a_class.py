@@ -106,13 +106,15 @@ def test_an_own_assignment_is_published_from_its_files(admin, tmp_path):
     assert admin.get(f"/api/v1/publications/{key}/form").json()["fields"]
 
 
-def test_an_assignment_with_faults_is_told_and_not_chosen(admin):
+def test_an_assignment_with_faults_is_told_and_not_chosen(admin, settings):
     key = admin.publish(assignment=None, is_open=False)
     body = b'title = "x"\nmechanism = "/etc/passwd"\n'
     admin.act("PUT", f"/publications/{key}/assignment/files/bad.assignment.toml", content=body)
     answer = admin.act("PATCH", f"/publications/{key}", json={"assignment": "bad.assignment.toml"})
     assert answer.status_code == 422
     assert "root:" not in answer.text
+    assert "bad.assignment.toml" in answer.json()["message"]
+    assert str(settings.data) not in answer.text
     assert admin.get(f"/api/v1/publications/{key}").json()["assignment"] == ""
     for name in ("nowhere.assignment.toml", "../../x.assignment.toml", "/etc/passwd"):
         answer = admin.act("PATCH", f"/publications/{key}", json={"assignment": name})

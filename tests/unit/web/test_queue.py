@@ -84,11 +84,12 @@ def test_a_cancelled_job_is_never_run(store, settings):
         assert session.get_one(Job, 1).state == "cancelled"
 
 
-def test_a_class_with_nothing_in_it_fails_with_words(admin):
+def test_a_class_with_nothing_in_it_fails_with_words(admin, settings):
     key = admin.publish()
     job = admin.ended(f"/publications/{key}/jobs", admin.act("POST", f"/publications/{key}/jobs").json())
     assert job["state"] == "failed"
     assert "nothing to grade" in job["message"]
+    assert str(settings.data) not in job["message"]
 
 
 def test_two_requests_to_grade_are_one_job(graded, admin, monkeypatch):
