@@ -237,8 +237,8 @@ def _tell(lines: list[CheckedLine], level: Level, speaker: Tongue) -> None:
         one, hint = line.checked, line.hint
         if level == "full" and one.measured and one.expected:
             hint = f"{_number(one.measured)} / {_number(one.expected)}  {hint}"
-        mark = typer.style(RESULTS[line.result][0], fg=STYLES[line.result])
-        terminal.say(f" {mark}  {line.name:{wide}}  ", nl=False)
+        typer.secho(f" {RESULTS[line.result][0]}", fg=STYLES[line.result], nl=False)
+        terminal.say(f"  {line.name:{wide}}  ", nl=False)
         _print(hint, " " * (wide + 6), is_begun=True)
         if line.advice:
             _print(f"→ {line.advice}", " " * (wide + 6))

@@ -171,6 +171,14 @@ def checked_lines(
     driven : the driven link's pin
     unread : of a drawing, the vectors that could not be read on it; None for entered measurements
     """
+    values = checked_values(judgement, level, unread or ())
+    other = next((one for one in judgement.mistakes if one.code == "other_variant"), None)
+    of_other = [one for one in values if any(reason.code == "other_variant" for reason in one.reasons[:1])]
+    if other is not None and of_other and level == "hint":
+        # Said once: what each value would be worth by those data is of no use here.
+        hint = _hint(of_other[0].reasons[0], speaker, level, names)
+        advice = speaker.gettext(ADVICE["other_variant"][""])
+        return [CheckedLine(of_other[0], ", ".join(other.detail), hint, advice)]
     laws: dict[str, str] = {}
     told: dict[str, str] = {}
     lines = []
@@ -178,7 +186,7 @@ def checked_lines(
         law = law_of(mistake)
         laws |= dict.fromkeys((one for one in mistake.explains if one not in laws), law)
     own = {} if unread is None else ON_SHEET
-    for one in checked_values(judgement, level, unread or ()):
+    for one in values:
         name = names.get(one.name, one.name)
         # What is right needs one reason: the others say what would be off, had it not been accepted.
         shown = one.reasons[:1] if one.result == "right" else one.reasons

@@ -189,6 +189,19 @@ def test_each_command_tells_the_one_that_comes_next(tmp_path, course):
     assert following("check", "pump", "--measured", "class/s07.json") is None
 
 
+def test_a_check_has_its_own_marks_and_says_once_that_the_data_are_another_students(tmp_path):
+    path = SAMPLES / "s08.json"
+    entered = json.loads(path.read_text(encoding="utf-8"))
+    _, right, _ = run(tmp_path, "check", "pump", "--measured", str(path))
+    assert "✓" in right
+    assert "x1b" not in right
+    (tmp_path / "other.json").write_text(json.dumps({**entered, "n": entered["n"] - 1}), encoding="utf-8")
+    _, other, _ = run(tmp_path, "check", "pump", "--measured", "other.json")
+    assert other.count("another student's data") == 1
+    assert "Look at your number" in other
+    assert "Right" not in other
+
+
 def test_a_path_with_spaces_is_told_so_that_it_can_be_typed(tmp_path):
     _, out, _ = run(tmp_path, "new", "my class/mine")
     assert "next: change them, then planmark lint 'my class/mine.assignment.toml'" in out
