@@ -4,7 +4,6 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, closing, suppress
-from dataclasses import replace
 from http import HTTPStatus
 
 from fastapi import FastAPI, Request
@@ -145,8 +144,3 @@ def _without_token(request: Request) -> Request:
     """The request as a browser's: the page of an error needs nobody's token."""
     headers = [(name, value) for name, value in request.scope["headers"] if name != b"authorization"]
     return Request({**request.scope, "headers": headers})
-
-
-def at_address(settings: Settings, port: int) -> Settings:
-    """The settings with the port that was really taken, where the address has none of its own."""
-    return replace(settings, address=settings.address.replace(":0", f":{port}", 1))

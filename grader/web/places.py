@@ -8,7 +8,6 @@ import re
 import shutil
 import tomllib
 import unicodedata
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -160,10 +159,3 @@ def batch_of(data: Path, publication: Publication, jobs: int = 1) -> Batch:
         assignment, rubric_of(assignment), places.handed_in, places.results,
         pages_per_student=publication.pages_per_student, jobs=jobs, lang=publication.lang,
     )  # fmt: skip
-
-
-def results_of(places: Places, student_id: str) -> Iterator[Path]:
-    """The folders of a student's results, one for each position."""
-    top = places.results / student_id
-    if _PLAIN.fullmatch(student_id) and top.is_dir():
-        yield from (path.parent for path in sorted(top.rglob("feedback.html")))
