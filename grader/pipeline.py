@@ -63,7 +63,7 @@ from reference.errors import InputFileError, MechanismError
 
 def scan(ref: PageRef, asked: Asked) -> ScannedPage:
     """A page as far as it can be taken without its owner, its pixels left behind."""
-    page = open_page(ref, asked.figures)
+    page = open_page(ref, asked.figures, asked.units)
     if page.image is None:
         return page
     reading = page.reading
@@ -75,10 +75,13 @@ def scan(ref: PageRef, asked: Asked) -> ScannedPage:
     return replace(page, image=None, reading=reading, backdrop=backdrop(page.image, page.sheet))
 
 
-def open_page(ref: PageRef, figures: Collection[str] = ()) -> ScannedPage:
+def open_page(
+    ref: PageRef, figures: Collection[str] = (), units: Mapping[str, str] | None = None
+) -> ScannedPage:
     """A page decoded, registered, and its strokes found; `problems` say where the way ended.
 
     Arguments: of a printed sheet, only the zones of these `figures` are looked at; all of it by default.
+    `units` are those of scales in its boxes that are bare numbers, by scale.
     """
     if ref.problem is not None:
         return ScannedPage(ref, problems=(ref.problem,))
@@ -122,7 +125,7 @@ def open_page(ref: PageRef, figures: Collection[str] = ()) -> ScannedPage:
                 return _refused(page, "page_not_a_drawing", why)
             problems += tuple(replace(problem, file=ref.file) for problem in ink.problems)
             page = replace(page, ink=replace(ink, letters=find_letters(ink, boxes)), problems=problems)
-        reading = Reading({}, written=written_scales(image, sheet))
+        reading = Reading({}, written=written_scales(image, sheet, units))
     return replace(page, reading=reading, narrowed=boxes is not None)
 
 

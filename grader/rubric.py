@@ -278,6 +278,11 @@ class Asked:
     entries: tuple[str, ...] = ()
     assignment: Assignment | None = None
 
+    @property
+    def units(self) -> dict[str, str]:
+        """The units of scales that are written as bare numbers, by scale."""
+        return {} if self.assignment is None else dict(self.assignment.file.scales.bare_units.items())
+
 
 def asked_of(assignment: Assignment, rubric: RubricFile) -> Asked:
     """What a rubric asks to be read."""

@@ -31,7 +31,7 @@ from grader.language import ROOT_LANGUAGE
 from grader.marking.report import reading_document
 from grader.pipeline import open_page, read_pages
 from grader.records import PageRef, ScannedPage
-from grader.rubric import rubric_of
+from grader.rubric import Asked, rubric_of
 from grader.scan.decode.pages import count_pages
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, InputFileError
@@ -193,7 +193,8 @@ def read_scans(
 
 
 def _read(refs: Sequence[PageRef], assignment: Assignment, variant: Variant | None) -> list[ReadingDocument]:
-    pages = [open_page(ref) for ref in refs]
+    units = Asked(assignment=assignment).units
+    pages = [open_page(ref, units=units) for ref in refs]
     read = [
         replace(page, problems=(*page.problems, *flaw_problems(page, ROOT_LANGUAGE)))
         for page in read_pages(pages, assignment, variant, {}, rubric_of(assignment).vectors)

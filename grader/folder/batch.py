@@ -374,7 +374,7 @@ def _compared(
 
 def _page_cache(batch: Batch) -> PageCache:
     asked = asked_of(batch.assignment, batch.rubric)
-    key = digest_of((stage_digest(SCAN_STAGE), asked.figures))
+    key = digest_of((stage_digest(SCAN_STAGE), asked.figures, asked.units))
     cells = digest_of(
         (stage_digest(CELL_STAGE, CELLS_OF), asked.entries, batch.assignment.file.model_dump_json())
     )

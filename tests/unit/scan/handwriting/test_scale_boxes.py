@@ -11,7 +11,7 @@ from grader.scan.handwriting.fields import moves, read_scale, start, written_sca
 from grader.scan.handwriting.model import lattice_of
 from grader.scan.register.registration import rectify
 from reference.authored.assignment import load_assignment
-from samples.simulation import CAREFUL, CLEAN_SCAN, PageStyle, Settings, simulate
+from samples.simulation import CAREFUL, CLEAN_SCAN, PageStyle, Settings, simulate, wording
 from samples.simulation.printing import printed_sheets
 
 SURE = 0.9
@@ -73,8 +73,11 @@ def test_a_line_of_scribble_is_not_believed():
     assert read_scale(lattice_of(grey, 12.0), "kv").confidence < SURE
 
 
-@pytest.fixture(scope="module")
-def sheets():
+UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s^2)/mm"}
+
+
+def _read_boxes(units=None):
+    """What is read in the boxes of a student's printed sheets, and what was written there."""
     assignment = load_assignment("pump")
     document = make_sheets(assignment, [RosterRow("s1", "Student 1", n=6)], "en")
     printed = printed_sheets(document.pdf, document.layout)
@@ -84,8 +87,27 @@ def sheets():
         page = Page("s.png", 1, np.ascontiguousarray(drawn.image), (300.0, 300.0))
         placed = rectify(page)
         assert isinstance(placed, Sheet)
-        found.append((written_scales(page, placed), drawn.truth["scales"]["written"]))
+        found.append((written_scales(page, placed, units), drawn.truth["scales"]["written"]))
     return found
+
+
+@pytest.fixture(scope="module")
+def sheets():
+    return _read_boxes()
+
+
+def test_a_bare_number_is_a_scale_where_the_assignment_says_its_unit(monkeypatch):
+    monkeypatch.setattr(wording, "scale_text", lambda _name, value, *_rest: f"{value:.4f}")
+    told = 0
+    for read, written in _read_boxes(UNITS):
+        for name, text in written.items():
+            if read[name].confidence >= SURE:
+                told += 1
+                assert parse_scale(name, read[name].text, bare_unit=UNITS[name]) == parse_scale(
+                    name, text, bare_unit=UNITS[name]
+                )
+    assert told >= 1
+    assert all(one.confidence < SURE for read, _ in _read_boxes() for one in read.values())
 
 
 def test_what_is_surely_read_is_what_was_written(sheets):
