@@ -32,6 +32,7 @@ TEXTS = {
     "looking": N_("Looking at the photo ..."),
     "left": N_("Attempts left: %(count)s"),
     "right": N_("All that you entered is right."),
+    "right_read": N_("All that was read is right."),
     "nothing": N_("Nothing that this assignment asks for was entered."),
     "unread": N_("The drawing could not be read."),
     "uploaded": N_("%(done)s of %(total)s files are there"),

@@ -131,7 +131,7 @@ function show(told) {
   const place = $("result"), parts = [];
   const add = (name, html, text) => { const one = document.createElement(name); if (html) one.innerHTML = html; else one.textContent = text; parts.push(one); return one; };
   for (const problem of told.problems || []) add("p", "", problem).className = "note";
-  if (told.is_right) add("p", "", texts.right);
+  if (told.is_right) add("p", "", told.is_read ? texts.right_read : texts.right);
   else if (!told.lines.length) add("p", "", told.is_read === false ? texts.unread : texts.nothing);
   for (const result of ["off", "open", "right"]) {
     const lines = told.lines.filter((line) => line.result === result);
