@@ -177,7 +177,7 @@ def checked_lines(
     if other is not None and of_other and level == "hint":
         # Said once: what each value would be worth by those data is of no use here.
         hint = _hint(of_other[0].reasons[0], speaker, level, names)
-        advice = speaker.gettext(ADVICE["other_variant"][""])
+        advice = speaker.gettext(advice_on(of_other[0].reasons[:1], "", driven))
         return [CheckedLine(of_other[0], ", ".join(other.detail), hint, advice)]
     laws: dict[str, str] = {}
     told: dict[str, str] = {}
