@@ -128,6 +128,7 @@ PROBLEMS: dict[str, str] = {
     "image_too_large": N_("The image is too large; scan at 600 dpi or less."),
     "file_too_large": N_("The file is too large; split it, or scan at 300 dpi."),
     "file_changed": N_("The file changed while the folder was read; grade again."),
+    "storage_unreadable": N_("The file could not be read from where it is stored; grade again."),
     "image_too_small": N_("The image is too small or too narrow for a drawing; scan the whole sheet."),
     "image_damaged_rows": N_("Rows of the image are damaged; scan it again, or grade it by hand."),
     "image_damaged": N_("The image is damaged; scan or export it again."),
