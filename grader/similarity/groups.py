@@ -31,7 +31,7 @@ NOTED = log(0.05)
 """Chance below which a part of the evidence is named."""
 MOST_OWNERS = 3
 """A number that more students share does not show whose drawing it is."""
-MOST_TOGETHER = 1500
+MOST_TOGETHER = 1000
 """Sheets that are compared with each other: time and memory grow with the square of their number."""
 Maps = Sequence[Sequence[NDArray[np.uint8]]]
 
