@@ -178,9 +178,12 @@ class VariantRows:
 
 
 def delimiter_of(text: str) -> str:
-    """`,`, `;` or a tab, whichever the first line of a CSV text has most of."""
+    """`,`, `;` or a tab, whichever the first line of a CSV text has most of; `;` where it has none.
+
+    Of a table of one column, commas are decimal ones, or a name's own.
+    """
     first = next((line for line in text.splitlines() if line.strip()), "")
-    return max(",;\t", key=first.count)
+    return max(",;\t", key=first.count) if any(sign in first for sign in ",;\t") else ";"
 
 
 AT_LINE = "line %(number)s"
