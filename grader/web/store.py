@@ -251,7 +251,7 @@ class Store:
         try:
             self.engine = _engine(url)
             Table.metadata.create_all(self.engine)
-        except (ArgumentError, ImportError, SQLAlchemyError, TypeError) as error:
+        except (ArgumentError, ImportError, SQLAlchemyError) as error:
             why = str(getattr(error, "orig", None) or error).splitlines()[0]
             raise CallError("data_base", f"--database: the data base cannot be opened ({why})") from error
         self._sessions = sessionmaker(self.engine, expire_on_commit=False)
@@ -289,7 +289,10 @@ class Store:
 
 
 def _engine(url: str) -> Engine:
-    is_sqlite = make_url(url).get_backend_name() == "sqlite"
+    parts = make_url(url)
+    is_sqlite = parts.get_backend_name() == "sqlite"
+    if is_sqlite and parts.database in {None, "", ":memory:"}:
+        raise ArgumentError("one in memory would be gone with the server: name a file, sqlite:///FILE")
     engine = create_engine(
         url, pool_size=CONNECTIONS, max_overflow=0, pool_pre_ping=not is_sqlite,
         connect_args={"timeout": 30.0} if is_sqlite else {},
