@@ -50,7 +50,7 @@ EXAMPLES: Mapping[str, str] = {
     "sum": "30", "tail": "A", "terms": "9 × 2 + 10 × 1", "text": "1:5?", "third": "C", "through": "a",
     "tolerance": "@1.0 mm", "used": "@0.036 (m/s)/mm", "vector": "a_BA_n", "why": "no unit", "wrong": "0.4",
     "written": "@45.0 mm", "x": "@60.0 mm", "x_direction": "@0°", "y": "@20.0 mm", "y_direction": "@90°",
-    "cause": "normal component reversed", "done": "12", "minutes": "4", "open": "38", "total": "30",
+    "cause": "normal component reversed", "done": "12", "minutes": "4", "open": "38", "total": "30", "unfit": "14",
     "verdict": "right", "who": "A. B.", "beyond": "@0.2 mm", "good_to": "@0.3 mm", "whose": "7",
     "instead": "v_CA", "share": "62\u00a0%", "file": "class.csv", "most": "1000", "names": "v_A, v_B",
     "error": "line 3", "fields": "5", "column": "v_BB", "columns": "4", "mark": ",", "point": "O1",

@@ -31,6 +31,7 @@ counted_for_you       beyond, good_to, what                                  bey
 not_certainly_within  beyond, good_to, what                                  within it by less: not counted
 at_stake                                                                     too little is left open
 other_variant         whose                                                  another student's data
+not_explained         unfit, of                                              no explanation fits the plan
 hand_may_miss                                                                off by no more than a careful
                                                                              hand may miss what is
                                                                              ill-conditioned, or a mistake
@@ -200,13 +201,25 @@ class Score:
 
 
 @dataclass(frozen=True, slots=True)
+class Unfit:
+    """How many vectors fit nothing, `of` so many that were handed in."""
+
+    vectors: int
+    of: int
+
+
+@dataclass(frozen=True, slots=True)
 class Judgement:
-    """All results of marking one submission."""
+    """All results of marking one submission.
+
+    `unfit` : the vectors that no explanation reaches; None where one reaches every plan
+    """
 
     outcomes: tuple[Outcome, ...]
     mistakes: tuple[NamedMistake, ...]
     scales: Mapping[str, UsedScale]
     score: Score
+    unfit: Unfit | None = None
 
     @property
     def needs_review(self) -> bool:

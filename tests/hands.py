@@ -172,3 +172,42 @@ def _measured_by_hand(one: ReadVector, *, with_direction: bool) -> ReadVector:
         return ReadVector(length, 0.0, None, None, 1.0)
     turned = round(one.direction_deg / PROTRACTOR_DEG) * PROTRACTOR_DEG % 360.0
     return ReadVector(length, 0.0, turned, 0.0, 1.0)
+
+
+# Nobody's drawing ---------------------------------------------------------------------------------
+
+LONGEST_MM = 120.0
+HALF_PAPER_MM = 80.0
+
+
+def nonsense(
+    task: Task,
+    lot: np.random.Generator,
+    *,
+    closed: bool,
+    directed: bool,
+    plans: tuple[str, ...] | None = None,
+) -> Reading:
+    """Measured vectors that follow no construction: of random points (closed), or each at random.
+
+    Arguments: `plans` are those that are nonsense (all by default); the others are drawn by a perfect hand.
+    """
+    right, figures = measured(task, directions=directed), {}
+    for plan in task.construction.poles:
+        if plans is not None and plan not in plans:
+            figures[plan] = right.figures[plan]
+            continue
+        places = {
+            step.node: complex(*lot.uniform(-HALF_PAPER_MM, HALF_PAPER_MM, 2))
+            for step in task.construction.figures[plan]
+        }
+        vectors = {}
+        for vector in task.construction.vectors_of(plan):
+            turn = float(lot.uniform(0.0, math.tau))
+            along = cmath.rect(float(lot.uniform(3.0, LONGEST_MM)), turn)
+            if closed:
+                along = places[vector.head] - places[vector.tail]
+            as_read = ReadVector(abs(along), 0.0, math.degrees(cmath.phase(along)) % 360.0, 0.0, 1.0)
+            vectors[vector.name] = _measured_by_hand(as_read, with_direction=directed)
+        figures[plan] = Figure({}, vectors)
+    return Reading(figures)

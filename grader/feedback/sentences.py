@@ -52,6 +52,7 @@ HINTS: dict[str, str] = {
     "not_certainly_within": N_("It is not certainly within the limit, as far as the scan can tell."),
     "at_stake": N_("What is open here is worth very little: counted for you."),
     "other_variant": N_("The drawing follows another student's data."),
+    "not_explained": N_("The vectors of this plan do not belong together: a person must look."),
     "not_drawn": N_("It is not drawn."),
     "hand_may_miss": N_(
         "Its lines meet at so small an angle that a careful hand may be off by as much: a person must look."
@@ -104,6 +105,7 @@ FULL: dict[str, str] = {
         " only what is certainly within counts."
     ),
     "other_variant": N_("The drawing follows another student's data (%(whose)s)."),
+    "not_explained": N_("These vectors do not belong together: %(unfit)s of %(of)s fit nothing."),
     "readings_disagree": N_("The drawing gives %(first)s, the entered measurement %(second)s."),
     "written_disagrees": N_("Drawn are %(drawn)s, written on the sheet %(written)s: a person must look."),
     "scale_refused": N_("The declared scale “%(text)s” could not be understood: %(why)s."),

@@ -195,6 +195,7 @@ PROBLEMS: dict[str, str] = {
     "measurements_twice": N_("There are several sets of measurements; they were taken together."),
     "measurements_disagree": N_("Sets of measurements disagree; what they disagree about is not used."),
     "measurements_unmatched": N_("Nothing says whose measurements these are."),
+    "not_explained": N_("The vectors do not belong together: no explanation fits them. A person must look."),
     "owner_unknown": N_("Nothing says whose page this is."),
     "owner_disagree": N_("Sources disagree about whose page this is."),
     "owner_not_listed": N_("The page names a student who is not on the roster."),

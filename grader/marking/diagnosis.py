@@ -24,6 +24,7 @@ from reference.construction.mistakes import RPM_FACTOR, Drawing, Mistake, affect
 from reference.construction.steps import Given, Step, TwoLines
 from reference.construction.uncertainty import Skill
 from reference.replay.explanations import RARITY, SLIP, Observations
+from reference.replay.nothing import with_nothing
 from reference.replay.replay import Replay, Root, replay
 
 OF_THE_WHOLE = frozenset({"labels_swapped", "figure_rotated", "other_variant"})
@@ -83,6 +84,7 @@ def explained(case: Case, *, by_another: bool = False) -> tuple[Replay, ...]:
     innocent = _cost_if_right(explanations)
     if explanations and not _is_clear(explanations, case):
         explanations = _searched_further(case, roots, explanations)
+    explanations = with_nothing(explanations, case.drawing.construction, case.observations)
     has_directions = any(one.has_direction for one in case.observations.entries)
     doubt = BEYOND_DOUBT if has_directions else BEYOND_DOUBT_BY_LENGTHS
     if not explanations or innocent - explanations[0].cost < doubt:
@@ -382,6 +384,8 @@ SURE_TOGETHER = 0.8
 LEAST_RIVAL = 0.1
 """A rival less likely than this is not named."""
 MOST_RIVALS = 3
+EVEN = 0.5
+"""A plan that is likelier than this to follow no construction goes to a person."""
 MOST_SLIPS = 2
 """Where more computed lengths do not fit, it is no slip in each, but something else."""
 SUSPICIOUS, GROSS = 2.0, 3.0
@@ -430,6 +434,13 @@ def sure_of(explanations: Sequence[Replay], least: float) -> list[Mistake]:
     ]
 
 
+def not_explained(explanations: Sequence[Replay]) -> frozenset[str]:
+    """The figures in which, more likely than not, nothing belongs together."""
+    whole = _Shares(explanations) if explanations else None
+    figures = {figure for one in explanations for figure in one.not_explained}
+    return frozenset(one for one in figures if whole is not None and whole.of_nothing(one) > EVEN)
+
+
 def _key(mistake: Mistake) -> Key:
     return mistake.code, mistake.at
 
@@ -452,6 +463,12 @@ class _Shares:
             ({_key(one): one for one in explanation.made}, weight / whole)
             for explanation, weight in zip(explanations, weights, strict=True)
         ]
+        self._nothing = [explanation.not_explained for explanation in explanations]
+
+    def of_nothing(self, figure: str) -> float:
+        """The share of the explanations in which nothing belongs together in a figure."""
+        found = zip(self._weights, self._nothing, strict=True)
+        return sum(weight for (_, weight), figures in found if figure in figures)
 
     def of(self, key: Key) -> float:
         """The share of the explanations with a mistake."""

@@ -18,7 +18,7 @@ from reference.construction.mistakes import Drawing
 from reference.construction.steps import Given
 from reference.construction.uncertainty import trace
 from reference.geometry import ComplexArray, FloatArray
-from reference.replay.explanations import Covariance, Observation, Observations
+from reference.replay.explanations import AREA_MM, Covariance, Observation, Observations
 
 LEAST_ERROR_MM = 0.15
 """Least standard error of a node, however well it is drawn and read."""
@@ -49,7 +49,11 @@ def case_of(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> Cas
     directions = _directions_of_the_sketch(task, evidence, {name: float(one) for name, one in used.items()})
     best, *otherwise = (
         Observations(
-            (*_nodes_observed(task, evidence, nodes), *entries), evidence.sketches, nodes.cost, directions
+            (*_nodes_observed(task, evidence, nodes), *entries),
+            evidence.sketches,
+            nodes.cost,
+            directions,
+            nodes.apart,
         )
         for nodes in _adjusted_nodes(task, evidence)
     )
@@ -138,6 +142,8 @@ CLOSES = 5.0
 """Standard deviations by which a polygon of measured vectors may fail to close."""
 WRONG_ENTRY = 30.0
 """Cost of a vector that was entered wrongly: rare, and it may be any (as in `reference.replay`)."""
+ANY_VECTOR = 4.0 * math.log(AREA_MM)
+"""Cost of a vector that may be any, where nothing in the plan belongs together."""
 ENTRY_WINDOW = 40.0
 """Entries left out at a higher cost than the cheapest by this much are not tried."""
 
@@ -146,12 +152,14 @@ ENTRY_WINDOW = 40.0
 class _Nodes:
     """The own nodes of both plans, and their covariances by measuring, as far as they are measured.
 
-    `cost` is that of the residuals, and of an entry that was left out.
+    `cost` is that of the residuals, and of an entry that was left out; `apart`, by plan, how much less it is
+    where the entries need not close polygons.
     """
 
     places: Mapping[str, complex]
     spreads: Mapping[str, Covariance] = field(default_factory=dict)
     cost: float = 0.0
+    apart: Mapping[str, float] = field(default_factory=dict)
 
 
 def _adjusted_nodes(task: Task, evidence: Evidence) -> list[_Nodes]:
@@ -166,7 +174,12 @@ def _adjusted_nodes(task: Task, evidence: Evidence) -> list[_Nodes]:
     for figure in task.construction.poles:
         plans = _adjusted_plan(task, evidence, figure)
         found = [
-            _Nodes({**one.places, **plan.places}, {**one.spreads, **plan.spreads}, one.cost + plan.cost)
+            _Nodes(
+                {**one.places, **plan.places},
+                {**one.spreads, **plan.spreads},
+                one.cost + plan.cost,
+                {**one.apart, **plan.apart},
+            )
             for one in found
             for plan in plans
         ]
@@ -197,7 +210,9 @@ def _adjusted_plan(task: Task, evidence: Evidence, figure: str) -> list[_Nodes]:
         for keep in kept
         if np.linalg.matrix_rank(rows[keep]) == 2 * len(nodes)
     ]
-    return [whole, *(replace(one, cost=one.cost + WRONG_ENTRY) for one in others)]
+    found = [whole, *(replace(one, cost=one.cost + WRONG_ENTRY) for one in others)]
+    spare = len(entries) - len(nodes)
+    return [replace(one, apart={figure: max(one.cost - spare * ANY_VECTOR, 0.0)}) for one in found]
 
 
 def _equations(

@@ -9,9 +9,16 @@ from grader.comparison.criteria import NOT_DRAWN, Comparison, compare
 from grader.comparison.evidence import DrawnVector, Submission
 from grader.comparison.task import Task
 from grader.documents import Verdict
-from grader.marking.diagnosis import LEAST_CONFIDENCE, Lost, drawn_instead, explained, named
+from grader.marking.diagnosis import (
+    LEAST_CONFIDENCE,
+    Lost,
+    drawn_instead,
+    explained,
+    named,
+    not_explained,
+)
 from grader.marking.drawn import case_of, explain
-from grader.marking.settling import at_stake, charged_where_made, of_another
+from grader.marking.settling import at_stake, charged_where_made, of_another, of_nothing
 from grader.outcomes import Judgement, NamedMistake, Outcome, Score
 from grader.records import Figure
 from grader.rubric import CriterionTable, RubricFile
@@ -35,18 +42,20 @@ def judge(task: Task, submission: Submission) -> Judgement:
     surer = _confirmed(task, submission, comparison)
     if surer is not None:
         submission, comparison = surer, compare(task, surer, explain)
-    mistakes = _named(task, comparison)
+    explanations, lost = _explanations(task, comparison)
+    mistakes = named(explanations, task.construction, lost)
     mistakes = (*mistakes, *_swapped_letters(task, submission, mistakes))
     mistakes = (*mistakes, *_not_drawn(task, comparison, mistakes))
     mistakes = (*mistakes, *_slips(task, comparison, mistakes))
     outcomes = charged_where_made(task, comparison.outcomes, mistakes)
+    outcomes, unfit = of_nothing(task, outcomes, not_explained(explanations))
     outcomes = at_stake(task.rubric, of_another(task.rubric, outcomes, mistakes))
     outcomes = tuple(with_mistake(outcome, mistakes) for outcome in outcomes)
-    return Judgement(outcomes, mistakes, comparison.scales, score(task.rubric, outcomes))
+    return Judgement(outcomes, mistakes, comparison.scales, score(task.rubric, outcomes), unfit)
 
 
-def _named(task: Task, comparison: Comparison) -> tuple[NamedMistake, ...]:
-    """The mistakes that explain lost points, or points that may be lost."""
+def _explanations(task: Task, comparison: Comparison) -> tuple[Sequence[Replay], Lost]:
+    """What explains lost points, or points that may be lost, and these."""
     scales, vectors = comparison.settled, task.construction.vectors
     lost = [one for one in comparison.outcomes if one.verdict in LOST]
     links = task.construction.links
@@ -59,7 +68,7 @@ def _named(task: Task, comparison: Comparison) -> tuple[NamedMistake, ...]:
         explanations = explanation.explanations
     if not explanations and _is_nearer_to_another(task, comparison):
         explanations = explained(case_of(task, comparison.evidence, scales), by_another=True)
-    return named(explanations, task.construction, Lost(by_vector, by_scale))
+    return explanations, Lost(by_vector, by_scale)
 
 
 CLEARLY_NEARER = 6.0

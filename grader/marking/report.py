@@ -1,6 +1,6 @@
 """The report of a submission, as the published schema has it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 
 from grader.comparison.task import Task
@@ -107,10 +107,17 @@ def report_of(  # noqa: PLR0913 - what a report holds beside the judgement
                 name: {**asdict(scale), "source": (sources or {}).get(name)}
                 for name, scale in judgement.scales.items()
             },
-            "problems": [*problems, *refused],
+            "problems": [*problems, *refused, *_unfit(judgement)],
             "reading": {"sheets": sheets},
         }
     )
+
+
+def _unfit(judgement: Judgement) -> Iterator[Problem]:
+    """The problem of a submission that no explanation reaches."""
+    if judgement.unfit is not None:
+        vectors, of = judgement.unfit.vectors, judgement.unfit.of
+        yield Problem("not_explained", f"these vectors do not belong together: {vectors} of {of} fit nothing")
 
 
 def unjudged_report(  # noqa: PLR0913 - what a report holds beside the status

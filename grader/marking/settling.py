@@ -10,8 +10,9 @@ from dataclasses import replace
 
 from grader.comparison.task import Task
 from grader.comparison.verdicts import EVEN, FULL, NONE, verdict_of
-from grader.outcomes import NamedMistake, Outcome, Reason
+from grader.outcomes import NamedMistake, Outcome, Reason, Unfit
 from grader.rubric import RubricFile
+from reference.authored.assignment import SCALE_NAMES
 
 NEARLY_CERTAIN = 0.95
 """A mistake named with this confidence is charged where it was made."""
@@ -90,6 +91,61 @@ def _of_another(rubric: RubricFile, outcome: Outcome, whose: Reason, named: Name
         proposed=outcome.shares[0] if outcome.verdict != "review" else outcome.proposed,
         probability=EVEN,
         reasons=(whose, *outcome.reasons),
+    )
+
+
+# Nothing fits --------------------------------------------------------------------------------------
+
+NOT_HANDED_IN = frozenset({"not_measured", "not_drawn"})
+"""Reasons of a vector that nobody drew: nothing is there that could belong to the others."""
+UNEXPLAINED = frozenset({"none", "partial", "follow_through"})
+
+
+def of_nothing(
+    task: Task, outcomes: Sequence[Outcome], figures: frozenset[str]
+) -> tuple[tuple[Outcome, ...], Unfit | None]:
+    """The outcomes of a drawing of which nothing explains some figures, and how many vectors fit nothing.
+
+    What such a figure loses goes to a person; so does what would follow rightly from wrong values in it.
+    """
+    lost = [
+        one
+        for one in outcomes
+        if one.verdict in UNEXPLAINED
+        and not NOT_HANDED_IN & {reason.code for reason in one.reasons}
+        and _is_in(task, one.name, figures)
+    ]
+    vectors = [one for one in outcomes if one.name in task.construction.vectors]
+    unfit = Unfit(
+        sum(one in lost for one in vectors), sum(one.measured.length_mm is not None for one in vectors)
+    )
+    if not lost or not unfit.vectors:
+        return tuple(outcomes), None
+    reason = Reason("not_explained", {"unfit": str(unfit.vectors), "of": str(unfit.of)})
+    return tuple(_waiting(one, NONE, reason) if one in lost else one for one in outcomes), unfit
+
+
+def _is_in(task: Task, name: str, figures: frozenset[str]) -> bool:
+    """Whether a vector or angular quantity is of these figures; a scale, of all plans."""
+    construction = task.construction
+    if name in SCALE_NAMES:
+        return figures >= construction.poles.keys()
+    if name in construction.rates:
+        name = construction.rates[name].vector
+    return name in construction.vectors and construction.figure_of(construction.vectors[name].head) in figures
+
+
+def _waiting(outcome: Outcome, worst: float, reason: Reason) -> Outcome:
+    """An outcome that a person decides, between the worst share and all points."""
+    best = outcome.shares[-1] if outcome.shares else FULL
+    return replace(
+        outcome,
+        verdict="review",
+        possible=("none", outcome.possible[1] if outcome.verdict != "none" else "full"),
+        shares=(worst, max(best, FULL)),
+        proposed=outcome.shares[0] if outcome.verdict != "review" and outcome.shares else outcome.proposed,
+        probability=EVEN,
+        reasons=(reason, *outcome.reasons),
     )
 
 

@@ -97,12 +97,14 @@ class Observations:
     cost : of taking it so: of measurements that contradict each other, or are left out
     directions_rad : by pair of joints, the standard error of the direction between them on a sketch that was
         not handed in
+    apart : by plan, how much less than `cost` its measurements cost where they need not close any polygon
     """
 
     entries: tuple[Observation, ...]
     sketches: Mapping[str, Mapping[str, complex]] = field(default_factory=dict)
     cost: float = 0.0
     directions_rad: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    apart: Mapping[str, float] = field(default_factory=dict)
 
 
 def by_node(construction: Construction, entries: Iterable[Observation]) -> dict[str, tuple[Observation, ...]]:
@@ -162,13 +164,12 @@ class NodeObservations:
     @property
     def freedom(self) -> int:
         """The number of observed coordinates and lengths."""
-        return sum(2 if one.has_direction else 1 for one in self.entries)
+        return _freedom(self.entries)
 
     @property
     def anywhere(self) -> float:
         """The cost of any position, made in an unknown way."""
-        size_mm = max(AREA_MM, *(abs(one.value) for one in self.entries))
-        return SOMETHING_ELSE + 2.0 * math.log(size_mm) * min(self.freedom, 2)
+        return SOMETHING_ELSE + cost_of_any(self.entries)
 
     def misfit_and_cost(
         self, place: ComplexArray, shifts: ComplexArray | None, nodes: Mapping[str, ComplexArray]
@@ -218,6 +219,16 @@ class NodeObservations:
         xx, yy, xy = (x * x).sum(axis=0) + STIFFNESS, (y * y).sum(axis=0) + STIFFNESS, (x * y).sum(axis=0)
         x, y = pull.real, pull.imag
         return np.asarray(((yy * x - xy * y) + 1j * (xx * y - xy * x)) / (xx * yy - xy**2))
+
+
+def _freedom(entries: Sequence[Observation]) -> int:
+    return sum(2 if one.has_direction else 1 for one in entries)
+
+
+def cost_of_any(entries: Sequence[Observation]) -> float:
+    """The cost of a node's observations where it may be anywhere; two of them place it."""
+    size_mm = max(AREA_MM, *(abs(one.value) for one in entries))
+    return 2.0 * math.log(size_mm) * min(_freedom(entries), 2)
 
 
 def _squared_residual(

@@ -64,6 +64,8 @@ class Replay:
     care : drafting errors as a multiple of the usual ones
     made : the mistakes, in the order of construction
     unexplained : nodes whose steps were made in an unknown way
+    spent : by figure, its part of the cost; what the whole drawing costs is in the first one's
+    not_explained : the figures in which nothing belongs together, see `reference.replay.nothing`
     branches, index : all branches of the replay, and which of them this is
     """
 
@@ -73,6 +75,8 @@ class Replay:
     unexplained: tuple[str, ...]
     branches: "_Branches" = field(repr=False)
     index: int
+    spent: Mapping[str, float] = field(default_factory=dict)
+    not_explained: frozenset[str] = frozenset()
 
     @property
     def is_innocent(self) -> bool:
@@ -126,6 +130,7 @@ def replay(
                     branches.go_on(
                         step, figure, here, _alternatives(step, context, branches.is_blind, blind=blind)
                     )
+            branches.spent[figure] = branches.cost
     return branches.explanations()
 
 
@@ -174,6 +179,8 @@ class _Branches:
     made: list[tuple[Mistake, ...]]
     unexplained: list[tuple[str, ...]]
     right: dict[str, FloatArray]
+    spent: dict[str, FloatArray] = field(default_factory=dict)
+    """By figure, the cost up to its end."""
 
     def observed(self, entries: tuple[Observation, ...], figure: str) -> NodeObservations:
         """The observations of a node of a figure, with the turn and the care of each branch."""
@@ -220,7 +227,7 @@ class _Branches:
     def _take(self, index: IntArray) -> None:
         """Keep these branches, in this order; one may be taken several times."""
         arrays: dict[str, np.ndarray[tuple[int, ...], np.dtype[np.generic]]]
-        for arrays in (self.nodes, self.known, self.turned, self.right):  # type: ignore[assignment]
+        for arrays in (self.nodes, self.known, self.turned, self.right, self.spent):  # type: ignore[assignment]
             arrays.update({name: array[index] for name, array in arrays.items() if np.ndim(array)})
         self.care, self.is_blind = self.care[index], self.is_blind[index]
         self.made = [self.made[i] for i in index]
@@ -228,11 +235,18 @@ class _Branches:
 
     def explanations(self) -> list[Replay]:
         """The branches as explanations, the likeliest first."""
+        before = [np.zeros(len(self.cost)), *self.spent.values()]
+        spent = {
+            figure: up_to - start for (figure, up_to), start in zip(self.spent.items(), before, strict=False)
+        }
         return [
-            Replay(float(self.cost[i]), float(self.care[i]), self.made[i], self.unexplained[i], self, i)
+            Replay(
+                float(self.cost[i]), float(self.care[i]), self.made[i], self.unexplained[i], self, i,
+                {figure: float(part[i]) for figure, part in spent.items()},
+            )
             for i in np.argsort(self.cost, kind="stable").tolist()
             if np.isfinite(self.cost[i])
-        ]
+        ]  # fmt: skip
 
 
 def _open(drawing: Drawing, roots: Sequence[Root], cares: Sequence[float], cost: float) -> _Branches:
