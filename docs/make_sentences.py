@@ -53,8 +53,9 @@ EXAMPLES: Mapping[str, str] = {
     "cause": "normal component reversed", "done": "12", "minutes": "4", "open": "38", "total": "30",
     "verdict": "right", "who": "A. B.", "beyond": "@0.2 mm", "good_to": "@0.3 mm", "whose": "7",
     "instead": "v_CA", "share": "62\u00a0%", "file": "class.csv", "most": "1000", "names": "v_A, v_B",
-    "unfit": "14", "error": "line 3", "fields": "5", "column": "v_BB", "columns": "4", "mark": ",", "point": "O1",
+    "error": "line 3", "fields": "5", "column": "v_BB", "columns": "4", "mark": ",", "point": "O1",
     "mechanism": "crank-rocker", "level": "all", "what": "n", "last": "30", "value": "31", "called": "7",
+    "unfit": "14",
     "filed": "8", "areas": "lower left", "corners": "the lower left corner", "files": "38", "limit": "150",
     "students": "30",
 }  # fmt: skip
