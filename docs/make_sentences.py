@@ -57,7 +57,8 @@ EXAMPLES: Mapping[str, str] = {
     "mechanism": "crank-rocker", "level": "all", "what": "n", "last": "30", "value": "31", "called": "7",
     "unfit": "14",
     "filed": "8", "areas": "lower left", "corners": "the lower left corner", "files": "38", "limit": "150",
-    "students": "30",
+    "students": "30", "right": "24", "audited": "24", "unclear": "1", "student": "s07",
+    "criterion": "Acceleration of B", "allowed": "3\u00a0%", "raised": "98.2\u00a0%",
 }  # fmt: skip
 """Parameters by name: after ``@`` a number with its unit; other texts of the catalogues are translated."""
 OTHERWISE: Mapping[str, Mapping[str, str]] = {

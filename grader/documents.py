@@ -201,6 +201,16 @@ class AppliedDecisionDocument(Document):
     at: str
 
 
+class SaidDocument(Document):
+    """What the program itself said of a criterion on which a person or an audit then had a say."""
+
+    verdict: Verdict
+    """Settled, or proposed to a person."""
+    settled: bool
+    probability: Share
+    mistake: str | None = None
+
+
 class CriterionDocument(Document):
     """The verdict on one criterion of the rubric."""
 
@@ -222,6 +232,8 @@ class CriterionDocument(Document):
     """Under review, the likeliest verdict."""
     decided: DecidedDocument | None = None
     """Where a person decided."""
+    said: SaidDocument | None = None
+    """The program's own verdict, where it is no longer the one above."""
     mistake: str | None = None
     """Code of the mistake that explains a loss."""
     feedback: str = ""
@@ -395,6 +407,76 @@ class StaleDecisionDocument(Document):
     reason: str
 
 
+class LikeDocument(Document):
+    """Settled verdicts that are not trusted any more: those of probability `most` or less.
+
+    `criterion`, `verdict` and `mistake` narrow them down; without a criterion all of that probability.
+    """
+
+    criterion: str | None = None
+    verdict: Verdict | None = None
+    mistake: str | None = None
+    most: Share
+
+
+class OpenedDocument(Document):
+    """Verdicts that an audit opened: which, why, and how many."""
+
+    like: LikeDocument
+    student_id: str
+    """Whose verdict was found wrong; empty where `settle` was raised."""
+    count: int
+
+
+class ReliabilityDocument(Document):
+    """Verdicts on which a person had a say, held against the probabilities that were stated for them.
+
+    Attributes
+    ----------
+    source : sheets that were printed by the program, plain paper, or entered values
+    kind : settled verdicts that were audited, or proposals that were decided
+    count, right : how many, and how many of them a person found right
+    said : the mean of the stated probabilities
+    """
+
+    source: Literal["printed", "plain", "entered"]
+    kind: Literal["settled", "proposed"]
+    count: int
+    right: int
+    said: Share
+
+
+class TrustDocument(Document):
+    """What the audit of a class shows.
+
+    Attributes
+    ----------
+    settled : verdicts that the program settled by itself
+    audited, right, unclear : of the random sample: checked, found right, not decidable
+    at_most : share of the settled verdicts that are wrong, with 95 % confidence and whenever the audit
+        stops; undecidable ones count as wrong. Null while nothing is audited
+    least_sure, least_sure_right : checked besides, because they were least sure: no random sample
+    settle, raised : the probability from which the rubric settles verdicts; the one above which this class
+        does, where the audit proves more errors than `settle` allows, else null
+    opened : verdicts that wait for a person again
+    reliability : what was said against what was found
+    moved : points of drawings that a person put elsewhere
+    """
+
+    settled: int
+    audited: int
+    right: int
+    unclear: int
+    at_most: Share | None
+    least_sure: int
+    least_sure_right: int
+    settle: Share
+    raised: Share | None
+    opened: list[OpenedDocument] = []
+    reliability: list[ReliabilityDocument] = []
+    moved: int = 0
+
+
 class ResultsDocument(Document):
     """A class's results; `moved` against the run before, empty after the first; `alike` sheets."""
 
@@ -410,6 +492,8 @@ class ResultsDocument(Document):
     """Decisions that wait for a person to look again."""
     expected_wrong: float | None = None
     """How many of the settled verdicts are expected to be wrong, by their probabilities."""
+    trust: TrustDocument | None = None
+    """What people checked says of the verdicts; null before anybody has checked one."""
 
 
 # Plan: the exact plan of a variant ----------------------------------------------------------------

@@ -39,6 +39,7 @@ readings_disagree     first, second, unit                                    sca
 follows               what, of                                               right from own earlier value
                       (what: nodes, small_errors, scale, vector, value; of: its name)
 decided                                                                      a person decided otherwise
+found_wrong_elsewhere                                                        an audit found one like it wrong
 scale_refused         text, why                                              declared, not understood
 scale_off             declared, expected, unit                               declared, contradicted
 scale_assumed         used, unit                                             not declared

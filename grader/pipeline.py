@@ -28,6 +28,7 @@ from grader.inputs.scale_text import SURE, declared_scales, sure_texts, understo
 from grader.marking.decided import decide, open_again, with_decisions, with_nodes
 from grader.marking.mark import judge
 from grader.marking.report import reading_document, report_of, unjudged_report
+from grader.marking.trust import opened_by_audit, with_said
 from grader.outcomes import Judgement
 from grader.overlay.measured import measured_picture
 from grader.overlay.picture import backdrop, overlay
@@ -341,7 +342,7 @@ def _marked(
         report = with_decisions(report, submission)
         return report, lambda _ghosts: tuple(overlay(scan, reading, {}, {}) for scan, reading in plain)
     task, own, declared = answer
-    judgement = decide(own, rubric, submission.decided)
+    judgement = decide(opened_by_audit(own, rubric, submission.opened), rubric, submission.decided)
     names, lang, measured = assignment.file.names, submission.lang, submission.measured or NOTHING_MEASURED
     report = report_of(
         task, judgement, submission.student_id,
@@ -352,6 +353,7 @@ def _marked(
         sources=declared.sources,
     )  # fmt: skip
     report = with_mistakes_explained(report, judgement, assignment, task.variant, lang, level)
+    report = with_said(report, own, {row.criterion for row in submission.decided})
     report = with_decisions(report, submission, own, task.construction)
     return report, lambda ghosts: pictures_of(
         pages, measured, task.construction, judgement, show_expected=ghosts

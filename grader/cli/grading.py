@@ -19,7 +19,7 @@ from grader.cli.app import check_language, new_table, progress
 from grader.cli.checking import checked_level
 from grader.cli.terminal import note, tell_next
 from grader.documents import AlikeDocument, MovedDocument, ReadingDocument, ResultsDocument
-from grader.feedback.class_page import CAUSES, SIGNS, write_demo_page
+from grader.feedback.class_page import CAUSES, SIGNS, trust_sentences, write_demo_page
 from grader.feedback.class_statistics import waiting
 from grader.feedback.photos import flaw_problems
 from grader.files import make_folder, samples_folder
@@ -27,7 +27,7 @@ from grader.folder.batch import Batch, grade
 from grader.folder.changes import standing_text
 from grader.folder.watch import arrivals
 from grader.folder.workers import Limits, Workers, result_of
-from grader.language import ROOT_LANGUAGE
+from grader.language import ROOT_LANGUAGE, tongue
 from grader.marking.report import reading_document
 from grader.pipeline import open_page, read_pages
 from grader.records import PageRef, ScannedPage
@@ -264,6 +264,8 @@ def tell_class(results: ResultsDocument, out: Path) -> None:
     """Print states, changes, similar sheets, what waits for a person, and the paths of the results."""
     note(_states(results))
     note(_left(results))
+    for sentence in trust_sentences(results, tongue(ROOT_LANGUAGE)):
+        note(sentence)
     page = out / "index.html"
     changes = [_change_line(change) for change in results.moved]
     _list(f"Moved since the last run: {len(results.moved)}", changes, page)

@@ -1,8 +1,9 @@
 """The class's page, and the demo's that leads to its classes. Readable offline, on a phone and on paper."""
 
+import math
 import shlex
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
@@ -39,6 +40,7 @@ from grader.feedback.numbers import score_text
 from grader.feedback.words import STATES, VERDICTS, environment, problem_sentence, unmatched_sentence
 from grader.files import result_folders, write_whole
 from grader.language import N_, Tongue, tongue
+from grader.marking.trust import CONFIDENCE
 from grader.overlay.scene import MARKS
 
 # The page -----------------------------------------------------------------------------------------
@@ -71,6 +73,31 @@ CAUSES: Mapping[Cause, str] = {
 REVIEW = N_("Look at what waits, and decide:")
 EXPORT = N_("Hand on what is finished:")
 WRONG = N_("Of %(settled)s verdicts that nobody has checked, about %(wrong)s may be wrong.")
+
+
+AUDITED = N_(
+    "%(right)s of %(audited)s verdicts checked at random were right: with %(confidence)s confidence at most"
+    " %(share)s of the %(settled)s settled ones are wrong. This holds whenever you stop checking."
+)
+UNDECIDABLE = N_("Verdicts that could not be checked count as wrong here: %(unclear)s.")
+LEAST_SURE = N_(
+    "Of %(count)s more among the least sure, %(right)s were right; these are not a random sample."
+)
+FOUND_WRONG = N_(
+    "A settled verdict of %(student)s was wrong. Verdicts like it were opened for a person: %(count)s"
+    " (%(criterion)s, %(verdict)s)."
+)
+RAISED = N_(
+    "More settled verdicts are wrong than the rubric allows (%(allowed)s). In this class, verdicts of"
+    " probability %(raised)s or less go to a person: %(count)s."
+)
+MOVED_POINTS = N_("Points of drawings that a person put elsewhere: %(count)s.")
+SOURCES: Mapping[str, str] = {
+    "printed": N_("printed sheets"),
+    "plain": N_("plain paper"),
+    "entered": N_("entered values"),
+}
+KINDS: Mapping[str, str] = {"settled": N_("settled, then checked"), "proposed": N_("proposed, then decided")}
 
 
 def write_index(
@@ -107,6 +134,8 @@ def index_page(
         title=title or results.assignment,
         steps=_next_steps(results, out),
         how_sure=_how_sure(results, speaker),
+        trust=list(trust_sentences(results, speaker)),
+        reliability=list(_reliability(results, speaker)),
         rows=[_row(report, student_names, link(report), speaker) for report in results.reports],
         has_positions=any(report.position is not None for report in results.reports),
         has_n=any("n" in report.variant for report in results.reports),
@@ -158,6 +187,55 @@ def _how_sure(results: ResultsDocument, speaker: Tongue) -> str:
         return ""
     known = {"settled": settled(results), "wrong": speaker.significant(results.expected_wrong, 1)}
     return speaker.gettext(WRONG) % known
+
+
+def trust_sentences(results: ResultsDocument, speaker: Tongue) -> Iterator[str]:
+    """What the verdicts that people checked say of the others; nothing before anybody has checked one."""
+    trust = results.trust
+    if trust is None:
+        return
+
+    def said(text: str, **values: object) -> str:
+        return speaker.gettext(text) % values
+
+    if trust.at_most is not None:
+        share = _per_cent(math.ceil(1000.0 * trust.at_most - 1e-9) / 1000.0, speaker)
+        yield said(
+            AUDITED, right=trust.right, audited=trust.audited, share=share, settled=trust.settled,
+            confidence=_per_cent(CONFIDENCE, speaker),
+        )  # fmt: skip
+    if trust.unclear:
+        yield said(UNDECIDABLE, unclear=trust.unclear)
+    if trust.least_sure:
+        yield said(LEAST_SURE, count=trust.least_sure, right=trust.least_sure_right)
+    titles = {one.id: title_of(results, one) for report in results.reports for one in report.criteria}
+    for one in trust.opened:
+        like = one.like
+        if like.criterion is None:
+            allowed, raised = _per_cent(1.0 - trust.settle, speaker), _per_cent(like.most, speaker)
+            yield said(RAISED, allowed=allowed, raised=raised, count=one.count)
+        else:
+            verdict = speaker.gettext(VERDICTS[like.verdict or "review"])
+            cause = f", {speaker.gettext(MISTAKES[like.mistake].title)}" if like.mistake in MISTAKES else ""
+            yield said(
+                FOUND_WRONG,
+                student=one.student_id, count=one.count,
+                criterion=titles.get(like.criterion, like.criterion), verdict=verdict + cause,
+            )  # fmt: skip
+    if trust.moved:
+        yield said(MOVED_POINTS, count=trust.moved)
+
+
+def _reliability(results: ResultsDocument, speaker: Tongue) -> Iterator[tuple[str, str, str, str]]:
+    """Rows of the reliability table: where from, what, the probability stated, how many were right."""
+    for one in [] if results.trust is None else results.trust.reliability:
+        found = f"{_per_cent(one.right / one.count, speaker)} ({one.right} / {one.count})"
+        source, kind = (speaker.gettext(text) for text in (SOURCES[one.source], KINDS[one.kind]))
+        yield source, kind, _per_cent(math.floor(1000.0 * one.said) / 1000.0, speaker), found
+
+
+def _per_cent(share: float, speaker: Tongue) -> str:
+    return f"{speaker.trimmed(100.0 * share, 1)}\N{NO-BREAK SPACE}%"
 
 
 # The demo's page ----------------------------------------------------------------------------------

@@ -47,6 +47,7 @@ HINTS: dict[str, str] = {
     "unread": N_("It could not be read on the sheet."),
     "entry_refused": N_("An entry that it rests on cannot be used: a person must look."),
     "doubtful": N_("It was read with too little certainty."),
+    "found_wrong_elsewhere": N_("A verdict like this one was found wrong in this class: a person must look."),
     "near_limit": N_("It lies so near the limit of the tolerance that the scan cannot decide."),
     "counted_for_you": N_("It is beyond the limit by no more than the scan can tell: counted for you."),
     "not_certainly_within": N_("It is not certainly within the limit, as far as the scan can tell."),

@@ -8,9 +8,16 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
-from grader.documents import AlikeDocument, ReportDocument, ResultsDocument, UnmatchedDocument
+from grader.documents import (
+    AlikeDocument,
+    LikeDocument,
+    ReportDocument,
+    ResultsDocument,
+    TrustDocument,
+    UnmatchedDocument,
+)
 from grader.feedback.class_page import write_index
 from grader.feedback.sentences import Level
 from grader.feedback.student_page import About, write_feedback
@@ -51,6 +58,7 @@ from grader.inputs.measurements import StudentSubmission, names_of
 from grader.inputs.roster import Roster, read_roster
 from grader.lms.table import write_summary
 from grader.marking.report import unjudged_report
+from grader.marking.trust import opened_in, trust_of
 from grader.pipeline import mark, missing_scales, read_submission
 from grader.records import PageRef, Problem, ScannedPage
 from grader.rubric import RubricFile, asked_of, rubric_of
@@ -62,6 +70,8 @@ from reference.errors import CallError, PlanmarkError
 LOG = logging.getLogger("planmark")
 ALIKE_NOTE = "alike.json"
 """The similar sheets, and a digest of what they were found in: every sheet is compared with every other."""
+OPENED_NOTE = "opened.json"
+_OPENED = TypeAdapter(dict[str, tuple[LikeDocument, ...]])
 _PASSING = "file_changed"
 """A problem that the next run need not have: nothing that has it is cached."""
 
@@ -172,8 +182,7 @@ def _graded(
             students, unmatched = _submissions(batch, listed, contents, cache, pool)
             if not students and not unmatched:
                 raise _nothing(batch)
-            jobs = _jobs(batch, cache, students)
-            reports = _marked(batch, cache, jobs, progress, pool)
+            jobs, reports, trust = _audited(batch, cache, students, progress, pool)
     except (KeyboardInterrupt, InterruptedRunError):
         remove_parts(batch.out)
         raise
@@ -195,6 +204,7 @@ def _graded(
         alike=_similar(batch.assignment, jobs, reports, notes),
         stale=sorted(decisions.stale, key=lambda decision: decision.line),
         expected_wrong=_expected_wrong(reports),
+        trust=trust,
     )
     _write_results(batch, results, students)
     note_inputs(notes, inputs)
@@ -391,6 +401,43 @@ def _jobs(batch: Batch, cache: PageCache, students: Sequence[StudentSubmission])
         _job(submission, folder, (read, marked))
         for submission, folder in zip(students, result_folders(students), strict=True)
     ]
+
+
+def _audited(
+    batch: Batch, cache: PageCache, students: Sequence[StudentSubmission], progress: Progress, workers: Pool
+) -> tuple[list[Job], list[ReportDocument], TrustDocument | None]:
+    """The jobs and their reports, with what an audit of the class opens, and what the audit shows.
+
+    What is opened follows from the reports; that of the last run is noted, so that nothing is marked twice.
+    """
+    note = batch.out / CACHE_FOLDER / OPENED_NOTE
+    opened, again = _noted_opened(note), False
+    settle, folders = batch.rubric.doubt.settle, result_folders(students)
+    while True:
+        students = [
+            replace(one, opened=opened.get(folder, ())) for one, folder in zip(students, folders, strict=True)
+        ]
+        jobs = _jobs(batch, cache, students)
+        reports = _marked(batch, cache, jobs, progress, workers)
+        trust = trust_of(reports, settle)
+        found = {
+            folder: likes
+            for folder, report in zip(folders, reports, strict=True)
+            if (likes := opened_in(report, trust))
+        }
+        is_applied = found == {folder: opened[folder] for folder in folders if folder in opened}
+        if is_applied or again:
+            return jobs, reports, trust
+        opened, again = found, True
+        write_whole(note, _OPENED.dump_json(opened))
+
+
+def _noted_opened(note: Path) -> dict[str, tuple[LikeDocument, ...]]:
+    """What the last run opened, by the submission's folder."""
+    try:
+        return _OPENED.validate_json(note.read_bytes())
+    except (OSError, ValidationError):
+        return {}
 
 
 def _job(submission: StudentSubmission, folder: str, depends: tuple[str, str]) -> Job:

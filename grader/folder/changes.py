@@ -115,7 +115,7 @@ def inputs_of(
     own = {
         folder: {
             "submission": _digest(pages_of(submission, by_person=False), submission.measured),
-            "decision": _digest(pages_of(submission, by_person=True), submission.decided),
+            "decision": _digest(pages_of(submission, by_person=True), submission.decided, submission.opened),
             "roster": _digest(
                 submission.variant, sorted(submission.declared.items()), submission.lang, submission.name
             ),

@@ -66,8 +66,9 @@ def _handed_in(submission: StudentSubmission, assignment: Assignment) -> list[ob
 
 def _asked(submission: StudentSubmission, rubric: RubricFile, criterion: str) -> object:
     """What a criterion asks for; of a node, how its page was placed."""
-    placed = [(page.turn_deg, page.corners_px) for page in submission.pages] if ":" in criterion else []
-    return [one.name for one in rubric.criterion if one.id == criterion], placed
+    is_node, asked = criterion.startswith("node:"), criterion.removeprefix("audit:")
+    placed = [(page.turn_deg, page.corners_px) for page in submission.pages] if is_node else []
+    return [one.name for one in rubric.criterion if one.id == asked], placed
 
 
 def page_basis(page: PageRef) -> str:
@@ -320,11 +321,14 @@ class _Check:
         """The column that is wrong, and why; None for a decision that fits."""
         if row.kind == "node":
             return self._node(row)
-        if row.kind != "verdict":
+        if row.kind not in {"verdict", "audit"}:
             return None
         criteria = {one.id: one for one in self.rubric.criterion}
-        if row.criterion not in criteria:
-            return "criterion", f"'{row.criterion}' is not in this rubric{_meant(row.criterion, criteria)}"
+        asked = row.criterion.removeprefix("audit:")
+        if asked not in criteria:
+            return "criterion", f"'{asked}' is not in this rubric{_meant(asked, criteria)}"
+        if row.kind == "audit":
+            return None
         why = why_not(row, criteria[row.criterion], self.rubric)
         return None if why is None else ("points", why)
 

@@ -1,4 +1,4 @@
-"""Texts of a decision that are more than a word: a node's place; a page's owner, turn and corners."""
+"""Texts of a decision that are more than a word: a node's place; a page's owner and corners; an audit."""
 
 import re
 from dataclasses import dataclass
@@ -81,6 +81,30 @@ def _corners(text: str | None) -> tuple[tuple[float, float], ...]:
             "corners: give the upright sheet's from the top left clockwise; no three may lie in a line"
         )
     return corners
+
+
+ANSWERS = ("right", "wrong", "unclear")
+"""To the question whether a settled verdict is right; `unclear`: what was handed in does not tell."""
+
+
+@dataclass(frozen=True, slots=True)
+class AuditAnswer:
+    """What a person found of a settled verdict: one of `ANSWERS`, and the verdict that it is about."""
+
+    answer: str
+    said: str
+
+    def __str__(self) -> str:
+        return f"{self.answer}; said={self.said}"
+
+
+def audit_answer(text: str) -> AuditAnswer:
+    """The answer that a row has. Raises ValueError with what is wrong and what is right."""
+    answer, _, rest = (part.strip() for part in text.partition(";"))
+    name, _, said = (part.strip() for part in rest.partition("="))
+    if answer not in ANSWERS or name != "said" or not said:
+        raise ValueError(f"'{short(text)}': {', '.join(ANSWERS)} are known, then ; said=VERDICT")
+    return AuditAnswer(answer, said)
 
 
 def place_text(x_mm: float, y_mm: float) -> str:

@@ -7,6 +7,7 @@ a semicolon-separated file `points` has a decimal comma. `criterion` says what a
 |---|---|---|
 | an id of the rubric | `full`, `partial`, `none`, `follow_through`, `not_judged` | blank, or as given |
 | `node:FIGURE:NODE` | the node's place, ``x,y`` in millimetres of the sheet | blank |
+| `audit:ID` | ``right; said=full``: whether the settled verdict is right (or `wrong`, `unclear`) | blank |
 | `page:FILE#N` | ``owner=s03; turn=90; corners=x,y x,y x,y x,y``, at least one of them | blank |
 | `total` | blank | added, or taken away with a minus |
 | `comment` | blank | blank |
@@ -28,7 +29,14 @@ from pathlib import Path
 from typing import Literal
 
 from grader.files import OutputError, guarded, make_folder, sync_folder, unguarded, write_whole
-from grader.inputs.decision_texts import LARGEST, PageDecision, page_decision, place
+from grader.inputs.decision_texts import (
+    LARGEST,
+    AuditAnswer,
+    PageDecision,
+    audit_answer,
+    page_decision,
+    place,
+)
 from grader.inputs.roster import (
     ScanRef,
     parse_scan,
@@ -44,7 +52,7 @@ FILE_NAME = "decisions.csv"
 COLUMNS = ("student_id", "position", "criterion", "verdict", "points", "comment", "by", "at", "basis")
 _REQUIRED = ("student_id", "criterion", "verdict")
 VERDICTS = ("full", "partial", "none", "follow_through", "not_judged")
-Kind = Literal["verdict", "node", "page", "total", "comment"]
+Kind = Literal["verdict", "audit", "node", "page", "total", "comment"]
 Key = tuple[str, int | None, str]
 """What a row is about: student, position, criterion; of a page the page alone."""
 
@@ -102,7 +110,7 @@ class Decision:
         """What sort of thing it is about."""
         start = self.criterion.partition(":")[0]
         match start:
-            case "node" | "page" if ":" in self.criterion:
+            case "audit" | "node" | "page" if ":" in self.criterion:
                 return start
             case "total" | "comment":
                 return start
@@ -136,6 +144,11 @@ class Decision:
     def place(self) -> tuple[float, float]:
         """Where the node was put, x and y in mm of the sheet, y down. Raises ValueError."""
         return place(self.verdict)
+
+    @property
+    def audited(self) -> tuple[str, AuditAnswer]:
+        """The criterion whose settled verdict was audited, and the answer. Raises ValueError."""
+        return self.criterion.partition(":")[2], audit_answer(self.verdict)
 
     @property
     def page(self) -> PageDecision:
@@ -330,7 +343,7 @@ def faults_of(row: Decision) -> Iterator[tuple[str, str]]:
     yield from _faults_of_kind(row)
     if row.points is not None and not abs(row.points) <= LARGEST:
         yield "points", "is no number of points"
-    elif row.points is not None and row.kind in {"node", "page", "comment"}:
+    elif row.points is not None and row.kind in {"audit", "node", "page", "comment"}:
         yield "points", f"must be empty for {row.criterion.partition(':')[0]}"
     elif row.points is not None and row.kind == "verdict" and row.points < 0.0:
         yield "points", "are below 0; points are taken away in a row `total`"
@@ -343,6 +356,8 @@ def _faults_of_kind(row: Decision) -> Iterator[tuple[str, str]]:
                 yield "criterion", "is empty: write a criterion's id, total, comment, node:... or page:..."
             if row.verdict not in VERDICTS:
                 yield "verdict", f"'{short(row.verdict)}' is none of {', '.join(VERDICTS)}"
+        case "audit":
+            yield from _fault("verdict", lambda: row.audited)
         case "node":
             yield from _fault("criterion", lambda: row.node, "; node:FIGURE:NODE is right")
             yield from _fault("verdict", lambda: row.place)

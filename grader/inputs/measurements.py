@@ -22,7 +22,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeGuard
 
-from grader.documents import MeasurementsDocument
+from grader.documents import LikeDocument, MeasurementsDocument
 from grader.inputs.roster import MAX_LINES, short, surplus_of, whole_number, why_no_id
 from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
 from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
@@ -116,6 +116,7 @@ class StudentSubmission:
     problems : what was noticed before marking
     has_unusable : whether something was handed in that cannot be used; `problems` say what
     decided : what people decided of it, to be applied
+    opened : settled verdicts that an audit of the class found to be no longer trusted
     """
 
     student_id: str
@@ -128,6 +129,7 @@ class StudentSubmission:
     problems: tuple[Problem, ...] = ()
     has_unusable: bool = False
     decided: "tuple[Decision, ...]" = ()
+    opened: tuple[LikeDocument, ...] = ()
 
     @property
     def position(self) -> int | None:

@@ -401,3 +401,50 @@ def test_the_same_submission_decided_by_two_rows_is_not_guessed():
     (student,) = decisions.give([StudentSubmission("s1", Variant(position=0))], press, rubric)
     assert student.decided == ()
     assert [problem.message[:6] for problem in decisions.problems()] == ["line 2", "line 3"]
+
+
+# Audit --------------------------------------------------------------------------------------------
+
+
+def test_a_wrong_verdict_that_was_checked_opens_those_like_it_and_says_so(folder):
+    hand_in(folder, "s3", 5)
+    first = run(folder)
+    assert first.trust is None
+    scores = [report.score for report in first.reports]
+    decide(folder, row("audit:v_B", "right; said=full", "s3"), row("audit:v_A", "wrong; said=full", "s2"))
+    results = run(folder)
+    (opened,) = results.trust.opened
+    assert (opened.student_id, opened.like.criterion) == ("s2", "v_A")
+    waiting = {report.student_id: report for report in results.reports if report.status == "needs_review"}
+    assert len(waiting) == opened.count == 3
+    for report in waiting.values():
+        (criterion,) = [one for one in report.criteria if one.verdict == "review"]
+        assert (criterion.id, criterion.proposed, criterion.said.settled) == ("v_A", "full", True)
+        assert "found wrong" in criterion.feedback
+    page = (folder.parent / "out" / "index.html").read_text(encoding="utf-8")
+    assert "A settled verdict of s2 was wrong" in page
+    decide(folder, *(row("v_A", "full", student) for student in ("s1", "s2", "s3")))
+    results = run(folder)
+    assert [report.score for report in results.reports] == scores
+    assert results.trust.opened == [opened]
+
+
+def test_a_right_one_changes_no_mark_and_counts_for_what_the_program_still_says(folder):
+    before = run(folder)
+    decide(folder, row("audit:v_B", "right; said=full", "s2"))
+    results = run(folder)
+    assert results.moved == []
+    assert [one.criteria for one in results.reports] == [one.criteria for one in before.reports]
+    hand_in(folder, "s2", 9, v_B=3.0)
+    assert run(folder).trust is None
+
+
+@pytest.mark.parametrize("verdict", ["right", "right; said=", "good; said=full", "right; full", ""])
+def test_an_audit_that_cannot_be_read_is_an_error_with_its_line(folder, verdict):
+    path = folder / "decisions.csv"
+    path.write_text(
+        f"{','.join(COLUMNS)}\ns1,,audit:v_A,{verdict},,,,,\ns1,,audit:v_X,right; said=full,,,,,\n"
+    )
+    messages = [one.message for one in run(folder).unmatched]
+    assert messages[0].startswith("line 2, verdict: ")
+    assert messages[1].startswith("line 3, criterion: 'v_X' is not in this rubric")

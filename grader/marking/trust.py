@@ -1,0 +1,331 @@
+"""What checked verdicts say of the others: an audit of a class, and what it opens again.
+
+The settled verdicts of a class stand in an order that depends on nothing but their names: the ones checked
+first are a random sample, whatever their probability, and a review that is started again goes on with it.
+How many of all are wrong is bounded by a confidence sequence for sampling without replacement: it holds
+whenever the teacher stops, also because the figure looks good [1]. With W wrong verdicts among N and a prior
+on W, the ratio of prior to posterior probability of the true W is a martingale that starts at 1; by Ville's
+inequality it reaches 20 with a probability of 5 % at most. What has not reached it is the confidence set.
+
+[1] I. Waudby-Smith, A. Ramdas: Confidence sequences for sampling without replacement. NeurIPS 2020.
+"""
+
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from typing import Literal
+
+import numpy as np
+from scipy.special import betaln, gammaln, logsumexp
+
+from grader.comparison.verdicts import EVEN, FULL, NONE
+from grader.documents import (
+    CriterionDocument,
+    LikeDocument,
+    OpenedDocument,
+    ReliabilityDocument,
+    ReportDocument,
+    SaidDocument,
+    TrustDocument,
+    Verdict,
+)
+from grader.inputs.decision_texts import audit_answer
+from grader.marking.mark import score, share_of
+from grader.outcomes import Judgement, Outcome, Reason
+from grader.records import FloatArray
+from grader.rubric import RubricFile
+
+CONFIDENCE = 0.95
+PRIOR_NONE = 0.5
+"""Prior probability that no verdict is wrong: an audit that finds nothing then comes near the bound of a
+sample of fixed size (24 right: 12.6 instead of 11.7 %). Every prior is valid; it only moves the width."""
+PRIOR_FEW = 32.0
+"""Otherwise W is beta-binomial with parameters 1 and this: 3 % are wrong in the mean, which is what a rubric
+that settles from 0.97 promises."""
+LEAST_SURE = 5
+"""Verdicts offered because they are least sure; more of them are no sample of anything."""
+CREDIT, CHARGE = frozenset({"full", "follow_through"}), frozenset({"partial", "none"})
+NOT_CHECKED = frozenset({"not_measured", "optional"})
+"""Reasons of a verdict on what was not handed in: there is nothing to look at."""
+OPENED = "found_wrong_elsewhere"
+"""The reason of a verdict that an audit opened."""
+Answer = Literal["right", "wrong", "unclear"]
+
+
+# The bound ----------------------------------------------------------------------------------------
+
+
+def wrong_between(total: int, wrong: int, right: int) -> tuple[int, int]:
+    """The least and the largest number of wrong ones among `total`, after some were checked at random.
+
+    Each of the two holds with 95 % confidence, at every moment of the audit at once.
+    """
+    numbers = np.arange(total + 1.0)
+    checked = wrong + right
+    is_possible = (numbers >= wrong) & (numbers <= total - right)
+    log = np.full(total + 1, -np.inf)
+    some = numbers[is_possible]
+    log[is_possible] = _log_choose(some, wrong) + _log_choose(total - some, right)
+    log -= _log_choose(np.array([float(total)]), checked)
+    prior = np.log1p(-PRIOR_NONE) + _log_choose(np.full(total + 1, float(total)), numbers)
+    prior += betaln(numbers + 1.0, total - numbers + PRIOR_FEW) - betaln(1.0, PRIOR_FEW)
+    prior[0] = np.logaddexp(prior[0], np.log(PRIOR_NONE))
+    left = np.flatnonzero(logsumexp(prior + log) - log < -np.log1p(-CONFIDENCE))
+    return int(left[0]), int(left[-1])
+
+
+def _log_choose(of: FloatArray, some: FloatArray | float) -> FloatArray:
+    return np.asarray(gammaln(of + 1.0) - gammaln(some + 1.0) - gammaln(of - some + 1.0))
+
+
+# The verdicts that can be checked -----------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Checkable:
+    """A verdict that the program settled, and what a person found of it.
+
+    Attributes
+    ----------
+    student, position, criterion : whose, and on what
+    answer : None where nobody has looked
+    by_audit : whether the answer was asked for, and not a verdict that a person decided by the way
+    """
+
+    student: str
+    position: int | None
+    criterion: str
+    source: Literal["printed", "plain", "entered"]
+    said: SaidDocument
+    answer: Answer | None
+    by_audit: bool
+
+    @property
+    def order(self) -> bytes:
+        """Its place in the random order."""
+        return sha256(f"{self.student}/{self.position}/{self.criterion}".encode()).digest()
+
+
+def said_of(criterion: CriterionDocument) -> SaidDocument | None:
+    """What the program itself said of a criterion; None where it said nothing."""
+    if criterion.said is not None or criterion.decided is not None:
+        return criterion.said
+    is_open = criterion.verdict == "review"
+    verdict = criterion.proposed if is_open else criterion.verdict
+    if verdict not in CREDIT | CHARGE or criterion.probability is None:
+        return None
+    return SaidDocument(
+        verdict=verdict, settled=not is_open, probability=criterion.probability, mistake=criterion.mistake
+    )
+
+
+def checkable(reports: Sequence[ReportDocument]) -> list[Checkable]:
+    """The settled verdicts of a class in the order in which an audit asks for them."""
+    found = [one for report in reports for one in _of_report(report) if one.said.settled]
+    return sorted(found, key=lambda one: one.order)
+
+
+def _of_report(report: ReportDocument) -> Iterator[Checkable]:
+    methods = {sheet.sheet.method for sheet in report.reading.sheets if sheet.sheet is not None}
+    source: Literal["printed", "plain", "entered"]
+    source = "entered" if not methods else "printed" if "markers" in methods else "plain"
+    answers = {row.criterion: row.verdict for row in report.decisions if row.criterion.startswith("audit:")}
+    for criterion in report.criteria:
+        said = said_of(criterion)
+        if said is None or NOT_CHECKED & {*criterion.reasons}:
+            continue
+        answer, row = None, answers.get(f"audit:{criterion.id}")
+        if row is not None and audit_answer(row).said == said.verdict:
+            answer = audit_answer(row).answer
+        by_audit = answer is not None
+        if answer is None and criterion.decided is not None:
+            answer = _answer_by(criterion, said)
+        yield Checkable(
+            report.student_id, report.position, criterion.id, source, said, answer, by_audit  # type: ignore[arg-type]
+        )  # fmt: skip
+
+
+def _answer_by(criterion: CriterionDocument, said: SaidDocument) -> Answer:
+    """Whether a person's verdict on a criterion is the program's."""
+    if criterion.verdict not in CREDIT | CHARGE:
+        return "unclear"
+    same = criterion.verdict == said.verdict or {criterion.verdict, said.verdict} <= CREDIT
+    return "right" if same else "wrong"
+
+
+def sample(verdicts: Sequence[Checkable]) -> list[Checkable]:
+    """The random sample so far: the verdicts before the first one that nobody has looked at."""
+    first = next((index for index, one in enumerate(verdicts) if one.answer is None), len(verdicts))
+    return list(verdicts[:first])
+
+
+def next_to_check(verdicts: Sequence[Checkable], count: int) -> list[Checkable]:
+    """The verdicts to ask for next: the random sample's next `count`, then the least sure of all."""
+    waiting = [one for one in verdicts if one.answer is None]
+    least = sorted(verdicts, key=lambda one: one.said.probability)[:LEAST_SURE]
+    return list(dict.fromkeys([*waiting[:count], *(one for one in least if one.answer is None)]))
+
+
+# What follows -------------------------------------------------------------------------------------
+
+
+def trust_of(reports: Sequence[ReportDocument], settle: float) -> TrustDocument | None:
+    """What people checked says of a class; None before anybody has checked anything.
+
+    Arguments: `settle` is the rubric's.
+    """
+    verdicts = checkable(reports)
+    checked = sample(verdicts)
+    further = [one for one in verdicts if one.by_audit and one not in checked]
+    moved = sum(row.criterion.startswith("node:") for report in reports for row in report.decisions)
+    proposals = [
+        one for report in reports for one in _of_report(report) if not one.said.settled and one.answer
+    ]
+    if not (checked or further or proposals or moved):
+        return None
+    count = Counter(one.answer for one in checked)
+    low, high = wrong_between(len(verdicts), count["wrong"], count["right"])
+    _, high = wrong_between(len(verdicts), count["wrong"] + count["unclear"], count["right"])
+    raised = None
+    if low > (1.0 - settle) * len(verdicts):
+        raised = _raised([*checked, *further], settle)
+    return TrustDocument(
+        settled=len(verdicts),
+        audited=len(checked),
+        right=count["right"],
+        unclear=count["unclear"],
+        at_most=high / len(verdicts) if checked else None,
+        least_sure=len(further),
+        least_sure_right=sum(one.answer == "right" for one in further),
+        settle=settle,
+        raised=raised,
+        opened=list(_opened(verdicts, [*checked, *further], raised)),
+        reliability=list(_reliability([*checked, *further], proposals)),
+        moved=moved,
+    )
+
+
+def _raised(checked: Sequence[Checkable], settle: float) -> float:
+    """The least probability of a wrong verdict above which as few are wrong as promised, else the largest."""
+    wrong = sorted(one.said.probability for one in checked if one.answer == "wrong")
+    for most in wrong:
+        above = [one for one in checked if one.said.probability > most and one.answer != "unclear"]
+        if above and sum(one.answer == "wrong" for one in above) <= (1.0 - settle) * len(above):
+            return most
+    return wrong[-1]
+
+
+def _opened(
+    verdicts: Sequence[Checkable], checked: Sequence[Checkable], raised: float | None
+) -> Iterator[OpenedDocument]:
+    """What is no longer trusted: verdicts like those found wrong, and those that are not sure enough."""
+    likes = {
+        LikeDocument(
+            criterion=one.criterion, verdict=one.said.verdict, mistake=one.said.mistake,
+            most=one.said.probability,
+        ): one.student
+        for one in checked
+        if one.answer == "wrong" and one.by_audit
+    }  # fmt: skip
+    if raised is not None:
+        likes[LikeDocument(most=raised)] = ""
+    for like, student in likes.items():
+        count = sum(is_like(one.criterion, one.said, like) for one in verdicts)
+        yield OpenedDocument(like=like, student_id=student, count=count)
+
+
+def is_like(criterion: str, said: SaidDocument, like: LikeDocument) -> bool:
+    """Whether a verdict is one of those that are no longer trusted."""
+    if said.probability > like.most:
+        return False
+    return like.criterion is None or (criterion, said.verdict, said.mistake) == (
+        like.criterion, like.verdict, like.mistake
+    )  # fmt: skip
+
+
+def opened_in(report: ReportDocument, trust: TrustDocument | None) -> tuple[LikeDocument, ...]:
+    """What an audit opens of one submission."""
+    likes = () if trust is None else tuple(one.like for one in trust.opened)
+    own = [one for one in _of_report(report) if one.said.settled] if likes else []
+    return tuple(like for like in likes if any(is_like(one.criterion, one.said, like) for one in own))
+
+
+def with_said(report: ReportDocument, own: Judgement, decided: Collection[str]) -> ReportDocument:
+    """The report with what the program itself said, where the verdict is another one or a person's.
+
+    Arguments: `own` is the program's judgement, `decided` are the criteria that a person decided.
+    """
+    if all(one.confidence == 0.0 or one.verdict == "not_judged" for one in own.outcomes):
+        return report
+    said = {one.criterion: said_by(one) for one in own.outcomes}
+    stood = {one.criterion: one.verdict for one in own.outcomes}
+    criteria = [
+        one.model_copy(update={"said": said.get(one.id)})
+        if one.id in decided or stood.get(one.id, one.verdict) != one.verdict
+        else one
+        for one in report.criteria
+    ]
+    return report.model_copy(update={"criteria": criteria})
+
+
+def _reliability(
+    settled: Sequence[Checkable], proposals: Sequence[Checkable]
+) -> Iterator[ReliabilityDocument]:
+    """What was said against what was found, by source; undecidable verdicts tell nothing."""
+    for kind, verdicts in (("settled", settled), ("proposed", proposals)):
+        for source in ("printed", "plain", "entered"):
+            own = [one for one in verdicts if one.source == source and one.answer != "unclear"]
+            if own:
+                said = sum(one.said.probability for one in own) / len(own)
+                right = sum(one.answer == "right" for one in own)
+                yield ReliabilityDocument(source=source, kind=kind, count=len(own), right=right, said=said)
+
+
+# Marking ------------------------------------------------------------------------------------------
+
+
+def opened_by_audit(judgement: Judgement, rubric: RubricFile, likes: Sequence[LikeDocument]) -> Judgement:
+    """The judgement in which what an audit no longer trusts waits for a person."""
+    criteria = {one.id: one for one in rubric.criterion}
+    outcomes = tuple(
+        _open(one, share_of(rubric, criteria[one.criterion], one.verdict))
+        if any(_is_opened(one, like) for like in likes)
+        else one
+        for one in judgement.outcomes
+    )
+    if outcomes == judgement.outcomes:
+        return judgement
+    return replace(judgement, outcomes=outcomes, score=score(rubric, outcomes))
+
+
+def _is_opened(outcome: Outcome, like: LikeDocument) -> bool:
+    said = said_by(outcome)
+    checkable_here = not NOT_CHECKED & {reason.code for reason in outcome.reasons}
+    return said is not None and said.settled and checkable_here and is_like(outcome.criterion, said, like)
+
+
+def said_by(outcome: Outcome) -> SaidDocument | None:
+    """What an outcome says, as it stands in a report; None where nothing was judged."""
+    is_open = outcome.verdict == "review"
+    verdict = outcome.proposed_verdict if is_open else outcome.verdict
+    if verdict == "not_judged":
+        return None
+    return SaidDocument(
+        verdict=verdict, settled=not is_open, probability=outcome.probability, mistake=outcome.mistake
+    )
+
+
+def _open(outcome: Outcome, share: float) -> Outcome:
+    """A settled outcome, open between nothing and all points: a wrong one may be wrong in any way."""
+    best: Verdict = "follow_through" if outcome.verdict == "follow_through" else "full"
+    return replace(
+        outcome,
+        verdict="review",
+        possible=("none", best),
+        shares=(NONE, FULL),
+        proposed=outcome.shares[0] if outcome.shares else share,
+        probability=EVEN,
+        confidence=0.0,
+        reasons=(Reason(OPENED), *outcome.reasons),
+    )
