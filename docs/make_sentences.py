@@ -59,11 +59,14 @@ EXAMPLES: Mapping[str, str] = {
     "filed": "8", "areas": "lower left", "corners": "the lower left corner", "files": "38", "limit": "150",
     "students": "30", "right": "24", "audited": "24", "unclear": "1", "student": "s07",
     "criterion": "Acceleration of B", "allowed": "3\u00a0%", "raised": "98.2\u00a0%",
+    "times": "10",
 }  # fmt: skip
 """Parameters by name: after ``@`` a number with its unit; other texts of the catalogues are translated."""
 OTHERWISE: Mapping[str, Mapping[str, str]] = {
     "Draw %(first)s": {"first": "the line through %(tail)s and %(head)s", "second": "the guide of %(joint)s"},
     "The drawing gives": {"first": "@47.2 mm", "second": "@49.0 mm"},
+    "%(declared)s is declared": {"expected": "@0.4 (m/s)/mm", "factor": "%(times)s times too small"},
+    "No default": {"least": "80\u00a0%"},
     "The letters": {"first": "b", "second": "c"},
     "Through %(first)s": {"first": "n_BA", "second": "o'"},
     "All of": {"at": "the velocity plan"},
@@ -74,7 +77,6 @@ OTHERWISE: Mapping[str, Mapping[str, str]] = {
     "%(at)s is not drawn": {"at": "v_BA"},
     "It is too short for": {"length": "@2.4 mm"},
     "From %(start)s": {"direction": "parallel to %(link)s, from %(tail)s towards %(head)s"},
-    "Declared is": {"expected": "@0.036 (m/s)/mm"},
 }
 """Parameters of texts that begin so."""
 

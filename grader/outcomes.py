@@ -42,6 +42,8 @@ decided                                                                      a p
 found_wrong_elsewhere                                                        an audit found one like it wrong
 scale_refused         text, why                                              declared, not understood
 scale_off             declared, expected, unit                               declared, contradicted
+scale_seems_off       declared, expected, unit                               contradicted by what was
+                                                                             not read for certain
 scale_assumed         used, unit                                             not declared
 ===================== ====================================================== =========================
 """

@@ -198,9 +198,7 @@ def _hold_declared(task: Task, evidence: Evidence, name: str, scale: UsedScale, 
             drawn = evidence.drawn[f"{name[1]}_{task.pin}"]
             return Scale(scale, None, with_confidence(mark([]), drawn.confidence, task.rubric.doubt.settle))
         if _is_unseen(task, evidence, name, scale.used):
-            why = f"{name[1]}_{task.pin}, which tells it, was not read for certain"
-            unread = Reason("unread", {"reason": why})
-            return Scale(scale, None, MarkRange(NONE, NONE, FULL, (unread,), EVEN))
+            return _unseen(task, evidence, name, scale, doubtful)
         return Scale(scale, None, mark([]) if is_rule else None)
     other = _followed_instead(task, evidence, name, scale.used, None if is_rule else rule)
     if other is None:
@@ -217,6 +215,21 @@ def _hold_declared(task: Task, evidence: Evidence, name: str, scale: UsedScale, 
         reason=Reason("scale_off", params),
     )
     return Scale(scale, other, by_rule(mark([limit]), task.rubric.doubt.in_doubt))
+
+
+def _unseen(
+    task: Task, evidence: Evidence, name: str, scale: UsedScale, doubtful: tuple[float, float, float] | None
+) -> Scale:
+    """A declared scale that waits: what shows it was not read for certain.
+
+    Arguments: `doubtful` is what shows it as read, where that contradicts it.
+    """
+    unread = Reason("unread", {"reason": f"{name[1]}_{task.pin}, which tells it, was not read for certain"})
+    other = None if doubtful is None else doubtful[0] / doubtful[1]
+    if other is None or _fitting(task, evidence, name, other) <= _fitting(task, evidence, name, scale.used):
+        return Scale(scale, None, MarkRange(FULL, NONE, FULL, (unread,), EVEN))
+    params: dict[str, float | str] = {"declared": scale.used, "expected": other, "unit": unit_of(name)}
+    return Scale(scale, other, MarkRange(NONE, NONE, FULL, (Reason("scale_seems_off", params), unread), EVEN))
 
 
 def _is_unseen(task: Task, evidence: Evidence, name: str, scale: float) -> bool:

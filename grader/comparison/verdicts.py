@@ -405,7 +405,8 @@ def outcome(  # noqa: PLR0913 - one argument per field of the record
     lost = mark.share != FULL or not mark.is_certain or followed
     likely, probability = mark.share, mark.sure
     if not mark.is_certain and probability < EVEN:
-        likely, probability = (mark.best if likely == mark.worst else mark.worst), 1.0 - probability
+        # Most probably misread: what is off as read is right, and the other way round.
+        likely, probability = (mark.worst if likely == mark.best else mark.best), 1.0 - probability
     return Outcome(
         criterion=criterion.id,
         name=criterion.name,

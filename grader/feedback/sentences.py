@@ -27,8 +27,20 @@ UNSURE = "read_unsurely"
 """Stands for `unread` where something was read, though not surely, and for `doubtful` beside it."""
 UNCHECKED = "unchecked"
 """Stands where nothing was judged and no reason is given."""
+MISREAD = "misread"
+"""Stands for what is off as read, where it is proposed as right: most probably it was misread."""
 OPEN_ONLY = frozenset({"near_limit", "hand_may_miss", "doubtful", UNSURE})
 """Said of what waits alone: no doubt is left where there is a verdict."""
+RESIDUALS = frozenset(
+    {
+        "too_long", "too_short", "turned_left", "turned_right", "reversed", "should_be_zero",
+        "value_too_large", "value_too_small", "value_reversed", "scale_off", "not_drawn",
+        "not_certainly_within",
+    }
+)  # fmt: skip
+"""Said of what is off as it was read: not of what is proposed as right."""
+IN_FAVOUR = frozenset({"counted_for_you", "at_stake", "right"})
+"""Said of what counts: not of what is proposed as wrong."""
 
 HINTS: dict[str, str] = {
     "right": N_("Right."),
@@ -72,6 +84,8 @@ HINTS: dict[str, str] = {
         " that the drawing follows."
     ),
     UNSURE: N_("It was read with too little certainty."),
+    MISREAD: N_("It was probably misread; a person will look."),
+    "scale_seems_off": N_("The declared scale seems not to be the one that the drawing was made with."),
     UNCHECKED: N_("Nothing was drawn that it could be held against."),
 }
 """What is said at level `hint`, by code of the reason."""
@@ -95,6 +109,8 @@ FULL: dict[str, str] = {
     "entry_refused": N_("An entry that it rests on cannot be used (%(reason)s): a person must look."),
     "doubtful": N_("It was read with too little certainty (%(confidence)s)."),
     UNSURE: N_("It was read with too little certainty (%(reason)s)."),
+    MISREAD: N_("It was probably misread; the dotted stroke may be the one meant."),
+    "scale_seems_off": N_("%(declared)s is declared, %(expected)s was probably drawn with: %(factor)s."),
     "near_limit": N_(
         "It lies so near the limit of the tolerance that the scan cannot decide (standard error %(se)s)."
     ),
@@ -110,7 +126,7 @@ FULL: dict[str, str] = {
     "readings_disagree": N_("The drawing gives %(first)s, the entered measurement %(second)s."),
     "written_disagrees": N_("Drawn are %(drawn)s, written on the sheet %(written)s: a person must look."),
     "scale_refused": N_("The declared scale “%(text)s” could not be understood: %(why)s."),
-    "scale_off": N_("Declared is %(declared)s; the drawing and the data give %(expected)s."),
+    "scale_off": N_("%(declared)s is declared, %(expected)s was drawn with: %(factor)s."),
     "scale_assumed": N_("The scale was not declared; %(used)s was assumed."),
 }
 """What is said at level `full` where that differs."""
@@ -132,6 +148,8 @@ FOLLOWS: dict[str, str] = {
 NEARLY = N_("Held against your own earlier work it is nearly right; held against the data:")
 MAY_FOLLOW = N_("It may follow rightly from your own earlier work; held against the data:")
 """In place of `follows` where full marks do not follow, at level `full`."""
+PROBABLY_FOLLOWS = N_("It probably follows rightly from your own earlier work.")
+"""In place of `follows` where that is proposed."""
 
 MOST_REASONS = 3
 """More would hide the important ones."""
@@ -147,7 +165,8 @@ def criterion_feedback(
     if level == "symbol":
         return ""
     speaker = tongue(lang)
-    in_part = NEARLY if outcome.verdict == "partial" else MAY_FOLLOW
+    may = PROBABLY_FOLLOWS if outcome.verdict == "review" and outcome.proposed == 1.0 else MAY_FOLLOW
+    in_part = NEARLY if outcome.verdict == "partial" else may
     told = (
         speaker.gettext(in_part)
         if reason.code == "follows" and outcome.verdict != "follow_through"
@@ -174,6 +193,13 @@ def _worth_telling(outcome: Outcome, level: Level = "full") -> list[Reason]:
     if outcome.verdict == "follow_through" and "follows" in codes:
         return [one for one in outcome.reasons if one.code in {"follows", "counted_for_you", "at_stake"}]
     needless = {"right"} if codes - {"right"} else set()
+    if outcome.verdict == "review":
+        needless |= RESIDUALS if outcome.proposed == 1.0 else IN_FAVOUR
+        if outcome.proposed == 1.0 and codes & RESIDUALS and not codes & {"follows", "counted_for_you"}:
+            return [
+                Reason(MISREAD),
+                *(one for one in outcome.reasons if one.code in {"doubtful", "other_variant"}),
+            ]
     if outcome.verdict != "review":
         needless |= OPEN_ONLY
     if "doubtful" in codes:
@@ -351,7 +377,26 @@ def _speak(params: Mapping[str, Param], speaker: Tongue, names: Mapping[str, str
             said[key] = f"{speaker.number(100.0 * value, 0)}\N{NO-BREAK SPACE}%"
         else:
             said[key] = _real(speaker, value, unit)
+    if {"declared", "expected"} <= params.keys():
+        said["factor"] = _how_far_off(float(params["declared"]), float(params["expected"]), speaker)
     return said
+
+
+TOO_LARGE, TOO_SMALL = N_("%(times)s times too large"), N_("%(times)s times too small")
+SHARE_TOO_LARGE, SHARE_TOO_SMALL = N_("%(share)s too large"), N_("%(share)s too small")
+SEVERAL_TIMES = 1.5
+"""From this factor on a scale is said to be so many times too large, below it by so many per cent."""
+
+
+def _how_far_off(declared: float, right: float, speaker: Tongue) -> str:
+    """How far a declared scale is from the right one: "10 times too small", "5 % too large"."""
+    factor = declared / right if right else 1.0
+    ratio = max(factor, 1.0 / factor) if factor > 0.0 else 1.0
+    if ratio >= SEVERAL_TIMES:
+        text = TOO_LARGE if factor > 1.0 else TOO_SMALL
+        return speaker.gettext(text) % {"times": speaker.trimmed(ratio, 1 if ratio < 20.0 else 0)}
+    share = f"{speaker.number(100.0 * abs(factor - 1.0), 1)}\N{NO-BREAK SPACE}%"
+    return speaker.gettext(SHARE_TOO_LARGE if factor > 1.0 else SHARE_TOO_SMALL) % {"share": share}
 
 
 def _real(speaker: Tongue, value: float, unit: str) -> str:

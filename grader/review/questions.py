@@ -27,7 +27,7 @@ TEXTS = {
     "node": N_("node"),
     "corner": N_("corner"),
     "no_scan": N_("It was entered by hand: there is no scan of it."),
-    "choose": N_("There is no proposal: choose a verdict, 1 to 4."),
+    "choose": N_("Enter does nothing here: no proposal is sure enough. Choose a verdict, 1 to 4."),
     "gone": N_("The server does not answer. What was accepted is kept; start planmark review again."),
     "look_again": N_("look again"),
     "close": N_("close"),
@@ -53,6 +53,9 @@ PROPOSED = N_("proposed: %(verdict)s")
 ACCEPT = N_("Accept: %(verdict)s")
 NO_PROPOSAL = N_("No proposal: choose a verdict")
 GO_ON = N_("Go on")
+UNSURE = N_("No default below %(least)s: choose a verdict")
+SURE = 0.8
+"""A proposal of this probability is what Enter accepts; below it a person chooses without being led."""
 FAULT = "decision_fault"
 WHOLE_MARGIN = 0.03
 """Of a figure's size, where nothing else says what to look at."""
@@ -136,22 +139,39 @@ def question_facts(session: Session, student: Student, name: str, speaker: Tongu
     what = speaker.gettext(VERDICTS[proposed]) if proposed else ""
     if proposed and criterion.probability is not None:
         what = f"{what}, {per_cent(criterion.probability)}"
-    accept = ACCEPT if proposed else NO_PROPOSAL if criterion.verdict == OPEN else GO_ON
+    is_default = is_sure(criterion)
     said = speaker.gettext(PROPOSED) % {"verdict": what} if proposed else ""
     return {
         **row,
-        "proposed": proposed,
+        "proposed": proposed if is_default else None,
         "decided": criterion.verdict if decision and criterion.decided else "",
         "comment": decision.comment if decision else "",
         "position": "",
         "numbers": list(_numbers(criterion, speaker)),
         "state": _state(criterion, decision, said, speaker),
         "brief": said or speaker.gettext(VERDICTS[criterion.verdict]),
-        "accept": Markup("<kbd>Enter</kbd> {}").format(speaker.gettext(accept) % {"verdict": what}),
+        "accept": _accept(criterion, what, speaker),
         "why": _why(student, criterion, asked=row["asked"], speaker=speaker),
-        "sentence": symbols(session.sentence_if(student, criterion)) if accept != NO_PROPOSAL else "",
+        "sentence": symbols(session.sentence_if(student, criterion))
+        if is_default or criterion.verdict != OPEN
+        else "",
         "look": _look(session, student, criterion),
     }
+
+
+def is_sure(criterion: CriterionDocument) -> bool:
+    """Whether what is proposed for a criterion is sure enough to be the default."""
+    return criterion.proposed is not None and (criterion.probability or 0.0) >= SURE
+
+
+def _accept(criterion: CriterionDocument, what: str, speaker: Tongue) -> Markup:
+    """The words of the button that accepts the proposal, or why there is none."""
+    if criterion.verdict != OPEN or is_sure(criterion):
+        accept = ACCEPT if criterion.verdict == OPEN else GO_ON
+        return Markup("<kbd>Enter</kbd> {}").format(speaker.gettext(accept) % {"verdict": what})
+    if criterion.proposed is None:
+        return Markup.escape(speaker.gettext(NO_PROPOSAL))
+    return Markup.escape(speaker.gettext(UNSURE) % {"least": per_cent(SURE)})
 
 
 def _why(student: Student, criterion: CriterionDocument, *, asked: bool, speaker: Tongue) -> Markup:
@@ -185,8 +205,9 @@ def _numbers(criterion: CriterionDocument, speaker: Tongue) -> Iterator[tuple[st
         return " · ".join(quantity_cells(quantity, speaker))
 
     unit = criterion.expected.unit or criterion.measured.unit or ""
+    is_doubtful = criterion.verdict == OPEN and "doubtful" in criterion.reasons
     shown = (
-        (N_("Measured"), cells(criterion.measured)),
+        (N_("As read") if is_doubtful else N_("Measured"), cells(criterion.measured)),
         (N_("Expected"), cells(criterion.expected)),
         (N_("Tolerance"), " · ".join(tolerance_cells(criterion.tolerance, unit, speaker))),
         (N_("Points"), _points(criterion, speaker)),

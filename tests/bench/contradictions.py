@@ -25,6 +25,10 @@ COUNTED = {"counted_for_you", "at_stake"}
 """Reasons that say why more than the tolerance is right."""
 AGAINST_THE_DATA = "held against the data"
 """After it numbers are told that are not the row's: what was expected there follows from own values."""
+OFF = re.compile(
+    r"too (long|short) by|turned [\d.]+°|opposite way|is too (large|small)|times too (large|small)"
+)
+IN_FAVOUR = re.compile(r"counted for you|^Right\.")
 LENGTH = re.compile(r"too (long|short) by ([\d.]+)")
 TURN = re.compile(r"turned ([\d.]+)°")
 
@@ -32,7 +36,7 @@ TURN = re.compile(r"turned ([\d.]+)°")
 def contradictions(report: ReportDocument) -> Iterator[str]:
     """What a report says that its own numbers deny."""
     for criterion in report.criteria:
-        for what in (*_of_verdict(criterion), *_of_sentence(criterion)):
+        for what in (*_of_verdict(criterion), *_of_sentence(criterion), *_of_proposal(criterion)):
             yield f"{criterion.id}: {what}"
     yield from _of_mistakes(report)
     yield from _of_score(report)
@@ -102,6 +106,21 @@ def _of_sentence(criterion: CriterionDocument) -> Iterator[str]:
             yield f"'{told[0]}', but {offs[name]:.1f} by the numbers shown"
     if "points the opposite way" in said and offs.get("direction_deg", 0.0) < OPPOSITE_DEG:
         yield "opposite, but the directions shown are near"
+
+
+def _of_proposal(criterion: CriterionDocument) -> Iterator[str]:
+    """What is proposed against the sentence and the numbers beside it."""
+    said, proposed = criterion.feedback, criterion.proposed
+    if criterion.verdict != "review" or proposed is None:
+        return
+    if proposed in {"full", "follow_through"} and OFF.search(said):
+        yield f"proposed {proposed}, but '{said}'"
+    if proposed in {"partial", "none"} and IN_FAVOUR.search(said):
+        yield f"proposed {proposed}, but '{said}'"
+    measured, expected = criterion.measured, criterion.expected
+    is_same = measured.value is not None and measured.value == expected.value
+    if proposed == "none" and is_same and not OFF.search(said):
+        yield f"proposed none, but measured and expected are both {measured.value}"
 
 
 def _of_mistakes(report: ReportDocument) -> Iterator[str]:
