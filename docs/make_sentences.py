@@ -55,7 +55,7 @@ EXAMPLES: Mapping[str, str] = {
     "instead": "v_CA", "share": "62\u00a0%", "file": "class.csv", "most": "1000", "names": "v_A, v_B",
     "error": "line 3", "fields": "5", "column": "v_BB", "columns": "4", "mark": ",", "point": "O1",
     "mechanism": "crank-rocker", "level": "all", "what": "n", "last": "30", "value": "31", "called": "7",
-    "unfit": "14",
+    "unfit": "14", "unit": "cm", "axis": "+y",
     "filed": "8", "areas": "lower left", "corners": "the lower left corner", "files": "38", "limit": "150",
     "students": "30", "right": "24", "audited": "24", "unclear": "1", "student": "s07",
     "criterion": "Acceleration of B", "allowed": "3\u00a0%", "raised": "98.2\u00a0%",

@@ -148,6 +148,10 @@ class NamedMistake:
 
 def _detail(mistake: Mistake) -> dict[str, Param]:
     match mistake:
+        case Mistake(code="units", other=(slip, *more), factor=factor):
+            found: dict[str, Param] = {"slip": slip}
+            found |= {"axis" if slip == "axis" else "unit": one for one in more}
+            return found if abs(factor) == 1.0 else {**found, "factor": factor}
         case Mistake(code="scale_wrong" | "rpm_not_converted" | "arithmetic", factor=factor):
             return {} if factor == 1.0 else {"factor": factor}
         case Mistake(code="wrong_intersection", other=(name,)) if name[:2] in {"v_", "a_"}:

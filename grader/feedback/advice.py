@@ -118,6 +118,10 @@ LAWS: dict[str, str] = {
     "labels_swapped": N_("The vector from the pole to a letter belongs to the point with that letter."),
     "figure_rotated": N_("All directions of a plan are taken from the mechanism in the same position."),
     "arithmetic": N_("Drawn length = real value / scale."),
+    "units": N_(
+        "Lengths are in millimetres, directions in degrees counter-clockwise from the +x axis, values in SI"
+        " units."
+    ),
 }
 """The law that a mistake breaks, by its code."""
 _CORIOLIS = {

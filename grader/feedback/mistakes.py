@@ -116,7 +116,46 @@ MISTAKES: dict[str, Words] = {
         N_("The number at %(at)s does not follow from what it was computed from."),
         N_("Compute it once more; the drawing before it can stay."),
     ),
+    "units": Words(
+        N_("other units or signs"),
+        N_("%(at)s were entered in other units, or with other signs, than the assignment asks for."),
+        N_("Check the unit, the sense and the axis, and enter them again."),
+    ),
 }  # fmt: skip
+
+_UNITS: dict[str, Words] = {
+    "radians": Words(
+        N_("directions in radians"),
+        N_("The directions were entered in radians instead of degrees."),
+        N_("Multiply each direction by 180/π."),
+    ),
+    "clockwise": Words(
+        N_("directions clockwise"),
+        N_("The directions were measured clockwise instead of counter-clockwise: their signs are reversed."),
+        N_("Directions count counter-clockwise from the +x axis: reverse the sign of each."),
+    ),
+    "axis": Words(
+        N_("directions from another axis"),
+        N_("The directions were measured from the %(axis)s axis instead of the +x axis."),
+        N_("Directions count counter-clockwise from the +x axis: measure them from there."),
+    ),
+    "lengths": Words(
+        N_("lengths in another unit"),
+        N_("The lengths were entered in %(unit)s instead of mm."),
+        N_("Enter the lengths in millimetres."),
+    ),
+    "values": Words(
+        N_("values in another unit"),
+        N_("The values were computed in %(unit)s instead of SI units."),
+        N_("Enter velocities in m/s, accelerations in m/s², angular velocities in rad/s."),
+    ),
+    "exchanged": Words(
+        N_("kv and ka exchanged"),
+        N_("The scales kv and ka were exchanged: each was declared as the other one."),
+        N_("kv is the scale of velocities, ka that of accelerations: write each in its own place."),
+    ),
+}  # fmt: skip
+"""By which slip of units it is."""
 
 _CORIOLIS: dict[str, Words] = {
     "normal_missing": Words(
@@ -201,6 +240,17 @@ PRECISE: dict[str, tuple[str, ...]] = {
         N_("The drawing fits the data of position %(position)s."),
     ),
 }  # fmt: skip
+_PRECISE_UNITS: dict[str, tuple[str, ...]] = {
+    "radians": (
+        N_("The directions were entered in radians instead of degrees: each is %(factor)s times too small."),
+    ),
+    "lengths": (
+        N_("The lengths were entered in %(unit)s instead of mm: each is %(factor)s times too small."),
+    ),
+    "values": (
+        N_("The values were computed in %(unit)s instead of SI units: each is %(factor)s times too large."),
+    ),
+}  # fmt: skip
 """Better than `Words.what` where every name in it is known, the first that has all of its names."""
 PRECISE_ALONG_GUIDE: dict[str, tuple[str, ...]] = {
     "parallel_for_perpendicular": (
@@ -218,6 +268,9 @@ def precise(code: str, at: str, line: str, known: Collection[str]) -> str | None
     """The text that says what was done with all that is known of it; None where that is too little."""
     if at.startswith(CORIOLIS_END):
         return None
+    if code == "units":
+        texts = _PRECISE_UNITS.get(line, ())
+        return next((text for text in texts if set(_NAMED.findall(text)) <= set(known)), None)
     by_guide = line == ALONG_GUIDE and code in PRECISE_ALONG_GUIDE
     texts = PRECISE_ALONG_GUIDE[code] if by_guide else PRECISE.get(code, ())
     return next((text for text in texts if set(_NAMED.findall(text)) <= set(known)), None)
@@ -226,11 +279,15 @@ def precise(code: str, at: str, line: str, known: Collection[str]) -> str | None
 def words_of(code: str, at: str = "", line: str = "") -> Words:
     """The words for a mistake of this code made there, in a `line` along a guide or across a link.
 
+    Of a slip of units `line` is which one it is.
+
     Raises KeyError for a code that is not known.
     """
     usual = MISTAKES[code]
     if at.startswith(CORIOLIS_END):
         return _CORIOLIS.get(code, usual)
+    if code == "units":
+        return _UNITS.get(line, usual)
     return _BY_LINE.get(line, {}).get(code, usual)
 
 
@@ -253,6 +310,7 @@ QUESTIONS: dict[str, str] = {
     "labels_swapped": N_("At which points of your plan do the letters %(first)s and %(second)s stand?"),
     "figure_rotated": N_("Is all of %(at)s turned against the mechanism, or only its first vector?"),
     "arithmetic": N_("What length did you compute for the component that ends in %(at)s, and from what?"),
+    "units": N_("In which unit, in which sense and from which axis did you measure?"),
 }
 """What tells a mistake from others that explain the same: a question that the student can answer."""
 LEAST_KNOWN: dict[str, str] = {

@@ -318,14 +318,18 @@ _IMAGE, ACCELERATED = re.compile("[a-z][0-9]?'?"), "'"
 
 
 def line_of(mistake: NamedMistake) -> str:
-    """Which kind of line it was made in, as `words_of` takes it; empty where the code says enough."""
-    return str(mistake.detail.get("line", ""))
+    """Which kind of line or slip of units it is, as `words_of` takes it; empty where the code is enough."""
+    return str(mistake.detail.get("line", mistake.detail.get("slip", "")))
 
 
 PLACES = {
     "mechanism": N_("the mechanism"),
     "velocity_plan": N_("the velocity plan"),
     "acceleration_plan": N_("the acceleration plan"),
+    "directions": N_("the directions"),
+    "lengths": N_("the lengths"),
+    "scales": N_("the scales"),
+    "values": N_("the values"),
 }
 
 

@@ -7,7 +7,9 @@ import numpy as np
 
 from grader.comparison.criteria import NOT_DRAWN, Comparison, compare
 from grader.comparison.evidence import DrawnVector, Submission
+from grader.comparison.scales import Scale
 from grader.comparison.task import Task
+from grader.comparison.verdicts import NONE
 from grader.documents import Verdict
 from grader.marking.diagnosis import (
     LEAST_CONFIDENCE,
@@ -18,7 +20,8 @@ from grader.marking.diagnosis import (
     not_explained,
 )
 from grader.marking.drawn import case_of, explain
-from grader.marking.settling import at_stake, charged_where_made, of_another, of_nothing
+from grader.marking.settling import at_stake, charged_where_made, of_another, of_nothing, settled
+from grader.marking.units import EXCHANGED, Undone, undone, with_scales_exchanged
 from grader.outcomes import Judgement, NamedMistake, Outcome, Score
 from grader.records import Figure
 from grader.rubric import CriterionTable, RubricFile
@@ -30,6 +33,7 @@ from reference.plan import exact_plan
 from reference.replay.replay import Replay
 
 CHARGED = frozenset({"none", "partial"})
+CREDITED = frozenset({"full", "follow_through"})
 LOST = CHARGED | {"follow_through", "review"}
 """Verdicts for which the diagnosis seeks a cause, also where a person has still to decide."""
 AGREES, BY_CHANCE = 0.95, 0.03
@@ -39,6 +43,58 @@ AGREES, BY_CHANCE = 0.95, 0.03
 def judge(task: Task, submission: Submission) -> Judgement:
     """Verdicts, mistakes and points of one submission for one variant."""
     comparison = compare(task, submission, explain)
+    slips: list[tuple[Mistake, float]] = []
+    as_entered = comparison.outcomes
+    if any(one.verdict in LOST for one in comparison.outcomes):
+        exchanged = _with_scales_exchanged(task, submission, comparison)
+        if exchanged is not None:
+            submission, comparison = exchanged
+            slips.append((EXCHANGED, SLIPPED))
+        as_meant = undone(task, submission, comparison.evidence.measured, comparison.scales)
+        meant = None if as_meant is None else compare(task, as_meant.submission, explain)
+        if as_meant and meant and _is_explained_better(task, meant, comparison, as_meant):
+            submission, comparison = as_meant.submission, meant
+            slips += as_meant.slips
+    judgement = _judged(task, submission, comparison)
+    return with_slips_charged(task.rubric, judgement, as_entered, slips) if slips else judgement
+
+
+def _with_scales_exchanged(
+    task: Task, submission: Submission, comparison: Comparison
+) -> tuple[Submission, Comparison] | None:
+    """The submission with kv and ka exchanged, compared; None where that does not put both right."""
+    scales = [comparison.settled[name] for name in ("kv", "ka")]
+    other = with_scales_exchanged(submission)
+    if other is None or not all(map(_is_off, scales)):
+        return None
+    exchanged = compare(task, other, explain)
+    after = [exchanged.settled[name] for name in ("kv", "ka")]
+    are_other_units = all(one.used.refused for one in scales) and not any(one.used.refused for one in after)
+    return (other, exchanged) if are_other_units or not any(map(_is_off, after)) else None
+
+
+def _is_explained_better(task: Task, meant: Comparison, entered: Comparison, slips: Undone) -> bool:
+    """Whether a submission is explained better without its slips of units, these at their price."""
+    if not slips.is_drawing_changed:
+        return True
+    without = _cost_of(task, meant)
+    with_slips = None if without is None else _cost_of(task, entered)
+    return without is None or (with_slips is not None and without + slips.price < with_slips)
+
+
+def _cost_of(task: Task, comparison: Comparison) -> float | None:
+    """The cost of the likeliest explanation of a drawing; None where it may be right."""
+    found = comparison.explanation or explain(task, comparison.evidence, comparison.settled)
+    return found.explanations[0].cost if found.explanations else None
+
+
+def _is_off(scale: Scale) -> bool:
+    """Whether a declared scale was not understood, or is not the one that the drawing follows."""
+    return scale.used.refused is not None or (scale.other is not None and not scale.used.assumed)
+
+
+def _judged(task: Task, submission: Submission, comparison: Comparison) -> Judgement:
+    """The judgement of a submission that was compared."""
     surer = _confirmed(task, submission, comparison)
     if surer is not None:
         submission, comparison = surer, compare(task, surer, explain)
@@ -186,6 +242,47 @@ def with_mistake(outcome: Outcome, mistakes: Sequence[NamedMistake]) -> Outcome:
     if found is None or outcome.mistake is not None:
         return outcome
     return replace(outcome, mistake=found.code, cause=found)
+
+
+def with_slips_charged(
+    rubric: RubricFile,
+    judgement: Judgement,
+    as_entered: Sequence[Outcome],
+    slips: Sequence[tuple[Mistake, float]],
+) -> Judgement:
+    """The judgement of what was meant, with each slip of units charged once: where it shows first.
+
+    Arguments: `as_entered` are the outcomes of what was entered.
+    """
+    outcomes, named_slips = list(judgement.outcomes), []
+    for slip, probability in slips:
+        places = (
+            index
+            for index, (meant, entered) in enumerate(zip(outcomes, as_entered, strict=True))
+            if meant.verdict in CREDITED and _shows(slip, entered)
+        )
+        index = next(places, None)
+        criteria = () if index is None else (outcomes[index].criterion,)
+        one = NamedMistake(slip, criteria, probability)
+        named_slips.append(one)
+        if index is not None:
+            outcomes[index] = replace(
+                settled(as_entered[index], NONE, probability), mistake=one.code, cause=one
+            )
+    return replace(
+        judgement,
+        outcomes=tuple(outcomes),
+        mistakes=(*named_slips, *judgement.mistakes),
+        score=score(rubric, outcomes),
+    )
+
+
+def _shows(slip: Mistake, entered: Outcome) -> bool:
+    """Whether a criterion as entered loses by a slip of units: values apart from what was drawn."""
+    if slip.at == "scales":
+        return entered.name in SCALE_NAMES and entered.verdict not in CREDITED
+    is_value = {"value_too_large", "value_too_small"} & {one.code for one in entered.reasons}
+    return entered.verdict in CHARGED and (slip.at != "values" or bool(is_value))
 
 
 # Points --------------------------------------------------------------------------------------------

@@ -51,6 +51,7 @@ Code = Literal[
     "labels_swapped",
     "figure_rotated",
     "arithmetic",
+    "units",
 ]
 CODES: tuple[Code, ...] = get_args(Code)
 RPM_FACTOR = 30.0 / math.pi

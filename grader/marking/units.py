@@ -1,0 +1,339 @@
+"""Slips of units and signs: a whole submission entered in another unit, sense or axis.
+
+Each is a transformation of everything that was entered, tried before any mistake of a single step: the
+entries as they stand, the entries undone, and entries that fit nothing are compared by their likelihood.
+A slip of the drawing's entries counts only where both plans show it; what is left of the drawing is then
+explained both ways, and the slip is undone where that explains it better.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from grader.comparison.evidence import DrawnVector, Submission
+from grader.comparison.task import Task
+from grader.outcomes import UsedScale
+from grader.records import Reading, ReadVector
+from reference.construction.mistakes import RPM_FACTOR, Mistake
+from reference.geometry import FloatArray
+from reference.replay.explanations import AREA_MM
+from reference.replay.nothing import NOTHING_FITS
+
+BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+UNITS = "units"
+PRICE = 12.0
+"""Cost of each slip, -2 log of its probability: as rare as any other mistake."""
+STRAY = 0.1
+"""Share of the entries that may be anything: slips of units come with other mistakes."""
+CARES = (0.5, 1.0, 2.0, 8.0)
+"""Standard errors that are tried, as multiples of a tolerance's half: a drawing with mistakes in it, too."""
+FITS = 4.0
+"""Standard errors within which an entry fits: twice its tolerance."""
+LEAST_ENTRIES = 2
+"""Of each plan: fewer do not show what all of them have in common."""
+MOST_FIT = 0.5
+"""Where more of the entries fit as they stand, there is no slip in all of them."""
+SURE = 0.9
+"""A slip less probable than this is not undone."""
+DEGREE = math.pi / 180.0
+
+
+@dataclass(frozen=True, slots=True)
+class Undone:
+    """A submission without its slips of units, and the slips, each with its probability.
+
+    `entries` : how many vectors were measured
+    """
+
+    submission: Submission
+    slips: tuple[tuple[Mistake, float], ...]
+    entries: int = 0
+
+    @property
+    def is_drawing_changed(self) -> bool:
+        """Whether a slip is in the drawing's entries."""
+        return any(one.at in {"directions", "lengths"} for one, _ in self.slips)
+
+    @property
+    def price(self) -> float:
+        """The cost of the slips that change the drawing's entries, beside the cost of what was meant.
+
+        Costs are of densities per millimetre: what was entered lies closer together than what was meant.
+        """
+        of_drawing = [one for one, _ in self.slips if one.at in {"directions", "lengths"}]
+        closer = sum(2.0 * math.log(one.factor) for one in of_drawing if one.at == "lengths")
+        return PRICE * len(of_drawing) - closer * self.entries
+
+
+def undone(
+    task: Task, submission: Submission, drawn: Mapping[str, DrawnVector], scales: Mapping[str, UsedScale]
+) -> Undone | None:
+    """The submission with slips of units undone; None where it has none.
+
+    Arguments: `drawn` are its measured vectors, `scales` those used for marking.
+    """
+    slips: list[tuple[Mistake, float]] = []
+    if submission.measured is not None and not submission.readings:
+        entries = _Entries.of(task, drawn, scales)
+        for found in (_directions(entries), _lengths(entries)):
+            if found is not None:
+                submission = replace(submission, measured=_changed(submission.measured, found.change))
+                slips += [(one, found.probability) for one in found.mistakes]
+    of_values = _values(task, submission.values)
+    if of_values is not None:
+        mistake, names, probability = of_values
+        values = {
+            name: value / mistake.factor if name in names else value
+            for name, value in submission.values.items()
+        }
+        submission = replace(submission, values=values)
+        slips.append((mistake, probability))
+    return Undone(submission, tuple(slips), len(drawn)) if slips else None
+
+
+# What was entered ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class _Entries:
+    """Measured vectors beside the exact ones; arrays over the vectors.
+
+    Attributes
+    ----------
+    exact_mm, drawn_mm : lengths
+    exact_rad, drawn_rad : directions; nan where none was entered, or where the vector is too short for one
+    sigma_mm, sigma_rad : standard errors, half of a tolerance
+    plan : index of the plan
+    """
+
+    exact_mm: FloatArray
+    drawn_mm: FloatArray
+    exact_rad: FloatArray
+    drawn_rad: FloatArray
+    sigma_mm: FloatArray
+    sigma_rad: FloatArray
+    plan: FloatArray
+
+    @classmethod
+    def of(cls, task: Task, drawn: Mapping[str, DrawnVector], scales: Mapping[str, UsedScale]) -> "_Entries":
+        """The measured vectors that are asked for."""
+        # A scale that nobody declared was taken from the lengths themselves.
+        used = {**task.rule_scales, **{name: one.used for name, one in scales.items() if not one.assumed}}
+        rows = []
+        for name, one in drawn.items():
+            if name not in task.construction.vectors:
+                continue
+            exact, table = task.drawn(name, used), task.rubric.tolerance_of(name)
+            length = abs(exact)
+            is_directed = one.direction_rad is not None and length >= max(table.least_mm, 1.0)
+            turned = one.direction_rad if is_directed and one.direction_rad is not None else math.nan
+            across = math.atan(table.across_mm / max(length, table.across_mm))
+            rows.append(
+                (
+                    length,
+                    one.length_mm,
+                    float(np.angle(exact)),
+                    turned,
+                    table.length_at(length) / 2.0,
+                    max(math.radians(table.direction_deg), across) / 2.0,
+                    float(task.scale_of(name) == "ka"),
+                )
+            )
+        return cls(*np.array(rows or np.zeros((0, 7)), np.float64).reshape(-1, 7).T)
+
+    def only(self, which: BoolArray) -> "_Entries":
+        """Some of the entries."""
+        return _Entries(*(getattr(self, name)[which] for name in self.__slots__))
+
+    @property
+    def shows_both_plans(self) -> bool:
+        """Whether enough of the entries are in each plan."""
+        return bool(min(np.sum(self.plan == 0.0), np.sum(self.plan == 1.0)) >= LEAST_ENTRIES)
+
+
+def _cost(residuals: FloatArray, sigmas: FloatArray, anywhere: float) -> float:
+    """-2 log of the likelihood of residuals, some of which may be anything within a range."""
+    broad = STRAY / anywhere
+    costs = []
+    for care in CARES:
+        sigma = care * sigmas
+        density = np.exp(-0.5 * (residuals / sigma) ** 2) / (sigma * math.sqrt(math.tau))
+        costs.append(float(-2.0 * np.log((1.0 - STRAY) * density + broad).sum()))
+    return min(costs)
+
+
+def _share(residuals: FloatArray, sigmas: FloatArray) -> float:
+    """The share of the entries that fit."""
+    return float(np.mean(np.abs(residuals) <= FITS * sigmas))
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """Slips, how each vector is undone, and their probability."""
+
+    mistakes: tuple[Mistake, ...]
+    change: Callable[[ReadVector], ReadVector]
+    probability: float
+
+
+def _chosen(costs: Sequence[float], anything: float) -> tuple[int, float]:
+    """The likeliest hypothesis and its probability beside the others and beside entries that may be any."""
+    best = int(np.argmin(costs))
+    others = [*costs[:best], *costs[best + 1 :], NOTHING_FITS + anything]
+    return best, 1.0 / (1.0 + sum(math.exp(min(costs[best] - one, 0.0) / 2.0) for one in others))
+
+
+def _changed(measured: Reading, change: Callable[[ReadVector], ReadVector]) -> Reading:
+    figures = {
+        plan: replace(figure, vectors={name: change(one) for name, one in figure.vectors.items()})
+        for plan, figure in measured.figures.items()
+    }
+    return replace(measured, figures=figures)
+
+
+# Directions ---------------------------------------------------------------------------------------
+
+AXES = ("+x", "+y", "-x", "-y")
+"""From which directions were measured, by quarter turns counter-clockwise from +x."""
+MOST_RADIANS = 2.0 * math.pi + 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class _Convention:
+    """How directions were entered: in which unit, in which sense, from which axis."""
+
+    radians: bool
+    clockwise: bool
+    quarters: int
+
+    def undone(self, entered_rad: FloatArray) -> FloatArray:
+        """Directions, counter-clockwise from +x, nan where the entry cannot be one of these."""
+        angle = np.remainder(entered_rad, math.tau)
+        if self.radians:
+            # What was typed are degrees here; negative ones have become nearly 360.
+            typed = np.where(angle > math.pi, angle - math.tau, angle) / DEGREE
+            angle = np.where(np.abs(typed) <= MOST_RADIANS, typed, np.nan)
+        return np.asarray((-angle if self.clockwise else angle) + self.quarters * math.pi / 2.0)
+
+    @property
+    def mistakes(self) -> Iterator[Mistake]:
+        """The slips, one for each difference from the convention."""
+        if self.radians:
+            yield Mistake(UNITS, "directions", other=("radians",), factor=1.0 / DEGREE)
+        if self.clockwise:
+            yield Mistake(UNITS, "directions", other=("clockwise",), factor=-1.0)
+        if self.quarters:
+            yield Mistake(UNITS, "directions", other=("axis", AXES[self.quarters]))
+
+
+CONVENTIONS = tuple(_Convention(*one) for one in product((False, True), (False, True), range(4)))
+"""The first one is the right one."""
+
+
+def _directions(entries: _Entries) -> _Found | None:
+    """The slips in all directions, if any."""
+    entries = entries.only(np.isfinite(entries.drawn_rad))
+    if not entries.shows_both_plans:
+        return None
+    costs, residuals = [], np.zeros(0)
+    for one in reversed(CONVENTIONS):
+        turned = np.remainder(one.undone(entries.drawn_rad) - entries.exact_rad + math.pi, math.tau) - math.pi
+        residuals = np.where(np.isfinite(turned), turned, math.pi)
+        costs.append(_cost(residuals, entries.sigma_rad, math.tau) + PRICE * len([*one.mistakes]))
+    costs.reverse()
+    best, probability = _chosen(costs, 2.0 * math.log(math.tau) * len(entries.plan))
+    convention = CONVENTIONS[best]
+    # The residuals of the last one tried are those of the entries as they stand.
+    if best == 0 or probability < SURE or _share(residuals, entries.sigma_rad) > MOST_FIT:
+        return None
+
+    def change(vector: ReadVector) -> ReadVector:
+        if vector.direction_deg is None:
+            return vector
+        angle = convention.undone(np.array([math.radians(vector.direction_deg)]))[0]
+        if not math.isfinite(angle):
+            return vector
+        return replace(vector, direction_deg=math.degrees(angle) % 360.0)
+
+    return _Found(tuple(convention.mistakes), change, probability)
+
+
+# Lengths ------------------------------------------------------------------------------------------
+
+LENGTH_UNITS: Mapping[str, float] = {"cm": 10.0, "m": 1000.0}
+PAPER_MM = 420.0
+"""Where declared scales ask for vectors longer than an A3 sheet, these are wrong, not the lengths."""
+
+
+def _lengths(entries: _Entries) -> _Found | None:
+    """The unit of all lengths, where that is not millimetres."""
+    if not entries.shows_both_plans:
+        return None
+    factors = {"mm": 1.0}
+    if float(entries.exact_mm.max()) <= PAPER_MM:
+        factors |= LENGTH_UNITS
+    residuals = {unit: entries.drawn_mm * factor - entries.exact_mm for unit, factor in factors.items()}
+    costs = [
+        _cost(one, entries.sigma_mm, AREA_MM) + (0.0 if unit == "mm" else PRICE)
+        for unit, one in residuals.items()
+    ]
+    best, probability = _chosen(costs, 2.0 * math.log(AREA_MM) * len(entries.plan))
+    unit = [*factors][best]
+    if unit == "mm" or probability < SURE or _share(residuals["mm"], entries.sigma_mm) > MOST_FIT:
+        return None
+    factor = factors[unit]
+
+    def change(vector: ReadVector) -> ReadVector:
+        return vector if vector.length_mm is None else replace(vector, length_mm=vector.length_mm * factor)
+
+    return _Found((Mistake(UNITS, "lengths", other=("lengths", unit), factor=factor),), change, probability)
+
+
+# Values -------------------------------------------------------------------------------------------
+
+VALUE_UNITS: Mapping[str, tuple[str, float]] = {
+    "cm/s": ("va", 100.0),
+    "mm/s": ("va", 1000.0),
+    "rev/min": ("o", RPM_FACTOR),
+    "deg/s": ("oe", 1.0 / DEGREE),
+}
+"""By unit, the first letters of the quantities that are in it, and the factor of all of them."""
+RELATIVE_SIGMA = 0.03
+"""Standard error of a value's logarithm: of a length measured by hand and a scale."""
+VALUE_RANGE = 10.0
+"""Of a logarithm: a wrong value may be anything between a hundredth and a hundredfold."""
+
+
+def _values(task: Task, values: Mapping[str, float]) -> tuple[Mistake, frozenset[str], float] | None:
+    """The unit of all computed values of a kind, where that is not the SI's, and which values these are."""
+    right = {**{name: abs(real) for name, real in task.real.items()}, **task.rates}
+    known = {name: value for name, value in values.items() if value and right.get(name)}
+    for unit, (kinds, factor) in VALUE_UNITS.items():
+        names = [name for name in known if name[0] in kinds]
+        if len(names) < LEAST_ENTRIES:
+            continue
+        logs = np.log([abs(known[name] / right[name]) for name in names])
+        sigmas = np.full(len(names), RELATIVE_SIGMA)
+        residuals = (logs, logs - math.log(factor))
+        costs = [_cost(one, sigmas, VALUE_RANGE) for one in residuals]
+        best, probability = _chosen((costs[0], costs[1] + PRICE), 2.0 * math.log(VALUE_RANGE) * len(names))
+        if best and probability >= SURE and _share(residuals[0], sigmas) <= MOST_FIT:
+            mistake = Mistake(UNITS, "values", other=("values", unit), factor=factor)
+            return mistake, frozenset(names), probability
+    return None
+
+
+# Scales -------------------------------------------------------------------------------------------
+
+EXCHANGED = Mistake(UNITS, "scales", other=("exchanged",))
+
+
+def with_scales_exchanged(submission: Submission) -> Submission | None:
+    """The submission with what was declared as kv and ka exchanged; None unless both were declared."""
+    kv, ka = (submission.declared.get(name, "").strip() for name in ("kv", "ka"))
+    if not kv or not ka or kv == ka:
+        return None
+    return replace(submission, declared={**submission.declared, "kv": ka, "ka": kv})
