@@ -254,6 +254,18 @@ def review(
 
 
 @app.command()
+def collect(
+    folder: ResultsArgument,
+    file: Annotated[Path, typer.Option("--to", help="The .zip file to write; F.preview is made beside it.")],
+    jobs: JobsOption = None,
+) -> None:
+    """Give away sheets without names, with the decisions as truth; each page is looked at before."""
+    from grader.cli.collecting import collect_class
+
+    raise typer.Exit(1 if collect_class(folder, file, jobs) else 0)
+
+
+@app.command()
 def serve(
     data: Annotated[
         Path, typer.Argument(help="The folder that everything is kept in; made if it is not there.")

@@ -92,17 +92,18 @@ def overlay(
             behind.page_mm, reading, vectors, outcomes, show_expected=show_expected, links=links or {}
         )
     plain = _grey(cv2.LUT(scan, _FEW_TONES))
-    png = _encode(".png", paint(plain, scene), _FLAT_PNG)
+    png = encode(".png", paint(plain, scene), _FLAT_PNG)
     return Picture(behind.source, behind.page, png, _smaller(scan, plain), scene)
 
 
 def _smaller(scan: GreyImage, plain: GreyImage) -> bytes:
     """A cleaned scan as a small file: pencil on white paper needs few tones, a photo's shades many."""
-    jpeg = _encode(".jpg", scan, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    return min(jpeg, _encode(".png", plain, _FLAT_PNG), key=len)
+    jpeg = encode(".jpg", scan, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    return min(jpeg, encode(".png", plain, _FLAT_PNG), key=len)
 
 
-def _encode(kind: str, image: NDArray[np.uint8], options: list[int]) -> bytes:
+def encode(kind: str, image: NDArray[np.uint8], options: list[int]) -> bytes:
+    """A picture as a file of this kind, `.png` or `.jpg`, without any metadata."""
     encoded, data = cv2.imencode(kind, image, options)
     if not encoded:
         raise ValueError(f"expected an image that can be stored as {kind}, got shape {image.shape}")
@@ -143,7 +144,7 @@ def cut(page: Page, sheet: Sheet | None, box: Box, px_per_mm: float) -> bytes:
     part = cut_out(averaged(page.grey, less), reduction(1.0 / less) @ to_px, box, scale, outside=255)
     if not part.size:  # nothing of the page is there
         part = np.full((1, 1), 255, np.uint8)
-    return _encode(".jpg", part, [cv2.IMWRITE_JPEG_QUALITY, CUT_QUALITY])
+    return encode(".jpg", part, [cv2.IMWRITE_JPEG_QUALITY, CUT_QUALITY])
 
 
 def _clean(grey: GreyImage) -> GreyImage:

@@ -6,12 +6,14 @@ import platform
 import sys
 from dataclasses import asdict, dataclass
 from itertools import chain
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
+from tests.bench.collected import measured
 from tests.bench.judging import JudgingBench
 from tests.bench.judging_tally import JudgingFigures, judging_tables
 from tests.bench.lines import LinesFigures, lines_tables
@@ -67,6 +69,9 @@ class Report:
 def main(arguments: list[str]) -> None:
     """Measure the parts asked for, all by default, and print the figures."""
     asked = _parser().parse_args(arguments)
+    if asked.collected is not None:
+        print(measured(asked.collected, asked.assignment))
+        return
     parts = [part for part in PARTS if getattr(asked, part)] or PARTS
     quick, students = asked.quick, asked.students
     solver = SolverBench(quick) if "solver" in parts else None
@@ -101,6 +106,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--reading", action="store_true", help="simulated scenes, foreign pages, strokes")
     parser.add_argument("--judging", action="store_true", help="verdicts, mistakes named, time")
     parser.add_argument("--students", type=int, help="per scene of the reading, per kind of class")
+    parser.add_argument(
+        "--collected", type=Path, metavar="F.zip", help="only this: points on sheets of `planmark collect`"
+    )
+    parser.add_argument("--assignment", help="of --collected, where it is not a built-in one: its file")
     parser.add_argument("--quick", action="store_true", help="a few sheets and cases only")
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
     return parser

@@ -1,0 +1,381 @@
+"""Sheets that a department may give away: no names, no title blocks, no metadata; decisions are the truth.
+
+Two steps, so that nothing leaves unseen. The first writes a preview: each page as it would be given, a page
+on which to look at them, and `pages.csv` with an empty column. The second gives away the pages that say yes,
+as they were seen. Pages stand in random order, under numbers. No student, date, file name or path is told.
+"""
+
+import csv
+import io
+import json
+import zipfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from random import SystemRandom
+from typing import Any, Literal
+
+import numpy as np
+
+from grader.documents import CriterionDocument, ReportDocument
+from grader.feedback.words import environment
+from grader.files import make_folder, write_whole
+from grader.folder.batch import Batch, Graded, pages_read
+from grader.folder.cache import digest_of
+from grader.inputs.decision_texts import audit_answer
+from grader.overlay.covered import Keep, bare_png, covered, painted, reopened, upright_pixels
+from grader.records import MECHANISM, ZONE_SLACK_MM, Box, FloatArray, ScannedPage, Sheet
+from grader.scan.decode.pages import decode
+from grader.scan.handwriting.lines import find_lines
+from grader.scan.pixels import TITLE_BLOCK_MM, mapped
+from reference.construction.graph import Construction
+from reference.errors import CallError
+from reference.plan import construction_for
+
+PAGES, TRUTH, STATE, LOOK = "pages.csv", "truth.jsonl", "state.txt", "index.html"
+COLUMNS = ("page", "give_away", "cover")
+YES, NO = frozenset({"yes", "da", "да"}), frozenset({"no", "nu", "нет"})
+USUAL_BLOCK_MM = (200.0, 70.0)
+"""ISO 7200 and GOST 2.104: 180 to 185 by 55 mm at most, 10 mm from the paper's edges."""
+OF_SHEET = ("page_mm", "px_per_mm", "method", "residual_mm", "scale_se", "drawable_mm", "zones")
+"""What is told of a page's registration beside `mm_to_px`."""
+EPOCH = (1980, 1, 1, 0, 0, 0)
+"""The earliest date that a ZIP file can hold: no date is told."""
+SCHEMA_VERSION = 1
+By = Literal["moved", "audited", "decided", "program", "disputed"]
+"""Who vouches for a point: a person put it there, found the verdict that rests on it right, decided as the
+program had proposed; nobody but the program; or a person found the verdict wrong."""
+_RANK: Mapping[By, int] = {"program": 0, "decided": 1, "audited": 2, "disputed": 3, "moved": 4}
+Row = dict[str, Any]
+"""An object of JSON."""
+Known = tuple[ScannedPage, Construction, Row]
+"""A page, how it is constructed, and what is known of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Collected:
+    """What a step did.
+
+    Attributes
+    ----------
+    preview : the folder in which pages are looked at
+    given : how many pages were written; None where the preview was made, or waits for a person
+    waiting : pages that a person must (again) look at
+    left_out : pages that cannot be given away at all
+    """
+
+    preview: Path
+    given: int | None
+    waiting: tuple[str, ...] = ()
+    left_out: int = 0
+
+
+def preview_of(file: Path) -> Path:
+    """The folder of the preview of a file."""
+    return file.with_suffix(".preview")
+
+
+def check_target(file: Path) -> None:
+    """Raise CallError for a file that cannot be written, or a folder that is no preview."""
+    if file.suffix.lower() != ".zip":
+        raise CallError("not_a_zip", f"--to {file}: name a .zip file")
+    if file.exists():
+        raise CallError("file_exists", f"{file} is there already; name another file or remove it")
+    preview = preview_of(file)
+    if preview.exists() and not (preview / STATE).is_file():
+        raise CallError("file_exists", f"{preview} is there already and is no preview; name another file")
+
+
+def check_scans(batch: Batch, reports: Sequence[ReportDocument]) -> None:
+    """Raise CallError where scans that the results came from are no longer in their folder."""
+    files = {sheet.source for report in reports for sheet in report.reading.sheets}
+    gone = sorted(file for file in files if not (batch.folder / file).is_file())
+    if gone:
+        named = f"{', '.join(gone[:3])}{' ...' if len(gone) > 3 else ''}"
+        raise CallError(
+            "scans_moved",
+            f"{batch.folder}: {len(gone)} scan(s) are not there any more ({named}); grade again",
+        )
+
+
+# The preview --------------------------------------------------------------------------------------
+
+
+def collect(batch: Batch, graded: Graded, file: Path) -> Collected:
+    """Make the preview; where there is one that a person has looked at, write the file.
+
+    Raises CallError for a preview of another state of the class, or answers that cannot be understood.
+    """
+    preview, known = preview_of(file), list(_known(batch, graded))
+    state = digest_of([(page.ref.digest, page.ref.page, row) for page, _, row in known])
+    if not preview.exists():
+        return _make(preview, known, state, batch.lang)
+    if (preview / STATE).read_text(encoding="utf-8") != state:
+        why = "scans or decisions have changed since the pages were looked at; remove it, and begin again"
+        raise CallError("preview_outdated", f"{preview}: {why}")
+    return _give(preview, file, batch.lang)
+
+
+def _make(preview: Path, known: Sequence[Known], state: str, lang: str) -> Collected:
+    order = list(known)
+    SystemRandom().shuffle(order)
+    rows: list[Row] = []
+    cells: list[tuple[str, str, str]] = []
+    left_out = 0
+    make_folder(preview)
+    for page, construction, row in order:
+        made = _anonymous(page, construction)
+        if made is None:
+            left_out += 1
+            continue
+        name = f"{len(rows) + 1:04}.png"
+        write_whole(preview / name, made[0])
+        cells.append((name, "", ""))
+        rows.append({"page": name, "mm_to_px": made[1].tolist(), **row})
+    write_whole(preview / TRUTH, _lines(rows))
+    _ask(preview, cells, lang)
+    write_whole(preview / STATE, state)
+    return Collected(preview, None, tuple(name for name, *_ in cells), left_out)
+
+
+def _ask(preview: Path, cells: Sequence[tuple[str, str, str]], lang: str) -> None:
+    """Write the page on which a person looks, and the table of the answers so far."""
+    write_whole(preview / PAGES, _table(cells))
+    write_whole(preview / LOOK, environment(lang).get_template("collect.html").render(pages=cells))
+
+
+def _lines(rows: Sequence[Row]) -> str:
+    return "".join(f"{json.dumps(row)}\n" for row in rows)
+
+
+def _table(cells: Sequence[tuple[str, str, str]]) -> str:
+    buffer = io.StringIO()
+    csv.writer(buffer, lineterminator="\r\n").writerows([COLUMNS, *cells])
+    return buffer.getvalue()
+
+
+def _anonymous(page: ScannedPage, construction: Construction) -> tuple[bytes, FloatArray] | None:
+    """The picture that is left of a page, and the map from mm to its pixels; None where no figure is left."""
+    sheet, keep = page.sheet, keep_of(page, construction)
+    if sheet is None or keep is None:
+        return None
+    grey, mm_to_px = upright_pixels(decode(page.ref), sheet)
+    return bare_png(covered(grey, mm_to_px, sheet.px_per_mm, keep)), mm_to_px
+
+
+def keep_of(page: ScannedPage, construction: Construction) -> Keep | None:
+    """What stays of a page; None where no figure was read, or one lies where the title block is."""
+    if page.sheet is None or page.ink is None:
+        return None
+    keep = Keep(
+        zones=[_slack(box) for box in page.sheet.zones.values()],
+        writing=[line.box for line in find_lines(page.ink.where)],
+        signs=[
+            *map(_box, page.ink.marks),
+            *([] if page.ink.letters is None else map(_box, page.ink.letters.box_mm)),
+        ],
+    )
+    ends = [(one.tail, one.head) for one in construction.vectors.values()]
+    ends += construction.links.values()
+    for figure in page.reading.figures.values():
+        nodes = {name: np.array([one.at.real, -one.at.imag]) for name, one in figure.nodes.items()}
+        if len(nodes) > 1:
+            keep.figures.append(np.array([*nodes.values()]))
+            keep.strokes += [np.array([nodes[a], nodes[b]]) for a, b in ends if a in nodes and b in nodes]
+    if not keep.figures:
+        return None
+    if not page.sheet.zones:
+        keep.block = _title_block(page.sheet, np.concatenate(keep.figures))
+    return keep if page.sheet.zones or keep.block is not None else None
+
+
+def _title_block(sheet: Sheet, points: FloatArray) -> Box | None:
+    """The corner in which the title block may lie, as large as figures allow; None where they lie in it."""
+    wide, high = sheet.page_mm
+    for size in (TITLE_BLOCK_MM, USUAL_BLOCK_MM):
+        x, y = wide - size[0], high - size[1]
+        if not np.any((points[:, 0] > x) & (points[:, 1] > y)):
+            return x, y, *size
+    return None
+
+
+def _slack(box: Box) -> Box:
+    x, y, wide, high = box
+    return x - ZONE_SLACK_MM, y - ZONE_SLACK_MM, wide + 2 * ZONE_SLACK_MM, high + 2 * ZONE_SLACK_MM
+
+
+def _box(row: FloatArray) -> Box:
+    x, y, wide, high = (float(side) for side in row)
+    return x, y, wide, high
+
+
+# The truth ----------------------------------------------------------------------------------------
+
+
+def _known(batch: Batch, graded: Graded) -> Iterator[Known]:
+    """The pages with figures, each with what is known of it, in the order of the class."""
+    for job, report in zip(graded.jobs, graded.results.reports, strict=True):
+        variant = job.submission.variant
+        if variant is None or not report.criteria:
+            continue
+        construction = construction_for(
+            batch.assignment, [variant], accelerations=batch.rubric.needs_accelerations
+        )
+        by = vouched(report, construction)
+        for page, read in zip(pages_read(batch, graded.cache, job), report.reading.sheets, strict=True):
+            if page.sheet is None or not read.figures:
+                continue
+            yield page, construction, {
+                "schema_version": SCHEMA_VERSION,
+                "assignment": report.assignment,
+                "n": variant.n,
+                "position": variant.position,
+                "scales": {name: scale.used for name, scale in report.scales.items()},
+                "sheet": {name: getattr(page.sheet, name) for name in OF_SHEET},
+                "figures": {
+                    figure: {
+                        name: [round(node.x_mm, 3), round(node.y_mm, 3), by.get((figure, name), "program")]
+                        for name, node in one.nodes.items()
+                    }
+                    for figure, one in read.figures.items()
+                },
+            }  # fmt: skip
+
+
+def vouched(report: ReportDocument, construction: Construction) -> dict[tuple[str, str], By]:
+    """Who vouches for each point, by figure and node; points that nobody looked at are absent."""
+    audits = {
+        row.criterion[6:]: row.verdict for row in report.decisions if row.criterion.startswith("audit:")
+    }
+    found: dict[tuple[str, str], By] = {}
+    for criterion in report.criteria:
+        by = _by(criterion, audits.get(criterion.id))
+        if by is not None:
+            for place in _ends(criterion, construction):
+                if _RANK[by] > _RANK[found.get(place, "program")]:
+                    found[place] = by
+    for row in report.decisions:
+        kind, _, place_name = row.criterion.partition(":")
+        if kind == "node":
+            figure, _, node = place_name.partition(":")
+            found[figure, node] = "moved"
+    return found
+
+
+def _by(criterion: CriterionDocument, audit: str | None) -> By | None:
+    """Whether a person found the verdict that the program gave right; None where nobody looked."""
+    if audit is not None and audit_answer(audit).answer != "unclear":
+        return "audited" if audit_answer(audit).answer == "right" else "disputed"
+    if criterion.decided is None or criterion.said is None or criterion.verdict == "not_judged":
+        return None
+    return "decided" if criterion.verdict == criterion.said.verdict else "disputed"
+
+
+def _ends(criterion: CriterionDocument, construction: Construction) -> list[tuple[str, str]]:
+    """Figure and node of both ends of what a criterion asks for, as far as it is drawn."""
+    vector = construction.vectors.get(criterion.vector or "")
+    if vector is not None:
+        return [(construction.figure_of(vector.head), end) for end in (vector.tail, vector.head)]
+    return [(MECHANISM, end) for end in construction.links.get(criterion.link or "", ())]
+
+
+# What is given away -------------------------------------------------------------------------------
+
+
+def _give(preview: Path, file: Path, lang: str) -> Collected:
+    """Write the pages that a person looked at and said yes to."""
+    rows = [json.loads(line) for line in (preview / TRUTH).read_text(encoding="utf-8").splitlines()]
+    answers = read_answers(preview, [row["page"] for row in rows])
+    again = tuple(name for name, (_, boxes) in answers.items() if boxes)
+    for name in again:
+        grey = reopened((preview / name).read_bytes())
+        if grey is not None:
+            write_whole(preview / name, bare_png(painted(grey, answers[name][1])))
+    if again:
+        rows = [_uncovered(row, answers[row["page"]][1]) for row in rows]
+        write_whole(preview / TRUTH, _lines(rows))
+        words = {True: "yes", False: "no", None: ""}
+        cells = [(name, "" if name in again else words[said], "") for name, (said, _) in answers.items()]
+        _ask(preview, cells, lang)
+    waiting = again or tuple(name for name, (said, _) in answers.items() if said is None)
+    if waiting:
+        return Collected(preview, None, waiting)
+    given = [row for row in rows if answers[row["page"]][0]]
+    if not given:
+        raise CallError("nothing_to_give", f"{preview / PAGES}: no page says yes")
+    _write_zip(preview, file, given)
+    return Collected(preview, len(given))
+
+
+def read_answers(preview: Path, pages: Sequence[str]) -> dict[str, tuple[bool | None, list[Box]]]:
+    """What a person said of each page: whether it is given away (None: nothing yet), and boxes to paint.
+
+    Raises CallError with all that cannot be understood.
+    """
+    path = preview / PAGES
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise CallError(
+            "answers_wrong", f"{path}: cannot be read ({error}); remove {preview}, begin again"
+        ) from error
+    table = list(csv.DictReader(io.StringIO(text), delimiter=";" if ";" in text.partition("\n")[0] else ","))
+    found: dict[str, tuple[bool | None, list[Box]]] = {}
+    faults = []
+    for line, row in enumerate(table, 2):
+        cell = {name: (row.get(name) or "").strip() for name in COLUMNS}
+        said, boxes = cell["give_away"].lower(), _boxes(cell["cover"])
+        if cell["page"] not in pages or cell["page"] in found:
+            faults.append(f"line {line}: '{cell['page'][:40]}' is no page of this preview, or is there twice")
+        elif said not in {"", *YES, *NO}:
+            faults.append(f"line {line}: give_away '{said[:40]}': write yes or no")
+        elif boxes is None:
+            faults.append(
+                f"line {line}: cover: write x y width height in pixels of the picture, several with ; between"
+            )
+        else:
+            found[cell["page"]] = (None if not said else said in YES), boxes
+    faults += [f"{name} is missing" for name in pages if name not in found] if not faults else []
+    if faults:
+        more = f"\n... and {len(faults) - 5} more" if len(faults) > 5 else ""
+        raise CallError("answers_wrong", f"{path}:\n" + "\n".join(faults[:5]) + more)
+    return found
+
+
+def _boxes(text: str) -> list[Box] | None:
+    try:
+        boxes = [tuple(float(side) for side in part.split()) for part in text.split(";") if part.strip()]
+    except ValueError:
+        return None
+    good = all(len(box) == 4 and min(box) >= 0.0 and max(box) < 1e5 for box in boxes)
+    return [(box[0], box[1], box[2], box[3]) for box in boxes] if good else None
+
+
+def _uncovered(row: Row, boxes: Sequence[Box]) -> Row:
+    """The truth without the points over which paper was painted."""
+    mm_to_px = np.array(row["mm_to_px"])
+
+    def is_left(x: float, y: float) -> bool:
+        ((u, v),) = mapped(mm_to_px, np.array([(x, y)]))
+        return not any(left <= u <= left + wide and top <= v <= top + high for left, top, wide, high in boxes)
+
+    figures = {
+        figure: {name: node for name, node in nodes.items() if is_left(node[0], node[1])}
+        for figure, nodes in row["figures"].items()
+    }
+    return {**row, "figures": figures}
+
+
+def _write_zip(preview: Path, file: Path, rows: Sequence[Row]) -> None:
+    """Write the file: its pictures with pixels alone, its entries without a date."""
+    buffer = io.BytesIO()
+    given = []
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for number, row in enumerate(rows, 1):
+            grey = reopened((preview / row["page"]).read_bytes())
+            if grey is None:
+                raise CallError("answers_wrong", f"{preview / row['page']}: is no picture any more")
+            given.append({**row, "page": f"{number:04}.png"})
+            archive.writestr(zipfile.ZipInfo(given[-1]["page"], EPOCH), bare_png(grey))
+        archive.writestr(zipfile.ZipInfo(TRUTH, EPOCH), _lines(given))
+    write_whole(file, buffer.getvalue())
