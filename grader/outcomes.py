@@ -30,7 +30,9 @@ counted_for_you       beyond, good_to, what                                  bey
                                                                              reading's error: counted
 not_certainly_within  beyond, good_to, what                                  within it by less: not counted
 at_stake                                                                     too little is left open
-other_variant         whose                                                  another student's data
+other_variant,        whose                                                  another student's data; the own
+data_misread                                                                 ones misread
+data_unclear                                                                 it may follow other data
 not_explained         unfit, of                                              no explanation fits the plan
 hand_may_miss                                                                off by no more than a careful
                                                                              hand may miss what is
@@ -48,6 +50,7 @@ scale_assumed         used, unit                                             not
 ===================== ====================================================== =========================
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -158,8 +161,11 @@ def _detail(mistake: Mistake) -> dict[str, Param]:
             return {"instead": name}
         case Mistake(code="labels_swapped", other=(first, second)):
             return {"first": first, "second": second}
-        case Mistake(code="other_variant", n=n, position=position):
-            return {key: value for key, value in (("n", n), ("position", position)) if value is not None}
+        case Mistake(code="other_variant", n=n, position=position, at=at):
+            whose = (("n", n), ("position", position), ("part", at if at.endswith("_plan") else None))
+            return {key: value for key, value in whose if value is not None}
+        case Mistake(code="data_misread", parameters={"angle crank": angle}):
+            return {"crank_deg": round(math.degrees(float(angle)) % 360.0, 1)}
         case Mistake(code="figure_rotated", quarters=quarters) if quarters:
             return {"degrees": 90.0 * quarters}
         case Mistake(other=other) if other:

@@ -1,5 +1,6 @@
 """The student's own nodes, from the sheet or from measured lengths, and the mechanism they belong to."""
 
+import cmath
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -10,12 +11,12 @@ import numpy as np
 from grader.comparison.evidence import DrawnVector, Evidence
 from grader.comparison.task import Task
 from grader.records import MECHANISM
+from grader.rubric import ToleranceTable
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.elements import Coriolis, Normal, Parameters, View
-from reference.construction.graph import Construction, Vector, evaluate, parameters_of
+from reference.construction.graph import Construction, Vector, evaluate
 from reference.construction.steps import ArcAndLine, Given, Step, TwoArcs
 from reference.construction.uncertainty import OwnNode
-from reference.errors import PlanmarkError
 from reference.geometry import ComplexArray, FloatArray
 
 
@@ -304,107 +305,72 @@ LEAST_SHARE = 0.6
 def other_mechanism(
     task: Task, evidence: Evidence, scales: tuple[Mapping[str, float], Mapping[str, float]]
 ) -> PlanBasis | None:
-    """The wrong mechanism that the vectors were drawn for; None where the right one explains them.
+    """The wrong assembly for which the vectors were drawn; None where the right one explains them.
 
     Arguments: `scales` are those used, and those that the drawing seems to follow.
     """
-    known = {name: one for name in task.real if (one := evidence.vector(name)) is not None}
+    known = {name: drawn for name in task.real if (drawn := evidence.vector(name)) is not None}
     if evidence.has_sketch or len(known) < BETTER_BY:
         return None
     each = [scales[0]] if scales[0] == scales[1] else list(scales)
     tried = [one for scale in each for one in _tried(task, scale)]
-    counts = [_fitting(task, plans, known) for _, plans in tried]
-    right = max(int(count[0]) for (name, _), count in zip(tried, counts, strict=True) if name == "right")
+    counts = [_fitting(task, one, known) for one in tried]
+    right = max(count for one, count in zip(tried, counts, strict=True) if one.is_right)
     least, best = max(right + BETTER_BY, math.ceil(LEAST_SHARE * len(known))), None
-    for (name, plans), count in zip(tried, counts, strict=True):
-        most = int(np.argmax(count))
-        if name != "right" and count[most] >= least:
-            best, least = plans.sketch(most), int(count[most]) + 1
+    for one, count in zip(tried, counts, strict=True):
+        if not one.is_right and count >= least:
+            best, least = PlanBasis("other", one.construction, one.parameters), count + 1
     return best
 
 
 @dataclass(frozen=True, slots=True)
 class _Plans:
-    """What one construction makes of one or several variants' data: (vectors, variants), millimetres."""
+    """What one construction makes of the data: complex millimetres by vector."""
 
+    is_right: bool
     construction: Construction
     parameters: Parameters
-    vectors: ComplexArray
-
-    def sketch(self, index: int) -> PlanBasis:
-        """The basis of the variant at an index."""
-        one = {
-            name: np.asarray(np.ravel(value)[index if np.size(value) > 1 else 0])
-            for name, value in self.parameters.items()
-        }
-        return PlanBasis("other", self.construction, one)
+    vectors: Mapping[str, complex]
 
 
-def _tried(task: Task, scales: Mapping[str, float]) -> list[tuple[str, _Plans]]:
-    """The plans for the right mechanism and for every wrong one."""
+def _tried(task: Task, scales: Mapping[str, float]) -> list[_Plans]:
+    """The plans for the right mechanism and for every wrong assembly."""
     key = ("plans", *(scales[name] for name in SCALE_NAMES))
 
-    def tried() -> list[tuple[str, _Plans]]:
-        right = task.at(scales)
-        found = [("right", _plans(task.construction, right))]
-        found += [("assembly", _plans(one, right)) for one in _other_assemblies(task.construction)]
-        found += [("variant", _plans(task.construction, one)) for one in _other_variants(task, scales)]
-        return found
+    def tried() -> list[_Plans]:
+        known = task.at(scales)
+        others = [
+            task.construction.with_step(replace(step, side=-step.side))
+            for step in task.construction.figures[MECHANISM]
+            if isinstance(step, TwoArcs | ArcAndLine)
+        ]
+        return [_plans(one, known, is_right=one is task.construction) for one in (task.construction, *others)]
 
     return task.cached(key, tried)
 
 
-def _plans(construction: Construction, parameters: Parameters) -> _Plans:
+def _plans(construction: Construction, parameters: Parameters, *, is_right: bool) -> _Plans:
     nodes = evaluate(construction, parameters)
-    vectors = [np.ravel(nodes[one.head] - nodes[one.tail]) for one in construction.vectors.values()]
-    return _Plans(construction, parameters, np.array(np.broadcast_arrays(*vectors)))
-
-
-def _other_assemblies(construction: Construction) -> list[Construction]:
-    return [
-        construction.with_step(replace(step, side=-step.side))
-        for step in construction.figures["mechanism"]
-        if isinstance(step, TwoArcs | ArcAndLine)
-    ]
-
-
-def _other_variants(task: Task, scales: Mapping[str, float]) -> list[Parameters]:
-    """All other variants' data, at the scales given and at their own: arrays over variants."""
-    together = task.cached(("variants",), lambda: _variants(task))
-    if not together:
-        return []
-    fixed = {name: np.asarray(scales[name]) for name in SCALE_NAMES}
-    return [together, {**together, **fixed}]
-
-
-def _variants(task: Task) -> Parameters:
-    others = [one for one in task.assignment.variants() if one != task.variant]
-    if not others:
-        return {}
-    try:
-        mechanism, scales = task.assignment.mechanism(others), task.assignment.scales(others)
-    except PlanmarkError:
-        return {}
-    found = parameters_of(mechanism, scales.kL, scales.kv, scales.ka)
-    return {
-        **{name: np.asarray(value) for name, value in task.parameters.items() if name not in found},
-        **found,
+    vectors = {
+        one.name: complex(np.ravel(nodes[one.head] - nodes[one.tail])[0])
+        for one in construction.vectors.values()
     }
+    return _Plans(is_right, construction, parameters, vectors)
 
 
-def _fitting(
-    task: Task, plans: _Plans, known: Mapping[str, DrawnVector]
-) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
-    """How many of the vectors lie within twice their tolerance, by variant."""
-    count = np.zeros(plans.vectors.shape[1], np.int64)
-    for row, name in enumerate(plans.construction.vectors):
-        if name in known:
-            drawn, table = known[name], task.rubric.tolerance_of(name)
-            size = np.abs(plans.vectors[row])
-            fits = np.abs(size - drawn.length_mm) <= 2.0 * np.array([table.length_at(mm) for mm in size])
-            if drawn.direction_rad is not None:
-                turned = np.abs(np.angle(plans.vectors[row] * np.exp(-1j * drawn.direction_rad)))
-                across = table.across_mm / np.maximum(size, 1e-9)
-                fits &= ~(turned > 2.0 * np.maximum(math.radians(table.direction_deg), across))
-            count += fits
-    return count
+def _fitting(task: Task, plans: _Plans, known: Mapping[str, DrawnVector]) -> int:
+    """How many of the vectors lie within twice their tolerance."""
+    return sum(
+        _fits(drawn, plans.vectors[name], task.rubric.tolerance_of(name)) for name, drawn in known.items()
+    )
+
+
+def _fits(drawn: DrawnVector, exact: complex, table: ToleranceTable) -> bool:
+    size = abs(exact)
+    if not abs(size - drawn.length_mm) <= 2.0 * table.length_at(size):
+        return False
+    if drawn.direction_rad is None:
+        return True
+    across = table.across_mm / max(size, 1e-9)
+    turned = abs(math.remainder(cmath.phase(exact) - drawn.direction_rad, math.tau))
+    return turned <= 2.0 * max(math.radians(table.direction_deg), across)

@@ -76,6 +76,8 @@ ADVICE: dict[str, Mapping[str, str]] = {
     "near_limit": {"": N_("Measure it again.")},
     "hand_may_miss": {"": _LINES},
     "other_variant": {"": N_("Look at your number, and at the data that belong to it.")},
+    "data_misread": {"": N_("Look at the crank's angle: from which axis and in which sense it is measured.")},
+    "data_unclear": {"": N_("Look at your number, and at the data that belong to it.")},
     "scale_off": {"": N_("Look at how it is made: real value divided by drawn length, each with its unit.")},
     "scale_refused": {"": _SCALE},
     "scale_assumed": {"": _SCALE},
@@ -108,6 +110,7 @@ LAWS: dict[str, str] = {
     "normal_missing": N_("A point that turns has a_n = v²/l too; only where v = 0 there is none."),
     "normal_from_absolute": N_("a_n = v²/l of a link uses the relative velocity of its ends."),
     "other_variant": N_("Each number has its own data."),
+    "data_misread": N_("The angle given says where the crank stands; all the rest follows from it."),
     "other_assembly": N_(
         "Two arcs meet in two points: the scheme of the assignment shows which one is meant."
     ),

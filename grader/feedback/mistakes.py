@@ -77,6 +77,12 @@ MISTAKES: dict[str, Words] = {
         N_("The drawing fits the data of another variant."),
         N_("Check your number and the data that belong to it."),
     ),
+    "data_misread": Words(
+        N_("crank angle misread"),
+        N_("The drawing follows another crank angle than the one given."),
+        N_("Look at the angle given, at the axis from which it is measured and in which sense; then draw"
+           " the mechanism and the plans again."),
+    ),
     "other_assembly": Words(
         N_("mechanism assembled the other way"),
         N_("At %(at)s, the links were assembled in their other possible position."),
@@ -235,7 +241,13 @@ PRECISE: dict[str, tuple[str, ...]] = {
     "figure_rotated": (
         N_("All of %(at)s is turned by %(degrees)s° counter-clockwise against the mechanism."),
     ),
+    "data_misread": (
+        N_("The drawing follows a crank that stands at %(crank_deg)s°, counter-clockwise from the axis to the"
+           " right; that is not the angle given."),
+    ),
     "other_variant": (
+        N_("Only this part of the drawing fits the data of number %(n)s: %(part)s."),
+        N_("Only this part of the drawing fits the data of position %(position)s: %(part)s."),
         N_("The drawing fits the data of number %(n)s."),
         N_("The drawing fits the data of position %(position)s."),
     ),
@@ -260,7 +272,7 @@ PRECISE_ALONG_GUIDE: dict[str, tuple[str, ...]] = {
         N_("The line from %(from)s to %(at)s was drawn along %(other)s instead of along the guide."),
     ),
 }  # fmt: skip
-GIVING_AWAY = frozenset({"factor", "degrees", "n", "position"})
+GIVING_AWAY = frozenset({"factor", "degrees", "n", "position", "crank_deg"})
 """Details of a mistake that only those who may see the answers are given."""
 
 
@@ -301,6 +313,7 @@ QUESTIONS: dict[str, str] = {
     "normal_missing": N_("Did you lay off the component that ends in %(at)s?"),
     "normal_from_absolute": N_("From which velocity did you compute the component that ends in %(at)s?"),
     "other_variant": N_("Whose number and data did you draw with?"),
+    "data_misread": N_("At which angle did you draw the crank, and from which axis did you measure it?"),
     "other_assembly": N_("On which side does %(at)s lie on your sketch of the mechanism?"),
     "image_mirrored": N_(
         "Going round the triangle with %(at)s, do the letters follow in the same sense as on the plate?"

@@ -66,6 +66,8 @@ HINTS: dict[str, str] = {
     "at_stake": N_("What is open here is worth very little: counted for you."),
     "other_variant": N_("The drawing follows another student's data."),
     "not_explained": N_("The vectors of this plan do not belong together: a person must look."),
+    "data_misread": N_("The drawing follows another crank angle than the one given."),
+    "data_unclear": N_("It is not clear whether the drawing follows your own data: a person must look."),
     "not_drawn": N_("It is not drawn."),
     "hand_may_miss": N_(
         "Its lines meet at so small an angle that a careful hand may be off by as much: a person must look."
@@ -300,7 +302,7 @@ def mistake_sentence(
 def _known(mistake: NamedMistake, speaker: Tongue, level: Level, names: Mapping[str, str]) -> dict[str, str]:
     """What is known of a mistake, in words; numbers only where they may be told."""
     told = {
-        key: speaker.trimmed(value, 3) if isinstance(value, float) else names.get(str(value), str(value))
+        key: speaker.trimmed(value, 3) if isinstance(value, float) else place(str(value), speaker, names)
         for key, value in mistake.detail.items()
         if level == "full" or key not in GIVING_AWAY
     }

@@ -64,6 +64,8 @@ GROUPS: Mapping[GroupName, tuple[str, ...]] = {
 """Verdicts of the groups of rows, after the titles of those that are not folded."""
 WAITING: dict[str, str] = {
     "other_variant": N_("drawn with another student's data"),
+    "data_misread": N_("drawn with a crank angle that was misread"),
+    "data_unclear": N_("perhaps drawn with other data"),
     "entry_refused": N_("an entry that it rests on cannot be used"),
     "doubtful": N_("read with too little certainty"),
     "near_limit": N_("so near the limit of the tolerance that the scan cannot decide"),

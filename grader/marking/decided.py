@@ -88,7 +88,9 @@ def _decided(outcome: Outcome, row: Decision, rubric: RubricFile) -> Outcome:
     )
 
 
-FOR_THE_STUDENT = frozenset({"counted_for_you", "not_certainly_within", "at_stake", "other_variant"})
+FOR_THE_STUDENT = frozenset(
+    {"counted_for_you", "not_certainly_within", "at_stake", "other_variant", "data_misread", "data_unclear"}
+)
 """Reasons of rules that hold where nobody decides."""
 REMARKS = frozenset({"right", "too_short_to_judge", "scale_assumed"})
 """Reasons that tell of no loss."""

@@ -2,7 +2,7 @@
 
 `reference.replay.replay` gives explanations of the drawing, each with its mistakes. First the drawing is
 replayed step by step. Only where that leaves residuals, mistakes of the whole drawing are tried as well
-(another variant's data, a plan turned as a whole, letters swapped) and mistakes at steps without an
+(a plan turned as a whole, letters swapped) and mistakes at steps without an
 observation. The confidence in a mistake is its share of the probability of all explanations; a mistake
 that the evidence does not distinguish from it is its rival. The size of drafting errors is estimated on
 the drawing itself, so that a right drawing has no mistake named.
@@ -17,9 +17,9 @@ import numpy as np
 
 from grader.outcomes import NamedMistake
 from grader.records import MECHANISM
-from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
-from reference.construction.elements import Along, Line, Nodes, Parameters, Scaled
-from reference.construction.graph import Construction, evaluate, parameters_of
+from reference.authored.assignment import SCALE_NAMES
+from reference.construction.elements import Along, Line, Nodes
+from reference.construction.graph import Construction, evaluate
 from reference.construction.mistakes import RPM_FACTOR, Drawing, Mistake, affected, commit
 from reference.construction.steps import Given, Step, TwoLines
 from reference.construction.uncertainty import Skill
@@ -27,7 +27,7 @@ from reference.replay.explanations import RARITY, SLIP, Observations
 from reference.replay.nothing import with_nothing
 from reference.replay.replay import Replay, Root, replay
 
-OF_THE_WHOLE = frozenset({"labels_swapped", "figure_rotated", "other_variant"})
+OF_THE_WHOLE = frozenset({"labels_swapped", "figure_rotated"})
 
 
 # The explanations of a drawing ---------------------------------------------------------------------
@@ -53,7 +53,6 @@ class Case:
     ----------
     drawing : how it should have been drawn, at the scales declared
     observations : the drawing as read or measured
-    assignment, variant : the student's
     skill : usual drafting errors
     followed : scales that the drawing follows although others were declared
     assumed : scales that nobody declared
@@ -62,20 +61,15 @@ class Case:
 
     drawing: Drawing
     observations: Observations
-    assignment: Assignment
-    variant: Variant
     skill: Skill
     followed: Mapping[str, float] = field(default_factory=dict)
     assumed: frozenset[str] = frozenset()
     otherwise: tuple[Observations, ...] = ()
 
 
-def explained(case: Case, *, by_another: bool = False) -> tuple[Replay, ...]:
-    """The explanations of a drawing, the likeliest first; none where it may well be right.
-
-    Arguments: `by_another` tries other variants' data even where the own ones explain it.
-    """
-    roots = [Root(), *_other_scales(case), *(_other_variants(case) if by_another else ())]
+def explained(case: Case) -> tuple[Replay, ...]:
+    """The explanations of a drawing, the likeliest first; none where it may well be right."""
+    roots = [Root(), *_other_scales(case)]
     explanations = replay(case.drawing, case.observations, roots, case.skill, cares=CARES)
     for observations in case.otherwise:
         others = replay(case.drawing, observations, roots, case.skill, cares=CARES)
@@ -235,57 +229,11 @@ def _other_scales(case: Case) -> Iterator[Root]:
 
 
 def _of_the_whole(case: Case) -> Iterator[Root]:
-    """Roots with a plan turned as a whole, or with another variant's data."""
+    """Roots with a plan turned as a whole."""
     for plan in case.drawing.construction.poles:
         for quarters in (1, 2, 3):
             turned = Mistake("figure_rotated", plan, quarters=quarters)
             yield Root((turned,), turned={plan: 1j**quarters}, cost=RARITY["figure_rotated"])
-    yield from _other_variants(case)
-
-
-def _other_variants(case: Case) -> Iterator[Root]:
-    """Roots with another variant's data, all else right."""
-    variants = case.assignment.variants()
-    scales = case.assignment.scales(variants, kL=float(case.drawing.parameters["kL"]))
-    together = parameters_of(case.assignment.mechanism(variants), scales.kL, scales.kv, scales.ka)
-    table = {
-        name: np.broadcast_to(value, (len(variants),))
-        for name, value in together.items()
-        if name not in set(SCALE_NAMES) - case.assumed and np.ndim(value) and np.ptp(value) > 0.0
-    }
-    for index, variant in enumerate(variants):
-        if variant != case.variant and table:
-            parameters = {name: np.asarray(value[index]) for name, value in table.items()}
-            parameters |= _scales_of_the_drawn_driver(case, parameters)
-            other = Mistake(
-                "other_variant", "mechanism", n=variant.n, position=variant.position, parameters=parameters
-            )
-            yield Root((other,), parameters, cost=RARITY["other_variant"])
-
-
-def _scales_of_the_drawn_driver(case: Case, parameters: Parameters) -> Parameters:
-    """The scales that nobody declared, as they follow from the driven link's vectors with another's data."""
-    construction, own, scales = case.drawing.construction, case.drawing.parameters, {}
-    for plan, scale in (("velocity_plan", "kv"), ("acceleration_plan", "ka")):
-        pole = construction.poles.get(plan)
-        if pole is None or scale not in case.assumed:
-            continue
-        names = [name for name in own if name.startswith(f"{scale[1]}_")]
-        size = math.hypot(*(float(parameters.get(name, own[name])) for name in names))
-        head = next(
-            one.node
-            for one in reversed(construction.figures[plan])
-            if isinstance(one, Given) and isinstance(one.length, Scaled)
-        )
-        drawn = (
-            abs(one.value)
-            for one in case.observations.entries
-            if one.node == head and one.tail in {None, pole}
-        )
-        length = next(drawn, 0.0)
-        if length > 0.0 and size > 0.0:
-            scales[scale] = np.asarray(size / length)
-    return scales
 
 
 def _swaps(case: Case, explanation: Replay) -> Iterator[Mistake]:
@@ -361,18 +309,10 @@ def drawn_instead(explanations: Sequence[Replay], case: Case) -> tuple[Drawing, 
     """
     joints = {step.node for step in case.drawing.construction.figures[MECHANISM]}
     certain = [one for one in sure_of(explanations, CERTAIN) if one.code not in NO_STEPS]
-    wrong = {MECHANISM if one.at in joints or one.code == "other_variant" else one.at for one in certain}
-    return _with(certain, case.drawing), frozenset(wrong)
-
-
-def _with(mistakes: Sequence[Mistake], drawing: Drawing) -> Drawing:
-    """A drawing with mistakes in it, at its own scales."""
-    for one in mistakes:
-        if one.code == "other_variant":
-            drawing = Drawing(drawing.construction, {**drawing.parameters, **one.parameters})
-        else:
-            drawing = commit(one, drawing)
-    return drawing
+    drawing = case.drawing
+    for one in certain:
+        drawing = commit(one, drawing)
+    return drawing, frozenset(MECHANISM if one.at in joints else one.at for one in certain)
 
 
 # The mistakes that are named -----------------------------------------------------------------------
@@ -414,8 +354,7 @@ def named(explanations: Sequence[Replay], construction: Construction, lost: Lost
         rivals = shares.rivals(key, {_key(one) for one in best.made})
         together = share + sum(shares.instead(key, _key(one)) for one in rivals)
         is_sure = share >= LEAST_CONFIDENCE or (together >= SURE_TOGETHER and rivals)
-        is_shown = explains[mistake] or mistake.code == "other_variant"
-        is_shown = is_shown and (mistake.code != SLIP or slips <= MOST_SLIPS)
+        is_shown = explains[mistake] and (mistake.code != SLIP or slips <= MOST_SLIPS)
         if is_shown and is_sure and not _is_slight(mistake, best):
             others = tuple(_record(one, construction, (), shares.instead(key, _key(one))) for one in rivals)
             mistakes.append(_record(mistake, construction, tuple(explains[mistake]), share, others))
@@ -501,8 +440,7 @@ def _losses_explained(
     """
     made = _in_order(explanation.made, construction)
     explains: dict[Mistake, list[str]] = {
-        mistake: [name for scale, name in lost.scales.items() if _is_about(mistake, scale)]
-        for mistake in made
+        mistake: [name for scale, name in lost.scales.items() if mistake.at == scale] for mistake in made
     }
     reach = {mistake: affected(mistake, construction) for mistake in made}
     touched: dict[Mistake, list[str]] = {mistake: [] for mistake in made}
@@ -533,10 +471,6 @@ def _touches(mistake: Mistake, scale: str, ends: set[str], reach: frozenset[str]
     if mistake.code == "labels_swapped":
         return bool(ends & set(mistake.other))
     return bool(ends & reach)
-
-
-def _is_about(mistake: Mistake, scale: str) -> bool:
-    return mistake.at == scale or mistake.code == "other_variant"
 
 
 SPEED_FACTORS = (RPM_FACTOR, 60.0, 0.5 / math.pi)

@@ -11,7 +11,9 @@ from grader.comparison.follow_through import ReplayResult
 from grader.comparison.own import PlanBasis
 from grader.comparison.scales import Scale
 from grader.comparison.task import Task
+from grader.given_data.owner import Owner
 from grader.marking.diagnosis import Case, drawn_instead, explained
+from grader.records import MECHANISM
 from reference.construction.elements import Coriolis, Normal, Parameters
 from reference.construction.graph import Vector
 from reference.construction.mistakes import Drawing
@@ -25,26 +27,40 @@ LEAST_ERROR_MM = 0.15
 NO_ERRORS: ComplexArray = np.zeros(0, np.complex128)
 
 
-def explain(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> ReplayResult:
-    """The explanations of a drawing, and the basis of its plans where that is certain."""
-    case = case_of(task, evidence, settled)
+def explain(
+    task: Task, evidence: Evidence, settled: Mapping[str, Scale], *, owner: Owner | None = None
+) -> ReplayResult:
+    """The explanations of a drawing, and the basis of its plans where that is certain.
+
+    Arguments: `owner` is whose data the drawing follows, None for the student's own.
+    """
+    case = case_of(task, evidence, settled, owner)
     explanations = explained(case)
     drawn, wrong = drawn_instead(explanations, case)
+    if owner is not None and owner.of_whole is not None:
+        wrong |= {MECHANISM}
     # Where a sheet shows the drawn mechanism and no plan is turned, the own nodes are enough.
     is_needed = wrong and (wrong & task.construction.poles.keys() or not evidence.has_sheets)
     basis = PlanBasis("instead", drawn.construction, drawn.parameters, wrong) if is_needed else None
     return ReplayResult(explanations, basis)
 
 
-def case_of(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> Case:
-    """The drawing to explain at the scales used, with the scales that the drawing follows instead."""
-    assumed = frozenset(name for name, scale in settled.items() if scale.used.assumed)
-    others = {name: scale.other for name, scale in settled.items() if scale.other}
+def case_of(task: Task, evidence: Evidence, settled: Mapping[str, Scale], owner: Owner | None = None) -> Case:
+    """The drawing to explain at the scales used, with the scales that the drawing follows instead.
+
+    A drawing by other data is held against these, at the scales at which its driven link's vectors are drawn.
+    """
+    taken = None if owner is None else owner.of_whole
+    assumed = frozenset(name for name, scale in settled.items() if scale.used.assumed or taken is not None)
+    others = {name: scale.other for name, scale in settled.items() if scale.other and taken is None}
     used = {
         name: np.asarray(others.get(name, scale.used.used) if name in assumed else scale.used.used)
         for name, scale in settled.items()
     }
     parameters = {**task.parameters, **used}
+    if taken is not None:
+        parameters |= taken.parameters
+        parameters |= _scales_of_the_drawn_driver(task, evidence, parameters)
     entries = _lengths_observed(task, evidence, parameters)
     directions = _directions_of_the_sketch(task, evidence, {name: float(one) for name, one in used.items()})
     best, *otherwise = (
@@ -61,8 +77,6 @@ def case_of(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> Cas
         drawing=Drawing(task.construction, parameters),
         observations=best,
         otherwise=tuple(otherwise),
-        assignment=task.assignment,
-        variant=task.variant,
         skill=task.skill,
         followed={
             name: other
@@ -71,6 +85,21 @@ def case_of(task: Task, evidence: Evidence, settled: Mapping[str, Scale]) -> Cas
         },
         assumed=assumed,
     )
+
+
+def _scales_of_the_drawn_driver(
+    task: Task, evidence: Evidence, parameters: Parameters
+) -> dict[str, FloatArray]:
+    """The scales of the plans as they follow from the drawn lengths of the driven link's vectors."""
+    found = {}
+    for scale in ("kv", "ka"):
+        drawn = evidence.vector(f"{scale[1]}_{task.pin}")
+        size = math.hypot(
+            *(float(one) for name, one in parameters.items() if name.startswith(f"{scale[1]}_"))
+        )
+        if drawn is not None and drawn.length_mm > 0.0 and size > 0.0:
+            found[scale] = np.asarray(size / drawn.length_mm)
+    return found
 
 
 def _nodes_observed(task: Task, evidence: Evidence, nodes: "_Nodes") -> list[Observation]:

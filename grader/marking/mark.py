@@ -2,25 +2,27 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from grader.comparison.criteria import NOT_DRAWN, Comparison, compare
-from grader.comparison.evidence import DrawnVector, Submission
+from grader.comparison.evidence import DrawnVector, Submission, gather
 from grader.comparison.scales import Scale
 from grader.comparison.task import Task
 from grader.comparison.verdicts import NONE
 from grader.documents import Verdict
-from grader.marking.diagnosis import (
-    LEAST_CONFIDENCE,
-    Lost,
-    drawn_instead,
-    explained,
-    named,
-    not_explained,
-)
+from grader.given_data.owner import Owner, owner_of
+from grader.marking.diagnosis import LEAST_CONFIDENCE, Lost, drawn_instead, named, not_explained
 from grader.marking.drawn import case_of, explain
-from grader.marking.settling import at_stake, charged_where_made, of_another, of_nothing, settled
+from grader.marking.settling import (
+    at_stake,
+    charged_where_made,
+    is_of,
+    of_another,
+    of_nothing,
+    settled,
+)
 from grader.marking.units import EXCHANGED, Undone, undone, with_scales_exchanged
 from grader.outcomes import Judgement, NamedMistake, Outcome, Score
 from grader.records import Figure
@@ -28,8 +30,6 @@ from grader.rubric import CriterionTable, RubricFile
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.graph import evaluate
 from reference.construction.mistakes import Mistake
-from reference.geometry import ComplexArray
-from reference.plan import exact_plan
 from reference.replay.replay import Replay
 
 CHARGED = frozenset({"none", "partial"})
@@ -95,23 +95,44 @@ def _is_off(scale: Scale) -> bool:
 
 def _judged(task: Task, submission: Submission, comparison: Comparison) -> Judgement:
     """The judgement of a submission that was compared."""
+    owner = owner_of(task, gather(task, submission), submission.declared)
+    search = partial(explain, owner=owner)
+    if owner is not None:
+        comparison = compare(task, submission, search)
     surer = _confirmed(task, submission, comparison)
     if surer is not None:
-        submission, comparison = surer, compare(task, surer, explain)
-    explanations, lost = _explanations(task, comparison)
-    mistakes = named(explanations, task.construction, lost)
+        submission, comparison = surer, compare(task, surer, search)
+    explanations, lost = _explanations(task, comparison, owner)
+    mistakes = _named(task, comparison, owner, explanations, lost)
     mistakes = (*mistakes, *_swapped_letters(task, submission, mistakes))
     mistakes = (*mistakes, *_not_drawn(task, comparison, mistakes))
     mistakes = (*mistakes, *_slips(task, comparison, mistakes))
     outcomes = charged_where_made(task, comparison.outcomes, mistakes)
     outcomes, unfit = of_nothing(task, outcomes, not_explained(explanations))
-    outcomes = at_stake(task.rubric, of_another(task.rubric, outcomes, mistakes))
+    outcomes = at_stake(task.rubric, outcomes)
+    outcomes = of_another(task, outcomes, owner)
     outcomes = tuple(with_mistake(outcome, mistakes) for outcome in outcomes)
     return Judgement(outcomes, mistakes, comparison.scales, score(task.rubric, outcomes), unfit)
 
 
-def _explanations(task: Task, comparison: Comparison) -> tuple[Sequence[Replay], Lost]:
-    """What explains lost points, or points that may be lost, and these."""
+def _named(
+    task: Task, comparison: Comparison, owner: Owner | None, explanations: Sequence[Replay], lost: Lost
+) -> tuple[NamedMistake, ...]:
+    """The mistakes named; whose data they are goes first."""
+    other = None if owner is None else owner.named
+    if owner is None or other is None:
+        return named(explanations, task.construction, lost)
+    losing = [one for one in comparison.outcomes if one.verdict in LOST]
+    explained = tuple(one.criterion for one in losing if is_of(task, one.name, owner.part))
+    other = replace(other, explains=explained)
+    return (other, *named(explanations, task.construction, lost))
+
+
+def _explanations(task: Task, comparison: Comparison, owner: Owner | None) -> tuple[Sequence[Replay], Lost]:
+    """What explains lost points, or points that may be lost, and these.
+
+    Where one plan follows other data than the rest, nothing explains what is drawn from it, or into it.
+    """
     scales, vectors = comparison.settled, task.construction.vectors
     lost = [one for one in comparison.outcomes if one.verdict in LOST]
     links = task.construction.links
@@ -119,45 +140,11 @@ def _explanations(task: Task, comparison: Comparison) -> tuple[Sequence[Replay],
     by_scale = {one.name: one.criterion for one in lost if one.name in scales and one.verdict in CHARGED}
     is_other_scale = any(scale.other and not scale.used.assumed for scale in scales.values())
     explanations: Sequence[Replay] = ()
-    if by_vector or is_other_scale:
-        explanation = comparison.explanation or explain(task, comparison.evidence, scales)
+    is_of_two = owner is not None and owner.named is not None and owner.of_whole is None
+    if (by_vector or is_other_scale) and not is_of_two:
+        explanation = comparison.explanation or explain(task, comparison.evidence, scales, owner=owner)
         explanations = explanation.explanations
-    if not explanations and _is_nearer_to_another(task, comparison):
-        explanations = explained(case_of(task, comparison.evidence, scales), by_another=True)
     return explanations, Lost(by_vector, by_scale)
-
-
-CLEARLY_NEARER = 6.0
-"""By so much the squared residuals, in halves of a tolerance, must fall with another student's data before
-the whole drawing is searched for them."""
-
-
-def _is_nearer_to_another(task: Task, comparison: Comparison) -> bool:
-    """Whether the drawing fits another variant's exact vectors better than its own, however little is off.
-
-    Neighbouring variants may differ by less than the tolerances.
-    """
-    evidence, vectors = comparison.evidence, task.construction.vectors
-    own = {name: drawn for name in vectors if (drawn := evidence.vector(name)) is not None}
-    if not own or len(task.assignment.variants()) < 2:
-        return False
-    variants = task.assignment.variants()
-    exact = task.cached(("everybody",), lambda: _everybody(task))
-    misfits = np.zeros(len(variants))
-    for name, drawn in own.items():
-        scale, at = comparison.scales[vectors[name].scale], drawn.as_complex
-        right = exact[name] / (exact[vectors[name].scale] if scale.assumed else scale.used)
-        residual = np.abs(right) - drawn.length_mm if at is None else right - at
-        misfits += np.abs(2.0 * residual / task.rubric.tolerance_of(name).length_at(drawn.length_mm)) ** 2
-    return bool(misfits[variants.index(task.variant)] - misfits.min() > CLEARLY_NEARER)
-
-
-def _everybody(task: Task) -> Mapping[str, ComplexArray]:
-    """The exact vectors (SI) and the rule's scales of all variants, an array each."""
-    accelerations = task.rubric.needs_accelerations
-    plan = exact_plan(task.assignment, task.assignment.variants(), accelerations=accelerations)
-    scales = {name: np.asarray(getattr(plan.scales, name), np.complex128) for name in SCALE_NAMES}
-    return {**plan.vectors_si, **scales}
 
 
 def _swapped_letters(task: Task, submission: Submission, known: Sequence[NamedMistake]) -> list[NamedMistake]:

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 from grader.comparison.task import Task
 from grader.comparison.verdicts import EVEN, FULL, NONE, verdict_of
+from grader.given_data.owner import Owner
 from grader.outcomes import NamedMistake, Outcome, Reason, Unfit
 from grader.rubric import RubricFile
 from reference.authored.assignment import SCALE_NAMES
@@ -64,22 +65,39 @@ OPENING = frozenset({"doubtful", "near_limit", "unread", "hand_may_miss", "readi
 # Another student's data ----------------------------------------------------------------------------
 
 
-def of_another(
-    rubric: RubricFile, outcomes: Sequence[Outcome], mistakes: Sequence[NamedMistake]
-) -> tuple[Outcome, ...]:
-    """The outcomes of a drawing by another student's data, as the rubric's `other_variant` has it."""
-    named = next((one for one in mistakes if one.code == "other_variant"), None)
-    if named is None or rubric.doubt.other_variant == "follow":
+def of_another(task: Task, outcomes: Sequence[Outcome], owner: Owner | None) -> tuple[Outcome, ...]:
+    """The outcomes of a drawing by other data than the own, as the rubric's `other_variant` has it.
+
+    Whatever is not sure, or was misread by the student, is left to a person.
+    """
+    if owner is None or task.rubric.doubt.other_variant == "follow":
         return tuple(outcomes)
-    whose = ", ".join(f"{key} = {value}" for key, value in named.detail.items())
-    reason = Reason("other_variant", {"whose": whose})
-    return tuple(_of_another(rubric, outcome, reason, named) for outcome in outcomes)
+    named = owner.named
+    is_sure = named is not None and named.code == "other_variant" and owner.not_own >= NEARLY_CERTAIN
+    earns_none = is_sure and task.rubric.doubt.other_variant == "none"
+    return tuple(
+        _of_another(outcome, named, earns_none=earns_none)
+        if is_of(task, outcome.name, owner.part)
+        else outcome
+        for outcome in outcomes
+    )
 
 
-def _of_another(rubric: RubricFile, outcome: Outcome, whose: Reason, named: NamedMistake) -> Outcome:
+def is_of(task: Task, name: str, part: str) -> bool:
+    """Whether a criterion is about a part of the drawing: a plan, or all of it."""
+    if part not in task.construction.poles:
+        return True
+    return name == task.construction.vectors_of(part)[0].scale or _is_in(task, name, frozenset({part}))
+
+
+def _of_another(outcome: Outcome, named: NamedMistake | None, *, earns_none: bool) -> Outcome:
     if outcome.verdict == "not_judged":
         return outcome
-    if rubric.doubt.other_variant == "none":
+    whose = Reason("data_unclear")
+    if named is not None:
+        detail = {key: value for key, value in named.detail.items() if key != "part"}
+        whose = Reason(named.code, {"whose": ", ".join(f"{key} = {value}" for key, value in detail.items())})
+    if named is not None and earns_none:
         lost = settled(outcome, NONE, named.confidence, whose)
         return replace(lost, mistake=named.code, cause=named)
     best = outcome.shares[-1] if outcome.shares else FULL

@@ -52,6 +52,7 @@ Code = Literal[
     "figure_rotated",
     "arithmetic",
     "units",
+    "data_misread",
 ]
 CODES: tuple[Code, ...] = get_args(Code)
 RPM_FACTOR = 30.0 / math.pi
@@ -79,7 +80,7 @@ class Mistake:
     factor : of a length, speed or scale
     quarters : quarter turns of a figure or of the driven link's vector, counter-clockwise
     n, position : the other student's variant
-    parameters : that variant's parameters, or those that differ
+    parameters : that variant's parameters, or those that differ; of data that were misread, those taken
     """
 
     code: str
@@ -105,7 +106,7 @@ def commit(mistake: Mistake, drawing: Drawing) -> Drawing:
         case "scale_wrong" if mistake.at in {"kL", "kv", "ka"}:
             scaled = np.asarray(parameters[mistake.at] * mistake.factor)
             return Drawing(construction, {**parameters, mistake.at: scaled})
-        case "other_variant":
+        case "other_variant" | "data_misread":
             scales = {name: parameters[name] for name in ("kL", "kv", "ka", "turn") if name in parameters}
             return Drawing(construction, {**parameters, **mistake.parameters, **scales})
         case "vector_missing":
@@ -368,7 +369,8 @@ def _further_lines(step: TwoLines, slot: int, line: Line, construction: Construc
 
 def affected(mistake: Mistake, construction: Construction) -> frozenset[str]:
     """The nodes that a mistake moves: its own and those drawn from it."""
-    if mistake.at in {"kL", "kv", "ka"} or mistake.code in {"other_variant", "rpm_not_converted"}:
+    is_of_data = mistake.code in {"other_variant", "data_misread"} and mistake.at not in construction.poles
+    if mistake.at in {"kL", "kv", "ka"} or mistake.code == "rpm_not_converted" or is_of_data:
         return frozenset(step.node for step in construction.steps)
     if mistake.at in construction.figures:
         return frozenset(step.node for step in construction.figures[mistake.at])

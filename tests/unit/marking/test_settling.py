@@ -16,7 +16,7 @@ from tests.hands import changed, measured, sheet, task_for
 from tests.unit.comparison.rubrics import with_rubric
 
 PUMP = task_for("pump", 7)
-OTHER = task_of(PUMP.assignment, PUMP.rubric, Variant(n=PUMP.variant.n + 1))
+OTHER = task_of(PUMP.assignment, PUMP.rubric, Variant(n=PUMP.variant.n + 3))
 
 
 def by_name(judgement):

@@ -1,0 +1,1 @@
+"""Whose data a drawing follows: what a student is given, and may not choose."""

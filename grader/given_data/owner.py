@@ -1,0 +1,204 @@
+"""Whose data a drawing follows: the student's own, another variant's, the own ones misread, or nobody's.
+
+Found from what a student is given and may not choose: the directions of links and vectors relative to the
+ground, and the ratios of lengths. A declared scale changes none of them. Nothing is followed through here:
+each part of the drawing (sketch, velocity plan, acceleration plan) is held against the exact drawing by each
+set of data, with propagated drafting errors; a vector that does not fit is an outlier, so that a mistake or
+two hide no owner. The posterior has "somebody's data, but these" and "own data, with a mistake" in it.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from grader.comparison.evidence import DrawnVector, Evidence
+from grader.comparison.task import Task
+from grader.given_data.fit import ALIKE, TURNS, fit_of, is_clearly_own, nobodys
+from grader.given_data.rows import rows_of
+from grader.given_data.scales import by_scale, declared_scales, is_at_own_scales
+from grader.given_data.sets import (
+    HALF_COPIED,
+    NOBODYS,
+    Data,
+    ExactDrawings,
+    drawn_by_variants,
+    own_first,
+    sets_of,
+)
+from grader.outcomes import NamedMistake
+from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN
+from reference.construction.mistakes import Mistake
+from reference.geometry import FloatArray
+
+PARTS = (MECHANISM, VELOCITY_PLAN, ACCELERATION_PLAN)
+
+
+@dataclass(frozen=True, slots=True)
+class Owner:
+    """Whose data a drawing, or a part of it, follows.
+
+    Attributes
+    ----------
+    data : the likeliest set
+    part : the plan that follows them while the rest follows the own data; ``mechanism`` for the whole drawing
+    probability : that the part follows these data
+    not_own : that it does not follow the own data, whosever it follows
+    rivals : other sets that it may follow as well, with their probabilities
+    """
+
+    data: Data
+    part: str
+    probability: float
+    not_own: float
+    rivals: tuple[tuple[Data, float], ...] = ()
+
+    @property
+    def of_whole(self) -> Data | None:
+        """The data that the whole drawing follows, where that is sure."""
+        return self.data if self.part == MECHANISM and self.not_own >= NAMED else None
+
+    @property
+    def named(self) -> NamedMistake | None:
+        """The mistake that it is; None where that is not sure."""
+        if self.not_own < NAMED:
+            return None
+        others = tuple(_named(data, self.part, chance) for data, chance in self.rivals)
+        return _named(self.data, self.part, self.probability, others)
+
+
+NAMED = 0.7
+"""From this probability on it is said whose data they are; below, a person is asked."""
+
+
+def _named(data: Data, part: str, chance: float, rivals: tuple[NamedMistake, ...] = ()) -> NamedMistake:
+    """A set of data as a mistake."""
+    n, position = (data.variant.n, data.variant.position) if data.kind == "other_variant" else (None, None)
+    mistake = Mistake(data.kind, part, n=n, position=position, parameters=data.parameters)
+    return NamedMistake(mistake, (), chance, rivals=rivals)
+
+
+# The posterior --------------------------------------------------------------------------------------
+
+LIKELY = 0.5
+"""From this probability on that the data are not the own, single mistakes are tried beside them."""
+LEAST_RIVAL = 0.04
+"""A set of data that is likelier is named beside the best. Between sets that are not the own, differences of
+the likelihood count half: errors of a hand are more alike than independent ones."""
+
+
+def owner_of(task: Task, evidence: Evidence, declared: Mapping[str, str]) -> Owner | None:
+    """Whose data the drawing follows; None where nothing speaks against the own ones.
+
+    Arguments: `declared` are the scales as declared, text by name.
+    """
+    drawn = {part: vectors for part, vectors in _drawn(task, evidence).items() if vectors}
+    if not drawn:
+        return None
+    everybody = own_first(drawn_by_variants(task), task)
+    scales = declared_scales(task, declared)
+    rows = {part: rows_of(task, evidence, vectors, everybody) for part, vectors in drawn.items()}
+    if all(is_clearly_own(one) for one in rows.values()) and is_at_own_scales(task, evidence, scales):
+        return None
+    for mistakes in (False, True):
+        # Single mistakes are tried only where something else than the own data is likely.
+        sets = sets_of(task, drawn, everybody, mistakes=mistakes)
+        posterior = posterior_of(task, evidence, drawn, sets, scales)
+        if posterior.not_own < LIKELY:
+            return None
+    return posterior.owner()
+
+
+def _drawn(task: Task, evidence: Evidence) -> dict[str, dict[str, DrawnVector]]:
+    """What was drawn by part, as read, else as measured."""
+    found: dict[str, dict[str, DrawnVector]] = {part: {} for part in PARTS}
+    for name, segment in task.segments.items():
+        one = evidence.vector(name)
+        if one is not None and one.length_mm > 0.0:
+            found[task.construction.figure_of(segment.head)][name] = one
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Posterior:
+    """Probabilities of whose data each part follows.
+
+    Attributes
+    ----------
+    data : the sets, the own one first
+    whole : (sets,) that the drawing as a whole follows a set
+    parts : by part, (sets,) that this part alone follows it, while the whole follows the own data
+    nobody : by part, that it follows no data
+    """
+
+    data: tuple[Data, ...]
+    whole: FloatArray
+    parts: Mapping[str, FloatArray]
+
+    @property
+    def is_own(self) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+        """(sets,) of the own data."""
+        return np.array([one.kind == "own" for one in self.data])
+
+    @property
+    def not_own(self) -> float:
+        """The probability that the drawing, or a part of it, does not follow the own data."""
+        return float(sum(one[~self.is_own].sum() for one in (self.whole, *self.parts.values())))
+
+    def owner(self) -> Owner:
+        """The likeliest owner that is not the student."""
+        each = {MECHANISM: self.whole, **self.parts}
+        part = max(each, key=lambda name: float(each[name][~self.is_own].sum()))
+        chances = np.where(self.is_own, 0.0, each[part])
+        tempered = np.sqrt(chances) * (self.not_own / np.sqrt(chances).sum())
+        order = np.argsort(-chances)
+        best, *others = [(self.data[index], float(tempered[index])) for index in order[:4]]
+        rivals = tuple((data, chance) for data, chance in others if chance >= LEAST_RIVAL)
+        return Owner(best[0], part, best[1], self.not_own, rivals)
+
+
+def posterior_of(
+    task: Task,
+    evidence: Evidence,
+    drawn: Mapping[str, Mapping[str, DrawnVector]],
+    sets: tuple[ExactDrawings, FloatArray],
+    scales: Mapping[str, float],
+) -> Posterior:
+    """The posterior of whose data each part follows.
+
+    Arguments: `sets` are the exact drawings with their prior probabilities, `scales` those declared.
+    """
+    exact, prior = sets
+    is_own = np.array([one.kind == "own" for one in exact.data])
+    is_other = np.array([one.kind == "other_variant" for one in exact.data])
+    likely, turn_rad = [], None
+    for part, vectors in drawn.items():
+        rows = rows_of(task, evidence, vectors, exact)
+        if not len(rows):
+            likely.append(np.zeros(len(prior)))
+            continue
+        turned = rows if turn_rad is None else rows.turned_back(turn_rad)
+        turns = TURNS if turn_rad is None or len(evidence.sketches) > 1 else ALIKE
+        fit = fit_of(turned, is_own, turns, is_plan=part != MECHANISM)
+        turn_rad = fit.turn_rad if turn_rad is None else turn_rad
+        likely.append(np.logaddexp(math.log1p(-NOBODYS) + fit.likely, math.log(NOBODYS) + nobodys(rows)))
+    together = np.array(likely) + np.array([by_scale(task, drawn[part], scales, exact) for part in drawn])
+    whole = np.log(prior) + together.sum(axis=0)
+    half = np.where(is_other, math.log(HALF_COPIED / max(int(is_other.sum()), 1)), -np.inf)
+    parts = {
+        part: half + together[row] + _rest(prior, together, row, is_own)
+        for row, part in enumerate(drawn)
+        if part != MECHANISM and len(drawn) > 1
+    }
+    every = np.concatenate([whole, *parts.values()])
+    top = float(every.max())
+    total = float(np.exp(every - top).sum())
+    chances = {part: np.exp(one - top) / total for part, one in parts.items()}
+    return Posterior(exact.data, np.exp(whole - top) / total, chances)
+
+
+def _rest(prior: FloatArray, together: FloatArray, row: int, is_own: np.ndarray) -> float:
+    """The log probability of all parts but one by the own data."""
+    other = np.delete(together, row, axis=0).sum(axis=0)
+    return float(np.logaddexp.reduce((np.log(prior) + other)[is_own]))

@@ -1,0 +1,85 @@
+"""The declared scales beside the driven link's vectors: weak evidence of whose data a plan follows."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from grader.comparison.evidence import DrawnVector, Evidence
+from grader.comparison.task import Task
+from grader.given_data.sets import ExactDrawings
+from grader.inputs.scale_text import Declared, parse_scale
+from reference.geometry import FloatArray
+
+WRONG_SCALE, OF_ANY = 0.1, 0.5
+"""Probability that a plan follows the rule's scale instead of the declared one, and that it follows any
+other; density of the logarithm of the factor then."""
+AT_DECLARED, AT_OWN_RULE = 0.4, 0.4
+"""How often a copied plan follows the scale that is declared beside it, or that of the one who drew it."""
+SET_OFF_SHARE, SET_OFF_MM = 0.006, 0.4
+"""Standard error of the length of the driven link's vector: of its scale, rounded; of setting it off."""
+
+
+def declared_scales(task: Task, declared: Mapping[str, str]) -> dict[str, float]:
+    """The scales that were declared as a number, SI for a millimetre."""
+    units: Mapping[str, str] = dict(task.assignment.file.scales.bare_units.items())
+    found = {}
+    for name, text in declared.items():
+        parsed = parse_scale(name, text, bare_unit=units.get(name)) if text.strip() else None
+        if isinstance(parsed, Declared):
+            found[name] = parsed.per_mm
+    return found
+
+
+def _driven(
+    task: Task, drawn: Mapping[str, DrawnVector], scales: Mapping[str, float]
+) -> tuple[str, float] | None:
+    """The driven link's vector of a plan, and its scale as declared; None without either."""
+    for kind in ("v", "a"):
+        name = f"{kind}_{task.pin}"
+        if name in drawn and f"k{kind}" in scales and task.real.get(name):
+            return name, scales[f"k{kind}"]
+    return None
+
+
+def is_at_own_scales(task: Task, evidence: Evidence, scales: Mapping[str, float]) -> bool:
+    """Whether the driven link's vectors have the lengths that the own data give at the declared scales."""
+    drawn = {name: one for name in task.real if (one := evidence.vector(name)) is not None}
+    for name, scale in scales.items():
+        found = _driven(task, drawn, {name: scale})
+        if found is not None:
+            off, sigma = _off_scale(drawn[found[0]], scale, np.array([abs(task.real[found[0]])]))
+            if abs(off[0]) > 3.0 * sigma:
+                return False
+    return True
+
+
+def _off_scale(drawn: DrawnVector, scale: float, real: FloatArray) -> tuple[FloatArray, float]:
+    """The logarithm of a drawn length to that of a real value at a scale, and its standard error."""
+    with np.errstate(all="ignore"):
+        off = np.log(drawn.length_mm * scale / real)
+    sigma = math.hypot(SET_OFF_SHARE, SET_OFF_MM / drawn.length_mm)
+    return np.where(np.isfinite(off), off, np.inf), sigma
+
+
+def by_scale(
+    task: Task, drawn: Mapping[str, DrawnVector], scales: Mapping[str, float], exact: ExactDrawings
+) -> FloatArray:
+    """The logarithm of the probability of a plan's declared scale beside its driven vector; (sets,).
+
+    A copy may stand beside the copied scale or the own one: it says little, and never hides a copy.
+    """
+    found = _driven(task, drawn, scales)
+    if found is None:
+        return np.zeros(len(exact.data))
+    name, declared = found
+    real = np.abs(exact.real[name])
+    is_other = np.array([one.kind == "other_variant" for one in exact.data])
+    rule = np.array([one.rule.get(f"k{name[0]}", declared) for one in exact.data])
+    at_declared, at_rule = (
+        np.exp(-0.5 * (off / sigma) ** 2) / (sigma * math.sqrt(math.tau))
+        for off, sigma in (_off_scale(drawn[name], declared, real), _off_scale(drawn[name], 1.0, real / rule))
+    )
+    copied = AT_DECLARED * at_declared + AT_OWN_RULE * at_rule + (1.0 - AT_DECLARED - AT_OWN_RULE) * OF_ANY
+    own = (1.0 - 2.0 * WRONG_SCALE) * at_declared[0] + WRONG_SCALE * (at_rule[0] + OF_ANY)
+    return np.asarray(np.log(np.where(is_other, copied, own)))
