@@ -25,6 +25,7 @@ from grader.feedback.redo_steps import with_mistakes_explained
 from grader.feedback.sentences import Level, criterion_feedback
 from grader.inputs.measurements import NOTHING_MEASURED, Measurements, StudentSubmission
 from grader.inputs.scale_text import SURE, declared_scales, sure_texts, understood_scales
+from grader.marking.answers import NONE_DECIDED, answers_of
 from grader.marking.decided import decide, open_again, with_decisions, with_nodes
 from grader.marking.mark import judge
 from grader.marking.report import reading_document, report_of, unjudged_report
@@ -33,6 +34,7 @@ from grader.outcomes import Judgement
 from grader.overlay.measured import measured_picture
 from grader.overlay.picture import backdrop, overlay
 from grader.overlay.scene import Picture
+from grader.reading.corrected import corrected
 from grader.reading.page_scale import at_drawn_scales, is_drawn_otherwise, is_upside_down
 from grader.reading.read import read_figures
 from grader.reading.sketch import drawings
@@ -342,7 +344,14 @@ def _marked(
         report = with_decisions(report, submission)
         return report, lambda _ghosts: tuple(overlay(scan, reading, {}, {}) for scan, reading in plain)
     task, own, declared = answer
-    judgement = decide(opened_by_audit(own, rubric, submission.opened), rubric, submission.decided)
+    learnt = answers_of(task, own, pages, submission.decided)
+    judgement = own
+    if learnt:
+        pages = corrected(pages, learnt.places, task.construction)[0]
+        sheets = [reading_document(page, submission.student_id) for page in pages]
+        again = judged(submission, assignment, rubric, [page.reading for page in pages], learnt.verdicts)
+        judgement = own if isinstance(again, Problem) else again[1]
+    judgement = decide(opened_by_audit(judgement, rubric, submission.opened), rubric, submission.decided)
     names, lang, measured = assignment.file.names, submission.lang, submission.measured or NOTHING_MEASURED
     report = report_of(
         task, judgement, submission.student_id,
@@ -367,9 +376,16 @@ def _is_doubtful(reading: Reading) -> bool:
 
 
 def judged(
-    submission: StudentSubmission, assignment: Assignment, rubric: RubricFile, readings: Sequence[Reading]
+    submission: StudentSubmission,
+    assignment: Assignment,
+    rubric: RubricFile,
+    readings: Sequence[Reading],
+    verdicts: Mapping[str, str] = NONE_DECIDED,
 ) -> tuple[Task, Judgement, Declarations] | Problem:
-    """The judgement and the scales that counted as declared, or why there is none."""
+    """The judgement and the scales that counted as declared, or why there is none.
+
+    Arguments: `verdicts` are what people decided of what waited, by vector, angular quantity or scale.
+    """
     drawn = tuple(reading for reading in readings if reading.figures)
     is_empty = not drawn and submission.measured is None
     if submission.variant is None:
@@ -391,7 +407,7 @@ def judged(
     entered = {"roster": submission.declared, "measurements": measured.scales}
     declared = declarations(task, entered, readings, measured.further_scales)
     by_hand = replace(measured.reading, unread=(*measured.reading.unread, *declared.unread))
-    evidence = Submission(drawn, by_hand, measured.values, declared.texts)
+    evidence = Submission(drawn, by_hand, measured.values, declared.texts, verdicts)
     judgement = judge(task, evidence)
     return task, open_again(judgement, rubric, submission) if is_empty else judgement, declared
 

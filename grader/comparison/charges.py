@@ -176,7 +176,9 @@ class Charges:
         construction, nodes = self.task.construction, self.evidence.nodes
         scale = self.settled[segment.scale].mark
         is_unseen = scale is not None and any(reason.code == "unread" for reason in scale.reasons)
-        needs = [need for need in construction.step(segment.head).needs if need not in nodes]
+        needs = [
+            need for need in construction.step(segment.head).needs if need not in {*nodes, *self.charged}
+        ]
         read = {construction.figure_of(node) for node in nodes} if needs else set()
         unread = dict.fromkeys(need for need in needs if construction.figure_of(need) in read)
         return (*((segment.scale,) if is_unseen else ()), *unread)
@@ -244,12 +246,26 @@ class Charges:
 
     def leave_open(self, name: str) -> None:
         """Record that the verdict on a vector, angular quantity or scale is open after all."""
+        self.doubtful.add(self._forgotten(name))
+
+    def decided(self, name: str, verdict: str) -> None:
+        """Record what a person decided of an open verdict: what follows from it is in doubt no more."""
+        node = self._forgotten(name)
+        if verdict in {"none", "partial"}:
+            self.charged.add(node)
+        elif verdict in {"full", "follow_through"}:
+            self.cleared.add(node)
+        if verdict == "follow_through":
+            self.inherited.add(node)
+
+    def _forgotten(self, name: str) -> str:
+        """The node, quantity or scale of a name, of which nothing is recorded any more."""
         segment = self.task.segments.get(name)
         node = name if segment is None else segment.head
         self.shown.clear()
-        for judged in (self.charged, self.cleared, self.by_length, self.inherited):
+        for judged in (self.charged, self.cleared, self.by_length, self.inherited, self.doubtful):
             judged.discard(node)
-        self.doubtful.add(node)
+        return node
 
     # Why ------------------------------------------------------------------------------------------
 

@@ -21,6 +21,7 @@ from grader.comparison.scales import Scale, settle
 from grader.comparison.task import Task, unit_of
 from grader.comparison.verdicts import (
     ALL_RIGHT,
+    EVEN,
     FULL,
     SHORT_MM,
     MarkRange,
@@ -95,6 +96,8 @@ def _outcome(charges: Charges, criterion: CriterionTable) -> Outcome:
     if entry is None and outcome.verdict in {"none", "partial"}:
         entry = _refused_below(charges, criterion.name)
     if entry is None:
+        if outcome.verdict == "review" and criterion.name in charges.evidence.verdicts:
+            charges.decided(criterion.name, charges.evidence.verdicts[criterion.name])
         return outcome
     charges.leave_open(criterion.name)
     return verdicts.entry_refused(outcome, entry)
@@ -373,6 +376,8 @@ def _is_charged(charges: Charges, scale: str) -> bool:
 # What was not handed in, or not read ---------------------------------------------------------------
 
 
+PROBABLY_NOT_DRAWN = 0.9
+"""That a vector was not drawn, where no ink lies along it and an end was not read for certain."""
 NOT_DRAWN = 0.98
 """That a vector was not drawn, where both its ends were read for certain and no ink lies between them."""
 
@@ -402,7 +407,8 @@ def absent(charges: Charges, criterion: CriterionTable, expected: Quantity) -> O
         return verdicts.unjudged(
             criterion, rubric.missing, (Reason("not_drawn"),), expected=expected, sure=NOT_DRAWN
         )
-    return verdicts.unjudged(criterion, "review", (reason,), expected=expected)
+    sure = PROBABLY_NOT_DRAWN if criterion.name in evidence.blank else EVEN
+    return verdicts.unjudged(criterion, "review", (reason,), expected=expected, sure=sure)
 
 
 def is_not_drawn(task: Task, evidence: Evidence, name: str, length_mm: float) -> bool:

@@ -23,12 +23,14 @@ class Submission:
     measured : what the student (or an instructor) measured, directions from the assignment's +x
     values : computed values, SI, by vector or angular quantity
     declared : scales as declared, text by ``kL``, ``kv``, ``ka``
+    verdicts : what a person decided of what waited, by vector, angular quantity or scale
     """
 
     readings: tuple[Reading, ...] = ()
     measured: Reading | None = None
     values: Mapping[str, float] = field(default_factory=dict)
     declared: Mapping[str, str] = field(default_factory=dict)
+    verdicts: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +80,7 @@ class Evidence:
     has_sketch : whether the mechanism was read on any
     refused : what was entered by hand for a vector, angular quantity or scale and cannot be used, by name
     written : lengths that stand in the sheets' cells, mm, and the probability that they do, by vector
+    verdicts : what a person decided of what waited, by name
     """
 
     drawn: Mapping[str, DrawnVector]
@@ -93,6 +96,7 @@ class Evidence:
     has_sketch: bool = False
     refused: Mapping[str, str] = field(default_factory=dict)
     blank: frozenset[str] = frozenset()
+    verdicts: Mapping[str, str] = field(default_factory=dict)
 
     def vector(self, name: str) -> DrawnVector | None:
         """The vector as read, else as measured."""
@@ -120,6 +124,7 @@ def gather(task: Task, submission: Submission) -> Evidence:
         unread={gap.name: gap.reason for reading in submission.readings for gap in reading.unread},
         has_sheets=bool(submission.readings),
         values=submission.values,
+        verdicts=submission.verdicts,
         written=written,
         se_mm=sheets.se_mm,
         sketches=sheets.sketches,

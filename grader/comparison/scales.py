@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal, cast
 
 from grader.comparison.evidence import DrawnVector, Evidence, Submission, gather
 from grader.comparison.task import Task, Yardstick, unit_of
-from grader.comparison.verdicts import EVEN, FULL, NONE, Limit, MarkRange, by_rule, mark, with_confidence
+from grader.comparison.verdicts import EVEN, FULL, NONE, Limit, MarkRange, by_rule, mark
 from grader.inputs.scale_text import (
     EXAMPLES,
     SURE,
@@ -50,8 +50,19 @@ def settle(task: Task, evidence: Evidence, declared: Mapping[str, str]) -> dict[
     """The three scales, in the order in which each may follow from those before."""
     settled: dict[str, Scale] = {}
     for name in SCALE_NAMES:
-        settled[name] = _settled_scale(task, evidence, name, declared.get(name), settled)
+        scale, said = _settled_scale(task, evidence, name, declared.get(name), settled), evidence.verdicts
+        settled[name] = _as_decided(scale, said[name]) if name in said else scale
     return settled
+
+
+def _as_decided(scale: Scale, verdict: str) -> Scale:
+    """A scale that a person has judged: the one drawn with, or another, which costs points once."""
+    used = scale.used
+    if verdict == "full":
+        right = scale.other if used.assumed and scale.other else used.used
+        return Scale(replace(used, used=right, assumed=False), None, mark([]))
+    off = () if scale.mark is None else tuple(one for one in scale.mark.reasons if one.code != "unread")
+    return Scale(replace(used, assumed=False), scale.other, MarkRange(NONE, NONE, NONE, off))
 
 
 def used_scales(settled: Mapping[str, Scale]) -> dict[str, float]:
@@ -195,8 +206,8 @@ def _hold_declared(task: Task, evidence: Evidence, name: str, scale: UsedScale, 
     if shown is None:
         doubtful = _evidence_of(task, evidence, name, however_doubtful=True)
         if doubtful is not None and _is_confirmed(task, evidence, name, scale.used, doubtful):
-            drawn = evidence.drawn[f"{name[1]}_{task.pin}"]
-            return Scale(scale, None, with_confidence(mark([]), drawn.confidence, task.rubric.doubt.settle))
+            # A stroke that was misread would have its very length by chance alone, and few scales are wrong.
+            return Scale(scale, None, mark([]))
         if _is_unseen(task, evidence, name, scale.used):
             return _unseen(task, evidence, name, scale, doubtful)
         return Scale(scale, None, mark([]) if is_rule else None)

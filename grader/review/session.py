@@ -10,12 +10,11 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Annotated
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.dataclasses import dataclass as posted
 
 from grader.comparison.task import task_of
-from grader.documents import CriterionDocument, ProblemDocument, ReadingDocument, ReportDocument
+from grader.documents import CriterionDocument, ProblemDocument, ReportDocument
 from grader.folder.batch import Batch, Graded, Job, graded, pages_read
 from grader.folder.decisions import basis_of, decided, page_basis
 from grader.folder.workers import Pool
@@ -24,7 +23,8 @@ from grader.inputs.measurements import StudentSubmission
 from grader.overlay.scene import Arrow, Ghost, Scene, expected_vector, ghost_of, on_paper, scene_of
 from grader.pipeline import report_on
 from grader.reading.corrected import snapped
-from grader.records import MECHANISM, Figure, PageRef, Reading, ReadNode, ReadVector, ScannedPage
+from grader.records import MECHANISM, PageRef, ScannedPage
+from grader.review.doubts import reading_of
 from grader.review.scans import Scans
 from reference.construction.graph import Construction
 from reference.errors import CallError, PlanmarkError
@@ -487,22 +487,6 @@ class Session:
             if any(vector.name == criterion.vector for vector in construction.vectors_of(figure))
         )
         return next(figures, "")
-
-
-def reading_of(document: ReadingDocument) -> Reading:
-    """The record of a document; covariances are as if they were the same in all directions."""
-    figures: dict[str, Figure] = {}
-    for kind, figure in document.figures.items():
-        nodes = {
-            name: ReadNode(complex(node.x_mm, -node.y_mm), np.eye(2) * node.se_mm**2, node.confidence)
-            for name, node in figure.nodes.items()
-        }
-        vectors = {
-            name: ReadVector(one.length_mm, one.se_mm, one.direction_deg, one.se_deg, one.confidence)
-            for name, one in figure.vectors.items()
-        }
-        figures[kind] = Figure(nodes, vectors)
-    return Reading(figures)
 
 
 def page_criterion(ref: PageRef) -> str:

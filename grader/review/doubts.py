@@ -1,0 +1,333 @@
+"""What to ask a person about a submission: one question for one doubt, whatever it touches.
+
+Whose drawing it is comes first, then scales, then where a node lies, then single verdicts. A question has
+choices; each is a bundle of rows for the file of decisions, and judging the submission with them shows what
+else the answer settles.
+"""
+
+import cmath
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from grader.comparison.task import Task
+from grader.comparison.verdicts import EVEN
+from grader.documents import CriterionDocument, ReadingDocument, ReportDocument
+from grader.inputs.decision_texts import place_text
+from grader.marking.answers import OFF_AS_READ, along_of, on_sheet
+from grader.records import MECHANISM, Figure, Reading, ReadNode, ReadVector, ScannedPage
+from reference.authored.assignment import SCALE_NAMES
+from reference.construction.graph import Vector
+
+Kind = Literal["owner", "scale", "node", "verdict"]
+ORDER: Mapping[Kind, int] = {"owner": 0, "scale": 1, "node": 2, "verdict": 3}
+OPEN = "review"
+OF_OWNER = ("other_variant", "data_misread", "not_explained")
+"""Reasons of a doubt that concerns a whole drawing."""
+CREDITED = frozenset({"full", "follow_through"})
+SURE = 0.8
+"""A choice of this probability is the default, which Enter takes; below it a person is not led."""
+APART_MM = 1.0
+"""Two places nearer than this are one: the tolerance of a short vector is a little more."""
+MOST_PLACES = 3
+OTHERWISE = 0.6
+"""Of nodes that do not lie where they were read, so many lie at one of the other places offered."""
+LIKELY_WHOLE = 2
+"""So many open verdicts or more with one reason are one question."""
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One answer to a question.
+
+    Attributes
+    ----------
+    key : ``a``, ``b`` for places, ``neither``, else a verdict or ``follow``
+    rows : what it writes, verdicts or places by criterion
+    probability : that it is the right answer, None where nothing is known
+    at : of a place, mm on the sheet, y down
+    """
+
+    key: str
+    rows: tuple[tuple[str, str], ...]
+    probability: float | None = None
+    at: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """One question.
+
+    Attributes
+    ----------
+    id : of the criterion, or ``owner`` or ``node:FIGURE:NODE``
+    criteria : the open criteria that it is about
+    choices : the likeliest first, but for verdicts, whose order is always the same
+    settles : how many open criteria its likeliest answer settles; 0 where that was not counted
+    """
+
+    id: str
+    kind: Kind
+    criteria: tuple[str, ...]
+    choices: tuple[Choice, ...] = ()
+    settles: int = 0
+
+    @property
+    def default(self) -> Choice | None:
+        """The choice that Enter takes."""
+        return next((one for one in self.choices if (one.probability or 0.0) >= SURE), None)
+
+    @property
+    def likeliest(self) -> Choice | None:
+        """The choice that is taken for the answer where what it settles is counted."""
+        known = [one for one in self.choices if one.probability is not None]
+        return max(known, key=lambda one: one.probability or 0.0, default=None) or next(
+            iter(self.choices), None
+        )
+
+
+def doubts_of(task: Task, report: ReportDocument, figures: Mapping[str, Figure]) -> list[Doubt]:
+    """The questions of a report, those that concern most first.
+
+    Arguments: `figures` as read on the sheets, with what else each vector may be.
+    """
+    waiting = [one for one in report.criteria if one.verdict == OPEN]
+    found: list[Doubt] = []
+    for make in (_owners, _scales, _nodes):
+        covered = {name for doubt in found for name in doubt.criteria}
+        left = [one for one in waiting if one.id not in covered]
+        found.extend(make(_Asked(task, left, figures)))
+    covered = {name for doubt in found for name in doubt.criteria}
+    found.extend(of_verdict(one) for one in waiting if one.id not in covered)
+    return sorted(found, key=lambda one: ORDER[one.kind])
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """The criteria that wait, and what was read."""
+
+    task: Task
+    waiting: Sequence[CriterionDocument]
+    figures: Mapping[str, Figure] = field(default_factory=dict)
+
+    @property
+    def least(self) -> float:
+        """The confidence from which a node counts as read."""
+        return self.task.rubric.least_confidence
+
+
+def of_verdict(criterion: CriterionDocument) -> Doubt:
+    """The question of one verdict."""
+    order = ("full", "partial", "none", "follow_through")
+    choices = tuple(
+        Choice(
+            verdict,
+            ((criterion.id, verdict),),
+            criterion.probability if verdict == criterion.proposed else None,
+        )
+        for verdict in order
+    )
+    return Doubt(criterion.id, "verdict", (criterion.id,), choices)
+
+
+# Whose drawing it is --------------------------------------------------------------------------------
+
+
+def _owners(asked: _Asked) -> Iterator[Doubt]:
+    """One question for all verdicts that wait because the whole drawing is not the student's own task."""
+    for code in OF_OWNER:
+        about = [one for one in asked.waiting if code in one.reasons]
+        if len(about) < LIKELY_WHOLE:
+            continue
+        names = tuple(one.id for one in about)
+        follow = tuple((one.id, one.proposed or "none") for one in about)
+        none = tuple((name, "none") for name in names)
+        yield Doubt("owner", "owner", names, (Choice("none", none), Choice("follow", follow)))
+        return
+
+
+# Scales ---------------------------------------------------------------------------------------------
+
+
+def _scales(asked: _Asked) -> Iterator[Doubt]:
+    """The scales that wait, each with the vectors that wait for it."""
+    by_scale = {one.name: one.id for one in asked.task.rubric.criterion if one.name in SCALE_NAMES}
+    for scale in SCALE_NAMES:
+        own = [one for one in asked.waiting if one.id == by_scale.get(scale)]
+        undecided = [one for one in asked.waiting if _waits_for(asked.task, one, scale)]
+        if not own and len(undecided) < LIKELY_WHOLE:
+            continue
+        names = (*(one.id for one in own), *(one.id for one in undecided))
+        if scale in by_scale:
+            likely = own[0].proposed if own else None
+            sure = own[0].probability if own else None
+            choices = tuple(
+                Choice(verdict, ((by_scale[scale], verdict),), sure if verdict == likely else None)
+                for verdict in ("full", "partial", "none")
+            )
+            yield Doubt(by_scale[scale], "scale", names, choices)
+        else:
+            right = tuple((one.id, "follow_through") for one in undecided)
+            wrong = tuple((one.id, "none") for one in undecided)
+            yield Doubt(f"scale:{scale}", "scale", names, (Choice("full", right), Choice("none", wrong)))
+
+
+def _waits_for(task: Task, criterion: CriterionDocument, scale: str) -> bool:
+    """Whether a vector is right at the scale drawn with, and wrong at the one that was assumed."""
+    segment = task.segments.get(criterion.vector or "")
+    codes = set(criterion.reasons)
+    return segment is not None and segment.scale == scale and {"scale_assumed", "follows"} <= codes
+
+
+# Nodes ----------------------------------------------------------------------------------------------
+
+
+def _nodes(asked: _Asked) -> Iterator[Doubt]:
+    """The nodes that were read in doubt and on which open verdicts hang, in the order of construction."""
+    left = {one.id: one for one in asked.waiting if one.vector is not None}
+    for step in asked.task.construction.steps:
+        figure = asked.task.construction.figure_of(step.node)
+        if figure not in asked.figures or figure == MECHANISM or not left:
+            continue
+        about = [one for one in left.values() if step.node in _in_doubt(asked, one)]
+        choices = _credit(about) or _places(asked, about, step.node, figure) if about else ()
+        if choices:
+            kind: Kind = "verdict" if choices[0].at is None else "node"
+            yield Doubt(f"node:{figure}:{step.node}", kind, tuple(one.id for one in about), choices)
+            left = {name: one for name, one in left.items() if one not in about}
+
+
+def _vector(asked: _Asked, criterion: CriterionDocument) -> Vector:
+    return asked.task.construction.vectors[criterion.vector or ""]
+
+
+def _in_doubt(asked: _Asked, criterion: CriterionDocument) -> set[str]:
+    """The nodes that were not read for certain and on which an open vector hangs; its ends before all.
+
+    None where it is open for another reason than its reading.
+    """
+    codes, vector = set(criterion.reasons), _vector(asked, criterion)
+    figure = asked.figures.get(asked.task.construction.figure_of(vector.head))
+    if figure is None or not {"doubtful", "unread"} & codes or criterion.measured.length_mm is None:
+        return set()
+    needs = asked.task.construction.step(vector.head).needs if "unread" in codes else ()
+    unsure = {one for one in (vector.tail, vector.head, *needs) if _sure(asked, one) < asked.least}
+    known = {end: _sure(asked, end) for end in (vector.tail, vector.head)}
+    weakest = min(known, key=lambda end: known[end])
+    return unsure or ({weakest} if "doubtful" in codes and known[weakest] < 1.0 else set())
+
+
+def _sure(asked: _Asked, node: str) -> float:
+    """The confidence in a node; 0 where it was not read."""
+    figure = asked.figures.get(asked.task.construction.figure_of(node))
+    return figure.nodes[node].confidence if figure is not None and node in figure.nodes else 0.0
+
+
+def _places(asked: _Asked, about: Sequence[CriterionDocument], node: str, figure: str) -> tuple[Choice, ...]:
+    """Where a node may lie: as read, as another reading has it, as is expected; then none of these."""
+    read = asked.figures[figure].nodes.get(node)
+    touching = [one for one in about if node in {_vector(asked, one).tail, _vector(asked, one).head}]
+    candidates = [] if read is None else [read.at]
+    for place in (*_of_others(asked, touching, node, figure), *_expected(asked, touching, node)):
+        if all(abs(place - one) > APART_MM for one in candidates):
+            candidates.append(place)
+    sure = _right_as_read(touching, read)
+    likely = sorted(_shared(candidates[:MOST_PLACES], sure), key=lambda one: -one[1])
+    places = tuple(
+        Choice(key, ((f"node:{figure}:{node}", place_text(*on_sheet(at))),), each, on_sheet(at))
+        for key, (at, each) in zip("abc", likely, strict=False)
+    )
+    missing = tuple((one.id, "none") for one in touching)
+    return (*places, Choice("neither", missing)) if len(places) > 1 else ()
+
+
+def _credit(about: Sequence[CriterionDocument]) -> tuple[Choice, ...]:
+    """The choices where every vector at a node is right as it was read, doubtful as that is; else none.
+
+    Wherever the node lies, the verdicts are the same: there is nothing to tell apart.
+    """
+    if any(one.proposed not in CREDITED or OFF_AS_READ & set(one.reasons) for one in about):
+        return ()
+    right = tuple((one.id, one.proposed or "full") for one in about)
+    wrong = tuple((one.id, "none") for one in about)
+    sure = min(one.probability or 0.0 for one in about)
+    return (Choice("full", right, sure), Choice("none", wrong))
+
+
+def _shared(places: Sequence[complex], sure: float) -> list[tuple[complex, float]]:
+    """The places with their probabilities: of the first one, what is left shared among the others."""
+    rest = OTHERWISE * (1.0 - sure) / max(len(places) - 1, 1)
+    return [(place, rest if index else sure) for index, place in enumerate(places)]
+
+
+def _right_as_read(about: Sequence[CriterionDocument], read: ReadNode | None) -> float:
+    """The probability that a node lies where it was read: that of its surest vector."""
+    if read is None:
+        return EVEN
+    return max((one.confidence for one in about), default=read.confidence)
+
+
+def _of_others(
+    asked: _Asked, about: Sequence[CriterionDocument], node: str, figure: str
+) -> Iterator[complex]:
+    """Where other readings of its vectors have a node."""
+    for criterion in about:
+        vector = _vector(asked, criterion)
+        start, read = _start(asked, vector, node), asked.figures[figure].vectors.get(vector.name)
+        if start is None or read is None:
+            continue
+        for other in read.others:
+            along = cmath.rect(other.length_mm, math.radians(other.direction_deg))
+            yield start[0].at + start[1] * along
+
+
+def _expected(asked: _Asked, about: Sequence[CriterionDocument], node: str) -> Iterator[complex]:
+    """Where a node is expected from the other ends of its vectors."""
+    for criterion in about:
+        start, along = _start(asked, _vector(asked, criterion), node), along_of(criterion.expected)
+        if start is not None and along is not None:
+            yield start[0].at + start[1] * along
+
+
+def _start(asked: _Asked, vector: Vector, node: str) -> tuple[ReadNode, float] | None:
+    """The other end of a vector, if it was read for certain, and the sign of the vector from there."""
+    if node not in {vector.tail, vector.head}:
+        return None
+    other, sign = (vector.tail, 1.0) if node == vector.head else (vector.head, -1.0)
+    if _sure(asked, other) < asked.least:
+        return None
+    return asked.figures[asked.task.construction.figure_of(other)].nodes[other], sign
+
+
+# What was read --------------------------------------------------------------------------------------
+
+
+def reading_of(document: ReadingDocument) -> Reading:
+    """The record of a document; covariances are as if they were the same in all directions."""
+    figures: dict[str, Figure] = {}
+    for kind, figure in document.figures.items():
+        nodes = {
+            name: ReadNode(complex(node.x_mm, -node.y_mm), np.eye(2) * node.se_mm**2, node.confidence)
+            for name, node in figure.nodes.items()
+        }
+        vectors = {
+            name: ReadVector(one.length_mm, one.se_mm, one.direction_deg, one.se_deg, one.confidence)
+            for name, one in figure.vectors.items()
+        }
+        figures[kind] = Figure(nodes, vectors)
+    return Reading(figures)
+
+
+def figures_read(report: ReportDocument, pages: Sequence[ScannedPage]) -> dict[str, Figure]:
+    """The figures of a report with what else each vector may be, as its pages were first read."""
+    found: dict[str, Figure] = {}
+    for document, page in zip(report.reading.sheets, pages, strict=False):
+        for name, figure in reading_of(document).figures.items():
+            first = page.reading.figures.get(name)
+            others = {} if first is None else {key: one.others for key, one in first.vectors.items()}
+            vectors = {key: replace(one, others=others.get(key, ())) for key, one in figure.vectors.items()}
+            found.setdefault(name, Figure(figure.nodes, vectors))
+    return found

@@ -1,0 +1,325 @@
+"""A review walked through without a person: how much is asked, and what pressing Enter alone comes to.
+
+::
+
+    python -m tests.bench.reviewing --seeds 1001 1100 --kept FOLDER [--one-by-one]
+
+Sheets of simulated students, read once (`judging_scans`), are reviewed three times. *Enter* takes each
+default, and the first choice where there is none. *Truth* answers by what was drawn: of places the one where
+the node lies, else it is dragged there; of verdicts the one that a perfect reading of the same drawing gives.
+The total of that perfect reading is what is due. ``--one-by-one`` asks each open criterion in the rubric's
+order and accepts what is proposed, whatever its probability: the review as it was.
+"""
+
+import argparse
+import cmath
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from grader.comparison.evidence import Submission
+from grader.comparison.task import Task, task_of
+from grader.documents import ReportDocument
+from grader.inputs.decisions import Decision
+from grader.inputs.measurements import StudentSubmission
+from grader.marking.mark import judge
+from grader.outcomes import Judgement
+from grader.pipeline import report_on
+from grader.records import Figure, PageRef, ReadNode, ScannedPage
+from tests.bench.judging_handed_in import submission
+from tests.bench.judging_scans import SHEET_KINDS, ReadWork, read_works
+from tests.bench.plain_text import Table, as_text
+
+NEAR_MM = 1.0
+"""A place this near to where a node was drawn is the right one."""
+MOST_QUESTIONS = 60
+BINS = (0.0, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.01)
+CREDITED, CHARGED = {"full", "follow_through"}, {"none", "partial"}
+
+
+@dataclass(frozen=True, slots=True)
+class Answered:
+    """One answer that was offered with a probability, and whether it is right."""
+
+    kind: str
+    probability: float
+    is_right: bool
+    about: str = ""
+
+
+@dataclass(slots=True)
+class Review:
+    """One student's sheets under review, without a page or a server."""
+
+    task: Task
+    student: StudentSubmission
+    pages: list[ScannedPage]
+    rows: list[Decision] = field(default_factory=list)
+
+    def report(self) -> ReportDocument:
+        """The report with what is decided so far."""
+        task, student = self.task, replace(self.student, decided=tuple(self.rows))
+        return report_on(student, self.pages, task.assignment, task.rubric)
+
+    def answer(self, rows: Sequence[tuple[str, str]]) -> None:
+        """Decide; a row on the same criterion replaces the one before."""
+        said = {name for name, _ in rows}
+        self.rows = [one for one in self.rows if one.criterion not in said]
+        self.rows += [Decision("s", None, name, verdict) for name, verdict in rows]
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """What was drawn: verdicts and total by a perfect reading, nodes on the sheet (complex mm) by figure."""
+
+    verdicts: Mapping[str, str]
+    total: float
+    nodes: Mapping[tuple[str, str], complex]
+
+
+def truth_of(read: ReadWork, task: Task) -> Truth:
+    """What a perfect reader would have found on a student's sheets."""
+    perfect = submission(read.work, "nodes")
+    sure = tuple(
+        replace(one, figures={k: _sure(v) for k, v in one.figures.items()}) for one in perfect.readings
+    )
+    judgement = judge(task, Submission(readings=sure, declared=read.declared))
+    return Truth(*_verdicts(task, judgement), _on_sheets(read))
+
+
+def _sure(figure: Figure) -> Figure:
+    return Figure(
+        {name: replace(one, confidence=1.0) for name, one in figure.nodes.items()},
+        {name: replace(one, confidence=1.0) for name, one in figure.vectors.items()},
+    )
+
+
+def _verdicts(task: Task, judgement: Judgement) -> tuple[Mapping[str, str], float]:
+    """The verdicts, those that wait as they are proposed, and the points that they come to."""
+    verdicts, total = dict[str, str](), 0.0
+    for one in judgement.outcomes:
+        is_open = one.verdict == "review"
+        verdicts[one.criterion] = one.proposed_verdict if is_open else one.verdict
+        share = one.proposed if is_open else (one.shares[0] if one.shares else float(one.verdict in CREDITED))
+        total += 0.0 if one.verdict == "not_judged" else share * task.rubric.points[one.criterion]
+    return verdicts, total
+
+
+def _on_sheets(read: ReadWork) -> dict[tuple[str, str], complex]:
+    """Where nodes were drawn on their sheets: the drawing laid onto the nodes that were surely read."""
+    found: dict[tuple[str, str], complex] = {}
+    for reading in read.readings:
+        for name, figure in reading.figures.items():
+            own = read.work.named(read.work.own(name), "nodes")
+            names = [node for node in figure.nodes if node in own]
+            if len(names) >= 2:
+                moved = _laid_onto([own[one] for one in names], [figure.nodes[one] for one in names])
+                steps = [step.node for step in read.work.construction.figures[name]]
+                found |= {(name, one): moved[0] * own[one] + moved[1] for one in steps if one in own}
+    return found
+
+
+def _laid_onto(own: Sequence[complex], read: Sequence[ReadNode]) -> tuple[complex, complex]:
+    """The turn (unit) and shift that lay a drawing onto its reading; nodes read in doubt hardly count."""
+    drawn, at = np.array(own), np.array([one.at for one in read])
+    weights = np.array([max(one.confidence, 0.01) ** 8 for one in read])
+    for _ in range(8):
+        centre, middle = np.average(drawn, weights=weights), np.average(at, weights=weights)
+        turn = cmath.phase(complex(np.sum(weights * (at - middle) * np.conj(drawn - centre))))
+        shift = middle - cmath.rect(1.0, turn) * centre
+        apart = np.abs(cmath.rect(1.0, turn) * drawn + shift - at)
+        weights = np.array([one.confidence**2 for one in read]) / (1.0 + (apart / 0.5) ** 2) + 1e-9
+    return cmath.rect(1.0, turn), complex(shift)
+
+
+# The three reviews ----------------------------------------------------------------------------------
+
+
+def questions_of(review: Review, report: ReportDocument, *, one_by_one: bool) -> list:  # type: ignore[type-arg]
+    """The open questions, the first one first."""
+    from grader.review.doubts import doubts_of, figures_read, of_verdict  # noqa: PLC0415 - not there before
+
+    if one_by_one:
+        return [of_verdict(one) for one in report.criteria if one.verdict == "review"]
+    return doubts_of(review.task, report, figures_read(report, review.pages))
+
+
+def walked(
+    review: Review, truth: Truth | None, *, one_by_one: bool = False
+) -> tuple[int, list[Answered], float]:
+    """Questions asked, what was offered, and the total that the review comes to.
+
+    Arguments: `truth` answers where it is given; else Enter does.
+    """
+    asked, offered = 0, list[Answered]()
+    report = review.report()
+    while asked < MOST_QUESTIONS:
+        questions = questions_of(review, report, one_by_one=one_by_one)
+        if not questions:
+            break
+        first, asked = questions[0], asked + 1
+        if truth is None:
+            chosen = first.likeliest if one_by_one else first.default or first.choices[0]
+            review.answer(chosen.rows)
+        else:
+            right = _right(first, truth)
+            best = first.likeliest
+            if best is not None and best.probability is not None and first.kind != "owner":
+                offered.append(
+                    Answered(
+                        first.kind,
+                        best.probability,
+                        _is_same(best, right),
+                        f"{first.id} {best.key} {right}",
+                    )
+                )
+            review.answer(right)
+        report = review.report()
+    return asked, offered, _total(report)
+
+
+def _right(question, truth: Truth) -> list[tuple[str, str]]:  # type: ignore[no-untyped-def]
+    """The rows that an honest person writes."""
+    if question.kind == "owner":
+        return [(name, truth.verdicts[name]) for name in question.criteria]
+    if question.kind == "node":
+        figure, node = question.id.split(":")[1:]
+        at = truth.nodes.get((figure, node))
+        if at is None:
+            return list(question.choices[-1].rows)
+        for choice in question.choices:
+            if choice.at is not None and abs(complex(choice.at[0], -choice.at[1]) - at) <= NEAR_MM:
+                return list(choice.rows)
+        return [(question.id, f"{at.real:.3f},{-at.imag:.3f}")]
+    names = {name for choice in question.choices for name, _ in choice.rows}
+    return [
+        (name, truth.verdicts[name] if truth.verdicts[name] != "not_judged" else "full") for name in names
+    ]
+
+
+def _is_same(choice, right: Sequence[tuple[str, str]]) -> bool:  # type: ignore[no-untyped-def]
+    if choice.at is not None:
+        return list(choice.rows) == list(right)
+    return all(
+        (said in CREDITED) == (due in CREDITED)
+        for (_, said), (_, due) in zip(choice.rows, right, strict=True)
+    )
+
+
+def _total(report: ReportDocument) -> float:
+    """The points, what still waits as it is proposed."""
+    points = 0.0
+    for one in report.criteria:
+        likely = one.max_points if one.proposed in CREDITED else 0.0
+        points += (one.points or 0.0) if one.verdict != "review" else likely
+    return points
+
+
+# All students ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Walked:
+    """One student: questions by Enter and by truth, how far the totals are from what is due."""
+
+    asked: int
+    honest: int
+    off: float
+    honest_off: float
+    offered: tuple[Answered, ...]
+
+
+def reviewed(read: ReadWork, *, one_by_one: bool) -> Walked | None:
+    """One student's sheets reviewed; None where nothing was read, or the data are another student's."""
+    drawn = [one for one in read.readings if one.figures]
+    if not drawn or any(one.code == "other_variant" for one in read.work.task.mistakes):
+        return None
+    work = read.work
+    task = task_of(work.assignment, work.rubric, work.variant)
+    student = StudentSubmission("s", work.variant, (), read.declared)
+    pages = [ScannedPage(PageRef(f"{number}.jpg"), reading=one) for number, one in enumerate(drawn)]
+    truth = truth_of(read, task)
+    asked, _, total = walked(Review(task, student, pages), None, one_by_one=one_by_one)
+    honest, offered, known = walked(Review(task, student, pages), truth, one_by_one=one_by_one)
+    return Walked(asked, honest, total - known, known - truth.total, tuple(offered))
+
+
+def tables(students: Sequence[Walked]) -> Iterator[Table]:
+    """How much was asked, how far the totals are off, and how often what was offered was right."""
+    near = [100.0 * np.mean([abs(one.off) <= 1.0 for one in students]) if students else 0.0]
+    near += [100.0 * np.mean([abs(one.honest_off) <= 1.0 for one in students]) if students else 0.0]
+    yield (
+        "Review: questions and totals",
+        ["answers", "sheets", "questions a sheet", "total within 1 point", "mean |off|"],
+        [
+            [
+                name,
+                str(len(students)),
+                f"{np.mean(counts):.2f}",
+                f"{share:.0f} %",
+                f"{np.mean(np.abs(offs)):.2f}",
+            ]
+            for name, counts, share, offs in (
+                ("Enter", [one.asked for one in students], near[0], [one.off for one in students]),
+                ("truth", [one.honest for one in students], near[1], [one.honest_off for one in students]),
+            )
+        ],
+    )
+    offered = [answer for one in students for answer in one.offered]
+    kinds = sorted({one.kind for one in offered})
+    heads = ["offered with", *kinds, "all"]
+    rows = []
+    for low, high in pairwise(BINS):
+        within = [one for one in offered if low <= one.probability < high]
+        rows.append(
+            [
+                f"{low:g}-{min(high, 1.0):g}",
+                *(_share([o for o in within if o.kind == kind]) for kind in kinds),
+                _share(within),
+            ]
+        )
+    yield "Review: proposals that are right, by their probability", heads, rows
+
+
+def _share(answers: Sequence[Answered]) -> str:
+    if not answers:
+        return "-"
+    return f"{100.0 * sum(one.is_right for one in answers) / len(answers):.0f} % of {len(answers)}"
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The benchmark as text."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0] if __doc__ else "")
+    parser.add_argument("--seeds", type=int, nargs=2, default=(1001, 1020), help="first and last")
+    parser.add_argument("--kinds", nargs="+", default=["flatbed"], choices=list(SHEET_KINDS))
+    parser.add_argument("--kept", type=Path, help="folder in which readings are kept")
+    parser.add_argument("--one-by-one", action="store_true")
+    parser.add_argument("--verbose", action="store_true")
+    chosen = parser.parse_args(arguments)
+    students = []
+    for kind in chosen.kinds:
+        for seed in range(chosen.seeds[0], chosen.seeds[1] + 1):
+            for read in read_works(kind, [seed], chosen.kept):
+                one = reviewed(read, one_by_one=chosen.one_by_one)
+                if one is not None:
+                    students.append(one)
+                    if chosen.verbose and (one.asked or abs(one.off) > 1.0):
+                        mistakes = [each.code for each in read.work.task.mistakes]
+                        for each in one.offered:
+                            print("    ", each)
+                        print(
+                            kind,
+                            seed,
+                            one.asked,
+                            one.honest,
+                            f"{one.off:+.2f} {one.honest_off:+.2f}",
+                            mistakes,
+                        )
+    print(as_text(tables(students)))
+
+
+if __name__ == "__main__":
+    main()
