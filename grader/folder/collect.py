@@ -108,6 +108,8 @@ def collect(batch: Batch, graded: Graded, file: Path) -> Collected:
     """
     preview, known = preview_of(file), list(_known(batch, graded))
     state = digest_of([(page.ref.digest, page.ref.page, row) for page, _, row in known])
+    if not known:
+        raise CallError("nothing_to_give", f"{batch.folder}: no figure was read on any page of this class")
     if not preview.exists():
         return _make(preview, known, state, batch.lang)
     if (preview / STATE).read_text(encoding="utf-8") != state:
