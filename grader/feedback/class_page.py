@@ -19,6 +19,7 @@ from grader.documents import (
     ResultsDocument,
     Sign,
     StandingDocument,
+    TrustDocument,
 )
 from grader.feedback.class_statistics import (
     BINS,
@@ -189,6 +190,20 @@ def _how_sure(results: ResultsDocument, speaker: Tongue) -> str:
     return speaker.gettext(WRONG) % known
 
 
+def audit_sentence(trust: TrustDocument, speaker: Tongue) -> str:
+    """What the random sample says of all settled verdicts; empty before anything of it is checked."""
+    if trust.at_most is None:
+        return ""
+    share = math.ceil(1000.0 * trust.at_most - 1e-9) / 1000.0
+    told = speaker.gettext(AUDITED) % {
+        "right": trust.right, "audited": trust.audited, "settled": trust.settled,
+        "share": _per_cent(share, speaker), "confidence": _per_cent(CONFIDENCE, speaker),
+    }  # fmt: skip
+    if not trust.unclear:
+        return told
+    return f"{told} {speaker.gettext(UNDECIDABLE) % {'unclear': trust.unclear}}"
+
+
 def trust_sentences(results: ResultsDocument, speaker: Tongue) -> Iterator[str]:
     """What the verdicts that people checked say of the others; nothing before anybody has checked one."""
     trust = results.trust
@@ -199,13 +214,7 @@ def trust_sentences(results: ResultsDocument, speaker: Tongue) -> Iterator[str]:
         return speaker.gettext(text) % values
 
     if trust.at_most is not None:
-        share = _per_cent(math.ceil(1000.0 * trust.at_most - 1e-9) / 1000.0, speaker)
-        yield said(
-            AUDITED, right=trust.right, audited=trust.audited, share=share, settled=trust.settled,
-            confidence=_per_cent(CONFIDENCE, speaker),
-        )  # fmt: skip
-    if trust.unclear:
-        yield said(UNDECIDABLE, unclear=trust.unclear)
+        yield audit_sentence(trust, speaker)
     if trust.least_sure:
         yield said(LEAST_SURE, count=trust.least_sure, right=trust.least_sure_right)
     titles = {one.id: title_of(results, one) for report in results.reports for one in report.criteria}

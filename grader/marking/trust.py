@@ -31,6 +31,7 @@ from grader.documents import (
     Verdict,
 )
 from grader.inputs.decision_texts import audit_answer
+from grader.marking.decided import FOR_THE_STUDENT
 from grader.marking.mark import score, share_of
 from grader.outcomes import Judgement, Outcome, Reason
 from grader.records import FloatArray
@@ -48,6 +49,8 @@ LEAST_SURE = 5
 CREDIT, CHARGE = frozenset({"full", "follow_through"}), frozenset({"partial", "none"})
 NOT_CHECKED = frozenset({"not_measured", "optional"})
 """Reasons of a verdict on what was not handed in: there is nothing to look at."""
+NO_LONGER_SAID = FOR_THE_STUDENT | {"right"}
+"""Reasons of a settled verdict that would contradict an open one."""
 OPENED = "found_wrong_elsewhere"
 """The reason of a verdict that an audit opened."""
 Answer = Literal["right", "wrong", "unclear"]
@@ -139,7 +142,8 @@ def _of_report(report: ReportDocument) -> Iterator[Checkable]:
         if row is not None and audit_answer(row).said == said.verdict:
             answer = audit_answer(row).answer
         by_audit = answer is not None
-        if answer is None and criterion.decided is not None:
+        if criterion.decided is not None:
+            # What a person decided says more than what the same person had answered.
             answer = _answer_by(criterion, said)
         yield Checkable(
             report.student_id, report.position, criterion.id, source, said, answer, by_audit  # type: ignore[arg-type]
@@ -327,5 +331,5 @@ def _open(outcome: Outcome, share: float) -> Outcome:
         proposed=outcome.shares[0] if outcome.shares else share,
         probability=EVEN,
         confidence=0.0,
-        reasons=(Reason(OPENED), *outcome.reasons),
+        reasons=(Reason(OPENED), *(one for one in outcome.reasons if one.code not in NO_LONGER_SAID)),
     )

@@ -29,7 +29,7 @@ from grader.inputs.decisions import Decision
 from grader.language import N_, Tongue, tongue
 from grader.lms.export import export, usual_name
 from grader.lms.grades import Options
-from grader.review import questions
+from grader.review import audit, questions
 from grader.review.scans import page_of
 from grader.review.session import Answer, ChangedError, Said, Session, Whole, page_criterion
 from reference.errors import CallError, PlanmarkError
@@ -105,6 +105,17 @@ class Review:
         )
         return Response(page, media_type="text/html")
 
+    def audit_page(self, _request: Request) -> Response:
+        """The page on which settled verdicts are checked."""
+        made = environment(self.lang).overlay(loader=PackageLoader("grader.review"))
+        page = made.get_template("audit.html").render(
+            title=self.session.batch.assignment.file.title.in_language(self.lang),
+            texts=audit.texts(self.speaker),
+            by=_user() if self.by is None else self.by,
+            verdicts=VERDICTS,
+        )
+        return Response(page, media_type="text/html")
+
     # The class ------------------------------------------------------------------------------------
 
     def class_facts(self, request: Request) -> Response:
@@ -124,6 +135,11 @@ class Review:
             "comments": session.comments(),
             "pages": len(session.waiting_pages()),
         }
+
+    def audit_facts(self, _request: Request) -> Response:
+        """The next settled verdict to check, and what was found so far."""
+        self.session.refresh()
+        return JSONResponse(audit.audit_facts(self.session, self.speaker))
 
     def question(self, request: Request) -> Response:
         """One question."""
@@ -181,6 +197,11 @@ class Review:
         since = self.session.version
         self.session.decide(said.answers, said.by, said.window)
         return self._facts(since)
+
+    def check(self, said: audit.Checked) -> dict[str, Any]:
+        """What a person found of a settled verdict."""
+        audit.check(self.session, said)
+        return audit.audit_facts(self.session, self.speaker)
 
     def whole(self, said: Whole) -> dict[str, Any]:
         """A comment on a whole submission, and points added."""
@@ -343,6 +364,9 @@ def application(session: Session, lang: str = "en", token: str = "", by: str | N
     review = Review(session, lang, token, by)
     gets: dict[str, Callable[[Request], Response]] = {
         "/": review.index,
+        "/audit": review.audit_page,
+        "/audit.js": _static("audit.js", "text/javascript"),
+        "/api/audit": review.audit_facts,
         "/api/class": review.class_facts,
         "/api/question": review.question,
         "/api/pages": review.pages,
@@ -354,6 +378,7 @@ def application(session: Session, lang: str = "en", token: str = "", by: str | N
         "/review.css": _static("review.css", "text/css"),
     }
     posts: dict[str, tuple[type[Said], Callable[[Any], dict[str, Any]]]] = {
+        "/api/audit": (audit.Checked, review.check),
         "/api/decide": (Answers, review.decide),
         "/api/whole": (Whole, review.whole),
         "/api/node": (Moved, review.node),

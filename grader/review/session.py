@@ -20,6 +20,7 @@ from grader.folder.decisions import basis_of, decided, page_basis
 from grader.folder.workers import Pool
 from grader.inputs.decisions import ClashError, Decision, DecisionFile, Key
 from grader.inputs.measurements import StudentSubmission
+from grader.marking.trust import opened_in, trust_of
 from grader.overlay.scene import Arrow, Ghost, Scene, expected_vector, ghost_of, on_paper, scene_of
 from grader.pipeline import report_on
 from grader.reading.corrected import snapped
@@ -361,7 +362,24 @@ class Session:
         for student in students:
             student.report = self._report(student, rows)
             student.version = self.version
-        return students
+        return students + self._opened_by_audit(rows)
+
+    def _opened_by_audit(self, rows: Sequence[Decision]) -> list[Student]:
+        """Those of whom an audit opens, or no longer opens, settled verdicts; marked anew."""
+        if not any(row.kind == "audit" for row in rows) and not any(
+            one.job.submission.opened for one in self.students
+        ):
+            return []
+        trust = trust_of([student.report for student in self.students], self.batch.rubric.doubt.settle)
+        found = []
+        for student in self.students:
+            likes = opened_in(student.report, trust)
+            if likes != student.job.submission.opened:
+                student.job = replace(student.job, submission=replace(student.job.submission, opened=likes))
+                student.report = self._report(student, rows)
+                student.version = self.version
+                found.append(student)
+        return found
 
     def _report(self, student: Student, rows: Sequence[Decision]) -> ReportDocument:
         """The report with what is decided in some rows of the file."""

@@ -466,9 +466,7 @@ def _taught(call: Call, message: _Launch, user: LtiUser, data: Mapping[str, Any]
     call.service.guard.begin(call.session, call.visitor, account)
     call.note("launched")
     if message.is_deep_link_launch():
-        waiting = {
-            "settings": dict(data[DEEP])
-        }
+        waiting = {"settings": dict(data[DEEP])}
         waiting |= {"platform": user.platform_id, "deployment": data[f"{CLAIM}deployment_id"]}  # type: ignore[dict-item]
         return _led(call, f"/lti/choose?for={_kept(call, waiting)}")
     activity = _activity(call, user, data)

@@ -182,6 +182,14 @@ def test_a_persons_verdict_on_a_settled_one_is_an_answer_of_the_sample():
     assert [one.answer for one in sample(checkable(reports))] == ["wrong"]
 
 
+def test_what_a_person_decided_says_more_than_the_answer_before():
+    said = {"verdict": "full", "settled": True, "probability": 0.98}
+    decided = {"by": "", "at": "", "before": "full"}
+    kept = criterion("v_A", probability=1.0, said=said, decided=decided)
+    trust = trust_of([report("s1", [kept], [("v_A", "wrong; said=full")])], SETTLE)
+    assert (trust.right, trust.opened) == (1, [])
+
+
 # Marking ------------------------------------------------------------------------------------------
 
 

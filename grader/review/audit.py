@@ -1,0 +1,97 @@
+"""The audit's page: one settled verdict after another, and whether it is right.
+
+Neither the probability nor why a verdict was chosen is shown: a person should judge the drawing.
+"""
+
+from typing import Any
+
+from grader.feedback.class_page import audit_sentence
+from grader.feedback.words import VERDICTS
+from grader.inputs.decision_texts import ANSWERS, AuditAnswer
+from grader.language import N_, Tongue
+from grader.marking.trust import Checkable, checkable, next_to_check, sample, trust_of
+from grader.overlay.scene import MARKS
+from grader.review import questions
+from grader.review.session import Answer, Said, Session, Student, mark_of
+from reference.errors import CallError
+
+SHORT = 24
+"""Verdicts of the sample before the least sure ones are asked: all right, at most 12 % are wrong."""
+SAYS = N_("The program says: %(verdict)s. Is that right?")
+ALL_CHECKED = N_("Every settled verdict has been checked.")
+TEXTS = {
+    "gone": questions.TEXTS["gone"],
+    "no_scan": questions.TEXTS["no_scan"],
+    "instead": N_("What is right instead?"),
+    "opened": N_("Verdicts like it wait in the review now."),
+    "undone": N_("Nothing was decided in this window."),
+}
+
+
+class Checked(Said):
+    """What a person found of a settled verdict, `said`; one of `ANSWERS`."""
+
+    student: str
+    criterion: str
+    said: str
+    answer: str
+
+
+def texts(speaker: Tongue) -> dict[str, str]:
+    """What the script says."""
+    return {name: speaker.gettext(text) for name, text in TEXTS.items()}
+
+
+def audit_facts(session: Session, speaker: Tongue) -> dict[str, Any]:
+    """What was found so far, and the next verdict to check."""
+    reports = [student.report for student in session.students]
+    verdicts = checkable(reports)
+    trust = trust_of(reports, session.batch.rubric.doubt.settle)
+    one = _next(verdicts)
+    return {
+        "checked": len(sample(verdicts)),
+        "short": min(SHORT, len(verdicts)),
+        "found": "" if trust is None else audit_sentence(trust, speaker),
+        "none": speaker.gettext(ALL_CHECKED),
+        "question": None if one is None else _question(session, one, speaker),
+    }
+
+
+def _next(verdicts: list[Checkable]) -> Checkable | None:
+    """The next one of the random sample; once that is long enough, first the least sure ones."""
+    asked = next_to_check(verdicts, 1)
+    least = asked[1:] if len(sample(verdicts)) >= SHORT else []
+    return next(iter([*least, *asked]), None)
+
+
+def _question(session: Session, one: Checkable, speaker: Tongue) -> dict[str, Any]:
+    student = _student(session, one)
+    about = questions.question_facts(session, student, one.criterion, speaker)
+    verdict = speaker.gettext(VERDICTS[one.said.verdict])
+    return {
+        **{name: about[name] for name in ("title", "numbers", "look", "seen", "student", "criterion")},
+        "number": student.number + 1,
+        "label": questions.label_of(student, speaker),
+        "said": one.said.verdict,
+        "mark": MARKS[one.said.verdict],
+        "asks": speaker.gettext(SAYS) % {"verdict": verdict},
+    }
+
+
+def _student(session: Session, one: Checkable) -> Student:
+    return next(
+        student
+        for student in session.students
+        if (student.report.student_id, student.report.position) == (one.student, one.position)
+    )
+
+
+def check(session: Session, said: Checked) -> None:
+    """Write what a person found. Raises as `Session.decide`."""
+    if said.answer not in ANSWERS or said.said not in VERDICTS:
+        raise CallError("answer_refused", f"'{said.answer[:40]}' is no answer")
+    student = session.student(said.student)
+    name = f"audit:{student.criterion(said.criterion).id}"
+    there = mark_of(session.standing().of(student, name))
+    answer = Answer(said.student, name, str(AuditAnswer(said.answer, said.said)), seen=there)
+    session.move(answer, said.by, said.window)
