@@ -105,6 +105,7 @@ def _searched_further(case: Case, scales: Sequence[Root], explanations: Sequence
     if scale is not None:
         further = [_both(scale, one) for one in roots]
         found = _by_cost(found, *(_replayed(case, further, cares, swap) for swap in (None, *swaps)))
+    found = _by_cost(found, _with_a_guess(case, roots, swaps, found[0], cares))
     return _by_cost(found, _with_another_guess(case, roots, found[0], cares))
 
 
@@ -137,6 +138,26 @@ def _scale_of_slips(case: Case, best: Replay) -> Root | None:
     made = () if "ka" in case.assumed else (Mistake("scale_wrong", "ka", factor=factor),)
     parameters = {"ka": np.asarray(case.drawing.parameters["ka"] / factor)}
     return Root(made, parameters, cost=RARITY["scale_wrong"])
+
+
+def _with_a_guess(
+    case: Case, roots: Sequence[Root], swaps: Sequence[Mistake], best: Replay, cares: Sequence[float]
+) -> list[Replay]:
+    """The explanations with a mistake at a step without an observation, beside the best one's of the whole.
+
+    Both together cost so much before anything is observed that a search from all roots drops them.
+    """
+    keys = {_key(one) for one in best.made}
+    swap = next((one for one in swaps if _key(one) in keys), None)
+    beside = [root for root in roots if root.made and keys >= {_key(one) for one in root.made}]
+    if (swap is None and not beside) or (len(best.made) == 1 and not best.unexplained):
+        return []
+    root = max(beside, key=lambda one: len(one.made), default=Root())
+    observations = case.observations
+    if swap is not None:
+        root = _both(root, Root((swap,), cost=RARITY[swap.code]))
+        observations = _renamed(observations, swap.other)
+    return replay(case.drawing, observations, [root], case.skill, cares=cares, blind=True)
 
 
 def _with_another_guess(

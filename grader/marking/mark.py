@@ -50,7 +50,7 @@ def judge(task: Task, submission: Submission) -> Judgement:
         if exchanged is not None:
             submission, comparison = exchanged
             slips.append((EXCHANGED, SLIPPED))
-        as_meant = undone(task, submission, comparison.evidence.measured, comparison.scales)
+        as_meant = undone(task, submission, comparison.evidence.measured, comparison.settled)
         meant = None if as_meant is None else compare(task, as_meant.submission, explain)
         if as_meant and meant and _is_explained_better(task, meant, comparison, as_meant):
             submission, comparison = as_meant.submission, meant

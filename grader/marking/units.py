@@ -14,6 +14,7 @@ from itertools import product
 import numpy as np
 
 from grader.comparison.evidence import DrawnVector, Submission
+from grader.comparison.scales import Scale
 from grader.comparison.task import Task
 from grader.outcomes import UsedScale
 from grader.records import Reading, ReadVector
@@ -69,12 +70,13 @@ class Undone:
 
 
 def undone(
-    task: Task, submission: Submission, drawn: Mapping[str, DrawnVector], scales: Mapping[str, UsedScale]
+    task: Task, submission: Submission, drawn: Mapping[str, DrawnVector], settled: Mapping[str, Scale]
 ) -> Undone | None:
     """The submission with slips of units undone; None where it has none.
 
-    Arguments: `drawn` are its measured vectors, `scales` those used for marking.
+    Arguments: `drawn` are its measured vectors, `settled` the scales used for marking.
     """
+    scales = {name: scale.used for name, scale in settled.items()}
     slips: list[tuple[Mistake, float]] = []
     if submission.measured is not None and not submission.readings:
         entries = _Entries.of(task, drawn, scales)
@@ -82,7 +84,7 @@ def undone(
             if found is not None:
                 submission = replace(submission, measured=_changed(submission.measured, found.change))
                 slips += [(one, found.probability) for one in found.mistakes]
-    of_values = _values(task, submission.values)
+    of_values = _values(task, submission.values, settled)
     if of_values is not None:
         mistake, names, probability = of_values
         values = {
@@ -152,6 +154,21 @@ class _Entries:
     def shows_both_plans(self) -> bool:
         """Whether enough of the entries are in each plan."""
         return bool(min(np.sum(self.plan == 0.0), np.sum(self.plan == 1.0)) >= LEAST_ENTRIES)
+
+    def turned_by(self, convention: "_Convention") -> FloatArray:
+        """Residuals (rad) of the directions entered by a convention; half a turn where they cannot be."""
+        turned = (
+            np.remainder(convention.undone(self.drawn_rad) - self.exact_rad + math.pi, math.tau) - math.pi
+        )
+        return np.where(np.isfinite(turned), turned, math.pi)
+
+    def fit_better(self, one: FloatArray, other: FloatArray, sigmas: FloatArray, anywhere: float) -> bool:
+        """Whether residuals are likelier than others in each plan: one plan alone has another mistake."""
+        plans = [self.plan == index for index in (0.0, 1.0)]
+        return all(
+            _cost(one[plan], sigmas[plan], anywhere) < _cost(other[plan], sigmas[plan], anywhere)
+            for plan in plans
+        )
 
 
 def _cost(residuals: FloatArray, sigmas: FloatArray, anywhere: float) -> float:
@@ -238,16 +255,15 @@ def _directions(entries: _Entries) -> _Found | None:
     entries = entries.only(np.isfinite(entries.drawn_rad))
     if not entries.shows_both_plans:
         return None
-    costs, residuals = [], np.zeros(0)
-    for one in reversed(CONVENTIONS):
-        turned = np.remainder(one.undone(entries.drawn_rad) - entries.exact_rad + math.pi, math.tau) - math.pi
-        residuals = np.where(np.isfinite(turned), turned, math.pi)
-        costs.append(_cost(residuals, entries.sigma_rad, math.tau) + PRICE * len([*one.mistakes]))
-    costs.reverse()
+    residuals = [entries.turned_by(one) for one in CONVENTIONS]
+    costs = [
+        _cost(turned, entries.sigma_rad, math.tau) + PRICE * len([*one.mistakes])
+        for one, turned in zip(CONVENTIONS, residuals, strict=True)
+    ]
     best, probability = _chosen(costs, 2.0 * math.log(math.tau) * len(entries.plan))
     convention = CONVENTIONS[best]
-    # The residuals of the last one tried are those of the entries as they stand.
-    if best == 0 or probability < SURE or _share(residuals, entries.sigma_rad) > MOST_FIT:
+    is_found = best > 0 and probability >= SURE and _share(residuals[0], entries.sigma_rad) <= MOST_FIT
+    if not is_found or not entries.fit_better(residuals[best], residuals[0], entries.sigma_rad, math.tau):
         return None
 
     def change(vector: ReadVector) -> ReadVector:
@@ -282,7 +298,8 @@ def _lengths(entries: _Entries) -> _Found | None:
     ]
     best, probability = _chosen(costs, 2.0 * math.log(AREA_MM) * len(entries.plan))
     unit = [*factors][best]
-    if unit == "mm" or probability < SURE or _share(residuals["mm"], entries.sigma_mm) > MOST_FIT:
+    is_found = unit != "mm" and probability >= SURE and _share(residuals["mm"], entries.sigma_mm) <= MOST_FIT
+    if not is_found or not entries.fit_better(residuals[unit], residuals["mm"], entries.sigma_mm, AREA_MM):
         return None
     factor = factors[unit]
 
@@ -307,9 +324,17 @@ VALUE_RANGE = 10.0
 """Of a logarithm: a wrong value may be anything between a hundredth and a hundredfold."""
 
 
-def _values(task: Task, values: Mapping[str, float]) -> tuple[Mistake, frozenset[str], float] | None:
-    """The unit of all computed values of a kind, where that is not the SI's, and which values these are."""
-    right = {**{name: abs(real) for name, real in task.real.items()}, **task.rates}
+def _values(
+    task: Task, values: Mapping[str, float], settled: Mapping[str, Scale]
+) -> tuple[Mistake, frozenset[str], float] | None:
+    """The unit of all computed values of a kind, where that is not the SI's, and which values these are.
+
+    They are computed at the scales declared, right or wrong.
+    """
+    followed = {name: one.used.used / (one.other or one.used.used) for name, one in settled.items()}
+    right = {name: abs(real) * followed[task.scale_of(name)] for name, real in task.real.items()}
+    for name, rate in task.rates.items():
+        right[name] = rate * followed[task.scale_of(task.construction.rates[name].vector)]
     known = {name: value for name, value in values.items() if value and right.get(name)}
     for unit, (kinds, factor) in VALUE_UNITS.items():
         names = [name for name in known if name[0] in kinds]
