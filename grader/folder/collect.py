@@ -126,7 +126,7 @@ def _make(preview: Path, known: Sequence[Known], state: str, lang: str) -> Colle
     left_out = 0
     make_folder(preview)
     for page, construction, row in order:
-        made = _anonymous(page, construction)
+        made = _anonymous(page, construction, row)
         if made is None:
             left_out += 1
             continue
@@ -156,17 +156,20 @@ def _table(cells: Sequence[tuple[str, str, str]]) -> str:
     return buffer.getvalue()
 
 
-def _anonymous(page: ScannedPage, construction: Construction) -> tuple[bytes, FloatArray] | None:
+def _anonymous(page: ScannedPage, construction: Construction, row: Row) -> tuple[bytes, FloatArray] | None:
     """The picture that is left of a page, and the map from mm to its pixels; None where no figure is left."""
-    sheet, keep = page.sheet, keep_of(page, construction)
+    sheet, keep = page.sheet, keep_of(page, construction, row)
     if sheet is None or keep is None:
         return None
     grey, mm_to_px = upright_pixels(decode(page.ref), sheet)
     return bare_png(covered(grey, mm_to_px, sheet.px_per_mm, keep)), mm_to_px
 
 
-def keep_of(page: ScannedPage, construction: Construction) -> Keep | None:
-    """What stays of a page; None where no figure was read, or one lies where the title block is."""
+def keep_of(page: ScannedPage, construction: Construction, row: Row) -> Keep | None:
+    """What stays of a page; None where no figure was read, or one lies where the title block is.
+
+    Arguments: `row` is what is known of it; points that a person moved stay where they were and are.
+    """
     if page.sheet is None or page.ink is None:
         return None
     keep = Keep(
@@ -179,10 +182,12 @@ def keep_of(page: ScannedPage, construction: Construction) -> Keep | None:
     )
     ends = [(one.tail, one.head) for one in construction.vectors.values()]
     ends += construction.links.values()
-    for figure in page.reading.figures.values():
-        nodes = {name: np.array([one.at.real, -one.at.imag]) for name, one in figure.nodes.items()}
+    for name, known in row["figures"].items():
+        nodes = {node: np.array(place[:2]) for node, place in known.items()}
+        read = page.reading.figures[name].nodes.values() if name in page.reading.figures else ()
         if len(nodes) > 1:
-            keep.figures.append(np.array([*nodes.values()]))
+            places = [*nodes.values(), *(np.array([one.at.real, -one.at.imag]) for one in read)]
+            keep.figures.append(np.array(places))
             keep.strokes += [np.array([nodes[a], nodes[b]]) for a, b in ends if a in nodes and b in nodes]
     if not keep.figures:
         return None

@@ -47,8 +47,8 @@ that settles from 0.97 promises."""
 LEAST_SURE = 5
 """Verdicts offered because they are least sure; more of them are no sample of anything."""
 CREDIT, CHARGE = frozenset({"full", "follow_through"}), frozenset({"partial", "none"})
-NOT_CHECKED = frozenset({"not_measured", "optional"})
-"""Reasons of a verdict on what was not handed in: there is nothing to look at."""
+NOT_CHECKED = frozenset({"not_measured", "optional", "at_stake"})
+"""Reasons of a verdict that nobody can find wrong: nothing was handed in, or too little is at stake."""
 NO_LONGER_SAID = FOR_THE_STUDENT | {"right"}
 """Reasons of a settled verdict that would contradict an open one."""
 OPENED = "found_wrong_elsewhere"
@@ -179,6 +179,8 @@ def trust_of(reports: Sequence[ReportDocument], settle: float) -> TrustDocument 
 
     Arguments: `settle` is the rubric's.
     """
+    if not any(report.decisions for report in reports):
+        return None
     verdicts = checkable(reports)
     checked = sample(verdicts)
     further = [one for one in verdicts if one.by_audit and one not in checked]
@@ -192,7 +194,8 @@ def trust_of(reports: Sequence[ReportDocument], settle: float) -> TrustDocument 
     low, high = wrong_between(len(verdicts), count["wrong"], count["right"])
     _, high = wrong_between(len(verdicts), count["wrong"] + count["unclear"], count["right"])
     raised = None
-    if low > (1.0 - settle) * len(verdicts):
+    promised = max((1.0 - settle) * len(verdicts), sum(1.0 - one.said.probability for one in verdicts))
+    if low > promised:
         raised = _raised([*checked, *further], settle)
     return TrustDocument(
         settled=len(verdicts),

@@ -17,6 +17,8 @@ from reference.errors import CallError
 
 SHORT = 24
 """Verdicts of the sample before the least sure ones are asked: all right, at most 12 % are wrong."""
+SHOWN = ("title", "numbers", "sentence", "look", "seen", "student", "criterion")
+"""Of a question's facts: not the probability, nor why a person is asked."""
 SAYS = N_("The program says: %(verdict)s. Is that right?")
 ALL_CHECKED = N_("Every settled verdict has been checked.")
 TEXTS = {
@@ -69,7 +71,7 @@ def _question(session: Session, one: Checkable, speaker: Tongue) -> dict[str, An
     about = questions.question_facts(session, student, one.criterion, speaker)
     verdict = speaker.gettext(VERDICTS[one.said.verdict])
     return {
-        **{name: about[name] for name in ("title", "numbers", "look", "seen", "student", "criterion")},
+        **{name: about[name] for name in SHOWN},
         "number": student.number + 1,
         "label": questions.label_of(student, speaker),
         "said": one.said.verdict,

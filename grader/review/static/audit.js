@@ -42,6 +42,7 @@ function show(facts) {
   if (!question) return;
   $("who").textContent = stored("anonymous") === "1" ? `# ${question.number}` : question.label;
   $("what").innerHTML = question.title;
+  $("sentence").innerHTML = question.sentence;
   $("badge").className = `badge v-${question.said}`;
   $("badge").textContent = question.mark;
   $("asks").textContent = question.asks;
