@@ -70,7 +70,7 @@ def criterion(name, *, verdict="full", probability=0.99, **other):
 
 def report(student, criteria, answers=()):
     rows = [
-        {"criterion": f"audit:{name}", "verdict": text, "points": None, "comment": "", "by": "", "at": ""}
+        {"criterion": name, "verdict": text, "points": None, "comment": "", "by": "", "at": ""}
         for name, text in answers
     ]
     return ReportDocument.model_validate(
@@ -87,7 +87,7 @@ def a_class(answer_of=lambda _student, _name: None, count=30, **other):
     students = []
     for number in range(count):
         student = f"s{number:02}"
-        answers = [(name, answer) for name in names if (answer := answer_of(student, name))]
+        answers = [(f"audit:{name}", answer) for name in names if (answer := answer_of(student, name))]
         criteria = [criterion(name, probability=0.97 + 0.0009 * number, **other) for name in names]
         students.append(report(student, criteria, answers))
     return students
@@ -175,7 +175,7 @@ def test_a_persons_verdict_on_a_settled_one_is_an_answer_of_the_sample():
     reports = a_class()
     index = next(k for k, one in enumerate(reports) if one.student_id == first.student)
     own = [corrected if one.id == first.criterion else one.model_dump() for one in reports[index].criteria]
-    reports[index] = report(first.student, own)
+    reports[index] = report(first.student, own, [(first.criterion, "none")])
     trust = trust_of(reports, SETTLE)
     assert (trust.audited, trust.right) == (1, 0)
     assert trust.opened == []
@@ -186,7 +186,7 @@ def test_what_a_person_decided_says_more_than_the_answer_before():
     said = {"verdict": "full", "settled": True, "probability": 0.98}
     decided = {"by": "", "at": "", "before": "full"}
     kept = criterion("v_A", probability=1.0, said=said, decided=decided)
-    trust = trust_of([report("s1", [kept], [("v_A", "wrong; said=full")])], SETTLE)
+    trust = trust_of([report("s1", [kept], [("audit:v_A", "wrong; said=full")])], SETTLE)
     assert (trust.right, trust.opened) == (1, [])
 
 
