@@ -7,6 +7,7 @@ set of data, with propagated drafting errors; a vector that does not fit is an o
 two hide no owner. The posterior has "somebody's data, but these" and "own data, with a mistake" in it.
 """
 
+import cmath
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,9 +20,13 @@ from grader.given_data.fit import ALIKE, TURNS, fit_of, is_clearly_own, nobodys
 from grader.given_data.rows import rows_of
 from grader.given_data.scales import by_scale, declared_scales, is_at_own_scales
 from grader.given_data.sets import (
+    CRANK,
+    ELSEWHERE,
     HALF_COPIED,
+    LEAST_TURNED_MM,
     NOBODYS,
     Data,
+    DrawnParts,
     ExactDrawings,
     drawn_by_variants,
     own_first,
@@ -106,8 +111,38 @@ def owner_of(task: Task, evidence: Evidence, declared: Mapping[str, str]) -> Own
         sets = sets_of(task, drawn, everybody, mistakes=mistakes)
         posterior = posterior_of(task, evidence, drawn, sets, scales)
         if posterior.not_own < LIKELY:
-            return None
+            return _crank_elsewhere(task, drawn)
     return posterior.owner()
+
+
+def _crank_elsewhere(task: Task, drawn: DrawnParts) -> Owner | None:
+    """The own data with the crank at the angle sketched; None where it is not followed beyond all tolerances.
+
+    What is drawn rightly from a crank that is off is the student's own work, its angle is not.
+    """
+    link = task.yardstick
+    if link is None or task.omega is None:
+        return None
+    sketched = _turned_by(task, drawn, f"{link.tail}{link.head}")
+    followed = [_turned_by(task, drawn, f"{kind}_{task.pin}") for kind in ("v", "a")]
+    table = task.rubric.tolerance_of(f"v_{task.pin}")
+    limit = math.radians(table.direction_deg) * table.farthest
+    if abs(sketched) <= limit or not any(abs(one - sketched) < limit < abs(one) for one in followed):
+        return None
+    angle = float(task.parameters[CRANK]) + sketched
+    data = Data("data_misread", task.variant, ELSEWHERE, {**task.parameters, CRANK: np.asarray(angle)})
+    return Owner(data, MECHANISM, LIKELY, LIKELY)
+
+
+def _turned_by(task: Task, drawn: DrawnParts, name: str) -> float:
+    """How far a vector or link is turned from the given direction, radians; 0 where that is not sure."""
+    found = next((vectors[name] for vectors in drawn.values() if name in vectors), None)
+    real = task.segments[name].real if name in task.segments else 0j
+    if found is None or found.direction_rad is None or not real:
+        return 0.0
+    if found.confidence < task.rubric.least_confidence or found.length_mm < LEAST_TURNED_MM:
+        return 0.0
+    return math.remainder(found.direction_rad - cmath.phase(real), math.tau)
 
 
 def _drawn(task: Task, evidence: Evidence) -> dict[str, dict[str, DrawnVector]]:
@@ -161,7 +196,7 @@ class Posterior:
 def posterior_of(
     task: Task,
     evidence: Evidence,
-    drawn: Mapping[str, Mapping[str, DrawnVector]],
+    drawn: DrawnParts,
     sets: tuple[ExactDrawings, FloatArray],
     scales: Mapping[str, float],
 ) -> Posterior:

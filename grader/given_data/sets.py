@@ -225,7 +225,7 @@ LEAST_TURNED_MM = 5.0
 
 
 def sets_of(
-    task: Task, drawn: Mapping[str, Mapping[str, DrawnVector]], everybody: ExactDrawings, *, mistakes: bool
+    task: Task, drawn: DrawnParts, everybody: ExactDrawings, *, mistakes: bool
 ) -> tuple[ExactDrawings, FloatArray]:
     """All sets of data, the own one first, and their prior probabilities."""
     exact, others = everybody, max(len(everybody.data) - 1, 1)
@@ -256,7 +256,7 @@ def _misread_angles(task: Task) -> dict[str, float]:
     return {how: one for how, one in angles.items() if _apart(one, right) > SAME_RAD}
 
 
-def _drawn_angles(task: Task, drawn: Mapping[str, Mapping[str, DrawnVector]]) -> dict[str, float]:
+def _drawn_angles(task: Task, drawn: DrawnParts) -> dict[str, float]:
     """The angles at which the crank was drawn, or stands by its vectors, where they are others."""
     given = task.parameters.get(CRANK)
     if given is None:

@@ -42,7 +42,8 @@ AGREES, BY_CHANCE = 0.95, 0.03
 
 def judge(task: Task, submission: Submission) -> Judgement:
     """Verdicts, mistakes and points of one submission for one variant."""
-    comparison = compare(task, submission, explain)
+    owner = owner_of(task, gather(task, submission), submission.declared)
+    comparison = compare(task, submission, partial(explain, owner=owner))
     slips: list[tuple[Mistake, float]] = []
     as_entered = comparison.outcomes
     if any(one.verdict in LOST for one in comparison.outcomes):
@@ -55,7 +56,10 @@ def judge(task: Task, submission: Submission) -> Judgement:
         if as_meant and meant and _is_explained_better(task, meant, comparison, as_meant):
             submission, comparison = as_meant.submission, meant
             slips += as_meant.slips
-    judgement = _judged(task, submission, comparison)
+    if slips:
+        owner = owner_of(task, comparison.evidence, submission.declared)
+        comparison = comparison if owner is None else compare(task, submission, partial(explain, owner=owner))
+    judgement = _judged(task, submission, comparison, owner)
     return with_slips_charged(task.rubric, judgement, as_entered, slips) if slips else judgement
 
 
@@ -93,15 +97,11 @@ def _is_off(scale: Scale) -> bool:
     return scale.used.refused is not None or (scale.other is not None and not scale.used.assumed)
 
 
-def _judged(task: Task, submission: Submission, comparison: Comparison) -> Judgement:
+def _judged(task: Task, submission: Submission, comparison: Comparison, owner: Owner | None) -> Judgement:
     """The judgement of a submission that was compared."""
-    owner = owner_of(task, gather(task, submission), submission.declared)
-    search = partial(explain, owner=owner)
-    if owner is not None:
-        comparison = compare(task, submission, search)
     surer = _confirmed(task, submission, comparison)
     if surer is not None:
-        submission, comparison = surer, compare(task, surer, search)
+        submission, comparison = surer, compare(task, surer, partial(explain, owner=owner))
     explanations, lost = _explanations(task, comparison, owner)
     mistakes = _named(task, comparison, owner, explanations, lost)
     mistakes = (*mistakes, *_swapped_letters(task, submission, mistakes))

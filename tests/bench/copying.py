@@ -3,29 +3,40 @@
 ::
 
     python -m tests.bench.copying --students 300
+    python -m tests.bench.copying --students 0 --scans 40 --kept FOLDER
 
 simulated students enter measurements: each draws with another variant's data, the whole or one plan, and
 hands it in under the own name with the own scales, the other's or none; as many honest ones draw rightly or
-with mistakes. The first seeds were used to set the constants of `grader.given_data`; the rest measure.
+with mistakes. With `--scans`, sheets drawn with another variant's data are read under the own number, and as
+many under the one that they were drawn with (some 5 s each; readings are kept in the folder). The first seeds
+were used to set the constants of `grader.given_data`; the rest measure.
 """
 
 import argparse
+import pickle
+import tempfile
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Literal, get_args
 
 from grader.comparison.evidence import Submission
 from grader.comparison.task import Task, task_of
+from grader.inputs.measurements import StudentSubmission
 from grader.marking.mark import judge
 from grader.outcomes import Judgement
-from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, Reading
+from grader.pipeline import read_submission, scan
+from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, PageRef, Reading
+from grader.rubric import asked_of
 from reference.authored.assignment import Assignment, Variant
+from samples.simulation import SimulatedSheet
 from samples.simulation.hand import draw
 from samples.simulation.hand import task_of as drawing_task
 from samples.simulation.settings import Student
 from samples.simulation.wording import declared_texts
 from tests.bench.judging_handed_in import submission
+from tests.bench.judging_scans import SCANNED, SHEET_KINDS, SheetKind, drawn_on
 from tests.bench.judging_students import (
     ASSIGNMENTS,
     HANDS,
@@ -113,9 +124,12 @@ def judged_copy(key: StudentKey, source: Source, how: How) -> Copied:
     """A copied submission, judged."""
     task, handed_in, other = copied(key, source, how)
     judgement = judge(task, handed_in)
-    numbers = [(one.n or 0, one.position or 0) for one in (task.variant, other)]
-    apart = abs(numbers[0][0] - numbers[1][0]) + abs(numbers[0][1] - numbers[1][1])
-    return Copied(key, source, how, apart, *_said(judgement, other))
+    return Copied(key, source, how, _apart(task.variant, other), *_said(judgement, other))
+
+
+def _apart(one: Variant, other: Variant) -> int:
+    """How far the numbers and positions of two variants are from each other."""
+    return abs((one.n or 0) - (other.n or 0)) + abs((one.position or 0) - (other.position or 0))
 
 
 def _said(judgement: Judgement, other: Variant | None) -> tuple[bool, bool, bool, float]:
@@ -138,6 +152,83 @@ def honest(key: StudentKey, source: Source) -> Copied | None:
     return Copied(key, source, "honest", 0, *_said(judgement, None))
 
 
+# Scans ---------------------------------------------------------------------------------------------
+
+SCANS: Mapping[str, SheetKind] = {
+    "flatbed": SHEET_KINDS["flatbed"],
+    "100 dpi": SheetKind("flatbed 100 dpi", dpi=100.0),
+    "copies": SHEET_KINDS["copies"],
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ReadCopy:
+    """Sheets drawn with one variant's data and read under another's number, or under the same one."""
+
+    key: StudentKey
+    own: Variant
+    drawn: Variant
+    declared: Mapping[str, str]
+    readings: tuple[Reading, ...]
+
+
+def read_copy(kind: str, seed: int, kept: Path | None, *, honest: bool) -> ReadCopy | None:
+    """A sheet read, from the folder `kept` where it has it; None where no such drawing comes about."""
+    path = None if kept is None else kept / f"{kind}-{seed}-{'honest' if honest else 'copied'}.pkl"
+    if path is not None and path.exists():
+        found: ReadCopy = pickle.loads(path.read_bytes())  # noqa: S301 - written by the lines below
+        return found
+    hand = list(HANDS)[seed % 2]
+    key = StudentKey(
+        SCANNED[seed % len(SCANNED)], hand, "single" if honest and seed % 4 > 1 else "right", seed
+    )
+    made = drawn_on(SCANS[kind], key, key.lot(f"scan {kind}"))
+    if made is None:
+        return None
+    work, pages = made
+    if any(one.code == "other_variant" for one in work.task.mistakes):
+        return None
+    own, variants = work.variant, work.assignment.variants()
+    if not honest:
+        others = [one for one in variants if one != work.variant]
+        own = others[int(key.lot("own").integers(len(others)))]
+    scales = task_of(work.assignment, work.rubric, own).rule_scales
+    declared = declared_texts(work.task.declared if honest else scales)
+    read = ReadCopy(key, own, work.variant, declared, _read_under(work, own, declared, pages))
+    if path is not None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(pickle.dumps(read))
+    return read
+
+
+def _read_under(
+    work: StudentWork, own: Variant, declared: Mapping[str, str], pages: Sequence[SimulatedSheet]
+) -> tuple[Reading, ...]:
+    """The pages as read for a variant."""
+    asked = asked_of(work.assignment, work.rubric)
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [page.save(Path(folder) / str(number)) for number, page in enumerate(pages)]
+        refs = tuple(PageRef(path.name, path=path) for path in paths)
+        submission = StudentSubmission("s", own, refs, declared)
+        read = read_submission(submission, [scan(ref, asked) for ref in refs], work.assignment, asked)
+    return tuple(page.reading for page in read)
+
+
+def judged_scan(kind: str, read: ReadCopy) -> Copied:
+    """Sheets that were read, judged under the own number."""
+    assignment, rubric = assignment_named(read.key.assignment)
+    task = task_of(assignment, rubric, read.own)
+    drawn = tuple(one for one in read.readings if one.figures)
+    is_copy = read.own != read.drawn
+    how = f"{kind}, copied" if is_copy else "honest"
+    if not drawn:
+        return Copied(
+            read.key, "scans", how, 99, is_told=False, is_named_rightly=False, waits=True, share=0.0
+        )
+    judgement = judge(task, Submission(readings=drawn, declared=read.declared))
+    return Copied(read.key, "scans", how, _apart(read.own, read.drawn), *_said(judgement, read.drawn))
+
+
 @dataclass(slots=True)
 class CopyingFigures:
     """All submissions, and their tables."""
@@ -157,18 +248,25 @@ class CopyingFigures:
         copies = [one for one in self.submissions if one.how != "honest"]
         groups = {f"{source}, {how}": [one for one in copies if (one.source, one.how) == (source, how)]
                   for source in SOURCES for how in HOWS}  # fmt: skip
+        groups |= {
+            f"scans, {kind}": [one for one in copies if one.how == f"{kind}, copied"] for kind in SCANS
+        }
         groups["all"] = copies
         groups["all but neighbours"] = [one for one in copies if one.apart >= LEAST_APART]
-        yield "Copies", heads, [_row(name, ones) for name, ones in groups.items()]
+        yield "Copies", heads, [_row(name, ones) for name, ones in groups.items() if ones]
         own = [one for one in self.submissions if one.how == "honest"]
         groups = {f"{hand}, {kind}, {source}": [
             one for one in own if (one.key.hand, one.key.kind, one.source) == (hand, kind, source)]
-            for hand in HANDS for kind in ("right", "single", "pair") for source in SOURCES}  # fmt: skip
+            for hand in HANDS for kind in KINDS for source in (*SOURCES, "scans")}  # fmt: skip
         groups["all"] = own
         yield (
             "Honest submissions",
             ["own data", "submissions", "accused"],
-            [[name, str(len(ones)), str(sum(one.is_told for one in ones))] for name, ones in groups.items()],
+            [
+                [name, str(len(ones)), str(sum(one.is_told for one in ones))]
+                for name, ones in groups.items()
+                if ones
+            ],
         )
 
 
@@ -205,13 +303,27 @@ def measure(students: int, first: int = FIRST_SEED) -> CopyingFigures:
     return found
 
 
+def measure_scans(students: int, first: int, kept: Path | None) -> Iterator[Copied]:
+    """So many copied sheets, and as many under the number that they were drawn with."""
+    for seed in range(first, first + students):
+        kind = list(SCANS)[seed % len(SCANS)]
+        for is_honest in (False, True):
+            read = read_copy(kind, seed, kept, honest=is_honest)
+            if read is not None:
+                yield judged_scan(kind, read)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """The benchmark as text."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0] if __doc__ else "")
     parser.add_argument("--students", type=int, default=100)
+    parser.add_argument("--scans", type=int, default=0, help="copied sheets, and as many honest ones")
+    parser.add_argument("--kept", type=Path, help="folder in which readings are kept")
     parser.add_argument("--first", type=int, default=FIRST_SEED)
     chosen = parser.parse_args(arguments)
-    print(as_text(measure(chosen.students, chosen.first).tables()))
+    figures = measure(chosen.students, chosen.first)
+    figures.submissions += measure_scans(chosen.scans, chosen.first, chosen.kept)
+    print(as_text(figures.tables()))
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from grader.marking.mark import judge
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Reading
 from grader.rubric import DoubtTable
 from reference.authored.assignment import Variant
+from reference.construction.graph import evaluate
 from reference.construction.mistakes import Mistake
 from samples.simulation import TYPICAL
 from samples.simulation.wording import declared_texts
@@ -157,3 +158,16 @@ def test_little_evidence_accuses_nobody():
     one = replace(plan, vectors={"v_B": plan.vectors["v_B"]})
     assert owner(PUMP, Submission(measured=Reading({VELOCITY_PLAN: one}))) is None
     assert owner(PUMP, Submission()) is None
+
+
+@pytest.mark.parametrize("degrees", [4.0, -4.5])
+def test_a_crank_beyond_every_tolerance_is_not_followed_without_a_person(degrees):
+    right = drawn_nodes(PUMP)
+    turned = {name: right[name] for name in ("O1", "O2")}
+    turned["A"] = right["O1"] + (right["A"] - right["O1"]) * np.exp(1j * math.radians(degrees))
+    given = {name: np.asarray(one) for name, one in turned.items()}
+    nodes = {
+        name: complex(one) for name, one in evaluate(PUMP.construction, PUMP.parameters, given=given).items()
+    }
+    judgement = judge(PUMP, handed_in(PUMP, nodes, "sheet"))
+    assert judgement.score.total is None
