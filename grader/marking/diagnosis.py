@@ -18,7 +18,7 @@ import numpy as np
 from grader.outcomes import NamedMistake
 from grader.records import MECHANISM
 from reference.authored.assignment import SCALE_NAMES
-from reference.construction.elements import Along, Line, Nodes
+from reference.construction.elements import Along, Line, Nodes, Scaled
 from reference.construction.graph import Construction, evaluate
 from reference.construction.mistakes import RPM_FACTOR, Drawing, Mistake, affected, commit
 from reference.construction.steps import Given, Step, TwoLines
@@ -78,6 +78,8 @@ def explained(case: Case) -> tuple[Replay, ...]:
     innocent = _cost_if_right(explanations)
     if explanations and not _is_clear(explanations, case):
         explanations = _searched_further(case, roots, explanations)
+    elif _may_be_assembled_otherwise(explanations, case):
+        explanations = _by_cost(explanations, _replayed(case, roots, [explanations[0].care]))
     explanations = with_nothing(explanations, case.drawing.construction, case.observations)
     has_directions = any(one.has_direction for one in case.observations.entries)
     doubt = BEYOND_DOUBT if has_directions else BEYOND_DOUBT_BY_LENGTHS
@@ -94,6 +96,7 @@ def _searched_further(case: Case, scales: Sequence[Root], explanations: Sequence
     other mistakes than in the scales.
     """
     best, whole = explanations[0], [Root()]
+    scales = [*scales, *_scales_of_the_driver(case, best)]
     if not _is_explained(best) or not all(one.has_direction for one in case.observations.entries):
         whole = [Root(), *_of_the_whole(case)]
     roots = [_both(scale, one) for one in whole for scale in scales]
@@ -220,6 +223,39 @@ def _is_clear(explanations: Sequence[Replay], case: Case) -> bool:
     joints = {step.node for step in construction.figures[MECHANISM]}
     step = next((one for one in construction.steps if one.node == best.made[0].at), None)
     return step is not None and places.issuperset({step.node, *step.needs} - joints)
+
+
+def _may_be_assembled_otherwise(explanations: Sequence[Replay], case: Case) -> bool:
+    """Whether a reversed component may be right for another assembly of a mechanism not handed in."""
+    made = explanations[0].made if explanations else ()
+    return any(one.code == "normal_reversed" for one in made) and not case.observations.sketches
+
+
+def _scales_of_the_driver(case: Case, best: Replay) -> Iterator[Root]:
+    """Roots with the scale that the driven link's vector alone follows, where that vector is not explained.
+
+    Beside another mistake too little else fits a wrong scale for it to be seen before.
+    """
+    construction, followed = case.drawing.construction, {}
+    off = {*best.unexplained, *(one.at for one in best.made)}
+    for plan, pole in construction.poles.items():
+        scaled = [
+            one.node
+            for one in construction.figures[plan]
+            if isinstance(one, Given) and isinstance(one.length, Scaled)
+        ]
+        scale = next((one.scale for one in construction.vectors_of(plan)), "")
+        if not scaled or scaled[-1] not in off or scale in {*case.assumed, *case.followed}:
+            continue
+        nodes = evaluate(construction, case.drawing.parameters)
+        right_mm = abs(complex(np.ravel(nodes[scaled[-1]] - nodes[pole])[0]))
+        entries = case.observations.entries
+        drawn = (abs(one.value) for one in entries if one.node == scaled[-1] and one.tail in {None, pole})
+        drawn_mm = next(drawn, 0.0)
+        if drawn_mm > 0.0 and right_mm > 0.0:
+            followed[scale] = float(case.drawing.parameters[scale]) * right_mm / drawn_mm
+    if followed:
+        yield from _other_scales(replace(case, followed={**case.followed, **followed}))
 
 
 def _other_scales(case: Case) -> Iterator[Root]:

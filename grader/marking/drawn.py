@@ -63,6 +63,7 @@ def case_of(task: Task, evidence: Evidence, settled: Mapping[str, Scale], owner:
         parameters |= _scales_of_the_drawn_driver(task, evidence, parameters)
     entries = _lengths_observed(task, evidence, parameters)
     directions = _directions_of_the_sketch(task, evidence, {name: float(one) for name, one in used.items()})
+    blank = _components_left_blank(task, evidence)
     best, *otherwise = (
         Observations(
             (*_nodes_observed(task, evidence, nodes), *entries),
@@ -70,6 +71,7 @@ def case_of(task: Task, evidence: Evidence, settled: Mapping[str, Scale], owner:
             nodes.cost,
             directions,
             nodes.apart,
+            blank,
         )
         for nodes in _adjusted_nodes(task, evidence)
     )
@@ -128,6 +130,20 @@ def _lengths_observed(task: Task, evidence: Evidence, parameters: Parameters) ->
         spread = _covariance(traced.shifts(vector.tail, vector.head), read_mm)
         entries.append(Observation(vector.head, vector.tail, drawn.length_mm, spread, has_direction=False))
     return entries
+
+
+def _components_left_blank(task: Task, evidence: Evidence) -> frozenset[str]:
+    """The nodes in which components end that are not there, though others of their plan are."""
+    vectors = task.construction.vectors.values()
+    drawn = {one.scale for one in vectors if evidence.vector(one.name) is not None}
+    return frozenset(
+        one.head
+        for one in vectors
+        if one.part in {"n", "c"}
+        and one.scale in drawn
+        and evidence.vector(one.name) is None
+        and (one.name in evidence.blank or not evidence.has_sheets)
+    )
 
 
 def _directions_of_the_sketch(

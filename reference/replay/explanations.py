@@ -38,6 +38,8 @@ RARITY: Mapping[str, float] = {
 }
 """Cost of each mistake: one step in about a hundred goes wrong, in one of about ten ways; a slip in a
 computation may give any length."""
+NOT_THERE = 5.0
+"""What a component left out costs less where it is not there: a component drawn is seldom left blank."""
 KNOWN_SLIP = 11.0
 """Of a slip by one of `SLIPS`: less rare than any other."""
 SLIPS = (0.1, 0.5, 2.0, 10.0)
@@ -97,6 +99,7 @@ class Observations:
     cost : of taking it so: of measurements that contradict each other, or are left out
     directions_rad : by pair of joints, the standard error of the direction between them on a sketch that was
         not handed in
+    blank : nodes in which a component ends that is not there, beside others that are
     apart : by plan, how much less than `cost` its measurements cost where they need not close any polygon
     """
 
@@ -105,6 +108,7 @@ class Observations:
     cost: float = 0.0
     directions_rad: Mapping[tuple[str, str], float] = field(default_factory=dict)
     apart: Mapping[str, float] = field(default_factory=dict)
+    blank: frozenset[str] = frozenset()
 
 
 def by_node(construction: Construction, entries: Iterable[Observation]) -> dict[str, tuple[Observation, ...]]:
@@ -378,7 +382,8 @@ class StepAlternatives:
 class StepContext:
     """What a step is compared with: the nodes so far in each branch, and the observations of the new one.
 
-    `measured` are the nodes of its figure that were measured roughly, see `measured_nodes`.
+    `measured` are the nodes of its figure that were measured roughly, see `measured_nodes`; `blank` those of
+    `Observations`.
     """
 
     nodes: Mapping[str, ComplexArray]
@@ -387,6 +392,7 @@ class StepContext:
     repertoire: Repertoire
     measured: Mapping[str, ComplexArray] = field(default_factory=dict)
     directions_rad: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    blank: frozenset[str] = frozenset()
 
     @property
     def count(self) -> int:
@@ -447,8 +453,13 @@ class StepContext:
             return StepAlternatives(empty.astype(np.complex128), empty, empty, ())
         place, shifts = self._placed(step, [changed for _, changed in steps])
         misfit, cost = self.observed.misfit_and_cost(place, shifts, self.nodes)
-        rarity = np.array([0.0 if one is None else _rarity(one) for one in mistakes])
+        rarity = np.array([0.0 if one is None else self._rarity(one) for one in mistakes])
         return StepAlternatives(place, cost + rarity[:, None], misfit, mistakes)
+
+    def _rarity(self, mistake: Mistake) -> float:
+        """The cost of a mistake; of a component left out less where it is not there."""
+        is_blank = mistake.code == "normal_missing" and mistake.at in self.blank
+        return _rarity(mistake) - (NOT_THERE if is_blank else 0.0)
 
     def _placed(self, step: Step, steps: Sequence[Step]) -> tuple[ComplexArray, ComplexArray | None]:
         """Where each step puts the node, and how each usual error moves it (steps, errors, branches)."""

@@ -6,13 +6,13 @@ anything. It has a prior of its own and pays for no single step, so an explanati
 of many nodes costs more than this one.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, combinations
 
 from reference.construction.graph import Construction
 from reference.construction.mistakes import Mistake, affected
-from reference.replay.explanations import RARITY, Observations, by_node, cost_of_any
+from reference.replay.explanations import COST_WINDOW, RARITY, Observations, by_node, cost_of_any
 from reference.replay.replay import Replay
 
 NOTHING_FITS = 11.0
@@ -43,10 +43,17 @@ def with_nothing(
         nodes[construction.figure_of(node)].append(node)
     plans = [plan for plan in construction.poles if len(nodes.get(plan, ())) >= LEAST_NODES]
     left_out = [frozenset(some) for some in _subsets(plans, set(anything))]
+    least = min((one.cost for one in explanations), default=0.0)
     cheapest: dict[tuple[object, ...], Replay] = {}
     for one in explanations:
         for figures in left_out:
-            other = _without(one, figures, construction, anything, observations.apart, nodes)
+            gain = sum(
+                one.spent[figure] + observations.apart.get(figure, 0.0) - anything[figure]
+                for figure in figures
+            )
+            if one.cost + NOTHING_FITS - gain > least + COST_WINDOW:
+                continue
+            other = _without(one, figures, construction, gain, anything.keys() - figures, nodes)
             key = (figures, frozenset((made.code, made.at) for made in other.made), other.unexplained)
             if key not in cheapest or other.cost < cheapest[key].cost:
                 cheapest[key] = other
@@ -66,17 +73,15 @@ def _without(
     explanation: Replay,
     figures: frozenset[str],
     construction: Construction,
-    anything: Mapping[str, float],
-    apart: Mapping[str, float],
+    gain: float,
+    others: Collection[str],
     nodes: Mapping[str, Sequence[str]],
 ) -> Replay:
-    """An explanation in which these figures are not explained."""
-    cost, kept = NOTHING_FITS + explanation.cost, []
-    for figure in figures:
-        cost += anything[figure] - explanation.spent[figure] - apart.get(figure, 0.0)
+    """An explanation in which these figures are not explained, which costs less by the gain."""
+    cost, kept = explanation.cost + NOTHING_FITS - gain, []
     for one in explanation.made:
         at, shown = _figures_of(one, construction)
-        if shown & (anything.keys() - figures):
+        if shown.intersection(others):
             kept.append(one)
         elif at not in figures:
             cost -= RARITY[one.code]

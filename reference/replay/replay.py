@@ -125,7 +125,13 @@ def replay(
                     here, nodes = by_name.get(step.node, ()), ChainMap(sketch, branches.nodes)
                     observed = branches.observed(here, figure)
                     context = StepContext(
-                        nodes, branches.known, observed, repertoire, measured, observations.directions_rad
+                        nodes,
+                        branches.known,
+                        observed,
+                        repertoire,
+                        measured,
+                        observations.directions_rad,
+                        observations.blank,
                     )
                     branches.go_on(
                         step, figure, here, _alternatives(step, context, branches.is_blind, blind=blind)

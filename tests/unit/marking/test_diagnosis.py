@@ -12,7 +12,18 @@ from grader.rubric import rubric_of
 from reference.authored.assignment import library, load_assignment
 from reference.construction.graph import evaluate
 from reference.construction.mistakes import Drawing, Mistake, commit
-from tests.hands import SOURCES, changed, drawn_nodes, handed_in, measured, rule_scales, sheet, task_for
+from samples.simulation.wording import declared_texts
+from tests.hands import (
+    SOURCES,
+    changed,
+    drawn_nodes,
+    handed_in,
+    measured,
+    rule_scales,
+    sheet,
+    task_for,
+    without,
+)
 
 PUMP = task_for("pump", 7)
 PRESS = task_for("press", position=1)
@@ -234,3 +245,17 @@ def test_what_the_evidence_does_not_tell_apart_is_told_with_its_odds():
     assert {found.code, rival.code} == {"arithmetic", "normal_missing"}
     assert 0.1 < rival.confidence < found.confidence
     assert found.confidence + rival.confidence == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_wrong_scale_is_named_beside_a_reversed_vector():
+    scales = rule_scales(PRESS)
+    declared = declared_texts({**scales, "ka": 1.25 * scales["ka"]})
+    reading = measured(PRESS, mistakes=(Mistake("sense_reversed", "a'"),))
+    judgement = judge(PRESS, Submission(measured=reading, declared=declared))
+    assert set(codes(judgement)) == {"scale_wrong", "sense_reversed"}
+
+
+def test_a_component_left_blank_is_rather_left_out_than_computed_too_small():
+    reading = without(measured(PUMP, mistakes=(Mistake("normal_missing", "n_BA"),)), "a_BA_n")
+    judgement = judge(PUMP, Submission(measured=reading))
+    assert codes(judgement) == ["normal_missing"]
