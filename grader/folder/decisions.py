@@ -266,6 +266,9 @@ class ClassDecisions:
         self.faults.append((row.line, Finding(f"line {row.line}, {column}", why)))
 
     def _out_of_date(self, row: Decision, reason: str) -> None:
+        """Note a decision to be made again; an answer of an audit is no decision, and just stops counting."""
+        if row.kind == "audit":
+            return
         self.stale.append(
             StaleDecisionDocument(
                 line=row.line, student_id=row.student_id, position=row.position, criterion=row.criterion,

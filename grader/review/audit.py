@@ -31,12 +31,13 @@ TEXTS = {
 
 
 class Checked(Said):
-    """What a person found of a settled verdict, `said`; one of `ANSWERS`."""
+    """What a person found of a settled verdict, `said`: one of `ANSWERS`; `seen` marks the one before."""
 
     student: str
     criterion: str
     said: str
     answer: str
+    seen: str = ""
 
 
 def texts(speaker: Tongue) -> dict[str, str]:
@@ -75,6 +76,7 @@ def _question(session: Session, one: Checkable, speaker: Tongue) -> dict[str, An
         "number": student.number + 1,
         "label": questions.label_of(student, speaker),
         "said": one.said.verdict,
+        "checked": mark_of(session.standing().of(student, f"audit:{one.criterion}")),
         "mark": MARKS[one.said.verdict],
         "asks": speaker.gettext(SAYS) % {"verdict": verdict},
     }
@@ -94,6 +96,5 @@ def check(session: Session, said: Checked) -> None:
         raise CallError("answer_refused", f"'{said.answer[:40]}' is no answer")
     student = session.student(said.student)
     name = f"audit:{student.criterion(said.criterion).id}"
-    there = mark_of(session.standing().of(student, name))
-    answer = Answer(said.student, name, str(AuditAnswer(said.answer, said.said)), seen=there)
+    answer = Answer(said.student, name, str(AuditAnswer(said.answer, said.said)), seen=said.seen)
     session.move(answer, said.by, said.window)

@@ -99,8 +99,10 @@ function check(answer) {
   const question = state.question;
   if (!question || !state.ready || state.correcting) return;
   busy(async () => {
-    const { student, criterion, said } = question;
-    const facts = await call("api/audit", { student, criterion, said, answer });
+    const { student, criterion, said, checked: seen } = question;
+    let facts;
+    try { facts = await call("api/audit", { student, criterion, said, answer, seen }); }
+    catch (error) { await next(); throw error; }
     tell("");
     if (answer !== "wrong") { show(facts); return; }
     state.correcting = question;

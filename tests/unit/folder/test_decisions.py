@@ -423,10 +423,19 @@ def test_a_wrong_verdict_that_was_checked_opens_those_like_it_and_says_so(folder
         assert "found wrong" in criterion.feedback
     page = (folder.parent / "out" / "index.html").read_text(encoding="utf-8")
     assert "A settled verdict of s2 was wrong" in page
-    decide(folder, *(row("v_A", "full", student) for student in ("s1", "s2", "s3")))
+    decide(folder, row("v_A", "full", "s1"), row("v_A", "none", "s2"), row("v_A", "full", "s3"))
+    results = run(folder)
+    now = [report.score for report in results.reports]
+    assert [score == before for score, before in zip(now, scores, strict=True)] == [True, False, True]
+    assert results.trust.opened == [opened]
+    # Who finds in the end that it was right closes the others again.
+    path = folder / "decisions.csv"
+    path.write_text(
+        path.read_text(encoding="utf-8-sig").replace("s2,,v_A,none", "s2,,v_A,full"), encoding="utf-8"
+    )
     results = run(folder)
     assert [report.score for report in results.reports] == scores
-    assert results.trust.opened == [opened]
+    assert results.trust.opened == []
 
 
 def test_a_right_one_changes_no_mark_and_counts_for_what_the_program_still_says(folder):
@@ -437,6 +446,13 @@ def test_a_right_one_changes_no_mark_and_counts_for_what_the_program_still_says(
     assert [one.criteria for one in results.reports] == [one.criteria for one in before.reports]
     hand_in(folder, "s2", 9, v_B=3.0)
     assert run(folder).trust is None
+
+
+def test_an_answer_on_what_was_handed_in_before_is_passed_over_and_nobody_is_asked_again(folder):
+    stands = basis_of(StudentSubmission("s2", None), PUMP, RUBRIC, "audit:v_B")
+    decide(folder, row("audit:v_B", "right; said=full", "s2", basis=stands))
+    results = run(folder)
+    assert (results.trust, results.stale) == (None, [])
 
 
 @pytest.mark.parametrize("verdict", ["right", "right; said=", "good; said=full", "right; full", ""])

@@ -4,7 +4,9 @@ from grader.review.audit import SHORT
 
 
 def checked(page, question, answer, **said):
-    about = {name: question[name] for name in ("student", "criterion", "said")}
+    about = {name: question[name] for name in ("student", "criterion", "said")} | {
+        "seen": question["checked"]
+    }
     return page.said("/api/audit", **{**about, "answer": answer, **said})
 
 
@@ -77,6 +79,16 @@ def test_all_can_be_checked_and_then_nothing_is_open_about_them(page):
         count += 1
     assert facts["checked"] == count
     assert "at most 0\N{NO-BREAK SPACE}%" in facts["found"]
+
+
+def test_what_somebody_else_has_checked_in_the_meantime_is_told_and_not_written_over(page, session):
+    question = page.get("/api/audit").json()["question"]
+    checked(page, question, "wrong", by="Ion")
+    late = checked(page, question, "right")
+    assert late.status_code == 409
+    assert "Ion has decided this" in late.json()["message"]
+    (row,) = session._file.all()
+    assert row.verdict.startswith("wrong")
 
 
 def test_what_is_no_answer_is_refused(page):
