@@ -60,7 +60,7 @@ EXAMPLES: Mapping[str, str] = {
     "filed": "8", "areas": "lower left", "corners": "the lower left corner", "files": "38", "limit": "150",
     "students": "30", "right": "24", "audited": "24", "unclear": "1", "student": "s07",
     "criterion": "Acceleration of B", "allowed": "3\u00a0%", "raised": "98.2\u00a0%",
-    "times": "10",
+    "times": "10", "vectors": "v_BA, v_CA", "letter": "A",
 }  # fmt: skip
 """Parameters by name: after ``@`` a number with its unit; other texts of the catalogues are translated."""
 OTHERWISE: Mapping[str, Mapping[str, str]] = {

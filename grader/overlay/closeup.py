@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from markupsafe import Markup
 
-from grader.overlay.scene import Arrow, Ghost, Layer, Picture, Scene, between, is_in, layers_of
+from grader.overlay.scene import XY, Arrow, Ghost, Layer, Picture, Scene, between, is_in, layers_of
 from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, Box
 from reference.drawing.canvas import FONTS, elements
 
@@ -167,9 +167,14 @@ def _close_up(part: Scene) -> Box | None:
 
 def _box(things: Collection[Arrow | Ghost], scene: Scene, margin_mm: float, least_mm: float) -> Box:
     """A box around arrows and ghosts, of a shape that sits well on a page, inside the sheet."""
-    xs = [x for one in things for x in (one.tail[0], one.tip[0])]
-    ys = [y for one in things for y in (one.tail[1], one.tip[1])]
-    wide, high = scene.page_mm
+    points = [point for one in things for point in (one.tail, one.tip)]
+    return box_around(points, margin_mm, least_mm, scene.page_mm)
+
+
+def box_around(points: Collection[XY], margin_mm: float, least_mm: float, page_mm: XY) -> Box:
+    """A box around some points, of a shape that sits well on a page, inside the sheet."""
+    xs, ys = [x for x, _ in points], [y for _, y in points]
+    wide, high = page_mm
     width = max(max(xs) - min(xs) + 2 * margin_mm, least_mm)
     height = max(max(ys) - min(ys) + 2 * margin_mm, width / WIDE_TO_HIGH[1])
     width = max(width, height * WIDE_TO_HIGH[0])

@@ -25,7 +25,7 @@ from reference.construction.graph import Vector
 Kind = Literal["owner", "scale", "node", "verdict"]
 ORDER: Mapping[Kind, int] = {"owner": 0, "scale": 1, "node": 2, "verdict": 3}
 OPEN = "review"
-OF_OWNER = ("other_variant", "data_misread", "not_explained")
+OF_OWNER = ("other_variant", "data_misread", "data_unclear", "not_explained")
 """Reasons of a doubt that concerns a whole drawing."""
 CREDITED = frozenset({"full", "follow_through"})
 SURE = 0.8
@@ -49,12 +49,14 @@ class Choice:
     rows : what it writes, verdicts or places by criterion
     probability : that it is the right answer, None where nothing is known
     at : of a place, mm on the sheet, y down
+    start : the other end of a vector to that place
     """
 
     key: str
     rows: tuple[tuple[str, str], ...]
     probability: float | None = None
     at: tuple[float, float] | None = None
+    start: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +104,12 @@ def doubts_of(task: Task, report: ReportDocument, figures: Mapping[str, Figure])
         found.extend(make(_Asked(task, left, figures)))
     covered = {name for doubt in found for name in doubt.criteria}
     found.extend(of_verdict(one) for one in waiting if one.id not in covered)
-    return sorted(found, key=lambda one: ORDER[one.kind])
+    return in_order(found)
+
+
+def in_order(doubts: Sequence[Doubt]) -> list[Doubt]:
+    """Questions in the order in which they are asked: by kind, then by what they settle."""
+    return sorted(doubts, key=lambda one: (ORDER[one.kind], -one.settles))
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,8 +243,10 @@ def _places(asked: _Asked, about: Sequence[CriterionDocument], node: str, figure
             candidates.append(place)
     sure = _right_as_read(touching, read)
     likely = sorted(_shared(candidates[:MOST_PLACES], sure), key=lambda one: -one[1])
+    starts = (_start(asked, _vector(asked, one), node) for one in touching)
+    start = next((on_sheet(one[0].at) for one in starts if one is not None), None)
     places = tuple(
-        Choice(key, ((f"node:{figure}:{node}", place_text(*on_sheet(at))),), each, on_sheet(at))
+        Choice(key, ((f"node:{figure}:{node}", place_text(*on_sheet(at))),), each, on_sheet(at), start)
         for key, (at, each) in zip("abc", likely, strict=False)
     )
     missing = tuple((one.id, "none") for one in touching)

@@ -8,7 +8,8 @@ must come from the page itself (Origin, a header of its own, JSON).
 import getpass
 import hmac
 import threading
-from collections.abc import Awaitable, Callable
+import time
+from collections.abc import Awaitable, Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
@@ -31,7 +32,16 @@ from grader.lms.export import export, usual_name
 from grader.lms.grades import Options
 from grader.review import audit, questions
 from grader.review.scans import page_of
-from grader.review.session import Answer, ChangedError, Said, Session, Whole, page_criterion
+from grader.review.session import (
+    Answer,
+    ChangedError,
+    Said,
+    Session,
+    Standing,
+    Student,
+    Whole,
+    page_criterion,
+)
 from reference.errors import CallError, PlanmarkError
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
@@ -39,6 +49,8 @@ COOKIE = "planmark"
 MOST_BYTES = 1_000_000
 """Of what is posted: a thousand answers have a tenth of it."""
 LONGEST_PX = 2000.0
+COUNTING_S = 2.0
+"""So long a person waits for a class of hundreds; what was not counted is when its student is asked about."""
 HEADERS = {
     "Content-Security-Policy": "default-src 'none'; img-src 'self' data:; style-src 'self';"
     " script-src 'self'; connect-src 'self'; form-action 'none'; base-uri 'none'; frame-ancestors 'none'",
@@ -129,9 +141,7 @@ class Review:
         return {
             "version": session.version,
             "keys": [student.key for student in session.students],
-            "students": [
-                questions.student_facts(one, standing, session.batch.rubric, self.speaker) for one in changed
-            ],
+            "students": list(self._students(changed, standing)),
             "comments": session.comments(),
             "pages": len(session.waiting_pages()),
         }
@@ -140,6 +150,13 @@ class Review:
         """The next settled verdict to check, and what was found so far."""
         self.session.refresh()
         return JSONResponse(audit.audit_facts(self.session, self.speaker))
+
+    def _students(self, students: Sequence[Student], standing: Standing) -> Iterator[dict[str, Any]]:
+        """What is told of each; what its questions settle is counted as long as that does not take long."""
+        until = time.monotonic() + COUNTING_S
+        for one in students:
+            asked = questions.asked_facts(self.session, one, self.speaker, counted=time.monotonic() < until)
+            yield questions.student_facts(one, standing, self.session.batch.rubric, self.speaker, asked)
 
     def question(self, request: Request) -> Response:
         """One question."""

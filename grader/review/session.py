@@ -25,7 +25,7 @@ from grader.overlay.scene import Arrow, Ghost, Scene, expected_vector, ghost_of,
 from grader.pipeline import report_on
 from grader.reading.corrected import snapped
 from grader.records import MECHANISM, PageRef, ScannedPage
-from grader.review.doubts import reading_of
+from grader.review.doubts import Doubt, doubts_of, figures_read, in_order, reading_of
 from grader.review.scans import Scans
 from reference.construction.graph import Construction
 from reference.errors import CallError, PlanmarkError
@@ -72,6 +72,8 @@ class Student:
     pages: list[ScannedPage] | None = None
     requests: Mapping[str, Request] = field(default_factory=dict)
     """By criterion."""
+    doubts: tuple[int, list[Doubt]] | None = None
+    """The open questions, and the version of the student that they are of."""
 
     @property
     def key(self) -> str:
@@ -239,7 +241,8 @@ class Session:
             there = self.standing()
             for answer in answers:
                 student = self.student(answer.student)
-                student.criterion(answer.criterion)
+                if not answer.criterion.startswith("node:"):
+                    student.criterion(answer.criterion)
                 row = self._row(student, answer.criterion, answer.verdict, by, there)
                 wanted.append((replace(row, comment=answer.comment), answer.seen))
             self._write(wanted, there, window)
@@ -410,12 +413,50 @@ class Session:
         """What the student is told of a criterion, if what is proposed is accepted."""
         if criterion.verdict != OPEN or criterion.proposed is None:
             return criterion.feedback
+        after = {
+            one.id: one for one in self.report_if(student, [(criterion.id, criterion.proposed)]).criteria
+        }
+        return after[criterion.id].feedback if criterion.id in after else criterion.feedback
+
+    def report_if(self, student: Student, answers: Sequence[tuple[str, str]]) -> ReportDocument:
+        """The report with these answers, verdicts or places by criterion, besides what is decided."""
         with self._lock:
             report = student.report
-            accepted = Decision(report.student_id, report.position, criterion.id, criterion.proposed)
-            rows = [*self._file.all(), accepted]
-            after = {one.id: one for one in self._report(student, rows).criteria}
-        return after[criterion.id].feedback if criterion.id in after else criterion.feedback
+            said = [Decision(report.student_id, report.position, *answer) for answer in answers]
+            return self._report(student, [*self._file.all(), *said])
+
+    # Questions ------------------------------------------------------------------------------------
+
+    def doubts(self, student: Student, *, counted: bool = True) -> list[Doubt]:
+        """The open questions on a student, in the order in which they are asked.
+
+        Arguments: `counted` judges the submission with the likeliest answer to each, to see what it settles.
+        """
+        if student.doubts is not None and student.doubts[0] == student.version:
+            return student.doubts[1]
+        variant = student.job.submission.variant
+        if variant is None or all(one.verdict != OPEN for one in student.report.criteria):
+            return []
+        task = task_of(self.batch.assignment, self.batch.rubric, variant)
+        found = doubts_of(task, student.report, figures_read(student.report, self.pages_of(student)))
+        if not counted:
+            return in_order(found)
+        found = in_order([self._counted(student, one) for one in found])
+        student.doubts = student.version, found
+        return found
+
+    def _counted(self, student: Student, doubt: Doubt) -> Doubt:
+        """A question with the number of verdicts that its likeliest answer settles."""
+        likely = doubt.likeliest
+        if likely is None:
+            return doubt
+        after = {one.id for one in self.report_if(student, likely.rows).criteria if one.verdict == OPEN}
+        before = {one.id for one in student.report.criteria if one.verdict == OPEN}
+        return replace(doubt, settles=len(before - after))
+
+    def doubt(self, student: Student, name: str) -> Doubt | None:
+        """An open question by its id; None where there is none, so that a criterion is meant."""
+        return next((one for one in self.doubts(student) if one.id == name), None)
 
     def snapped(self, key: str, sheet: int, figure: str, at: tuple[float, float]) -> tuple[float, float]:
         """The point of the ink that is meant by a place on a page, both in sheet millimetres.

@@ -173,7 +173,10 @@ class Window:
 
     def ready(self):
         """Wait until a question is there to be answered, or there is none."""
-        self.page.wait_for_function("() => document.body.dataset.shown && !document.body.dataset.busy")
+        self.page.wait_for_function(
+            "() => document.body.dataset.shown && !document.body.dataset.busy"
+            " && (document.body.dataset.ready || document.getElementById('question').hidden)"
+        )
         self.screens.add(self.shown)
 
     @property

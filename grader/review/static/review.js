@@ -54,7 +54,8 @@ function element(name, attributes = {}, text = "") {
 // What there is to decide --------------------------------------------------------------------------
 
 const keyOf = (row) => `${row.student}/${row.criterion}`;
-const isOpen = (row) => row.verdict === "review" || row.asked;
+const isOpen = (row) => (row.verdict === "review" && !row.under) || row.asked;
+const isSingle = (row) => !row.kind;
 const current = () => state.rows.get(state.list[state.at]);
 const nameOf = (student) => ($("anonymous").checked ? `${texts.sheet} ${student.number + 1}` : student.label);
 
@@ -66,6 +67,7 @@ function take(data) {
   for (const student of data.students) {
     state.students.set(student.key, student);
     for (const row of student.rows) state.rows.set(keyOf(row), row);
+    for (const asked of student.questions) takeQuestion(asked);
   }
   if (data.comments) state.comments = data.comments;
   state.version = data.version;
@@ -73,12 +75,23 @@ function take(data) {
   showProgress();
 }
 
+function takeQuestion(asked) {
+  // A question stands in the place of the rows that it covers.
+  const own = state.rows.get(keyOf(asked)), { kind, ...rest } = asked;
+  if (kind === "verdict" && own && asked.covers.length === 1) { own.rank = asked.rank; own.settles = asked.settles; return; }
+  for (const name of asked.covers) {
+    const row = state.rows.get(`${asked.student}/${name}`);
+    if (row && name !== asked.criterion) row.under = asked.criterion;
+  }
+  state.rows.set(keyOf(asked), { ...own, ...rest, kind, order: -1 });
+}
+
 function ordered() {
   // Where most points are at stake first: students by the sum of theirs, criteria by the sum of the class.
   const rows = [...state.rows.values()], sums = new Map();
   const group = state.mode === "student" ? (row) => row.student : (row) => row.criterion;
   for (const row of rows) sums.set(group(row), (sums.get(group(row)) || 0) + (isOpen(row) ? row.stake : 0));
-  const inside = state.mode === "student" ? (row) => row.order : (row) => row.probability ?? 0;
+  const inside = state.mode === "student" ? (row) => row.rank ?? 1000 + row.order : (row) => row.probability ?? 0;
   const place = new Map([...sums.keys()].sort((a, b) => sums.get(b) - sums.get(a)).map((name, index) => [name, index]));
   return rows.sort((a, b) => place.get(group(a)) - place.get(group(b)) || inside(a) - inside(b) || state.students.get(a.student).number - state.students.get(b.student).number);
 }
@@ -122,6 +135,7 @@ class Viewer {
 
   show(look) {
     this.look = look; this.drag = null; this.pointers.clear();
+    delete this.svg.dataset.loaded;
     this.svg.replaceChildren();
     this.base = this.image(); this.fine = this.image();
     this.marks = document.createElementNS(SVG, "g");
@@ -195,9 +209,15 @@ class Viewer {
     loader.onload = () => {
       for (const [name, value] of [["x", part.x], ["y", part.y], ["width", part.w], ["height", part.h]]) image.setAttribute(name, Number(value.toFixed(2)));
       image.setAttribute("href", loader.src);
-      this.svg.dataset.loaded = this.look.scan;
+      this.loaded();
     };
+    loader.onerror = () => { if (this.svg.id === "view") tell(texts.no_picture, [[texts.close, () => tell("")]]); this.loaded(); };
     loader.src = `${this.look.scan}&${query}`;
+  }
+
+  loaded() {
+    this.svg.dataset.loaded = this.look.scan;
+    if (this.onLoad) this.onLoad();
   }
 
   refine() {
@@ -263,6 +283,13 @@ class Viewer {
 // One question -------------------------------------------------------------------------------------
 
 const viewer = new Viewer($("view"), (node, x, y) => moveNode(node, x, y));
+viewer.onLoad = () => { if (state.question && state.question.look === viewer.look) setReady(true); };
+
+function setReady(isReady) {
+  // Keys answer only what is seen: not before the picture is there.
+  state.ready = isReady;
+  document.body.dataset.ready = isReady ? "1" : "";
+}
 
 function fetchQuestion(key) {
   if (!state.fetched.has(key)) {
@@ -297,10 +324,17 @@ async function showQuestion(keepView = false) {
   }));
   const accept = $("accept");
   accept.innerHTML = question.accept;
-  accept.disabled = !question.proposed && isOpen(row);
-  for (const button of document.querySelectorAll("#question [data-verdict]")) {
-    button.setAttribute("aria-pressed", String(button.dataset.verdict === (question.decided || "")));
-  }
+  accept.disabled = isOpen(row) && !question.choices.some((one) => one.default);
+  accept.classList.toggle("main", !accept.disabled);
+  $("settles").textContent = question.settles || "";
+  $("choices").replaceChildren(...question.choices.map((choice, index) => {
+    const button = element("button", { type: "button", "data-key": choice.key, "aria-pressed": String(choice.pressed) });
+    button.innerHTML = `<kbd>${choice.key}</kbd> ${choice.label}`;
+    button.onclick = () => choose(index);
+    return button;
+  }));
+  $("not-judged").disabled = question.choices.some((choice) => choice.answers.length !== 1 || choice.answers[0].criterion !== question.criterion);
+  $("look-note").textContent = question.look && question.look.note ? texts[question.look.note] : "";
   if (!same) $("comment").value = question.comment;
   $("score").textContent = student.score;
   $("remark").value = student.remark;
@@ -313,6 +347,7 @@ async function showQuestion(keepView = false) {
   $("view").style.display = question.look ? "" : "none";
   $("no-scan").hidden = Boolean(question.look);
   $("no-scan").textContent = texts.no_scan;
+  setReady(!question.look);
   if (question.look) {
     const view = viewer.view;
     viewer.show(question.look);
@@ -332,13 +367,20 @@ function step(by) {
   showQuestion().catch(failed);
 }
 
-function onward(from) {
-  // To the next question that is open, as the list stood when the last one was shown.
-  const rest = [...state.list.keys()].slice(state.at + 1), open = rest.find((at) => isOpen(state.rows.get(state.list[at]) || {}));
-  const wrap = [...state.list.keys()].find((at) => isOpen(state.rows.get(state.list[at]) || {}));
-  const all = $("all").checked;
-  const next = all ? (rest.length ? rest[0] : undefined) : open ?? wrap;
-  if (next === undefined) { relist(); if (state.list.length && !all) { showQuestion().catch(failed); } else showMode("done"); return; }
+function onward() {
+  // To what is still open of this student, in its new order; then on in the list as it stood.
+  const student = state.question ? state.question.student : "", all = $("all").checked;
+  const place = state.list[state.at], before = state.list.slice(0, state.at + 1), after = state.list.slice(state.at + 1);
+  const mine = ordered().filter((row) => row.student === student && (all || isOpen(row))).map(keyOf);
+  const isOther = (key) => !key.startsWith(`${student}/`) && state.rows.has(key);
+  const seen = before.filter((key) => state.rows.has(key) && !(mine.includes(key) && isOpen(state.rows.get(key))));
+  const rest = state.mode === "student" ? [...mine.filter((key) => !seen.includes(key)), ...after.filter(isOther)] : after.filter((key) => state.rows.has(key));
+  state.list = [...seen, ...rest];
+  const from = Math.max(seen.lastIndexOf(place) + 1, 0), isNext = (key) => all || isOpen(state.rows.get(key));
+  let next = state.list.findIndex((key, at) => at >= Math.min(from, seen.length) && isNext(key) && key !== place);
+  if (next < 0) { relist(); next = state.list.findIndex((key) => isOpen(state.rows.get(key)) && key !== place); }
+  if (next < 0 && state.rows.has(place) && isOpen(state.rows.get(place))) next = state.list.indexOf(place);
+  if (next < 0) { showMode("done"); return; }
   state.at = next;
   showQuestion().catch(failed);
 }
@@ -363,21 +405,32 @@ function answerOf(question, verdict) {
   return { student: question.student, criterion: question.criterion, verdict, comment: $("comment").value.trim(), seen: question.seen };
 }
 
-function decide(verdict) {
+function send(answers) {
+  const comment = $("comment").value.trim();
   return busy(async () => {
-    const question = state.question;
-    if (!question || !verdict) { tell(texts.choose); return; }
-    take(await call("api/decide", { answers: [answerOf(question, verdict)] }));
+    take(await call("api/decide", { answers: answers.map((one) => ({ ...one, comment: one.criterion.startsWith("node:") ? "" : comment })) }));
     looked(); showProgress(); tell("");
     onward();
   });
+}
+
+function choose(index) {
+  const choice = state.question && state.question.choices[index];
+  if (choice) send(choice.answers);
+}
+
+function notJudged() {
+  if (!state.question || $("not-judged").disabled) return;
+  send([{ ...state.question.choices[0].answers[0], verdict: "not_judged" }]);
 }
 
 function accept() {
   const question = state.question, row = current();
   if (!question || !row) return;
   if (!isOpen(row)) { busy(async () => onward()); return; }
-  decide(question.proposed);
+  const index = question.choices.findIndex((one) => one.default);
+  if (index < 0) { tell(texts.choose, [[texts.close, () => tell("")]]); return; }
+  choose(index);
 }
 
 function saveComment() {
@@ -397,6 +450,8 @@ function undo() {
     if (!data.undone) { tell(texts.nothing_to_undo, [[texts.close, () => tell("")]]); return; }
     take(data); tell("");
     if (state.mode === "eight") { showEight(data.undone); return; }
+    const undone = state.rows.get(data.undone);
+    if (undone && undone.under) data.undone = `${undone.student}/${undone.under}`;
     if (!state.rows.has(data.undone)) { await refreshScreen(); return; }
     if (!state.list.includes(data.undone)) relist(data.undone);
     state.at = state.list.indexOf(data.undone);
@@ -411,7 +466,9 @@ function moveNode(node, x, y) {
     const question = state.question, started = performance.now();
     try {
       take(await call("api/node", { student: question.student, sheet: question.look.sheet, node, x, y, seen: question.look.nodes.find((one) => `${one.figure}:${one.name}` === node).seen }));
-    } finally { await showQuestion(true); }
+    } finally {
+      if (state.rows.has(keyOf(question))) await showQuestion(true); else onward();
+    }
     document.body.dataset.nodeMs = Math.round(performance.now() - started);
   });
 }
@@ -419,7 +476,7 @@ function moveNode(node, x, y) {
 // Eight to a screen --------------------------------------------------------------------------------
 
 function showEight(keep) {
-  const open = ordered().filter(isOpen);
+  const open = ordered().filter((row) => isOpen(row) && isSingle(row));
   const first = keep && state.rows.get(keep) ? state.rows.get(keep) : open[0];
   if (!first) { showMode("done"); return; }
   const same = open.filter((row) => row.criterion === first.criterion).slice(0, EIGHT);
@@ -486,7 +543,7 @@ function decideTiles(indices, verdict) {
 
 function sureOnes() {
   const least = Number($("least").value) / 100;
-  return [...state.rows.values()].filter((row) => isOpen(row) && row.proposed && row.probability !== null && row.probability >= least);
+  return [...state.rows.values()].filter((row) => isOpen(row) && isSingle(row) && row.proposed && row.probability !== null && row.probability >= least);
 }
 
 function showSure() {
@@ -709,14 +766,19 @@ document.addEventListener("keydown", (event) => {
   const letter = isForeign ? event.code.slice(3) : event.key;
   const key = letter.length === 1 ? letter.toLowerCase() : letter, verdict = VERDICT_KEYS[event.key];
   if (!asks && !eight && key !== "u") return;
-  if (verdict) { if (eight) { if (verdict !== "not_judged") decideTiles([state.tile], verdict); } else decide(verdict); }
+  const place = asks && state.question && state.question.kind === "node" ? "abc".indexOf(key) : -1;
+  const answers = verdict || key === "Enter" || (place >= 0 && key.length === 1);
+  if (asks && answers && !state.ready) { event.preventDefault(); tell(texts.wait); return; }
+  if (verdict && eight) { if (verdict !== "not_judged") decideTiles([state.tile], verdict); }
+  else if (verdict) { if (verdict === "not_judged") notJudged(); else choose(Number(event.key) - 1); }
+  else if (place >= 0 && key.length === 1) choose(place);
   else if (acts[key]) acts[key]();
   else return;
   event.preventDefault();
 });
 
 $("accept").onclick = accept;
-for (const button of document.querySelectorAll("#question [data-verdict]")) button.onclick = () => decide(button.dataset.verdict);
+$("not-judged").onclick = notJudged;
 for (const button of document.querySelectorAll("#top nav button")) button.onclick = () => showMode(button.dataset.mode);
 $("back").onclick = () => step(-1);
 $("on").onclick = () => step(1);
