@@ -447,6 +447,8 @@ class StepContext:
         )
 
     def _alternatives(self, step: Step, steps: Sequence[tuple[Mistake | None, Step]]) -> StepAlternatives:
+        # Nodes on which nothing observed depends are not replayed: no line can have been drawn through them.
+        steps = [one for one in steps if one[0] is None or self.nodes.keys() >= set(one[1].needs)]
         mistakes = tuple(mistake for mistake, _ in steps)
         if not steps:
             empty = np.zeros((0, self.count))
