@@ -62,25 +62,25 @@ PROPOSED = N_("proposed: %(verdict)s")
 ACCEPT = N_("Accept: %(verdict)s")
 NO_PROPOSAL = N_("No proposal: choose a verdict")
 GO_ON = N_("Go on")
-UNSURE = N_("No default below %(least)s: choose a verdict")
+UNSURE = N_("No default below %(least)s: choose")
 WHOSE = N_("Whose data were drawn?")
 WHICH = N_("Which stroke is meant: %(vectors)s?")
 WHICH_SCALE = N_("Which scale was drawn with: %(scale)s?")
 ARE_RIGHT = N_("Read in doubt: %(vectors)s")
-NEITHER = N_("none of these: not drawn, wrong")
+NEITHER = N_("none of these: wrong")
 PLACE = N_("stroke %(letter)s")
 OF_OWNER = {
-    "none": N_("another student's data: no points"),
-    "follow": N_("the student's own work: mark it as proposed"),
+    "none": N_("another's: no points"),
+    "follow": N_("their own: as proposed"),
 }
 OF_SCALE = {
-    "full": N_("the declared scale was drawn with"),
-    "partial": N_("nearly right"),
-    "none": N_("the declared scale is wrong"),
+    "full": N_("the declared one"),
+    "partial": N_("nearly that one"),
+    "none": N_("another: wrong"),
 }
 UNDECLARED = {
-    "full": N_("the scale that the drawing follows is right"),
-    "none": N_("the scale that the drawing follows is wrong"),
+    "full": N_("the drawing's: right"),
+    "none": N_("the drawing's: wrong"),
 }
 OF_GROUP = {"full": N_("all are right"), "none": N_("all are wrong")}
 MOST_NAMED = 3
@@ -494,7 +494,11 @@ def _doubt_look(session: Session, student: Student, doubt: Doubt, first: Criteri
         return look
     known = [point for one in places for point in (one.at, one.start) if point is not None]
     box = box_around(known, LOOK_MARGIN_MM, LEAST_LOOK_MM, look["page_mm"])
-    return {**look, "box": box, "marks": Markup("").join(_place_marks(one, box[2]) for one in places)}
+    return {
+        **look,
+        "box": box,
+        "marks": Markup("").join(_place_marks(one, box[2]) for one in reversed(places)),
+    }
 
 
 def _place_marks(choice: Choice, wide_mm: float) -> Markup:

@@ -163,12 +163,12 @@ def chromium():
 class Window:
     """A window of the browser with the review's page in it."""
 
-    def __init__(self, page, address):
+    def __init__(self, page, address, student=""):
         self.page, self.keys, self.screens = page, 0, set()
         self.faults = []
         page.on("pageerror", lambda error: self.faults.append(str(error)))
         page.set_default_timeout(PATIENCE_MS)
-        page.goto(address)
+        page.goto(f"{address}?student={student}" if student else address)
         self.ready()
 
     def ready(self):
@@ -209,10 +209,10 @@ def open_window(chromium):
     """Opens windows on a server: each of a person's own, of a size in pixels."""
     contexts, windows = [], []
 
-    def opened(server, width=1280, height=800, **settings):
+    def opened(server, width=1280, height=800, student="", **settings):
         context = chromium.new_context(viewport={"width": width, "height": height}, **settings)
         contexts.append(context)
-        windows.append(Window(context.new_page(), server.address))
+        windows.append(Window(context.new_page(), server.address, student))
         return windows[-1]
 
     yield opened

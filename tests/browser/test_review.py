@@ -1,8 +1,11 @@
 """A person reviews a class of 30: by keys, by mouse on a phone, in two windows, through a power cut."""
 
 import math
+from dataclasses import replace
 
 import pytest
+
+from grader.records import Figure
 
 SHEETS = 30
 
@@ -14,11 +17,11 @@ def test_a_class_is_settled_by_keys_alone(open_window, server):
     while not window.is_done:
         window.press("Enter" if window.page.is_enabled("#accept") else "1")
     assert window.open == 0
-    # One look and one key for each question; what follows from a decision is not asked.
-    assert window.keys <= was_open
-    assert len(window.screens) <= was_open + 1
+    # One look and one key for each question; where one end of a vector lies may bring up the other end.
+    assert window.keys <= 1.2 * was_open
+    assert len(window.screens) <= 1.2 * was_open + 1
     assert window.keys / SHEETS < 2.0
-    assert len(server.decisions()) == window.keys
+    assert len(server.decisions()) >= window.keys
     window.page.click("#finish")
     window.page.wait_for_selector("#finished:visible")
     assert "planmark export" in window.page.inner_text("#commands")
@@ -26,7 +29,7 @@ def test_a_class_is_settled_by_keys_alone(open_window, server):
 
 
 def test_every_key_does_what_the_page_says(open_window, server):
-    window = open_window(server)
+    window = open_window(server, student="m03")
     page, first = window.page, window.shown
     window.press("3")
     student, criterion = first.split("/")
@@ -48,7 +51,7 @@ def test_every_key_does_what_the_page_says(open_window, server):
     window.press("2")
     (row,) = server.decisions().values()
     assert (row.criterion, row.verdict, row.comment) == (criterion, "partial", "look at the arrow 2")
-    assert student == "s02"
+    assert student == "m03"
     assert page.locator("#comments button", has_text="look at the arrow 2").count() == 1
 
 
@@ -58,7 +61,7 @@ def test_a_class_is_settled_by_mouse_on_a_phone(open_window, server):
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
     while not window.is_done:
         shown = page.evaluate("document.body.dataset.shown")
-        button = "#accept" if page.is_enabled("#accept") else ".verdicts [data-verdict=full]"
+        button = "#accept" if page.is_enabled("#accept") else "#choices [data-key='1']"
         box = page.locator(button).bounding_box()
         assert box["x"] >= 0
         assert box["x"] + box["width"] <= 390
@@ -70,14 +73,14 @@ def test_a_class_is_settled_by_mouse_on_a_phone(open_window, server):
             " || !document.getElementById('done').hidden)",
             arg=shown,
         )
-    assert len(server.decisions()) == clicks
+    assert len(server.decisions()) >= clicks
     assert window.open == 0
 
 
 def test_a_touch_settles_and_takes_back(open_window, server):
-    window = open_window(server, 390, 844, has_touch=True, is_mobile=True)
+    window = open_window(server, 390, 844, student="m03", has_touch=True, is_mobile=True)
     first = window.shown
-    window.page.tap(".verdicts [data-verdict=none]")
+    window.page.tap("#choices [data-key='3']")
     window.page.wait_for_function("first => !document.body.dataset.shown.startsWith(first + ' ')", arg=first)
     assert len(server.decisions()) == 1
     window.page.tap("#undo")
@@ -86,7 +89,7 @@ def test_a_touch_settles_and_takes_back(open_window, server):
 
 
 def test_a_killed_server_has_kept_every_key(open_window, process):
-    server, window = process, open_window(process)
+    server, window = process, open_window(process, student="m03")
     was_open = window.open
     for key in ("1", "3", "2"):
         window.press(key)
@@ -101,7 +104,7 @@ def test_a_killed_server_has_kept_every_key(open_window, process):
 
 
 def test_two_windows_lose_nothing_and_show_the_clash(open_window, server):
-    ana, ion = open_window(server), open_window(server)
+    ana, ion = open_window(server, student="m03"), open_window(server, student="m03")
     assert ana.shown == ion.shown
     student, criterion = ana.shown.split("/")
     for window, name in ((ana, "Ana"), (ion, "Ion")):
@@ -118,7 +121,7 @@ def test_two_windows_lose_nothing_and_show_the_clash(open_window, server):
     ion.press("Enter")
     ion.press("3")
     assert sorted(row.by for row in server.decisions().values()) == ["Ana", "Ion"]
-    assert student == "s02"
+    assert student == "m03"
 
 
 def test_a_dragged_node_snaps_and_the_marks_follow(open_window, server):
@@ -270,3 +273,88 @@ def test_a_comment_on_the_whole_is_kept(open_window, server):
     page.wait_for_selector("#note:visible")
     rows = {row.criterion: row for row in server.decisions().values()}
     assert (rows["comment"].comment, rows["total"].points) == ("drawn with care", 1.5)
+
+
+# Questions of reading ---------------------------------------------------------------------------------
+
+
+def places_asked(window):
+    """Go on to a question about where a node lies."""
+    for _ in range(window.open):
+        if window.shown.split("/")[1].startswith("node:") and window.page.locator(".place").count() > 1:
+            return
+        window.press("ArrowRight")
+    pytest.fail("no question about a place")
+
+
+def test_a_reading_is_asked_between_strokes_and_the_verdict_follows(open_window, server):
+    for one in server.session.students:
+        spread_confidence(server.session, one)
+    window = open_window(server)
+    places_asked(window)
+    page, shown = window.page, window.shown
+    assert page.locator(".place").count() == page.locator("#choices [data-key]").count() - 1
+    window.press("a")
+    (row,) = server.decisions().values()
+    assert row.kind == "node"
+    assert shown.endswith(row.criterion)
+    assert window.shown != shown
+
+
+def spread_confidence(session, student):
+    """A plan's node as good as unread, and its vectors off, so that a person must say where it lies."""
+    if student.key != "s02":
+        return
+    pages = [doubtful(page) for page in session.pages_of(student)]
+    student.pages = pages
+    session._marked_anew({student.key})
+
+
+def doubtful(page):
+    figure = page.reading.figures.get("velocity_plan")
+    if figure is None:
+        return page
+    moved = replace(figure.nodes["c"], at=figure.nodes["c"].at + 6.0 + 4.0j, confidence=0.4)
+    vectors = {
+        name: replace(one, confidence=0.4, length_mm=one.length_mm + 6.0) if "C" in name else one
+        for name, one in figure.vectors.items()
+    }
+    plan = Figure({**figure.nodes, "c": moved}, vectors)
+    return replace(
+        page, reading=replace(page.reading, figures={**page.reading.figures, "velocity_plan": plan})
+    )
+
+
+def test_enter_does_nothing_where_no_proposal_is_sure(open_window, server):
+    window = open_window(server, student="m03")
+    page = window.page
+    assert not page.is_enabled("#accept")
+    assert "80" in page.inner_text("#accept") or "proposal" in page.inner_text("#accept").lower()
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#note:visible")
+    assert not server.decisions()
+
+
+def test_buttons_stay_where_they_are(open_window, server):
+    for width, height in ((1280, 800), (390, 844)):
+        window = open_window(server, width, height)
+        page, seen = window.page, set()
+        for _ in range(6):
+            box = page.locator("#choices [data-key='1']").bounding_box()
+            seen.add((round(box["x"]), round(box["y"])))
+            view, bar = page.locator("#view").bounding_box(), page.locator(".answers").bounding_box()
+            covered = view and width < 500 and view["y"] + view["height"] > bar["y"]
+            assert not covered
+            window.press("ArrowRight")
+        assert len(seen) == 1
+
+
+def test_keys_wait_for_the_picture(open_window, server):
+    window = open_window(server)
+    page = window.page
+    page.route("**/scan?*", lambda _route: None)
+    page.evaluate("() => { state.fetched.clear(); showQuestion(); }")
+    page.wait_for_function("() => !document.body.dataset.ready")
+    page.keyboard.press("1")
+    page.wait_for_selector("#note:visible")
+    assert not server.decisions()
