@@ -1,7 +1,7 @@
 """Pages of which nothing is left but the figures: everything else is painted over with paper.
 
 It is said what stays, not what goes: what was read as a figure, with the letters at its points. Within it,
-lines of writing and signs away from points and strokes are painted over; strokes that were read stay whole.
+lines of writing and signs away from points and strokes are painted over; points and strokes stay whole.
 """
 
 from collections.abc import Iterable, Sequence
@@ -21,6 +21,8 @@ HULL_MM = 10.0
 """Around a figure: letters, arrowheads, supports, the ends of lines of construction."""
 STROKE_MM = 0.8
 """To each side of a stroke that was read: its own ink, where writing runs through it."""
+POINT_MM = 6.0
+"""Around a point: its circle, its letter, the hatching of a support, which looks like a line of writing."""
 AT_NODE_MM, AT_STROKE_MM = 10.0, 5.0
 """Signs so near a point, or a stroke, are its name."""
 AROUND_MM = 1.0
@@ -105,6 +107,8 @@ def _mask(grey: GreyImage, mm_to_px: FloatArray, px_per_mm: float, keep: Keep) -
     shows, strokes, away = blank(), blank(), blank()
     for points in keep.figures:
         draw(shows, points, HULL_MM)
+        for point in points:
+            draw(strokes, point[None], POINT_MM)
     if keep.zones:
         zones = blank()
         for box in keep.zones:

@@ -9,7 +9,7 @@ import zipfile
 import cv2
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageDraw, ImageFont
 
 from grader.files import samples_folder
 from grader.folder.batch import Batch, graded
@@ -27,6 +27,10 @@ PUMP = load_assignment("pump")
 RUBRIC = rubric_of(PUMP)
 NAME = "Ion-Popescu"
 ID = "grupa12_popescu"
+
+
+SIGNED_PX = (1775, 690)
+"""Where somebody has signed the scan of s02, inside its sketch."""
 
 
 def silent(*_progress):
@@ -48,6 +52,9 @@ def handed_in(tmp_path_factory):
     exif[0x013B], exif[0x8298] = NAME, "by " + NAME
     for source, name in (("s02_1.jpg", f"{ID}_1.jpg"), ("s06_1.jpg", "s06_1.jpg")):
         with Image.open(samples_folder() / "pump" / source) as picture:
+            if source == "s02_1.jpg":
+                font = ImageFont.load_default(size=34)
+                ImageDraw.Draw(picture).text(SIGNED_PX, "Popescu", "#444444", font)
             picture.save(
                 folder / name,
                 exif=exif,
@@ -148,6 +155,25 @@ def test_only_figures_are_left_on_a_page(preview):
         assert np.all(np.any(np.all(is_in, axis=-1), axis=-1))
         for node in np.concatenate(nodes):
             assert np.min(np.linalg.norm(places - node, axis=1)) < 1.5
+
+
+def test_a_name_within_a_figure_is_painted_over(handed_in, preview):
+    _, made = preview
+    rows = [json.loads(line) for line in (made.preview / "truth.jsonl").read_text().splitlines()]
+    row = next(one for one in rows if one["n"] == 12)
+    nodes = row["figures"]["mechanism"]
+    on_paper = {name: nodes[name][:2] for name in ("B", "C", "O2")}
+    pixels = cv2.perspectiveTransform(np.array([list(on_paper.values())]), np.array(row["mm_to_px"]))[0]
+    scan = cv2.imread(str(handed_in / "in" / f"{ID}_1.jpg"), cv2.IMREAD_GRAYSCALE)
+    given = cv2.imread(str(made.preview / row["page"]), cv2.IMREAD_GRAYSCALE)
+    # The page was cut to the sheet: what is beside a joint finds the shift.
+    x, y = np.rint(pixels[1]).astype(int)
+    piece = given[y - 25 : y + 25, x - 25 : x + 25]
+    _, _, _, found = cv2.minMaxLoc(cv2.matchTemplate(scan, piece, cv2.TM_CCOEFF_NORMED))
+    shift = np.array(found) - (x - 25, y - 25)
+    left, top = np.array(SIGNED_PX) - shift
+    assert np.min(scan[SIGNED_PX[1] : SIGNED_PX[1] + 40, SIGNED_PX[0] : SIGNED_PX[0] + 140]) < 120
+    assert np.min(given[top : top + 40, left : left + 140]) > 200
 
 
 def test_the_truth_says_who_vouches_for_each_point(known, preview):
