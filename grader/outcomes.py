@@ -23,6 +23,9 @@ not_measured                                                                 not
 optional                                                                     not handed in, not asked
 unread                reason                                                 asked for, not read
 not_drawn                                                                    no ink where it must be
+value_alone                                                                  computed, and not drawn
+by_similarity         of                                                     replaced by a right image
+letters_exchanged     first, second                                          named by exchanged letters
 entry_refused         reason                                                 an entry cannot be used
 doubtful              confidence                                             read without confidence
 near_limit            se, good_to, off, tolerance, what                      the error straddles a limit

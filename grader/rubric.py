@@ -203,8 +203,10 @@ class RubricFile(Authored):
     """What is read with less is no evidence of what follows from it."""
     follow_through: bool = True
     least_followed_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.2
-    """No credit for what follows from an earlier answer that makes it shorter than this share of the
-    right length: such a follow-through is trivial."""
+    """What follows from an earlier answer that makes it shorter than this share of the right length is
+    not judged: such a follow-through is trivial."""
+    values_alone: bool = False
+    """Whether a computed value counts for a vector without its drawn length."""
     criterion: Annotated[list[CriterionTable], Field(min_length=1)]
 
     @property

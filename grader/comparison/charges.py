@@ -1,19 +1,20 @@
 """The charges: what earlier mistakes have cost, and which later values may follow from them."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
-from grader.comparison.evidence import Evidence
-from grader.comparison.follow_through import NO_SPREAD, Expectation, Explain, FollowThrough, scaled
+from grader.comparison.evidence import DrawnVector, Evidence
+from grader.comparison.follow_through import NO_SPREAD, Expectation, Explain, FollowThrough
 from grader.comparison.own import known
 from grader.comparison.scales import Scale, followed_scales, used_scales
 from grader.comparison.task import Task, TaskSegment
-from grader.comparison.verdicts import EVEN, FULL, NONE, MarkRange, the_better
+from grader.comparison.verdicts import EVEN, FULL, NONE, MarkRange, at_worst, the_better, tolerances, widened
 from grader.outcomes import Reason
-from grader.records import MECHANISM
+from reference.construction.mistakes import line_of
 from reference.construction.steps import Given
-from reference.construction.uncertainty import EndSpread, spread
+from reference.construction.uncertainty import EndSpread
 
 
 class Against(Protocol):
@@ -29,7 +30,10 @@ class Against(Protocol):
 class ComparedMark:
     """A mark with the expectation that gave it.
 
-    `adds_up`: it follows from small errors, each within its tolerance, and from nothing charged.
+    Attributes
+    ----------
+    adds_up : it follows from small errors, each within its tolerance, and from nothing charged
+    is_trivial : an earlier mistake makes it so short that it shows nothing: it is not judged
     """
 
     mark: MarkRange
@@ -37,6 +41,7 @@ class ComparedMark:
     uncertainty: EndSpread = NO_SPREAD
     is_followed: bool = False
     adds_up: bool = False
+    is_trivial: bool = False
 
 
 def new_charges(task: Task, evidence: Evidence, settled: Mapping[str, Scale], explain: Explain) -> "Charges":
@@ -64,7 +69,7 @@ class Charges:
     inherited : nodes that are right only as they follow from something charged
     doubtful : nodes and scales whose verdict is open
     shown : what the current criterion is the first to show; it is charged there, and followed after it
-    known_wrong : by node, whether it is wrong (cache)
+    known_causes : by node, the causes of its position (cache)
     factors : by scale, the common factor by which all values are wrong, or None (cache)
     """
 
@@ -80,7 +85,7 @@ class Charges:
     inherited: set[str] = field(default_factory=set)
     doubtful: set[str] = field(default_factory=set)
     shown: set[str] = field(default_factory=set)
-    known_wrong: dict[str, bool] = field(default_factory=dict)
+    known_causes: dict[str, frozenset[str]] = field(default_factory=dict)
     factors: dict[str, float | None] = field(default_factory=dict)
 
     def best(self, segment: TaskSegment, against: Against, *, follows_through: bool) -> ComparedMark:
@@ -94,6 +99,10 @@ class Charges:
         if not marked.mark.is_full and follows_through:
             marked = self.followed_through(segment, against, marked)
         self.charge_shown()
+        if marked.is_trivial:
+            return marked
+        if marked.mark.worst != marked.mark.best and self.following.is_blamed(segment.name):
+            marked = replace(marked, mark=at_worst(marked.mark))
         self.remember(segment.head, marked.mark)
         if self.is_by_length(segment):
             self.by_length.add(segment.head)
@@ -117,10 +126,53 @@ class Charges:
         if not marked.mark.is_full:
             marked = self.from_own_nodes(segment, against, marked, original)
         if not marked.mark.is_full:
-            for expectation in following.expectations(segment):
-                if not following.is_trivial(segment, expectation.vector):
-                    marked = self.the_better(marked, expectation, against)
+            for expectation in (*self.at_charged_head(segment), *following.expectations(segment)):
+                marked = self.unless_trivial(segment, marked, expectation, against)
         return marked
+
+    def unless_trivial(
+        self, segment: TaskSegment, marked: ComparedMark, expectation: Expectation, against: Against
+    ) -> ComparedMark:
+        """As `the_better`; what follows rightly and is trivially short is neither credited nor charged."""
+        if marked.mark.is_full:
+            return marked
+        following, better = self.following, self.the_better(marked, expectation, against)
+        if better is marked or not following.is_trivial(segment, expectation.vector):
+            return better
+        return replace(marked, is_trivial=better.mark.is_full)
+
+    def at_charged_head(self, segment: TaskSegment) -> Iterator[Expectation]:
+        """What follows at a node whose wrong line has been charged to another vector."""
+        if segment.scale != "kL" and segment.head in self.charged | self.doubtful:
+            following = self.following
+            found = (following.on_own_line(segment), following.between_own_nodes(segment))
+            yield from (one for one in found if one is not None)
+
+    def rank(self, segment: TaskSegment) -> int:
+        """The order of vectors that end at one node: first those on wrong lines, then those on right ones.
+
+        A node that is made rightly needs no order.
+        """
+        head = segment.head
+        known_nodes = self.evidence.nodes.keys() | known(self.following.own(self.used))
+        if segment.scale == "kL" or head not in known_nodes or head not in self.causes_at(head):
+            return 0
+        if line_of(self.task.construction.vectors[segment.name], self.task.construction) is None:
+            return 2
+        expected, own = self.following.on_own_line(segment), self.evidence.vector(segment.name)
+        if expected is None or own is None:
+            basis = self.following.drawn_instead()
+            return int(basis is not None and not basis.blames(segment.name, head))
+        return int(self.is_along(segment, own, expected))
+
+    def is_along(self, segment: TaskSegment, own: DrawnVector, line: Expectation) -> bool:
+        """Whether a drawn vector lies along its line, one way or the other; a very short one may."""
+        table, size = self.task.rubric.tolerance_of(segment.name), own.length_mm
+        if size < table.least_mm:
+            return True
+        plain = tolerances(table, size, with_direction=True)
+        allowed = widened(plain, size, line.uncertainty, self.task.rubric.hand.at_most).direction_deg
+        return math.degrees(math.acos(min(abs(line.vector) / size, 1.0))) <= (allowed or 0.0)
 
     def from_own_nodes(
         self, segment: TaskSegment, against: Against, marked: ComparedMark, original: ComparedMark
@@ -129,9 +181,8 @@ class Charges:
         expectation = self.following.from_nodes(segment, self.used)
         if not expectation.relies_on:
             return marked
-        if self.wrong(expectation.relies_on):
-            is_trivial = self.following.is_trivial(segment, expectation.vector)
-            return marked if is_trivial else self.the_better(marked, expectation, against)
+        if self.causes(expectation) or expectation.relies_on & self.inherited:
+            return self.unless_trivial(segment, marked, expectation, against)
         # Every earlier step is within its propagated uncertainty: this step alone counts.
         mark = against(expectation.vector, expectation.uncertainty, expectation.se)
         if not mark.is_better(marked.mark):
@@ -149,7 +200,7 @@ class Charges:
     def the_better(self, marked: ComparedMark, expectation: Expectation, against: Against) -> ComparedMark:
         """The mark so far, or the one against an expectation where that is better."""
         candidate = self.allowed(
-            expectation.relies_on, against(expectation.vector, expectation.uncertainty, expectation.se)
+            expectation, against(expectation.vector, expectation.uncertainty, expectation.se)
         )
         if not candidate.is_better(marked.mark):
             return marked
@@ -185,24 +236,11 @@ class Charges:
 
     # What is wrong --------------------------------------------------------------------------------
 
-    def is_wrong(self, node: str) -> bool:
-        """Whether an own node's residual exceeds both its tolerance and its propagated uncertainty."""
-        if node not in self.known_wrong:
-            self.known_wrong[node] = self._is_wrong(node)
-        return self.known_wrong[node]
-
-    def _is_wrong(self, node: str) -> bool:
-        task, own = self.task, self.own_position(node)
-        exact = task.nodes(self.used)[node]
-        if task.construction.figure_of(node) == MECHANISM:
-            exact *= self.used["kL"] / self.followed["kL"]
-        residual = own - exact
-        if abs(residual) <= task.tolerance_at(node).length_at(abs(exact)):
-            return False
-        uncertainty = scaled(
-            spread(task.traced(self.used).nodes[node].shifts, residual), task.rubric.hand.sigmas
-        )
-        return abs(residual) > uncertainty.along
+    def causes_at(self, node: str) -> frozenset[str]:
+        """The causes of an own node's position, see `FollowThrough.causes_at`."""
+        if node not in self.known_causes:
+            self.known_causes[node] = self.following.causes_at(node)
+        return self.known_causes[node]
 
     def is_by_length(self, segment: TaskSegment) -> bool:
         """Whether only the length is known of a vector that is laid off: its sense may be wrong."""
@@ -210,30 +248,34 @@ class Charges:
         is_laid_off = isinstance(self.task.construction.step(segment.head), Given)
         return is_laid_off and drawn is not None and drawn.direction_rad is None
 
-    def own_position(self, node: str) -> complex:
-        """A known own node as read or measured, or as lengths lead to it."""
-        if node in self.evidence.nodes:
-            return self.evidence.nodes[node]
-        return next(nodes[node].at for nodes in self.following.own(self.used).values() if node in nodes)
-
-    def wrong(self, relies_on: frozenset[str]) -> frozenset[str]:
-        """The wrong ones among nodes and scales: charged, or off and not judged within tolerance."""
-        blamed = relies_on & (self.charged | self.inherited)
-        open_ones = relies_on - blamed - (self.cleared - self.by_length)
+    def causes(self, expectation: Expectation) -> frozenset[str]:
+        """The causes of what an expectation relies on, charged or not."""
+        right = self.cleared - self.by_length
         nodes = known(self.following.own(self.used)) | self.evidence.nodes.keys()
-        return blamed | {name for name in open_ones if name not in nodes or self.is_wrong(name)}
+        found = set(expectation.causes)
+        for name in expectation.relies_on - right:
+            found |= self.causes_at(name) if name in nodes else {name}
+        return frozenset(found - right) | (expectation.relies_on & self.charged)
 
-    def allowed(self, relies_on: frozenset[str], mark: MarkRange) -> MarkRange:
-        """The mark for what follows, where the earlier mistake has been charged; else it is charged here."""
-        wrong = self.wrong(relies_on)
-        has_doubtful_scale = bool(wrong & self.doubtful & self.settled.keys())
-        if not wrong or (wrong & (self.charged | self.inherited) and not has_doubtful_scale):
+    def allowed(self, expectation: Expectation, mark: MarkRange) -> MarkRange:
+        """The mark for what follows, where every mistake that it follows from has been charged.
+
+        The first mistake that has not been is charged here.
+        """
+        causes = self.causes(expectation)
+        unpaid = causes - self.charged
+        if not unpaid and not causes & self.doubtful & self.settled.keys():
             return mark
-        if wrong & self.doubtful:
+        if causes & self.doubtful:
             return MarkRange(NONE, NONE, mark.best, mark.reasons, min(mark.sure, EVEN))
         if mark.is_full:
-            self.shown.update(wrong)
+            self.shown.add(self.first(unpaid))
         return MarkRange(NONE, NONE, NONE, mark.reasons, mark.sure)
+
+    def first(self, names: frozenset[str]) -> str:
+        """The earliest of some causes in the order of construction; scales and data come before nodes."""
+        order = {step.node: index for index, step in enumerate(self.task.construction.steps)}
+        return min(names, key=lambda name: (order.get(name, -1), name))
 
     def remember(self, name: str, mark: MarkRange) -> None:
         """Record whether a node or scale has cost something, is in doubt, or is right."""
@@ -283,6 +325,6 @@ class Charges:
 
     def named(self, expectation: Expectation) -> str:
         """The last vector charged that an expectation relies on, or the mechanism."""
-        blamed = expectation.relies_on & (self.charged | self.doubtful)
+        blamed = (expectation.relies_on | expectation.causes) & (self.charged | self.doubtful)
         names = [v.name for v in self.task.construction.vectors.values() if v.head in blamed]
         return names[-1] if names else "mechanism"

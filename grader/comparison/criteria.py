@@ -16,9 +16,16 @@ from dataclasses import dataclass, replace
 from grader.comparison import verdicts
 from grader.comparison.charges import Against, Charges, ComparedMark, new_charges
 from grader.comparison.evidence import DrawnVector, Evidence, Submission, gather, held_against_cells
-from grader.comparison.follow_through import NO_SPREAD, Explain, ReplayResult, nothing_explained
+from grader.comparison.follow_through import (
+    NO_SPREAD,
+    Expectation,
+    Explain,
+    ReplayResult,
+    nothing_explained,
+)
+from grader.comparison.images import with_images
 from grader.comparison.scales import Scale, settle
-from grader.comparison.task import Task, unit_of
+from grader.comparison.task import Task, TaskSegment, unit_of
 from grader.comparison.verdicts import (
     ALL_RIGHT,
     EVEN,
@@ -34,7 +41,7 @@ from grader.comparison.verdicts import (
     tolerances,
     widened,
 )
-from grader.documents import Quantity, Tolerance
+from grader.documents import Quantity, Tolerance, Verdict
 from grader.outcomes import Outcome, Reason, UsedScale
 from grader.rubric import CriterionTable
 from reference.construction.elements import Normal
@@ -63,7 +70,8 @@ def compare(task: Task, submission: Submission, explain: Explain = nothing_expla
     evidence = gather(task, submission)
     settled = settle(task, evidence, submission.declared)
     charges = new_charges(task, evidence, settled, explain)
-    outcomes = {criterion.id: _outcome(charges, criterion) for criterion in _in_order(task, tuple(settled))}
+    judged = {criterion.id: _outcome(charges, criterion) for criterion in _in_order(charges)}
+    outcomes = with_images(task, judged)
     return Comparison(
         outcomes=tuple(outcomes[criterion.id] for criterion in task.rubric.criterion),
         scales={name: scale.used for name, scale in settled.items()},
@@ -73,18 +81,26 @@ def compare(task: Task, submission: Submission, explain: Explain = nothing_expla
     )
 
 
-def _in_order(task: Task, scales: tuple[str, ...]) -> list[CriterionTable]:
-    """The criteria as they are drawn: scales, sketch, velocities, omega, accelerations, epsilon."""
+def _in_order(charges: Charges) -> list[CriterionTable]:
+    """The criteria as they are drawn: scales, sketch, velocities, omega, accelerations, epsilon.
+
+    Of vectors that end at one node, those on wrong lines come first; the rubric's order changes nothing.
+    """
+    task, scales = charges.task, tuple(charges.settled)
     construction = task.construction
     steps = {step.node: place for place, step in enumerate(construction.steps)}
+    names = list(task.segments)
     kinds = ("v", "omega", "a", "epsilon")
 
-    def place(criterion: CriterionTable) -> tuple[int, int]:
+    def place(criterion: CriterionTable) -> tuple[int, ...]:
         name = criterion.name
         if name in scales:
             return -2, scales.index(name)
         kind = -1 if criterion.link else kinds.index(name.partition("_")[0])
-        return kind, steps[task.segments[name].head] if name in task.segments else 0
+        if name not in task.segments:
+            return kind, 0
+        one = task.segments[name]
+        return kind, steps[one.head], charges.rank(one), names.index(name)
 
     return sorted(task.rubric.criterion, key=place)
 
@@ -154,6 +170,8 @@ def segment(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) -> 
     with_direction = criterion.direction and drawn.direction_rad is not None
     marked = charges.best(one, _against(charges, criterion, drawn), follows_through=follows)
     mark = marked.mark
+    if marked.is_trivial:
+        return _too_short(charges, criterion, drawn)
     is_read = drawn is charges.evidence.drawn.get(one.name)
     if is_read:
         mark = charges.opened(one, mark, follows_through=follows)
@@ -181,6 +199,15 @@ def segment(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) -> 
     )
 
 
+def _too_short(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) -> Outcome:
+    """The outcome of a vector that an earlier mistake leaves too short to show anything."""
+    least = charges.task.rubric.least_followed_share * abs(
+        charges.task.segments[criterion.name].drawn(charges.used)
+    )
+    short = Reason("too_short_to_judge", {"length_mm": drawn.length_mm, "least_mm": least})
+    return verdicts.unjudged(criterion, "not_judged", (short,), expected=Quantity())
+
+
 def _against(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) -> Against:
     """A function that marks a drawn vector against an expectation, by the rubric and the sheet's cells."""
     rubric = charges.task.rubric
@@ -197,7 +224,8 @@ def _against(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) ->
             return by_rule(mark_vector(one, expected, plain, table, se), rule)
         allowed = widened(plain, size, uncertainty, rubric.hand.at_most)
         mark = by_rule(mark_vector(one, expected, allowed, table, se), rule)
-        if mark.is_full:
+        is_left_out = size >= SHORT_MM and one.length_mm <= table.length_mm / 2.0
+        if mark.is_full or is_left_out:
             return mark
         by_hand = by_rule(mark_vector(one, expected, widened(plain, size, uncertainty), table, se), rule)
         return left_open(mark, ALL_RIGHT if _is_boundless(uncertainty, size) else by_hand)
@@ -315,7 +343,7 @@ def value_outcome(charges: Charges, criterion: CriterionTable) -> Outcome:
     if not marked.mark.is_full and follows:
         marked = _by_factor(charges, one.scale, marked, against)
     measured, right = Quantity(value=values[one.name], unit=unit), abs(marked.expected) * scale
-    return verdicts.outcome(
+    found = verdicts.outcome(
         criterion,
         marked.mark,
         measured,
@@ -323,6 +351,7 @@ def value_outcome(charges: Charges, criterion: CriterionTable) -> Outcome:
         allowed(marked.expected, marked.uncertainty),
         followed=marked.is_followed,
     )
+    return found if charges.task.rubric.values_alone else verdicts.without_drawing(found)
 
 
 def _by_factor(charges: Charges, scale: str, marked: ComparedMark, against: Against) -> ComparedMark:
@@ -397,18 +426,26 @@ def absent(charges: Charges, criterion: CriterionTable, expected: Quantity) -> O
         short = Reason("too_short_to_judge", {"length_mm": length, "least_mm": least})
         return verdicts.unjudged(criterion, "not_judged", (short, reason), expected=expected)
     segment = charges.task.segments.get(criterion.name)
-    if segment is not None:
-        # Later criteria may depend on what was not read.
-        charges.doubtful.add(segment.head)
     if not evidence.has_sheets:
         blank = "none" if rubric.missing == "review" else rubric.missing
+        _leave_out(charges, segment, blank)
         return verdicts.unjudged(criterion, blank, (reason,), expected=expected)
     if is_not_drawn(charges.task, evidence, criterion.name, length or 0.0):
+        _leave_out(charges, segment, rubric.missing)
         return verdicts.unjudged(
             criterion, rubric.missing, (Reason("not_drawn"),), expected=expected, sure=NOT_DRAWN
         )
+    _leave_out(charges, segment, "review")
     sure = PROBABLY_NOT_DRAWN if criterion.name in evidence.blank else EVEN
     return verdicts.unjudged(criterion, "review", (reason,), expected=expected, sure=sure)
+
+
+def _leave_out(charges: Charges, segment: TaskSegment | None, verdict: Verdict) -> None:
+    """Record what was not handed in: a component left out has cost its points, all else stays in doubt."""
+    if segment is None:
+        return
+    is_component = isinstance(charges.task.construction.step(segment.head), Given)
+    (charges.charged if is_component and verdict == "none" else charges.doubtful).add(segment.head)
 
 
 def is_not_drawn(task: Task, evidence: Evidence, name: str, length_mm: float) -> bool:
@@ -463,9 +500,8 @@ def rate(charges: Charges, criterion: CriterionTable) -> Outcome:
         # A common factor of all values is also that of the angular one.
         own = own if factor is None else min(own, own * factor, key=lambda one: abs(one - value))
         limit = table.length_at(abs(own) / per_mm) * per_mm
-        candidate = charges.allowed(
-            frozenset({segment.head}), mark_value(value, own, limit, limit, table, unit)
-        )
+        source = Expectation(own, "vector", turned.vector, frozenset({segment.head}))
+        candidate = charges.allowed(source, mark_value(value, own, limit, limit, table, unit))
         if candidate.is_better(mark):
             follows_from = Reason("follows", {"what": "vector", "of": turned.vector})
             mark, right, followed = the_better(candidate, mark, follows_from), own, True

@@ -17,12 +17,13 @@ from grader.comparison.evidence import Evidence
 from grader.comparison.own import Nodes, PlanBasis, known, other_mechanism, own_nodes
 from grader.comparison.scales import Scale
 from grader.comparison.task import Task, TaskSegment
+from grader.records import MECHANISM
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.elements import Coriolis, Normal
 from reference.construction.graph import AngularRate
-from reference.construction.mistakes import Drawing, Mistake, commit
-from reference.construction.steps import Divide, Given, Similar
-from reference.construction.uncertainty import EndSpread, TracedDrawing, spread, trace
+from reference.construction.mistakes import Drawing, Mistake, commit, line_of
+from reference.construction.steps import Divide, Given, Similar, TwoLines
+from reference.construction.uncertainty import EndSpread, OwnNode, TracedDrawing, spread, trace
 from reference.geometry import ComplexArray
 from reference.replay.replay import Replay
 
@@ -40,6 +41,7 @@ class Expectation:
     vector : complex millimetres
     what, of : ``nodes``, ``scale``, ``vector`` or ``value``, and its name, for the reason `follows`
     relies_on : the student's nodes, scales and computed angular velocities from which it follows
+    causes : nodes and scales among them that are wrong for certain, whatever their own residuals
     uncertainty : its propagated drafting error, the rubric's number of standard deviations, millimetres
     se : its standard errors, from the reading of its sources
     """
@@ -50,6 +52,7 @@ class Expectation:
     relies_on: frozenset[str]
     uncertainty: EndSpread = NO_SPREAD
     se: EndSpread = NO_SPREAD
+    causes: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,10 +63,12 @@ class ReplayResult:
     ----------
     explanations : of the drawing, the likeliest first; none where it may be right
     basis : the other construction by which the plans were drawn, where that is certain
+    blamed : vectors in which a mistake was made, nearly certainly
     """
 
     explanations: tuple[Replay, ...] = ()
     basis: PlanBasis | None = None
+    blamed: frozenset[str] = frozenset()
 
 
 Explain = Callable[[Task, Evidence, Mapping[str, Scale]], ReplayResult]
@@ -84,6 +89,7 @@ class FollowThrough:
     explanation : the result of the search for what was done, once it was needed
     instead : the other construction by which the plans were drawn
     own_cache, trace_cache : by scales and basis
+    turned_cache : by ``v`` or ``a``, the plan as it is turned as a whole
     """
 
     task: Task
@@ -95,11 +101,26 @@ class FollowThrough:
     instead: PlanBasis | None = None
     own_cache: dict[tuple[object, ...], Nodes] = field(default_factory=dict)
     trace_cache: dict[tuple[object, ...], TracedDrawing] = field(default_factory=dict)
+    turned_cache: dict[str, PlanBasis | None] = field(default_factory=dict)
 
     @property
     def wrong_scales(self) -> frozenset[str]:
         """The scales that the drawing does not follow."""
         return frozenset(scale for scale in SCALE_NAMES if self.followed[scale] != self.used[scale])
+
+    def causes_of(self, node: str, basis: PlanBasis) -> frozenset[str]:
+        """The wrong nodes of a basis from which a node is made; a turned plan is wrong at its first node."""
+        construction = self.task.construction
+        upstream = construction.upstream(node)
+        figures = {construction.figure_of(node) for node in upstream}
+        first = {figure: self.first_node(figure) for figure in construction.poles if figure in figures}
+        wrong = {first.get(name, name) for name in basis.wrong}
+        return frozenset(name for name in wrong if name in upstream or name == MECHANISM)
+
+    def first_node(self, figure: str) -> str:
+        """The first node that is laid off in a plan: there a plan turned as a whole is wrong."""
+        pole = self.task.construction.poles[figure]
+        return next(step.node for step in self.task.construction.figures[figure] if step.node != pole)
 
     # From nodes -----------------------------------------------------------------------------------
 
@@ -192,23 +213,28 @@ class FollowThrough:
                 yield self.from_nodes(segment, self.followed, by_similarity=True)
             yield from self.from_vectors(segment, self.used)
             basis = self.drawn_instead()
-            if basis is not None and segment.head not in basis.wrong:
+            if basis is not None and not basis.blames(segment.name, segment.head):
                 one = self.from_nodes(segment, self.followed, basis)
-                yield replace(one, relies_on=one.relies_on | wrong | basis.wrong)
+                yield replace(one, causes=wrong | self.causes_of(segment.head, basis))
             if wrong:
                 for one in (
                     self.from_nodes(segment, self.followed),
                     *self.from_vectors(segment, self.followed),
                 ):
-                    yield replace(one, relies_on=one.relies_on | wrong)
+                    yield replace(one, causes=wrong)
 
     def drawn_instead(self) -> PlanBasis | None:
         """The basis of the plans: by the search for what was done, else by counting vectors; or None."""
+        self.is_blamed("")
+        return self.instead
+
+    def is_blamed(self, vector: str) -> bool:
+        """Whether the search for what was done finds a mistake in a vector, nearly certainly."""
         if self.explanation is None:
             self.explanation = self.explain()
             scales = (self.used, self.followed)
             self.instead = self.explanation.basis or other_mechanism(self.task, self.evidence, scales)
-        return self.instead
+        return vector in self.explanation.blamed
 
     def is_trivial(self, segment: TaskSegment, expected: complex) -> bool:
         """Whether an expectation is near zero, has no solution, or is far shorter than the right vector."""
@@ -221,27 +247,124 @@ class FollowThrough:
 
     def turned_plan(self, segment: TaskSegment) -> Iterator[Expectation]:
         """The vector in a plan that is turned as a whole by quarter turns, as the crank's vector is."""
-        task = self.task
-        crank = f"{segment.name[0]}_{task.pin}"
-        own = self.evidence.vector(crank)
-        if segment.name == crank or own is None or own.direction_rad is None or not task.real[crank]:
-            return
+        crank, basis = self.driven_vector(segment.name[0]), self.turned_basis(segment.name[0])
+        if basis is not None and segment.head not in basis.wrong:
+            quarters = basis.quarters
+            turned = segment.drawn(self.followed) * 1j**quarters
+            uncertainty = self.uncertainty_of(segment, turned)
+            yield Expectation(turned, "vector", crank, basis.wrong, uncertainty, causes=basis.wrong)
+            one = self.from_nodes(segment, self.followed, basis)
+            yield replace(one, what="vector", of=crank, causes=basis.wrong)
+
+    def driven_vector(self, letter: str) -> str:
+        """The name of the driven link's velocity (``v``) or acceleration (``a``)."""
+        return f"{letter}_{self.task.pin}"
+
+    def turned_basis(self, letter: str) -> PlanBasis | None:
+        """The plan turned as a whole as the driven link's vector is; None where that is not turned."""
+        if letter not in self.turned_cache:
+            self.turned_cache[letter] = self._turned_basis(self.driven_vector(letter))
+        return self.turned_cache[letter]
+
+    def _turned_basis(self, crank: str) -> PlanBasis | None:
+        task, own = self.task, self.evidence.vector(crank)
+        if own is None or own.direction_rad is None or not task.real[crank]:
+            return None
         turn = math.remainder(own.direction_rad - cmath.phase(task.real[crank]), math.tau)
         quarters = round(turn / (math.pi / 2.0))
         tolerance = task.rubric.tolerance_of(crank)
         slack = math.radians(tolerance.direction_deg * tolerance.farthest)
-        if quarters and abs(turn - quarters * math.pi / 2.0) <= slack:
-            head = task.construction.vectors[crank].head
-            turned = segment.drawn(self.followed) * 1j**quarters
-            uncertainty = self.uncertainty_of(segment, turned)
-            yield Expectation(turned, "vector", crank, frozenset({head}), uncertainty)
-            figure = task.construction.figure_of(head)
-            right = self.right(self.followed)
-            mistake = Mistake("figure_rotated", figure, quarters=quarters % 4)
-            drawing = commit(mistake, Drawing(right.construction, right.parameters))
-            basis = PlanBasis(f"{figure} {quarters}", drawing.construction, right.parameters)
-            one = self.from_nodes(segment, self.followed, basis)
-            yield replace(one, what="vector", of=crank, relies_on=one.relies_on | {head})
+        if not quarters or abs(turn - quarters * math.pi / 2.0) > slack:
+            return None
+        head = task.construction.vectors[crank].head
+        figure, right = task.construction.figure_of(head), self.right(self.followed)
+        mistake = Mistake("figure_rotated", figure, quarters=quarters % 4)
+        drawing = commit(mistake, Drawing(right.construction, right.parameters))
+        name, wrong = f"{figure} {quarters}", frozenset({self.first_node(figure)})
+        basis = PlanBasis(name, drawing.construction, right.parameters, wrong, quarters=quarters)
+        return basis if self._explains_more(figure, basis) else None
+
+    def _explains_more(self, figure: str, basis: PlanBasis) -> bool:
+        """Whether a basis makes every node of the plan that the right construction makes, and more."""
+        own = self.own(self.followed).get(figure, {})
+        turned, right = self.traced(self.followed, basis), self.traced(self.followed)
+        made = {node for node in own if self._makes(node, turned)}
+        return made > {node for node in own if self._makes(node, right)}
+
+    # At the end of a wrong line ----------------------------------------------------------------------
+
+    def on_own_line(self, segment: TaskSegment) -> Expectation | None:
+        """The vector as far as its own line reaches to the student's node, where another line is wrong.
+
+        None for a vector that is not on a line of its head's step, or whose direction is not known.
+        """
+        construction, own = self.task.construction, self.evidence.vector(segment.name)
+        drawn = None if own is None else own.as_complex
+        line = line_of(construction.vectors[segment.name], construction)
+        if drawn is None or line is None or not isinstance(construction.step(segment.head), TwoLines):
+            return None
+        made = self.from_nodes(segment, self.followed)
+        if not abs(made.vector) > self.task.rubric.tolerance_of(segment.name).least_mm:
+            return None
+        along = made.vector / abs(made.vector)
+        vector = along * (drawn * along.conjugate()).real
+        return replace(made, vector=vector, causes=frozenset({segment.head}))
+
+    def between_own_nodes(self, segment: TaskSegment) -> Expectation | None:
+        """The vector between the student's own nodes, for one that joins what other vectors have made."""
+        construction, own = self.task.construction, self.own(self.followed)
+        if line_of(construction.vectors[segment.name], construction) is not None:
+            return None
+        nodes = {name: node for figure in construction.poles for name, node in own.get(figure, {}).items()}
+        nodes |= {pole: OwnNode(0j) for pole in construction.poles.values()}
+        if segment.head not in nodes or segment.tail not in nodes:
+            return None
+        vector = nodes[segment.head].at - nodes[segment.tail].at
+        made = self.from_nodes(segment, self.followed)
+        return replace(made, vector=vector, causes=frozenset({segment.head}))
+
+    def causes_at(self, node: str) -> frozenset[str]:
+        """The causes of an own node's position beside the student's own earlier nodes.
+
+        None where its step leads there; wrong scales, the first node of a turned plan, or wrong steps that
+        lead there; the node itself where no known way does.
+        """
+        for causes, scales, basis, by_similarity in self._ways(node):
+            if self._makes(node, self.traced(scales, basis, by_similarity=by_similarity)):
+                return causes
+        return frozenset({node})
+
+    def _ways(
+        self, node: str
+    ) -> Iterator[tuple[frozenset[str], Mapping[str, float], PlanBasis | None, bool]]:
+        """The ways to make a node: their causes, scales and basis, and whether images are by similarity."""
+        construction, wrong = self.task.construction, self.wrong_scales
+        figure = construction.figure_of(node)
+        yield frozenset(), self.used, None, False
+        if wrong:
+            yield wrong, self.followed, None, False
+        if node in construction.images:
+            yield wrong, self.followed, None, True
+        if figure in construction.poles:
+            turned = self.turned_basis(construction.vectors_of(figure)[0].name[0])
+            if turned is not None and node not in turned.wrong:
+                yield turned.wrong | wrong, self.followed, turned, False
+            basis = self.drawn_instead()
+            if basis is not None and node not in basis.wrong:
+                yield self.causes_of(node, basis) | wrong, self.followed, basis, False
+
+    def _makes(self, node: str, traced: TracedDrawing) -> bool:
+        """Whether a drawing puts a node where the student has it, within tolerance or drafting errors."""
+        made, own = traced.made[node], traced.nodes[node]
+        residual = own.at - made.at
+        if not cmath.isfinite(residual):
+            return False
+        exact = self.task.nodes(self.used)[node]
+        if abs(residual) <= self.task.tolerance_at(node).length_at(abs(exact)):
+            return True
+        count = traced.drafting_count
+        shifts = np.concatenate((made.shifts[:count], (own.shifts - made.shifts)[count:]))
+        return abs(residual) <= self.task.rubric.hand.sigmas * spread(shifts, residual).along
 
     def uncertainty_of(self, segment: TaskSegment, along: complex) -> EndSpread:
         """The propagated drafting error of a vector since the start of the drawing."""

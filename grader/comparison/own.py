@@ -24,13 +24,26 @@ from reference.geometry import ComplexArray, FloatArray
 class PlanBasis:
     """A construction with its parameters from which plans may have been drawn, under a name of its own.
 
-    `wrong` are the nodes whose steps are wrong ones, or the mechanism.
+    Attributes
+    ----------
+    wrong : the nodes whose steps are wrong ones, or the mechanism
+    lines : the vectors on the wrong lines of those steps
+    quarters : by which its plan is turned as a whole, counter-clockwise
     """
 
     name: str
     construction: Construction
     parameters: Parameters
     wrong: frozenset[str] = frozenset({MECHANISM})
+    lines: frozenset[str] = frozenset()
+    quarters: int = 0
+
+    def blames(self, vector: str, head: str) -> bool:
+        """Whether the mistake was made in this vector, which ends at the node `head`."""
+        if head not in self.wrong:
+            return False
+        on_lines = {name for name in self.lines if self.construction.vectors[name].head == head}
+        return vector in on_lines or not on_lines
 
 
 Nodes = Mapping[str, Mapping[str, OwnNode]]
@@ -113,6 +126,7 @@ def nodes_from_lengths(task: Task, evidence: Evidence, sketch: PlanBasis) -> dic
             if ends:
                 tracking.settle(step, made, ends)
             elif _is_component(step) and step.node not in poles:
+                tracking.guessed.add(step.node)
                 tracking.part(step.node, [tracking.nodes[step.start]], made, [], [])
             else:
                 tracking.nodes[step.node] = made
@@ -129,6 +143,7 @@ class _LengthBranches:
     cost : as in `reference.replay.explanations`
     sources : by node, the vectors from which its position was taken
     is_known : by node, whether its position was taken from vectors
+    guessed : components that were not entered: left out of the drawing, or drawn rightly
     """
 
     task: Task
@@ -138,6 +153,7 @@ class _LengthBranches:
     cost: FloatArray = field(default_factory=lambda: np.zeros(1))
     sources: dict[str, Sequence[_Measured]] = field(default_factory=dict)
     is_known: dict[str, BoolArray] = field(default_factory=dict)
+    guessed: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         vectors = self.task.construction.vectors
@@ -152,16 +168,28 @@ class _LengthBranches:
 
     def settle(self, step: Step, made: ComplexArray, ends: Sequence[_Measured]) -> None:
         """Place a node in each branch; branches divide where its lengths admit two positions."""
-        directed = next((one for one in ends if one.drawn.direction_rad is not None), None)
-        if directed is not None:
-            self.nodes[step.node] = self.nodes[directed.vector.tail] + (directed.drawn.as_complex or 0j)
-            self.is_known[step.node] = np.ones(len(self.cost), np.bool_)
-            self.sources[step.node] = [directed]
+        directed = [one for one in ends if one.drawn.direction_rad is not None]
+        if directed:
+            directed.sort(key=lambda one: one.vector.tail in self.guessed)
+            self.direct(step.node, made, directed)
         elif len(ends) == 1:
             self.part(step.node, self._along(step, made, ends[0]), made, ends, ends)
         else:
             pair, positions = self._meeting(ends)
             self.part(step.node, positions, made, pair, ends)
+
+    def direct(self, node: str, made: ComplexArray, ends: Sequence[_Measured]) -> None:
+        """Place a node at the end of the first of some vectors with directions.
+
+        Branches in which its step or the other vectors put it elsewhere cost more.
+        """
+        positions = [self.nodes[one.vector.tail] + (one.drawn.as_complex or 0j) for one in ends]
+        self.nodes[node] = place = positions[0]
+        for other in (made, *positions[1:]):
+            squared = (np.abs(other - place) / self.sigma_mm) ** 2
+            self.cost = self.cost + np.where(squared <= AS_EXPECTED**2, squared, UNEXPECTED)
+        self.is_known[node] = np.ones(len(self.cost), np.bool_)
+        self.sources[node] = ends[:1]
 
     def _along(self, step: Step, made: ComplexArray, one: _Measured) -> list[ComplexArray]:
         """Positions at one length along the step's direction; for components laid off, also reversed."""
@@ -218,6 +246,7 @@ class _LengthBranches:
 
     def best(self) -> dict[str, OwnNode]:
         """The nodes that are known in the cheapest explanation."""
+        self.take(np.argsort(self.cost, kind="stable")[:1])
         columns = {name: 2 * index for index, name in enumerate(self.measured)}
         found: dict[str, OwnNode] = {}
         shifts: dict[str, ComplexArray] = {

@@ -133,6 +133,16 @@ def mark(limits: Sequence[Limit], remarks: tuple[Reason, ...] = ()) -> MarkRange
     )
 
 
+OPENING = frozenset({"doubtful", "near_limit", "unread", "hand_may_miss", "readings_disagree"})
+"""Reasons why a verdict is open."""
+
+
+def at_worst(mark: MarkRange) -> MarkRange:
+    """A mark that was open, settled at its worst: a mistake is known to have been made there."""
+    reasons = tuple(one for one in mark.reasons if one.code not in OPENING)
+    return MarkRange(mark.worst, mark.worst, mark.worst, reasons, 1.0)
+
+
 EVEN = 0.5
 """The probability of a mark that is open for a reason which no probability is known of."""
 
@@ -448,6 +458,19 @@ def unjudged(
         possible=("none", "full") if is_open else (verdict, verdict),
         shares=(NONE, FULL if is_open else NONE),
         probability=likely if sure is None else sure,
+    )
+
+
+def without_drawing(judged: Outcome) -> Outcome:
+    """The outcome of a value without the drawn vector that is asked for: no points, right or wrong."""
+    return replace(
+        judged,
+        verdict="none",
+        possible=("none", "none"),
+        shares=(NONE, NONE),
+        proposed=NONE,
+        probability=1.0,
+        reasons=(Reason("value_alone"), *judged.reasons),
     )
 
 

@@ -69,6 +69,11 @@ HINTS: dict[str, str] = {
     "data_misread": N_("The drawing follows another crank angle than the one given."),
     "data_unclear": N_("It is not clear whether the drawing follows your own data: a person must look."),
     "not_drawn": N_("It is not drawn."),
+    "value_alone": N_(
+        "A value alone earns no points here: the vector must be drawn, and its length handed in."
+    ),
+    "by_similarity": N_("It need not be drawn: the point was found by similar triangles."),
+    "letters_exchanged": N_("Two letters stand at each other's point: it is compared under the right ones."),
     "hand_may_miss": N_(
         "Its lines meet at so small an angle that a careful hand may be off by as much: a person must look."
     ),
@@ -124,6 +129,10 @@ FULL: dict[str, str] = {
         " only what is certainly within counts."
     ),
     "other_variant": N_("The drawing follows another student's data (%(whose)s)."),
+    "letters_exchanged": N_(
+        "The letters %(first)s and %(second)s stand at each other's point:"
+        " it is compared under the right ones."
+    ),
     "not_explained": N_("These vectors do not belong together: %(unfit)s of %(of)s fit nothing."),
     "readings_disagree": N_("The drawing gives %(first)s, the entered measurement %(second)s."),
     "written_disagrees": N_("Drawn are %(drawn)s, written on the sheet %(written)s: a person must look."),
@@ -152,6 +161,9 @@ MAY_FOLLOW = N_("It may follow rightly from your own earlier work; held against 
 """In place of `follows` where full marks do not follow, at level `full`."""
 PROBABLY_FOLLOWS = N_("It probably follows rightly from your own earlier work.")
 """In place of `follows` where that is proposed."""
+
+TOLD_BESIDE = frozenset({"follows", "counted_for_you", "at_stake", "letters_exchanged"})
+"""Reasons that are told of what follows rightly."""
 
 MOST_REASONS = 3
 """More would hide the important ones."""
@@ -193,7 +205,7 @@ def _worth_telling(outcome: Outcome, level: Level = "full") -> list[Reason]:
     if outcome.verdict == "review" and "scale_assumed" in codes and by_scale:
         return [Reason(UNDECIDED)]
     if outcome.verdict == "follow_through" and "follows" in codes:
-        return [one for one in outcome.reasons if one.code in {"follows", "counted_for_you", "at_stake"}]
+        return [one for one in outcome.reasons if one.code in TOLD_BESIDE]
     needless = {"right"} if codes - {"right"} else set()
     if outcome.verdict == "review":
         needless |= RESIDUALS if outcome.proposed == 1.0 else IN_FAVOUR

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import cast
 
-from grader.comparison.verdicts import EVEN
+from grader.comparison.verdicts import EVEN, OPENING
 from grader.documents import (
     AppliedDecisionDocument,
     CriterionDocument,
@@ -20,7 +20,7 @@ from grader.documents import (
 from grader.inputs.decisions import Decision
 from grader.inputs.measurements import StudentSubmission
 from grader.marking.mark import CHARGED, DECIMALS, score, with_mistake
-from grader.marking.settling import OPENING, at_stake
+from grader.marking.settling import at_stake
 from grader.outcomes import Judgement, NamedMistake, Outcome, Reason
 from grader.reading.corrected import corrected
 from grader.records import Problem, ScannedPage

@@ -1,7 +1,7 @@
 """What was drawn, as the diagnosis takes it: nodes and vectors with their errors, and what explains them."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,12 +12,12 @@ from grader.comparison.own import PlanBasis
 from grader.comparison.scales import Scale
 from grader.comparison.task import Task
 from grader.given_data.owner import Owner
-from grader.marking.diagnosis import Case, drawn_instead, explained
+from grader.marking.diagnosis import CERTAIN, LINE_MISTAKES, Case, drawn_instead, explained, sure_of
 from grader.records import MECHANISM
 from reference.construction.elements import Coriolis, Normal, Parameters
-from reference.construction.graph import Vector
-from reference.construction.mistakes import Drawing
-from reference.construction.steps import Given
+from reference.construction.graph import Construction, Vector
+from reference.construction.mistakes import Drawing, Mistake, line_of
+from reference.construction.steps import Given, TwoLines
 from reference.construction.uncertainty import trace
 from reference.geometry import ComplexArray, FloatArray
 from reference.replay.explanations import AREA_MM, Covariance, Observation, Observations
@@ -27,10 +27,14 @@ LEAST_ERROR_MM = 0.15
 NO_ERRORS: ComplexArray = np.zeros(0, np.complex128)
 
 
+NEARLY_CERTAIN = 0.95
+"""A mistake named with this confidence is charged where it was made, however doubtful what was read is."""
+
+
 def explain(
     task: Task, evidence: Evidence, settled: Mapping[str, Scale], *, owner: Owner | None = None
 ) -> ReplayResult:
-    """The explanations of a drawing, and the basis of its plans where that is certain.
+    """The explanations of a drawing, the basis of its plans where that is certain, and the wrong vectors.
 
     Arguments: `owner` is whose data the drawing follows, None for the student's own.
     """
@@ -39,10 +43,33 @@ def explain(
     drawn, wrong = drawn_instead(explanations, case)
     if owner is not None and owner.of_whole is not None:
         wrong |= {MECHANISM}
+    construction = task.construction
     # Where a sheet shows the drawn mechanism and no plan is turned, the own nodes are enough.
-    is_needed = wrong and (wrong & task.construction.poles.keys() or not evidence.has_sheets)
-    basis = PlanBasis("instead", drawn.construction, drawn.parameters, wrong) if is_needed else None
-    return ReplayResult(explanations, basis)
+    is_needed = wrong and (wrong & construction.poles.keys() or not evidence.has_sheets)
+    lines = _on_wrong_lines(sure_of(explanations, CERTAIN), construction)
+    basis = PlanBasis("instead", drawn.construction, drawn.parameters, wrong, lines) if is_needed else None
+    return ReplayResult(explanations, basis, _blamed(sure_of(explanations, NEARLY_CERTAIN), construction))
+
+
+def _on_wrong_lines(mistakes: Iterable[Mistake], construction: Construction) -> frozenset[str]:
+    """The vectors that lie on lines drawn wrongly."""
+    found = set()
+    for mistake in mistakes:
+        step = construction.step(mistake.at) if mistake.code in LINE_MISTAKES else None
+        if isinstance(step, TwoLines):
+            line = (step.first, step.second)[mistake.slot]
+            vectors = (one for one in construction.vectors.values() if one.head == mistake.at)
+            found |= {one.name for one in vectors if line_of(one, construction) == line}
+    return frozenset(found)
+
+
+def _blamed(mistakes: Iterable[Mistake], construction: Construction) -> frozenset[str]:
+    """The vectors in which mistakes of single steps were made."""
+    found: set[str] = set()
+    for mistake in mistakes:
+        here = {one.name for one in construction.vectors.values() if one.head == mistake.at}
+        found |= (here & _on_wrong_lines([mistake], construction)) or here
+    return frozenset(found)
 
 
 def case_of(task: Task, evidence: Evidence, settled: Mapping[str, Scale], owner: Owner | None = None) -> Case:

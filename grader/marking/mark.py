@@ -15,14 +15,8 @@ from grader.documents import Verdict
 from grader.given_data.owner import Owner, owner_of
 from grader.marking.diagnosis import LEAST_CONFIDENCE, Lost, drawn_instead, named, not_explained
 from grader.marking.drawn import case_of, explain
-from grader.marking.settling import (
-    at_stake,
-    charged_where_made,
-    is_of,
-    of_another,
-    of_nothing,
-    settled,
-)
+from grader.marking.lettering import exchanged_pair, letters_charged, with_letters_exchanged
+from grader.marking.settling import at_stake, is_of, of_another, of_nothing, settled
 from grader.marking.units import EXCHANGED, Undone, undone, with_scales_exchanged
 from grader.outcomes import Judgement, NamedMistake, Outcome, Score
 from grader.records import Figure
@@ -99,15 +93,25 @@ def _is_off(scale: Scale) -> bool:
 
 def _judged(task: Task, submission: Submission, comparison: Comparison, owner: Owner | None) -> Judgement:
     """The judgement of a submission that was compared."""
+    search = partial(explain, owner=owner)
     surer = _confirmed(task, submission, comparison)
     if surer is not None:
-        submission, comparison = surer, compare(task, surer, partial(explain, owner=owner))
+        submission, comparison = surer, compare(task, surer, search)
     explanations, lost = _explanations(task, comparison, owner)
     mistakes = _named(task, comparison, owner, explanations, lost)
+    pair = exchanged_pair(mistakes)
+    if pair is not None:
+        letters = [one for one in mistakes if one.code == "labels_swapped"]
+        used = {name: scale.used for name, scale in comparison.scales.items()}
+        submission = with_letters_exchanged(task, submission, pair, used)
+        comparison = compare(task, submission, search)
+        explanations, lost = _explanations(task, comparison, owner)
+        others = _named(task, comparison, owner, explanations, lost)
+        mistakes = (*letters, *(one for one in others if one.code != "labels_swapped"))
     mistakes = (*mistakes, *_swapped_letters(task, submission, mistakes))
     mistakes = (*mistakes, *_not_drawn(task, comparison, mistakes))
     mistakes = (*mistakes, *_slips(task, comparison, mistakes))
-    outcomes = charged_where_made(task, comparison.outcomes, mistakes)
+    outcomes = letters_charged(task, comparison.outcomes, mistakes)
     outcomes, unfit = of_nothing(task, outcomes, not_explained(explanations))
     outcomes = at_stake(task.rubric, outcomes)
     outcomes = of_another(task, outcomes, owner)
@@ -386,7 +390,10 @@ def _confirmed(task: Task, submission: Submission, comparison: Comparison) -> Su
     """
     explanations = () if comparison.explanation is None else comparison.explanation.explanations
     least, evidence = task.rubric.least_confidence, comparison.evidence
-    doubtful = {name: one for name, one in evidence.drawn.items() if one.confidence < least}
+    waiting = {one.name for one in comparison.outcomes if one.verdict == "review"}
+    doubtful = {
+        name: one for name, one in evidence.drawn.items() if one.confidence < least or name in waiting
+    }
     if not doubtful or not explanations:
         return None
     instead, wrong = drawn_instead(explanations, case_of(task, evidence, comparison.settled))

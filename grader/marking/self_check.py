@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from grader.documents import Quantity, Tolerance
-from grader.marking.settling import NEARLY_CERTAIN
+from grader.marking.drawn import NEARLY_CERTAIN
 from grader.outcomes import Judgement, NamedMistake, Outcome, Reason
 from reference.authored.assignment import SCALE_NAMES
 
@@ -101,7 +101,9 @@ def _checked(outcome: Outcome, level: Level) -> Checked:
 
 
 def _result(outcome: Outcome) -> Result:
-    if outcome.verdict in {"full", "follow_through"}:
+    is_right = {"right", "follows"} & {reason.code for reason in outcome.reasons}
+    is_right_alone = outcome.reasons[:1] == (Reason("value_alone"),) and bool(is_right)
+    if outcome.verdict in {"full", "follow_through"} or is_right_alone:
         return "right"
     return "off" if outcome.verdict in {"partial", "none"} else "open"
 

@@ -1,7 +1,7 @@
 """What is settled once all verdicts and mistakes are known together.
 
-A verdict that waits is settled where a mistake that is nearly certain was made just there, and where so
-little is left open that no verdict changes the score by more than the rubric's `stake`. Another student's
+A verdict that waits is settled where so little is left open that no verdict changes the score by more than
+the rubric's `stake`. Another student's
 data are never marked without saying so.
 """
 
@@ -9,37 +9,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from grader.comparison.task import Task
-from grader.comparison.verdicts import EVEN, FULL, NONE, verdict_of
+from grader.comparison.verdicts import EVEN, FULL, NONE, OPENING, verdict_of
 from grader.given_data.owner import Owner
+from grader.marking.drawn import NEARLY_CERTAIN
 from grader.outcomes import NamedMistake, Outcome, Reason, Unfit
 from grader.rubric import RubricFile
 from reference.authored.assignment import SCALE_NAMES
-
-NEARLY_CERTAIN = 0.95
-"""A mistake named with this confidence is charged where it was made."""
-RESIDUALS = frozenset({"too_long", "too_short", "turned_left", "turned_right", "reversed", "should_be_zero"})
-"""Reasons of what is off as it was read."""
-
-
-def charged_where_made(
-    task: Task, outcomes: Sequence[Outcome], mistakes: Sequence[NamedMistake]
-) -> tuple[Outcome, ...]:
-    """The outcomes, settled where a mistake that is nearly certain explains what was read."""
-    certain = [one for one in mistakes if one.confidence >= NEARLY_CERTAIN and not one.rivals]
-    return tuple(_charged(task, outcome, certain) for outcome in outcomes)
-
-
-def _charged(task: Task, outcome: Outcome, certain: Sequence[NamedMistake]) -> Outcome:
-    segment = task.segments.get(outcome.name)
-    if outcome.verdict != "review" or segment is None:
-        return outcome
-    for mistake in certain:
-        if mistake.at != segment.head or outcome.criterion not in mistake.explains:
-            continue
-        is_left_out = mistake.code == "normal_missing"
-        if is_left_out or RESIDUALS & {reason.code for reason in outcome.reasons}:
-            return settled(outcome, outcome.shares[0], mistake.confidence)
-    return outcome
 
 
 def settled(outcome: Outcome, share: float, sure: float, *reasons: Reason) -> Outcome:
@@ -56,10 +31,6 @@ def settled(outcome: Outcome, share: float, sure: float, *reasons: Reason) -> Ou
         probability=sure,
         reasons=(*reasons, *(one for one in kept if one.code not in OPENING)),
     )
-
-
-OPENING = frozenset({"doubtful", "near_limit", "unread", "hand_may_miss", "readings_disagree"})
-"""Reasons why a verdict is open."""
 
 
 # Another student's data ----------------------------------------------------------------------------

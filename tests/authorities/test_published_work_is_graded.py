@@ -8,6 +8,7 @@ millimetres, nothing is marked as wrong and no mistake is named.
 import cmath
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -165,7 +166,8 @@ def with_coriolis() -> list[tuple[str, dict, dict[str, float]]]:
 
 def verdicts(mechanism: dict, printed: dict[str, float], size_mm: float, *, as_segments: bool):
     case_task = task(mechanism, size_mm)
-    judgement = judge(case_task, entered(case_task, printed, as_segments=as_segments))
+    rubric = case_task.rubric.model_copy(update={"values_alone": True})
+    judgement = judge(replace(case_task, rubric=rubric), entered(case_task, printed, as_segments=as_segments))
     return judgement, {one.name: one.verdict for one in judgement.outcomes if one.name in printed}
 
 

@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from grader.comparison.criteria import compare
+from grader.marking.mark import judge
 from reference.construction.mistakes import Drawing, affected, single_mistakes
 from samples.simulation import PERFECT, TYPICAL
 from tests.hands import SOURCES, drawn_by, drawn_nodes, handed_in, task_for
@@ -72,7 +72,7 @@ def _followed(task, mistakes, hand, lot, source):
     wrong = {mistake.at for mistake in mistakes}
     moved = frozenset().union(*(affected(one, task.construction) for one in mistakes)) - wrong
     vectors = task.construction.vectors
-    for outcome in compare(task, handed_in(task, nodes, source)).outcomes:
+    for outcome in judge(task, handed_in(task, nodes, source)).outcomes:
         vector = vectors.get(outcome.name)
         if vector is None or vector.head not in moved or outcome.verdict == "not_judged":
             continue
@@ -107,7 +107,7 @@ def test_what_follows_from_one_mistake_is_credited_and_the_mistake_costs(source)
                 with contextlib.suppress(ValueError):
                     found.update(followed(task, (mistake,), hand, lot, source))
             if source == "sheet" and is_clear(task, mistake):
-                outcomes = compare(
+                outcomes = judge(
                     task, handed_in(task, drawn_nodes(task, mistakes=(mistake,)), source)
                 ).outcomes
                 assert {one.verdict for one in outcomes} & {"none", "partial", "review"}, mistake

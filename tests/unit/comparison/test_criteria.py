@@ -12,6 +12,8 @@ from grader.comparison.evidence import Submission
 from grader.comparison.follow_through import ReplayResult
 from grader.comparison.own import PlanBasis
 from grader.comparison.task import task_of
+from grader.marking.mark import judge
+from grader.marking.self_check import checked_values
 from grader.records import Figure, OtherReading, Reading, ReadNode, ReadVector, Unread
 from grader.rubric import Band, CriterionTable, DoubtTable, ToleranceTable, load_rubric
 from reference.authored.assignment import load_assignment
@@ -356,7 +358,8 @@ def test_a_factor_in_all_values_costs_once(factor, segments):
     values = {name: factor * abs(PUMP.real[name]) for name in names}
     values |= {f"omega_{k}": factor * PUMP.rates[f"omega_{k}"] for k in (2, 3, 4)}
     reading = measured(PUMP) if segments else without(measured(PUMP), *names)
-    found = verdicts(compare(PUMP, Submission(measured=reading, values=values)))
+    task = with_rubric(PUMP, values_alone=True)
+    found = verdicts(compare(task, Submission(measured=reading, values=values)))
     off = [name for name in values if found[name] in {"none", "partial"}]
     assert len(off) == 1
     assert off[0] in names
@@ -387,12 +390,26 @@ def test_a_value_right_by_the_own_wrong_drawing_costs_nothing_more():
         (0.5, "none", "value_too_small"),
     ],
 )
-def test_a_value_alone_is_judged(factor, verdict, code):
-    task = with_rubric(PUMP, missing="not_judged")
+def test_a_value_alone_is_judged_where_the_rubric_says_so(factor, verdict, code):
+    task = with_rubric(PUMP, missing="not_judged", values_alone=True)
     value = factor * abs(PUMP.real["v_A"])
     outcome = outcome_of(compare(task, Submission(values={"v_A": value})), "v_A")
     assert outcome.verdict == verdict
     assert codes(outcome)[0] == code
+
+
+@pytest.mark.parametrize(("factor", "result"), [(1.0, "right"), (0.5, "off")])
+def test_a_value_without_its_drawn_vector_has_no_points_and_is_still_checked(factor, result):
+    values = {name: factor * abs(PUMP.real[name]) for name in ("v_D", "a_D")}
+    reading = without(measured(PUMP), "v_D", "a_D")
+    judgement = judge(PUMP, Submission(measured=reading, values=values))
+    for name in values:
+        outcome = next(one for one in judgement.outcomes if one.name == name)
+        assert outcome.verdict == "none"
+        assert codes(outcome)[0] == "value_alone"
+        assert judgement.score.points[name] == 0.0
+    checked = {one.name: one.result for one in checked_values(judgement, "symbol")}
+    assert checked["v_D"] == checked["a_D"] == result
 
 
 @pytest.mark.parametrize(
@@ -417,8 +434,9 @@ def test_what_follows_rightly_from_a_wrong_node_has_full_marks():
     reading = measured(PUMP, mistakes=(WRONG_B,))
     comparison = compare(PUMP, Submission(measured=reading))
     found = verdicts(comparison)
-    assert {name for name, verdict in found.items() if verdict == "none"} == {"v_B", "v_BA"}
-    assert found["v_C"] == found["v_D"] == found["a_BA_n"] == "follow_through"
+    # The line of v_B is the wrong one; v_BA lies on its own line, as far as that.
+    assert {name for name, verdict in found.items() if verdict == "none"} == {"v_B"}
+    assert found["v_BA"] == found["v_C"] == found["v_D"] == found["a_BA_n"] == "follow_through"
     assert outcome_of(comparison, "v_C").reasons[0].code == "follows"
 
 
@@ -543,17 +561,20 @@ def test_a_loss_is_open_while_what_it_may_follow_from_is_not_known():
     comparison = compare(PUMP, Submission(readings=(replace(reading, figures=figures),)))
     outcome = outcome_of(comparison, "v_D")
     assert outcome.verdict == "review"
-    assert outcome.possible == ("none", "full")
+    assert outcome.possible == ("none", "follow_through")
     assert "c, on which it hangs" in outcome.reasons[-1].params["reason"]
-    assert outcome_of(compare(PUMP, Submission(readings=(reading,))), "v_D").verdict == "none"
+    certain = compare(PUMP, Submission(readings=(reading,)))
+    # The other line, of v_DC, is the wrong one: the guide is right.
+    assert outcome_of(certain, "v_DC").verdict == "none"
+    assert outcome_of(certain, "v_D").verdict == "follow_through"
 
 
-def test_a_trivial_earlier_answer_gives_no_credit():
+def test_what_an_earlier_answer_makes_trivial_is_neither_credited_nor_charged():
     reading = measured(PUMP, directions=False)
     reading = changed(reading, "v_BA", length_mm=2.0)
     reading = changed(reading, "a_BA_n", length_mm=0.1)
     comparison = compare(PUMP, Submission(measured=reading))
-    assert outcome_of(comparison, "a_BA_n").verdict == "none"
+    assert outcome_of(comparison, "a_BA_n").verdict == "not_judged"
 
 
 def test_what_hangs_on_a_doubtful_node_is_doubtful_too():

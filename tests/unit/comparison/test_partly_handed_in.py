@@ -30,8 +30,8 @@ def test_a_value_with_a_slip_of_its_own_does_not_follow_the_factor_of_all():
     names = [name for name, vector in PUMP.construction.vectors.items() if vector.scale == "kv"]
     values = {name: 2.0 * abs(PUMP.real[name]) for name in names}
     values["v_DC"] *= 3.0
-    reading = without(measured(PUMP), *names)
-    outcomes = {one.name: one for one in compare(PUMP, Submission(measured=reading, values=values)).outcomes}
+    reading, task = without(measured(PUMP), *names), with_rubric(PUMP, values_alone=True)
+    outcomes = {one.name: one for one in compare(task, Submission(measured=reading, values=values)).outcomes}
     assert outcomes["v_DC"].verdict == "none"
     assert outcomes["v_D"].verdict == "follow_through"
 

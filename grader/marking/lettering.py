@@ -1,0 +1,135 @@
+"""Letters exchanged in a plan: the drawing is judged under the right letters, the exchange charged once."""
+
+import cmath
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from grader.comparison.evidence import Submission
+from grader.comparison.task import Task
+from grader.comparison.verdicts import FULL, NONE
+from grader.marking.settling import settled
+from grader.outcomes import NamedMistake, Outcome, Reason
+from grader.records import Figure, Reading, ReadNode, ReadVector
+from reference.construction.graph import Vector
+from reference.construction.mistakes import Mistake
+
+CERTAIN = 0.9
+"""From this confidence on lines are judged under the right letters; below it each vector as it is named."""
+Pair = tuple[str, str]
+
+
+def exchanged_pair(mistakes: Sequence[NamedMistake]) -> Pair | None:
+    """The two nodes whose letters were certainly exchanged, in a drawing named by letters; else None."""
+    for one in mistakes:
+        if one.code == "labels_swapped" and one.confidence >= CERTAIN:
+            return one.mistake.other[0], one.mistake.other[1]
+    return None
+
+
+def with_letters_exchanged(
+    task: Task, submission: Submission, pair: Pair, scales: Mapping[str, float]
+) -> Submission:
+    """The submission as it is with these two letters at each other's node.
+
+    Arguments: `scales` are those used, real units per drawn millimetre.
+    """
+    measured, exact = submission.measured, task.nodes(scales)
+    return replace(
+        submission,
+        readings=tuple(_reading(task, one, pair, exact) for one in submission.readings),
+        measured=None if measured is None else _reading(task, measured, pair, exact),
+    )
+
+
+def _reading(task: Task, reading: Reading, pair: Pair, exact: Mapping[str, complex]) -> Reading:
+    plan = task.construction.figure_of(pair[0])
+    if plan not in reading.figures:
+        return reading
+    figure, other = reading.figures[plan], {pair[0]: pair[1], pair[1]: pair[0]}
+    nodes = {other.get(name, name): node for name, node in figure.nodes.items()}
+    vectors = dict(figure.vectors)
+    for vector in task.construction.vectors_of(plan):
+        if {vector.tail, vector.head} & set(pair):
+            vectors.pop(vector.name, None)
+            ends = (other.get(vector.tail, vector.tail), other.get(vector.head, vector.head))
+            found = _renamed(task, vector, figure, nodes, ends) or _by_its_length(
+                task, vector, ends, figure, exact
+            )
+            if found is not None:
+                vectors[vector.name] = found
+    return replace(reading, figures={**reading.figures, plan: Figure(nodes, vectors)})
+
+
+def _renamed(
+    task: Task, vector: Vector, figure: Figure, nodes: Mapping[str, ReadNode], ends: Pair
+) -> ReadVector | None:
+    """A vector under its right letters: as entered between the wrong ones, else between its nodes."""
+    for one in task.construction.vectors_of(task.construction.figure_of(vector.head)):
+        entered = figure.vectors.get(one.name)
+        if entered is not None and {one.tail, one.head} == set(ends) and one.part == vector.part:
+            return entered if one.tail == ends[0] else _reversed(entered)
+    if vector.tail in nodes and vector.head in nodes and vector.name in figure.vectors:
+        return _between(nodes[vector.tail], nodes[vector.head])
+    return None
+
+
+def _reversed(entered: ReadVector) -> ReadVector:
+    turn = None if entered.direction_deg is None else (entered.direction_deg + 180.0) % 360.0
+    return replace(entered, direction_deg=turn, others=())
+
+
+def _between(tail: ReadNode, head: ReadNode) -> ReadVector:
+    drawn, se_mm = head.at - tail.at, math.hypot(tail.se_mm, head.se_mm)
+    if not drawn:
+        return ReadVector(0.0, se_mm, None, None, min(tail.confidence, head.confidence))
+    turn = math.degrees(cmath.phase(drawn)) % 360.0
+    se_deg = min(math.degrees(se_mm / abs(drawn)), 90.0)
+    return ReadVector(abs(drawn), se_mm, turn, se_deg, min(tail.confidence, head.confidence))
+
+
+def _by_its_length(
+    task: Task, vector: Vector, ends: Pair, figure: Figure, exact: Mapping[str, complex]
+) -> ReadVector | None:
+    """The exact length, where the entry is the exact length between the wrong letters; else the entry."""
+    entered = figure.vectors.get(vector.name)
+    if entered is None or entered.length_mm is None:
+        return entered
+    right, wrong = exact[vector.head] - exact[vector.tail], exact[ends[1]] - exact[ends[0]]
+    allowed = 2.0 * task.rubric.tolerance_of(vector.name).length_at(abs(wrong))
+    if abs(entered.length_mm - abs(wrong)) > allowed:
+        return entered
+    return replace(entered, length_mm=abs(right), direction_deg=None, se_deg=None)
+
+
+def letters_charged(
+    task: Task, outcomes: Sequence[Outcome], mistakes: Sequence[NamedMistake]
+) -> tuple[Outcome, ...]:
+    """The outcomes, one vector charged for each certain exchange of letters, and all that it touches told."""
+    found = list(outcomes)
+    for one in mistakes:
+        if one.code == "labels_swapped" and one.confidence >= CERTAIN:
+            reason = Reason(
+                "letters_exchanged", {"first": one.mistake.other[0], "second": one.mistake.other[1]}
+            )
+            touched = [place for place in _in_order(task, found) if _touches(task, found[place], one.mistake)]
+            for place in touched:
+                found[place] = replace(found[place], reasons=(reason, *found[place].reasons))
+            paying = [place for place in touched if found[place].verdict in {"full", "follow_through"}]
+            if paying:
+                lost = settled(found[paying[0]], NONE, one.confidence, reason)
+                found[paying[0]] = replace(lost, reasons=(reason,), mistake=one.code, cause=one)
+    return tuple(found)
+
+
+def _in_order(task: Task, outcomes: Sequence[Outcome]) -> Iterator[int]:
+    """The places of vectors' outcomes in the order of construction."""
+    order = list(task.construction.vectors)
+    vectors = [place for place, one in enumerate(outcomes) if one.name in task.construction.vectors]
+    yield from sorted(vectors, key=lambda place: order.index(outcomes[place].name))
+
+
+def _touches(task: Task, outcome: Outcome, mistake: Mistake) -> bool:
+    vector = task.construction.vectors[outcome.name]
+    is_judged = outcome.measured.length_mm is not None and outcome.shares[-1:] == (FULL,)
+    return is_judged and bool({vector.tail, vector.head} & set(mistake.other))
