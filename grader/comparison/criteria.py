@@ -428,6 +428,9 @@ def absent(charges: Charges, criterion: CriterionTable, expected: Quantity) -> O
     segment = charges.task.segments.get(criterion.name)
     if not evidence.has_sheets:
         blank = "none" if rubric.missing == "review" else rubric.missing
+        if segment is not None and _is_nothing(charges, criterion, segment):
+            short = Reason("too_short_to_judge", {"length_mm": 0.0, "least_mm": least})
+            return verdicts.unjudged(criterion, "not_judged", (short, reason), expected=expected)
         _leave_out(charges, segment, blank)
         return verdicts.unjudged(criterion, blank, (reason,), expected=expected)
     if is_not_drawn(charges.task, evidence, criterion.name, length or 0.0):
@@ -438,6 +441,19 @@ def absent(charges: Charges, criterion: CriterionTable, expected: Quantity) -> O
     _leave_out(charges, segment, "review")
     sure = PROBABLY_NOT_DRAWN if criterion.name in evidence.blank else EVEN
     return verdicts.unjudged(criterion, "review", (reason,), expected=expected, sure=sure)
+
+
+NOTHING = DrawnVector(0.0, 0.0, None, 0.0, 1.0)
+"""A component left blank, as it is compared: a zero."""
+
+
+def _is_nothing(charges: Charges, criterion: CriterionTable, segment: TaskSegment) -> bool:
+    """Whether an earlier mistake leaves a component too short to be drawn."""
+    follows = charges.task.rubric.follows_through(criterion)
+    if not follows or not isinstance(charges.task.construction.step(segment.head), Given):
+        return False
+    marked = charges.best(segment, _against(charges, criterion, NOTHING), follows_through=True)
+    return marked.is_trivial or marked.mark.is_full
 
 
 def _leave_out(charges: Charges, segment: TaskSegment | None, verdict: Verdict) -> None:
@@ -470,6 +486,9 @@ def _why_unread(charges: Charges, criterion: CriterionTable) -> str | None:
 # Angular quantities --------------------------------------------------------------------------------
 
 
+NO_NODES: Mapping[str, complex] = {}
+
+
 def rate(charges: Charges, criterion: CriterionTable) -> Outcome:
     """An angular quantity against the exact one, then against what the student's own vector gives."""
     task, name, unit = charges.task, criterion.name, unit_of(criterion.name)
@@ -492,7 +511,9 @@ def rate(charges: Charges, criterion: CriterionTable) -> Outcome:
         mark = mark_value(value, right, allowed.value or 0.0, plain, table, unit)
     charges.remember(name, mark)
     follows = task.rubric.follows_through(criterion)
-    own = rate_from_vector(task, charges.evidence, turned, scale) if follows and not mark.is_full else None
+    own = None
+    if follows and not mark.is_full:
+        own = rate_from_vector(task, charges.evidence, turned, scale, charges.following.nodes_instead())
     factor = common_factor(charges, segment.scale)
     if own is None and factor is not None and follows and not mark.is_full:
         own = right
@@ -509,16 +530,20 @@ def rate(charges: Charges, criterion: CriterionTable) -> Outcome:
     return verdicts.outcome(criterion, mark, measured, expected, allowed, followed=followed)
 
 
-def rate_from_vector(task: Task, evidence: Evidence, rate: AngularRate, scale: float) -> float | None:
+def rate_from_vector(
+    task: Task, evidence: Evidence, rate: AngularRate, scale: float, instead: Mapping[str, complex] = NO_NODES
+) -> float | None:
     """The angular rate that the student's own vector gives; None without one, or a trivial one.
 
-    Arguments: `scale` is the vector's, real units per drawn millimetre. Where the own vector's direction
-    is not known, the sense is the right one's.
+    Arguments: `scale` is the vector's, real units per drawn millimetre; `instead` are the nodes of another
+    mechanism that was certainly drawn and not handed in. Where the own vector's direction is not known, the
+    sense is the right one's, or the other mechanism's.
     """
     own = evidence.vector(rate.vector)
     if own is None or own.length_mm < task.rubric.tolerance_of(rate.vector).least_mm:
         return None
-    return _own_sense(task, evidence, rate) * own.length_mm * scale / own_length(task, evidence, rate)
+    sense = _own_sense(task, evidence, rate, instead)
+    return sense * own.length_mm * scale / own_length(task, evidence, rate)
 
 
 def own_length(task: Task, evidence: Evidence, rate: AngularRate) -> float:
@@ -536,15 +561,19 @@ def _is_given(task: Task, rate: AngularRate) -> bool:
     return not any(isinstance(one, Normal) and one.measured == rate.link for one in lengths)
 
 
-def _own_sense(task: Task, evidence: Evidence, rate: AngularRate) -> float:
+def _own_sense(task: Task, evidence: Evidence, rate: AngularRate, instead: Mapping[str, complex]) -> float:
     """+1 where the own vector turns its link counter-clockwise: the link as drawn where it was read."""
     own, along = evidence.vector(rate.vector), task.real[rate.vector]
-    sense = math.copysign(1.0, task.rates[rate.name])
-    if own is None or own.direction_rad is None or along == 0:
-        return sense
-    plan = task.construction.figure_of(task.construction.vectors[rate.vector].head)
-    joints = evidence.sketches.get(plan, evidence.nodes)
+    vector = task.construction.vectors[rate.vector]
+    plan = task.construction.figure_of(vector.head)
+    joints = instead or evidence.sketches.get(plan, evidence.nodes)
     tail, head = (joints.get(joint) for joint in rate.link)
+    direction = None if own is None else own.direction_rad
+    if direction is None and not instead:
+        return math.copysign(1.0, task.rates[rate.name])
+    if direction is None:
+        direction = cmath.phase(instead[vector.head] - instead[vector.tail])
     if tail is not None and head is not None:
-        return math.copysign(1.0, math.sin(own.direction_rad - cmath.phase(head - tail)))
-    return sense * math.copysign(1.0, math.cos(own.direction_rad - cmath.phase(along)))
+        return math.copysign(1.0, math.sin(direction - cmath.phase(head - tail)))
+    sense = math.copysign(1.0, task.rates[rate.name])
+    return sense if along == 0 else sense * math.copysign(1.0, math.cos(direction - cmath.phase(along)))

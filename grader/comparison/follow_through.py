@@ -236,6 +236,13 @@ class FollowThrough:
             self.instead = self.explanation.basis or other_mechanism(self.task, self.evidence, scales)
         return vector in self.explanation.blamed
 
+    def nodes_instead(self) -> Mapping[str, complex]:
+        """The nodes by another mechanism that was certainly drawn, and whose sketch was not handed in."""
+        basis = None if self.evidence.has_sketch else self.drawn_instead()
+        if basis is None or MECHANISM not in basis.wrong:
+            return {}
+        return {name: node.at for name, node in self.traced(self.followed, basis).made.items()}
+
     def is_trivial(self, segment: TaskSegment, expected: complex) -> bool:
         """Whether an expectation is near zero, has no solution, or is far shorter than the right vector."""
         if not cmath.isfinite(expected):
