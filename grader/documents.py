@@ -232,8 +232,6 @@ class CriterionDocument(Document):
     """Under review, the likeliest verdict."""
     decided: DecidedDocument | None = None
     """Where a person decided."""
-    said: SaidDocument | None = None
-    """The program's own verdict, where it is no longer the one above."""
     mistake: str | None = None
     """Code of the mistake that explains a loss."""
     feedback: str = ""
@@ -320,6 +318,8 @@ class ReportDocument(Document):
     decisions: list[AppliedDecisionDocument] = []
     """All that people decided of it and that was applied."""
     criteria: list[CriterionDocument] = []
+    said: dict[str, SaidDocument] = {}
+    """What the program itself said, by criterion, where the verdict is another one or a person's."""
     mistakes: list[MistakeDocument] = []
     scales: dict[ScaleName, ScaleDocument] = {}
     problems: list[ProblemDocument] = []

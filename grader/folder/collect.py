@@ -17,12 +17,13 @@ from typing import Any, Literal
 
 import numpy as np
 
-from grader.documents import CriterionDocument, ReportDocument
+from grader.documents import CriterionDocument, ReportDocument, SaidDocument
 from grader.feedback.words import environment
 from grader.files import make_folder, write_whole
 from grader.folder.batch import Batch, Graded, pages_read
 from grader.folder.cache import digest_of
 from grader.inputs.decision_texts import audit_answer
+from grader.marking.trust import said_of
 from grader.overlay.covered import Keep, bare_png, covered, painted, reopened, upright_pixels
 from grader.records import MECHANISM, ZONE_SLACK_MM, Box, FloatArray, ScannedPage, Sheet
 from grader.scan.decode.pages import decode
@@ -256,7 +257,7 @@ def vouched(report: ReportDocument, construction: Construction) -> dict[tuple[st
     }
     found: dict[tuple[str, str], By] = {}
     for criterion in report.criteria:
-        by = _by(criterion, audits.get(criterion.id))
+        by = _by(criterion, said_of(report, criterion), audits.get(criterion.id))
         if by is not None:
             for place in _ends(criterion, construction):
                 if _RANK[by] > _RANK[found.get(place, "program")]:
@@ -269,13 +270,13 @@ def vouched(report: ReportDocument, construction: Construction) -> dict[tuple[st
     return found
 
 
-def _by(criterion: CriterionDocument, audit: str | None) -> By | None:
+def _by(criterion: CriterionDocument, said: SaidDocument | None, audit: str | None) -> By | None:
     """Whether a person found the verdict that the program gave right; None where nobody looked."""
     if audit is not None and audit_answer(audit).answer != "unclear":
         return "audited" if audit_answer(audit).answer == "right" else "disputed"
-    if criterion.decided is None or criterion.said is None or criterion.verdict == "not_judged":
+    if criterion.decided is None or said is None or criterion.verdict == "not_judged":
         return None
-    return "decided" if criterion.verdict == criterion.said.verdict else "disputed"
+    return "decided" if criterion.verdict == said.verdict else "disputed"
 
 
 def _ends(criterion: CriterionDocument, construction: Construction) -> list[tuple[str, str]]:

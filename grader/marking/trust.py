@@ -110,10 +110,10 @@ class Checkable:
         return sha256(f"{self.student}/{self.position}/{self.criterion}".encode()).digest()
 
 
-def said_of(criterion: CriterionDocument) -> SaidDocument | None:
+def said_of(report: ReportDocument, criterion: CriterionDocument) -> SaidDocument | None:
     """What the program itself said of a criterion; None where it said nothing."""
-    if criterion.said is not None or criterion.decided is not None:
-        return criterion.said
+    if criterion.id in report.said or criterion.decided is not None:
+        return report.said.get(criterion.id)
     is_open = criterion.verdict == "review"
     verdict = criterion.proposed if is_open else criterion.verdict
     if verdict not in CREDIT | CHARGE or criterion.probability is None:
@@ -135,7 +135,7 @@ def _of_report(report: ReportDocument) -> Iterator[Checkable]:
     source = "entered" if not methods else "printed" if "markers" in methods else "plain"
     answers = {row.criterion: row.verdict for row in report.decisions if row.criterion.startswith("audit:")}
     for criterion in report.criteria:
-        said = said_of(criterion)
+        said = said_of(report, criterion)
         if said is None or NOT_CHECKED & {*criterion.reasons}:
             continue
         answer, row = None, answers.get(f"audit:{criterion.id}")
@@ -265,15 +265,14 @@ def with_said(report: ReportDocument, own: Judgement, decided: Collection[str]) 
     """
     if all(one.confidence == 0.0 or one.verdict == "not_judged" for one in own.outcomes):
         return report
-    said = {one.criterion: said_by(one) for one in own.outcomes}
-    stood = {one.criterion: one.verdict for one in own.outcomes}
-    criteria = [
-        one.model_copy(update={"said": said.get(one.id)})
-        if one.id in decided or stood.get(one.id, one.verdict) != one.verdict
-        else one
-        for one in report.criteria
-    ]
-    return report.model_copy(update={"criteria": criteria})
+    now = {one.id: one.verdict for one in report.criteria}
+    said = {
+        one.criterion: found
+        for one in own.outcomes
+        if (one.criterion in decided or now.get(one.criterion) != one.verdict)
+        and (found := said_by(one)) is not None
+    }
+    return report.model_copy(update={"said": said}) if said else report
 
 
 def _reliability(

@@ -419,7 +419,7 @@ def test_a_wrong_verdict_that_was_checked_opens_those_like_it_and_says_so(folder
     assert len(waiting) == opened.count == 3
     for report in waiting.values():
         (criterion,) = [one for one in report.criteria if one.verdict == "review"]
-        assert (criterion.id, criterion.proposed, criterion.said.settled) == ("v_A", "full", True)
+        assert (criterion.id, criterion.proposed, report.said[criterion.id].settled) == ("v_A", "full", True)
         assert "found wrong" in criterion.feedback
     page = (folder.parent / "out" / "index.html").read_text(encoding="utf-8")
     assert "A settled verdict of s2 was wrong" in page

@@ -68,7 +68,7 @@ def criterion(name, *, verdict="full", probability=0.99, **other):
     }  # fmt: skip
 
 
-def report(student, criteria, answers=()):
+def report(student, criteria, answers=(), said=None):
     rows = [
         {"criterion": name, "verdict": text, "points": None, "comment": "", "by": "", "at": ""}
         for name, text in answers
@@ -78,6 +78,7 @@ def report(student, criteria, answers=()):
             "student_id": student, "assignment": "pump", "variant": {}, "position": None, "status": "graded",
             "score": 1.0, "score_range": (1.0, 1.0), "max_score": 1.0, "criteria": criteria,
             "decisions": rows,
+            "said": said or {},
         }
     )  # fmt: skip
 
@@ -171,11 +172,11 @@ def test_a_persons_verdict_on_a_settled_one_is_an_answer_of_the_sample():
     said = {"verdict": "full", "settled": True, "probability": 0.98}
     decided = {"by": "", "at": "", "before": "full"}
     first = checkable(a_class())[0]
-    corrected = criterion(first.criterion, verdict="none", probability=1.0, said=said, decided=decided)
+    corrected = criterion(first.criterion, verdict="none", probability=1.0, decided=decided)
     reports = a_class()
     index = next(k for k, one in enumerate(reports) if one.student_id == first.student)
     own = [corrected if one.id == first.criterion else one.model_dump() for one in reports[index].criteria]
-    reports[index] = report(first.student, own, [(first.criterion, "none")])
+    reports[index] = report(first.student, own, [(first.criterion, "none")], {first.criterion: said})
     trust = trust_of(reports, SETTLE)
     assert (trust.audited, trust.right) == (1, 0)
     assert trust.opened == []
@@ -185,8 +186,8 @@ def test_a_persons_verdict_on_a_settled_one_is_an_answer_of_the_sample():
 def test_what_a_person_decided_says_more_than_the_answer_before():
     said = {"verdict": "full", "settled": True, "probability": 0.98}
     decided = {"by": "", "at": "", "before": "full"}
-    kept = criterion("v_A", probability=1.0, said=said, decided=decided)
-    trust = trust_of([report("s1", [kept], [("audit:v_A", "wrong; said=full")])], SETTLE)
+    kept = criterion("v_A", probability=1.0, decided=decided)
+    trust = trust_of([report("s1", [kept], [("audit:v_A", "wrong; said=full")], {"v_A": said})], SETTLE)
     assert (trust.right, trust.opened) == (1, [])
 
 
@@ -206,7 +207,7 @@ def test_what_is_opened_waits_between_nothing_and_everything_and_keeps_what_was_
     assert opened.score.low < judgement.score.total
     assert opened.score.total is None
     told = with_said(report_of(task, opened, "s01"), judgement, set())
-    (said,) = [one.said for one in told.criteria if one.said is not None]
+    (said,) = told.said.values()
     assert (said.verdict, said.settled, said.probability) == ("full", True, first.probability)
     assert [one.said for one in checkable([told])] == [
         one.said for one in checkable([report_of(task, judgement, "s01")])
