@@ -86,8 +86,9 @@ def _named(data: Data, part: str, chance: float, rivals: tuple[NamedMistake, ...
 
 # The posterior --------------------------------------------------------------------------------------
 
-LIKELY = 0.5
-"""From this probability on that the data are not the own, single mistakes are tried beside them."""
+LIKELY = 0.15
+"""From this probability on that the data are not the own, single mistakes are tried beside them; if it stays
+as high, a person is asked."""
 LEAST_RIVAL = 0.04
 """A set of data that is likelier is named beside the best. Between sets that are not the own, differences of
 the likelihood count half: errors of a hand are more alike than independent ones."""

@@ -18,8 +18,9 @@ LEAST_DOUBT = 0.06
 """Probability that a vector is drawn wrongly, or is an outlier for another reason."""
 LEAST_RULED_MM = 3.0
 """Shorter lengths tell nothing by their ratio."""
-READ_MM = 0.25
-"""Standard error of a length laid against a ruler and noted to half a millimetre, beside that of its ends."""
+RULED_MM, SEEN_MM = 0.25, 0.1
+"""Standard errors of a length laid against a ruler and noted to half a millimetre, and of one seen on a
+sheet, beside those of its ends."""
 NOTED_DEG = 0.5
 """Of a direction noted to a degree, beside that of the protractor."""
 ZERO, ZERO_MM = 1e-9, 1e-6
@@ -106,7 +107,7 @@ def _direction(task: Task, evidence: Evidence, name: str, one: DrawnVector, expe
     return _Row(
         off,
         shifts.imag / length,
-        math.hypot(read, READ_MM / one.length_mm),
+        math.hypot(read, _seen(evidence) / one.length_mm),
         0.0,
         one.confidence,
         is_back * 1.0,
@@ -121,9 +122,13 @@ def _length(task: Task, evidence: Evidence, name: str, one: DrawnVector, expecte
     # An assembly that there is not has no lengths.
     off = np.where(np.isfinite(size), np.arcsinh(one.length_mm / floor) - np.arcsinh(size / floor), np.nan)
     shorter = math.hypot(floor, min(one.length_mm, float(size[0])))
-    read = math.hypot(READ_MM, one.se_mm, 0.0 if evidence.has_sheets else task.rubric.hand.ruler_mm)
+    read = math.hypot(_seen(evidence), one.se_mm, 0.0 if evidence.has_sheets else task.rubric.hand.ruler_mm)
     by_scale = max(one.length_mm, ZERO_MM) / math.hypot(floor, one.length_mm)
     return _Row(off, shifts / shorter, read / shorter, by_scale, one.confidence, np.zeros(len(size)))
+
+
+def _seen(evidence: Evidence) -> float:
+    return SEEN_MM if evidence.has_sheets else RULED_MM
 
 
 def _shifts(task: Task, name: str) -> ComplexArray:

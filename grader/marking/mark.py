@@ -114,7 +114,8 @@ def _judged(task: Task, submission: Submission, comparison: Comparison, owner: O
     outcomes = letters_charged(task, comparison.outcomes, mistakes)
     outcomes, unfit = of_nothing(task, outcomes, not_explained(explanations))
     outcomes = at_stake(task.rubric, outcomes)
-    outcomes = of_another(task, outcomes, owner)
+    if unfit is None or (owner is not None and owner.named is not None):
+        outcomes = of_another(task, outcomes, owner)
     outcomes = tuple(with_mistake(outcome, mistakes) for outcome in outcomes)
     return Judgement(outcomes, mistakes, comparison.scales, score(task.rubric, outcomes), unfit)
 

@@ -46,11 +46,12 @@ def of_another(task: Task, outcomes: Sequence[Outcome], owner: Owner | None) -> 
     named = owner.named
     is_sure = named is not None and named.code == "other_variant" and owner.not_own >= NEARLY_CERTAIN
     earns_none = is_sure and task.rubric.doubt.other_variant == "none"
+    touched = {one.criterion for one in outcomes if is_of(task, one.name, owner.part)}
+    if named is None:
+        return tuple(_unclear(one, owner) if one.criterion in touched else one for one in outcomes)
     return tuple(
-        _of_another(outcome, named, earns_none=earns_none)
-        if is_of(task, outcome.name, owner.part)
-        else outcome
-        for outcome in outcomes
+        _of_another(one, named, earns_none=earns_none) if one.criterion in touched else one
+        for one in outcomes
     )
 
 
@@ -61,16 +62,26 @@ def is_of(task: Task, name: str, part: str) -> bool:
     return name == task.construction.vectors_of(part)[0].scale or _is_in(task, name, frozenset({part}))
 
 
-def _of_another(outcome: Outcome, named: NamedMistake | None, *, earns_none: bool) -> Outcome:
+def _of_another(outcome: Outcome, named: NamedMistake, *, earns_none: bool) -> Outcome:
     if outcome.verdict == "not_judged":
         return outcome
-    whose = Reason("data_unclear")
-    if named is not None:
-        detail = {key: value for key, value in named.detail.items() if key != "part"}
-        whose = Reason(named.code, {"whose": ", ".join(f"{key} = {value}" for key, value in detail.items())})
-    if named is not None and earns_none:
+    detail = {key: value for key, value in named.detail.items() if key != "part"}
+    whose = Reason(named.code, {"whose": ", ".join(f"{key} = {value}" for key, value in detail.items())})
+    if earns_none:
         lost = settled(outcome, NONE, named.confidence, whose)
         return replace(lost, mistake=named.code, cause=named)
+    return _asked(outcome, whose, EVEN)
+
+
+def _unclear(outcome: Outcome, owner: Owner) -> Outcome:
+    """An outcome that a person decides, as likely as the data are the own."""
+    if outcome.verdict == "not_judged":
+        return outcome
+    return _asked(outcome, Reason("data_unclear"), outcome.probability * (1.0 - owner.not_own))
+
+
+def _asked(outcome: Outcome, why: Reason, probability: float) -> Outcome:
+    """An outcome that a person decides, between nothing and what it was worth."""
     best = outcome.shares[-1] if outcome.shares else FULL
     return replace(
         outcome,
@@ -78,8 +89,8 @@ def _of_another(outcome: Outcome, named: NamedMistake | None, *, earns_none: boo
         possible=("none", outcome.possible[1]),
         shares=(NONE, best),
         proposed=outcome.shares[0] if outcome.verdict != "review" else outcome.proposed,
-        probability=EVEN,
-        reasons=(whose, *outcome.reasons),
+        probability=probability,
+        reasons=(why, *outcome.reasons),
     )
 
 
