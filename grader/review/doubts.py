@@ -243,10 +243,24 @@ def _places(asked: _Asked, about: Sequence[CriterionDocument], node: str, figure
             candidates.append(place)
     sure = _right_as_read(touching, read)
     likely = sorted(_shared(candidates[:MOST_PLACES], sure), key=lambda one: -one[1])
-    starts = (_start(asked, _vector(asked, one), node) for one in touching)
-    start = next((on_sheet(one[0].at) for one in starts if one is not None), None)
+    starts = ((one, _start(asked, _vector(asked, one), node)) for one in touching)
+    vector, start = next(
+        ((_vector(asked, one), at[0].at) for one, at in starts if at is not None), (None, None)
+    )
+    known: tuple[tuple[str, str], ...] = ()
+    if vector is not None and start is not None:
+        other = vector.tail if node == vector.head else vector.head
+        if _sure(asked, other) < 1.0:
+            # The stroke that is chosen has two ends.
+            known = ((f"node:{figure}:{other}", place_text(*on_sheet(start))),)
     places = tuple(
-        Choice(key, ((f"node:{figure}:{node}", place_text(*on_sheet(at))),), each, on_sheet(at), start)
+        Choice(
+            key,
+            ((f"node:{figure}:{node}", place_text(*on_sheet(at))), *known),
+            each,
+            on_sheet(at),
+            None if start is None else on_sheet(start),
+        )
         for key, (at, each) in zip("abc", likely, strict=False)
     )
     missing = tuple((one.id, "none") for one in touching)
