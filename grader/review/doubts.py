@@ -197,10 +197,11 @@ def _nodes(asked: _Asked) -> Iterator[Doubt]:
     left = {one.id: one for one in asked.waiting if one.vector is not None}
     for step in asked.task.construction.steps:
         figure = asked.task.construction.figure_of(step.node)
-        if figure not in asked.figures or figure == MECHANISM or not left:
+        if figure not in asked.figures or not left:
             continue
         about = [one for one in left.values() if step.node in _in_doubt(asked, one)]
-        choices = _credit(about) or _places(asked, about, step.node, figure) if about else ()
+        make = _joint if figure == MECHANISM else _places
+        choices = _credit(about) or make(asked, about, step.node, figure) if about else ()
         if choices:
             kind: Kind = "verdict" if choices[0].at is None else "node"
             yield Doubt(f"node:{figure}:{step.node}", kind, tuple(one.id for one in about), choices)
@@ -265,6 +266,16 @@ def _places(asked: _Asked, about: Sequence[CriterionDocument], node: str, figure
     )
     missing = tuple((one.id, "none") for one in touching)
     return (*places, Choice("neither", missing)) if len(places) > 1 else ()
+
+
+def _joint(asked: _Asked, about: Sequence[CriterionDocument], node: str, figure: str) -> tuple[Choice, ...]:
+    """Where a joint lies on which vectors hang: as it was read; elsewhere a person puts it."""
+    read = asked.figures[figure].nodes.get(node)
+    if read is None:
+        return ()
+    at = on_sheet(read.at)
+    here = Choice("a", ((f"node:{figure}:{node}", place_text(*at)),), read.confidence, at)
+    return (here, Choice("neither", tuple((one.id, "none") for one in about)))
 
 
 def _credit(about: Sequence[CriterionDocument]) -> tuple[Choice, ...]:

@@ -65,6 +65,7 @@ GO_ON = N_("Go on")
 UNSURE = N_("No default below %(least)s: choose")
 WHOSE = N_("Whose data were drawn?")
 WHICH = N_("Which stroke is meant: %(vectors)s?")
+WHERE = N_("Is %(joint)s here? If it lies elsewhere, drag its ring.")
 WHICH_SCALE = N_("Which scale was drawn with: %(scale)s?")
 ARE_RIGHT = N_("Read in doubt: %(vectors)s")
 NEITHER = N_("none of these: wrong")
@@ -193,6 +194,8 @@ def title_of(session: Session, doubt: Doubt, speaker: Tongue) -> Markup:
         return Markup.escape(speaker.gettext(WHOSE))
     drawn = ", ".join(names[one].name for one in doubt.criteria[:MOST_NAMED] if one in names)
     more = ", …" if len(doubt.criteria) > MOST_NAMED else ""
+    if doubt.kind == "node" and doubt.id.startswith(f"node:{MECHANISM}:"):
+        return symbols(speaker.gettext(WHERE) % {"joint": doubt.id.split(":")[2]})
     if doubt.kind == "node":
         return symbols(speaker.gettext(WHICH) % {"vectors": drawn + more})
     if doubt.kind == "scale":
@@ -492,6 +495,8 @@ def _doubt_look(session: Session, student: Student, doubt: Doubt, first: Criteri
     places = [one for one in doubt.choices if one.at is not None]
     if not places:
         return look
+    if doubt.id.startswith(f"node:{MECHANISM}:"):
+        look = {**look, **_on_the_sketch(session, student)}
     known = [point for one in places for point in (one.at, one.start) if point is not None]
     box = box_around(known, LOOK_MARGIN_MM, LEAST_LOOK_MM, look["page_mm"])
     return {
@@ -499,6 +504,27 @@ def _doubt_look(session: Session, student: Student, doubt: Doubt, first: Criteri
         "box": box,
         "marks": Markup("").join(_place_marks(one, box[2]) for one in reversed(places)),
     }
+
+
+def _on_the_sketch(session: Session, student: Student) -> Facts:
+    """The sheet with the sketch, and its joints; nothing where there is none."""
+    standing = session.standing()
+    for sheet, document in enumerate(student.report.reading.sheets):
+        figure = document.figures.get(MECHANISM)
+        if figure is not None:
+            asked = {"student": student.key, "sheet": sheet, "run": session.runs}
+            nodes = [
+                {
+                    "figure": MECHANISM,
+                    "name": name,
+                    "x": node.x_mm,
+                    "y": node.y_mm,
+                    "seen": mark_of(standing.of(student, f"node:{MECHANISM}:{name}")),
+                }
+                for name, node in figure.nodes.items()
+            ]
+            return {"sheet": sheet, "scan": "scan?" + urlencode(asked), "nodes": nodes}
+    return {}
 
 
 def _place_marks(choice: Choice, wide_mm: float) -> Markup:
