@@ -1,7 +1,5 @@
 """What the page is told: a student's criteria as rows, and one question with all that is to be seen of it."""
 
-import cmath
-import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 from urllib.parse import urlencode
@@ -13,11 +11,10 @@ from grader.feedback.numbers import quantity_cells, score_text, tolerance_cells
 from grader.feedback.words import VERDICTS, problem_sentence, symbols, unmatched_sentence
 from grader.inputs.decisions import Decision
 from grader.language import N_, Tongue
-from grader.overlay.closeup import LEAST_LOOK_MM, LOOK_MARGIN_MM, box_around, look
+from grader.overlay.closeup import look
 from grader.overlay.scene import MARKS
-from grader.printed.layout import SCALE_BOXES, SCALE_OF
 from grader.records import MECHANISM, Box
-from grader.review.doubts import SURE, Choice, Doubt
+from grader.review.doubts import SURE
 from grader.review.session import OPEN, Session, Standing, Student, mark_of, page_criterion
 from grader.rubric import RubricFile
 
@@ -63,29 +60,6 @@ ACCEPT = N_("Accept: %(verdict)s")
 NO_PROPOSAL = N_("No proposal: choose a verdict")
 GO_ON = N_("Go on")
 UNSURE = N_("No default below %(least)s: choose")
-WHOSE = N_("Whose data were drawn?")
-WHICH = N_("Which stroke is meant: %(vectors)s?")
-WHERE = N_("Is %(joint)s here? If it lies elsewhere, drag its ring.")
-WHICH_SCALE = N_("Which scale was drawn with: %(scale)s?")
-ARE_RIGHT = N_("Read in doubt: %(vectors)s")
-NEITHER = N_("none of these: wrong")
-PLACE = N_("stroke %(letter)s")
-OF_OWNER = {
-    "none": N_("another's: no points"),
-    "follow": N_("their own: as proposed"),
-}
-OF_SCALE = {
-    "full": N_("the declared one"),
-    "partial": N_("nearly that one"),
-    "none": N_("another: wrong"),
-}
-UNDECLARED = {
-    "full": N_("the drawing's: right"),
-    "none": N_("the drawing's: wrong"),
-}
-OF_GROUP = {"full": N_("all are right"), "none": N_("all are wrong")}
-MOST_NAMED = 3
-"""Vectors that a question names."""
 FAULT = "decision_fault"
 WHOLE_MARGIN = 0.03
 """Of a figure's size, where nothing else says what to look at."""
@@ -163,62 +137,11 @@ def _row(
     }
 
 
-def asked_facts(session: Session, student: Student, speaker: Tongue, *, counted: bool) -> list[Facts]:
-    """The open questions on a student: what the script lists in the place of the rows that they cover."""
-    standing = session.standing()
-    rows = {one.id: one for one in student.report.criteria}
-    return [
-        {
-            "student": student.key,
-            "criterion": doubt.id,
-            "kind": doubt.kind,
-            "covers": doubt.criteria,
-            "rank": rank,
-            "settles": doubt.settles,
-            "title": title_of(session, doubt, speaker),
-            "verdict": OPEN,
-            "probability": None if doubt.likeliest is None else doubt.likeliest.probability,
-            "stake": sum(rows[name].max_points for name in doubt.criteria if name in rows),
-            "decided": False,
-            "asked": False,
-            "seen": mark_of(standing.of(student, doubt.id)),
-        }
-        for rank, doubt in enumerate(session.doubts(student, counted=counted))
-    ]
-
-
-def title_of(session: Session, doubt: Doubt, speaker: Tongue) -> Markup:
-    """What a question asks."""
-    names = {one.id: one for one in session.batch.rubric.criterion}
-    if doubt.kind == "owner":
-        return Markup.escape(speaker.gettext(WHOSE))
-    drawn = ", ".join(names[one].name for one in doubt.criteria[:MOST_NAMED] if one in names)
-    more = ", …" if len(doubt.criteria) > MOST_NAMED else ""
-    if doubt.kind == "node" and doubt.id.startswith(f"node:{MECHANISM}:"):
-        return symbols(speaker.gettext(WHERE) % {"joint": doubt.id.split(":")[2]})
-    if doubt.kind == "node":
-        return symbols(speaker.gettext(WHICH) % {"vectors": drawn + more})
-    if doubt.kind == "scale":
-        return symbols(
-            speaker.gettext(WHICH_SCALE) % {"scale": names[doubt.id].name if doubt.id in names else doubt.id}
-        )
-    if doubt.id in names:
-        title = names[doubt.id].title.in_language(speaker.lang)
-        drawn = "" if names[doubt.id].name in title else names[doubt.id].name
-        return Markup("{} {}").format(symbols(title), symbols(drawn)) if drawn else symbols(title)
-    return symbols(speaker.gettext(ARE_RIGHT) % {"vectors": drawn + more})
-
-
 # One question -------------------------------------------------------------------------------------
 
 
 def question_facts(session: Session, student: Student, name: str, speaker: Tongue) -> Facts:
     """One question on a student: what was handed in, what is right, what is proposed, where to look."""
-    doubt = session.doubt(student, name)
-    if doubt is not None and (
-        doubt.kind != "verdict" or len(doubt.criteria) > 1 or doubt.id != doubt.criteria[0]
-    ):
-        return _doubt_facts(session, student, doubt, speaker)
     criterion, standing = student.criterion(name), session.standing()
     title = next(one.title for one in session.batch.rubric.criterion if one.id == name)
     row = _row(student, criterion, standing, title.in_language(speaker.lang))
@@ -236,23 +159,17 @@ def question_facts(session: Session, student: Student, name: str, speaker: Tongu
         "comment": decision.comment if decision else "",
         "position": "",
         "numbers": list(_numbers(criterion, speaker)),
-        "state": _state(criterion, decision, said, speaker),
+        "state": state_of(criterion, decision, said, speaker),
         "brief": said or speaker.gettext(VERDICTS[criterion.verdict]),
         "accept": _accept(criterion, what, speaker),
         "why": _why(student, criterion, asked=row["asked"], speaker=speaker),
         "sentence": symbols(session.sentence_if(student, criterion))
         if is_default or criterion.verdict != OPEN
         else "",
-        "look": _look(session, student, criterion),
-        "settles": _settles(doubt, speaker),
+        "look": look_of(session, student, criterion),
+        "settles": "",
         "choices": _verdicts(student, criterion, row["seen"], decision, speaker),
     }
-
-
-def _settles(doubt: Doubt | None, speaker: Tongue) -> str:
-    """How many further verdicts an answer settles; empty where it is the one alone."""
-    more = 0 if doubt is None else doubt.settles - 1
-    return speaker.ngettext("settles %d more", "settles %d more", more) % more if more > 0 else ""
 
 
 def _verdicts(
@@ -263,7 +180,7 @@ def _verdicts(
     return [
         {
             "key": str(number),
-            "label": _badge(verdict, speaker.gettext(VERDICTS[verdict])),
+            "label": badge(verdict, speaker.gettext(VERDICTS[verdict])),
             "pressed": is_decided and criterion.verdict == verdict,
             "default": criterion.verdict == OPEN and is_sure(criterion) and criterion.proposed == verdict,
             "answers": [
@@ -274,112 +191,11 @@ def _verdicts(
     ]
 
 
-def _badge(verdict: str, words: str) -> Markup:
+def badge(verdict: str, words: str) -> Markup:
+    """A verdict's sign and its words."""
     return Markup('<span class="badge v-{}" aria-hidden="true">{}</span> {}').format(
         verdict, MARKS[verdict], words
     )
-
-
-# A question on more than one verdict ---------------------------------------------------------------
-
-
-def _doubt_facts(session: Session, student: Student, doubt: Doubt, speaker: Tongue) -> Facts:
-    """A question whose answer is a place, a scale or whose drawing it is, or several verdicts at once."""
-    standing, default = session.standing(), doubt.default
-    first = student.criterion(doubt.criteria[0])
-    choices = [
-        _choice_facts(student, doubt, number, one, standing, speaker)
-        for number, one in enumerate(doubt.choices, 1)
-    ]
-    label = "" if default is None else choices[doubt.choices.index(default)]["label"]
-    sure = "" if default is None else f", {per_cent(default.probability or 0.0)}"
-    accept = (
-        Markup("<kbd>Enter</kbd> {}{}").format(label, sure)
-        if default is not None
-        else Markup.escape(speaker.gettext(UNSURE) % {"least": per_cent(SURE)})
-    )
-    after = (
-        {} if default is None else {one.id: one for one in session.report_if(student, default.rows).criteria}
-    )
-    told = after[first.id].feedback if first.id in after and after[first.id].verdict != OPEN else ""
-    return {
-        "student": student.key,
-        "criterion": doubt.id,
-        "kind": doubt.kind,
-        "title": title_of(session, doubt, speaker),
-        "verdict": OPEN,
-        "proposed": "" if default is None else default.key,
-        "decided": "",
-        "comment": "",
-        "position": "",
-        "seen": mark_of(standing.of(student, doubt.id)),
-        "numbers": list(_doubt_numbers(student, doubt, first, speaker)),
-        "state": _state(first, None, "", speaker),
-        "brief": "",
-        "accept": accept,
-        "why": symbols(first.feedback) if doubt.kind != "node" else Markup(),
-        "sentence": symbols(told),
-        "settles": _settles(doubt, speaker),
-        "look": _doubt_look(session, student, doubt, first),
-        "choices": choices,
-    }
-
-
-def _choice_facts(
-    student: Student, doubt: Doubt, number: int, choice: Choice, standing: Standing, speaker: Tongue
-) -> Facts:
-    if choice.at is not None:
-        label = _letter(choice.key, speaker.gettext(PLACE) % {"letter": choice.key.upper()})
-    elif choice.key == "neither":
-        label = _badge("none", speaker.gettext(NEITHER))
-    else:
-        is_own = any(name == doubt.id for name, _ in choice.rows)
-        words = {"owner": OF_OWNER, "scale": OF_SCALE if is_own else UNDECLARED}.get(doubt.kind, OF_GROUP)
-        badge = choice.key if choice.key in MARKS else "follow_through"
-        label = _badge(badge, speaker.gettext(words.get(choice.key, VERDICTS.get(choice.key, ""))))
-    return {
-        "key": str(number),
-        "label": label,
-        "pressed": False,
-        "default": choice is doubt.default,
-        "answers": [
-            {
-                "student": student.key,
-                "criterion": name,
-                "verdict": verdict,
-                "seen": mark_of(standing.of(student, name)),
-            }
-            for name, verdict in choice.rows
-        ],
-    }
-
-
-def _letter(key: str, words: str) -> Markup:
-    return Markup('<span class="badge place-{}" aria-hidden="true">{}</span> {}').format(
-        key, key.upper(), words
-    )
-
-
-def _doubt_numbers(
-    student: Student, doubt: Doubt, first: CriterionDocument, speaker: Tongue
-) -> Iterator[tuple[str, Markup]]:
-    """Of a place the vector to it, beside the one expected; of a scale what was declared and drawn with."""
-    if doubt.kind == "node":
-        for choice in doubt.choices:
-            if choice.at is not None and choice.start is not None:
-                along = complex(choice.at[0] - choice.start[0], choice.start[1] - choice.at[1])
-                turn = math.degrees(cmath.phase(along)) % 360.0
-                cells = quantity_cells(Quantity(length_mm=abs(along), direction_deg=turn), speaker)
-                yield choice.key.upper(), Markup.escape(" · ".join(cells))
-        expected = Quantity(length_mm=first.expected.length_mm, direction_deg=first.expected.direction_deg)
-        yield speaker.gettext("Expected"), Markup.escape(" · ".join(quantity_cells(expected, speaker)))
-    elif doubt.kind == "scale":
-        for name, quantity in ((N_("Declared"), first.measured), (N_("Drawn with"), first.expected)):
-            cells = quantity_cells(quantity, speaker)
-            if cells:
-                yield speaker.gettext(name), Markup.escape(" · ".join(cells))
-    points = sum(one.max_points for one in student.report.criteria if one.id in doubt.criteria)
-    yield speaker.gettext("Points"), Markup.escape(f"– / {speaker.trimmed(points, 2)}")
 
 
 def is_sure(criterion: CriterionDocument) -> bool:
@@ -410,8 +226,9 @@ def per_cent(probability: float) -> str:
     return f"{int(100 * probability)}\N{NO-BREAK SPACE}%"
 
 
-def _state(criterion: CriterionDocument, decision: Decision | None, said: str, speaker: Tongue) -> Markup:
-    badge = Markup('<span class="badge v-{}" aria-hidden="true">{}</span> {}').format(
+def state_of(criterion: CriterionDocument, decision: Decision | None, said: str, speaker: Tongue) -> Markup:
+    """The verdict that stands, and who decided it or what is proposed."""
+    shown = Markup('<span class="badge v-{}" aria-hidden="true">{}</span> {}').format(
         criterion.verdict, MARKS[criterion.verdict], speaker.gettext(VERDICTS[criterion.verdict])
     )
     if criterion.decided is not None and criterion.verdict != OPEN:
@@ -420,7 +237,7 @@ def _state(criterion: CriterionDocument, decision: Decision | None, said: str, s
         was = speaker.gettext(VERDICTS[decision.verdict])
         who = decision.by or speaker.gettext(SOMEBODY)
         said = speaker.gettext(STALE) % {"who": who, "verdict": was}
-    return Markup('{} <span class="soft">{}</span>').format(badge, said) if said else badge
+    return Markup('{} <span class="soft">{}</span>').format(shown, said) if said else shown
 
 
 def _numbers(criterion: CriterionDocument, speaker: Tongue) -> Iterator[tuple[str, Markup]]:
@@ -446,7 +263,7 @@ def _points(criterion: CriterionDocument, speaker: Tongue) -> str:
 # Where to look ------------------------------------------------------------------------------------
 
 
-def _look(session: Session, student: Student, criterion: CriterionDocument) -> Facts | None:
+def look_of(session: Session, student: Student, criterion: CriterionDocument) -> Facts | None:
     """The part of a scan that a question is about, with what was read there; None without a scan."""
     names = session.batch.assignment.file.names
     pages, standing = session.pages_of(student), session.standing()
@@ -481,102 +298,6 @@ def _look(session: Session, student: Student, criterion: CriterionDocument) -> F
             return facts
         first = first or facts
     return first
-
-
-def _doubt_look(session: Session, student: Student, doubt: Doubt, first: CriterionDocument) -> Facts | None:
-    """Where to look: both strokes of a place, the writing of a scale, else the first vector."""
-    look = _look(session, student, first)
-    if look is None:
-        return None
-    if doubt.kind == "owner":
-        return {**look, "box": (0.0, 0.0, *look["page_mm"]), "marks": ""}
-    if doubt.kind == "scale":
-        return {**look, **_written_at(session, student, doubt, look)}
-    places = [one for one in doubt.choices if one.at is not None]
-    if not places:
-        return look
-    if doubt.id.startswith(f"node:{MECHANISM}:"):
-        look = {**look, **_on_the_sketch(session, student)}
-    known = [point for one in places for point in (one.at, one.start) if point is not None]
-    box = box_around(known, LOOK_MARGIN_MM, LEAST_LOOK_MM, look["page_mm"])
-    return {
-        **look,
-        "box": box,
-        "marks": Markup("").join(_place_marks(one, box[2]) for one in reversed(places)),
-    }
-
-
-def _on_the_sketch(session: Session, student: Student) -> Facts:
-    """The sheet with the sketch, and its joints; nothing where there is none."""
-    standing = session.standing()
-    for sheet, document in enumerate(student.report.reading.sheets):
-        figure = document.figures.get(MECHANISM)
-        if figure is not None:
-            asked = {"student": student.key, "sheet": sheet, "run": session.runs}
-            nodes = [
-                {
-                    "figure": MECHANISM,
-                    "name": name,
-                    "x": node.x_mm,
-                    "y": node.y_mm,
-                    "seen": mark_of(standing.of(student, f"node:{MECHANISM}:{name}")),
-                }
-                for name, node in figure.nodes.items()
-            ]
-            return {"sheet": sheet, "scan": "scan?" + urlencode(asked), "nodes": nodes}
-    return {}
-
-
-def _place_marks(choice: Choice, wide_mm: float) -> Markup:
-    """A candidate stroke with its letter."""
-    (x, y), (sx, sy) = choice.at or (0.0, 0.0), choice.start or choice.at or (0.0, 0.0)
-    size = wide_mm / 100.0
-    away = complex(x - sx, y - sy)
-    away = away / abs(away) if away else 1.0
-    beside = {"a": -1j, "b": 1j}.get(choice.key, 1.0 + 0j)
-    lx, ly = (
-        x + size * (2.2 * away + 2.6 * away * beside).real,
-        y + size * (2.2 * away + 2.6 * away * beside).imag,
-    )
-    return Markup(
-        '<g class="place place-{key}" style="--mm:{size:.3f}">'
-        '<line x1="{sx:.2f}" y1="{sy:.2f}" x2="{x:.2f}" y2="{y:.2f}"/>'
-        '<circle cx="{x:.2f}" cy="{y:.2f}" r="{r:.2f}"/>'
-        '<text x="{lx:.2f}" y="{ly:.2f}">{letter}</text></g>'
-    ).format(
-        key=choice.key,
-        size=size,
-        sx=sx,
-        sy=sy,
-        x=x,
-        y=y,
-        r=0.9 * size,
-        lx=lx,
-        ly=ly,
-        letter=choice.key.upper(),
-    )
-
-
-def _written_at(session: Session, student: Student, doubt: Doubt, look: Facts) -> Facts:
-    """The box of a printed sheet that a scale is written in; the place of a caption is not known.
-
-    Then the lower right quarter is shown, where title blocks are, and the page says so.
-    """
-    scale = next((one.name for one in session.batch.rubric.criterion if one.id == doubt.id), doubt.id[-2:])
-    for sheet, page in enumerate(session.pages_of(student)):
-        if page.sheet is not None and any(SCALE_OF.get(figure) == scale for figure in page.sheet.zones):
-            x, y, wide, high = SCALE_BOXES[scale]
-            margin = 0.25 * wide
-            box = (x - margin, y - margin, wide + 2 * margin, high + 2 * margin)
-            asked = {"student": student.key, "sheet": sheet, "run": session.runs}
-            return {"sheet": sheet, "scan": "scan?" + urlencode(asked), "box": box, "marks": "", "nodes": []}
-    wide, high = look["page_mm"]
-    return {
-        "box": (0.5 * wide, 0.6 * high, 0.5 * wide, 0.4 * high),
-        "marks": "",
-        "nodes": [],
-        "note": "no_place",
-    }
 
 
 def _box_of(figure: Any, page_mm: tuple[float, float]) -> Box:  # noqa: ANN401 - a figure's document, or None

@@ -30,7 +30,7 @@ from grader.inputs.decisions import Decision
 from grader.language import N_, Tongue, tongue
 from grader.lms.export import export, usual_name
 from grader.lms.grades import Options
-from grader.review import audit, questions
+from grader.review import asked, audit, questions
 from grader.review.scans import page_of
 from grader.review.session import (
     Answer,
@@ -155,15 +155,15 @@ class Review:
         """What is told of each; what its questions settle is counted as long as that does not take long."""
         until = time.monotonic() + COUNTING_S
         for one in students:
-            asked = questions.asked_facts(self.session, one, self.speaker, counted=time.monotonic() < until)
-            yield questions.student_facts(one, standing, self.session.batch.rubric, self.speaker, asked)
+            open_ones = asked.asked_facts(self.session, one, self.speaker, counted=time.monotonic() < until)
+            yield questions.student_facts(one, standing, self.session.batch.rubric, self.speaker, open_ones)
 
     def question(self, request: Request) -> Response:
         """One question."""
-        asked = request.query_params
-        student = self.session.student(asked.get("student", ""))
+        wanted = request.query_params
+        student = self.session.student(wanted.get("student", ""))
         return JSONResponse(
-            questions.question_facts(self.session, student, asked.get("criterion", ""), self.speaker)
+            asked.asked_question(self.session, student, wanted.get("criterion", ""), self.speaker)
         )
 
     def pages(self, _request: Request) -> Response:

@@ -1,0 +1,302 @@
+"""What the page is told of open questions: their list, and one question with its choices."""
+
+import cmath
+import math
+from collections.abc import Iterator
+from urllib.parse import urlencode
+
+from markupsafe import Markup
+
+from grader.documents import CriterionDocument, Quantity
+from grader.feedback.numbers import quantity_cells
+from grader.feedback.words import VERDICTS, symbols
+from grader.language import N_, Tongue
+from grader.overlay.closeup import LEAST_LOOK_MM, LOOK_MARGIN_MM, box_around
+from grader.overlay.scene import MARKS
+from grader.printed.layout import SCALE_BOXES, SCALE_OF
+from grader.records import MECHANISM
+from grader.review.doubts import SURE, Choice, Doubt
+from grader.review.questions import UNSURE, Facts, badge, look_of, per_cent, question_facts, state_of
+from grader.review.session import OPEN, Session, Standing, Student, mark_of
+
+WHOSE = N_("Whose data were drawn?")
+WHICH = N_("Which stroke is meant: %(vectors)s?")
+WHERE = N_("Is %(joint)s here? If it lies elsewhere, drag its ring.")
+WHICH_SCALE = N_("Which scale was drawn with: %(scale)s?")
+ARE_RIGHT = N_("Read in doubt: %(vectors)s")
+NEITHER = N_("none of these: wrong")
+PLACE = N_("stroke %(letter)s")
+OF_OWNER = {
+    "none": N_("another's: no points"),
+    "follow": N_("their own: as proposed"),
+}
+OF_SCALE = {
+    "full": N_("the declared one"),
+    "partial": N_("nearly that one"),
+    "none": N_("another: wrong"),
+}
+UNDECLARED = {
+    "full": N_("the drawing's: right"),
+    "none": N_("the drawing's: wrong"),
+}
+OF_GROUP = {"full": N_("all are right"), "none": N_("all are wrong")}
+MOST_NAMED = 3
+"""Vectors that a question names."""
+
+
+def asked_question(session: Session, student: Student, name: str, speaker: Tongue) -> Facts:
+    """One question on a student: an open one by its id, or a criterion."""
+    doubt = session.doubt(student, name)
+    if doubt is not None and (doubt.kind != "verdict" or doubt.criteria != (doubt.id,)):
+        return _doubt_facts(session, student, doubt, speaker)
+    return {**question_facts(session, student, name, speaker), "settles": _settles(doubt, speaker)}
+
+
+def asked_facts(session: Session, student: Student, speaker: Tongue, *, counted: bool) -> list[Facts]:
+    """The open questions on a student: what the script lists in the place of the rows that they cover."""
+    standing = session.standing()
+    rows = {one.id: one for one in student.report.criteria}
+    return [
+        {
+            "student": student.key,
+            "criterion": doubt.id,
+            "kind": doubt.kind,
+            "covers": doubt.criteria,
+            "rank": rank,
+            "settles": doubt.settles,
+            "title": title_of(session, doubt, speaker),
+            "verdict": OPEN,
+            "probability": None if doubt.likeliest is None else doubt.likeliest.probability,
+            "stake": sum(rows[name].max_points for name in doubt.criteria if name in rows),
+            "decided": False,
+            "asked": False,
+            "seen": mark_of(standing.of(student, doubt.id)),
+        }
+        for rank, doubt in enumerate(session.doubts(student, counted=counted))
+    ]
+
+
+def title_of(session: Session, doubt: Doubt, speaker: Tongue) -> Markup:
+    """What a question asks."""
+    names = {one.id: one for one in session.batch.rubric.criterion}
+    if doubt.kind == "owner":
+        return Markup.escape(speaker.gettext(WHOSE))
+    drawn = ", ".join(names[one].name for one in doubt.criteria[:MOST_NAMED] if one in names)
+    more = ", …" if len(doubt.criteria) > MOST_NAMED else ""
+    if doubt.kind == "node" and doubt.id.startswith(f"node:{MECHANISM}:"):
+        return symbols(speaker.gettext(WHERE) % {"joint": doubt.id.split(":")[2]})
+    if doubt.kind == "node":
+        return symbols(speaker.gettext(WHICH) % {"vectors": drawn + more})
+    if doubt.kind == "scale":
+        return symbols(
+            speaker.gettext(WHICH_SCALE) % {"scale": names[doubt.id].name if doubt.id in names else doubt.id}
+        )
+    if doubt.id in names:
+        title = names[doubt.id].title.in_language(speaker.lang)
+        drawn = "" if names[doubt.id].name in title else names[doubt.id].name
+        return Markup("{} {}").format(symbols(title), symbols(drawn)) if drawn else symbols(title)
+    return symbols(speaker.gettext(ARE_RIGHT) % {"vectors": drawn + more})
+
+
+def _settles(doubt: Doubt | None, speaker: Tongue) -> str:
+    """How many further verdicts an answer settles; empty where it is the one alone."""
+    more = 0 if doubt is None else doubt.settles - 1
+    return speaker.ngettext("settles %d more", "settles %d more", more) % more if more > 0 else ""
+
+
+# A question on more than one verdict ---------------------------------------------------------------
+
+
+def _doubt_facts(session: Session, student: Student, doubt: Doubt, speaker: Tongue) -> Facts:
+    """A question whose answer is a place, a scale or whose drawing it is, or several verdicts at once."""
+    standing, default = session.standing(), doubt.default
+    first = student.criterion(doubt.criteria[0])
+    choices = [
+        _choice_facts(student, doubt, number, one, standing, speaker)
+        for number, one in enumerate(doubt.choices, 1)
+    ]
+    label = "" if default is None else choices[doubt.choices.index(default)]["label"]
+    sure = "" if default is None else f", {per_cent(default.probability or 0.0)}"
+    accept = (
+        Markup("<kbd>Enter</kbd> {}{}").format(label, sure)
+        if default is not None
+        else Markup.escape(speaker.gettext(UNSURE) % {"least": per_cent(SURE)})
+    )
+    after = (
+        {} if default is None else {one.id: one for one in session.report_if(student, default.rows).criteria}
+    )
+    told = after[first.id].feedback if first.id in after and after[first.id].verdict != OPEN else ""
+    return {
+        "student": student.key,
+        "criterion": doubt.id,
+        "kind": doubt.kind,
+        "title": title_of(session, doubt, speaker),
+        "verdict": OPEN,
+        "proposed": "" if default is None else default.key,
+        "decided": "",
+        "comment": "",
+        "position": "",
+        "seen": mark_of(standing.of(student, doubt.id)),
+        "numbers": list(_doubt_numbers(student, doubt, first, speaker)),
+        "state": state_of(first, None, "", speaker),
+        "brief": "",
+        "accept": accept,
+        "why": symbols(first.feedback) if doubt.kind != "node" else Markup(),
+        "sentence": symbols(told),
+        "settles": _settles(doubt, speaker),
+        "look": _doubt_look(session, student, doubt, first),
+        "choices": choices,
+    }
+
+
+def _choice_facts(
+    student: Student, doubt: Doubt, number: int, choice: Choice, standing: Standing, speaker: Tongue
+) -> Facts:
+    if choice.at is not None:
+        label = _letter(choice.key, speaker.gettext(PLACE) % {"letter": choice.key.upper()})
+    elif choice.key == "neither":
+        label = badge("none", speaker.gettext(NEITHER))
+    else:
+        is_own = any(name == doubt.id for name, _ in choice.rows)
+        words = {"owner": OF_OWNER, "scale": OF_SCALE if is_own else UNDECLARED}.get(doubt.kind, OF_GROUP)
+        mark = choice.key if choice.key in MARKS else "follow_through"
+        label = badge(mark, speaker.gettext(words.get(choice.key, VERDICTS.get(choice.key, ""))))
+    return {
+        "key": str(number),
+        "label": label,
+        "pressed": False,
+        "default": choice is doubt.default,
+        "answers": [
+            {
+                "student": student.key,
+                "criterion": name,
+                "verdict": verdict,
+                "seen": mark_of(standing.of(student, name)),
+            }
+            for name, verdict in choice.rows
+        ],
+    }
+
+
+def _letter(key: str, words: str) -> Markup:
+    return Markup('<span class="badge place-{}" aria-hidden="true">{}</span> {}').format(
+        key, key.upper(), words
+    )
+
+
+def _doubt_numbers(
+    student: Student, doubt: Doubt, first: CriterionDocument, speaker: Tongue
+) -> Iterator[tuple[str, Markup]]:
+    """Of a place the vector to it, beside the one expected; of a scale what was declared and drawn with."""
+    if doubt.kind == "node":
+        for choice in doubt.choices:
+            if choice.at is not None and choice.start is not None:
+                along = complex(choice.at[0] - choice.start[0], choice.start[1] - choice.at[1])
+                turn = math.degrees(cmath.phase(along)) % 360.0
+                cells = quantity_cells(Quantity(length_mm=abs(along), direction_deg=turn), speaker)
+                yield choice.key.upper(), Markup.escape(" · ".join(cells))
+        expected = Quantity(length_mm=first.expected.length_mm, direction_deg=first.expected.direction_deg)
+        yield speaker.gettext("Expected"), Markup.escape(" · ".join(quantity_cells(expected, speaker)))
+    elif doubt.kind == "scale":
+        for name, quantity in ((N_("Declared"), first.measured), (N_("Drawn with"), first.expected)):
+            cells = quantity_cells(quantity, speaker)
+            if cells:
+                yield speaker.gettext(name), Markup.escape(" · ".join(cells))
+    points = sum(one.max_points for one in student.report.criteria if one.id in doubt.criteria)
+    yield speaker.gettext("Points"), Markup.escape(f"– / {speaker.trimmed(points, 2)}")
+
+
+def _doubt_look(session: Session, student: Student, doubt: Doubt, first: CriterionDocument) -> Facts | None:
+    """Where to look: both strokes of a place, the writing of a scale, else the first vector."""
+    look = look_of(session, student, first)
+    if look is None:
+        return None
+    if doubt.kind == "owner":
+        return {**look, "box": (0.0, 0.0, *look["page_mm"]), "marks": ""}
+    if doubt.kind == "scale":
+        return {**look, **_written_at(session, student, doubt, look)}
+    places = [one for one in doubt.choices if one.at is not None]
+    if not places:
+        return look
+    if doubt.id.startswith(f"node:{MECHANISM}:"):
+        look = {**look, **_on_the_sketch(session, student)}
+    known = [point for one in places for point in (one.at, one.start) if point is not None]
+    box = box_around(known, LOOK_MARGIN_MM, LEAST_LOOK_MM, look["page_mm"])
+    return {
+        **look,
+        "box": box,
+        "marks": Markup("").join(_place_marks(one, box[2]) for one in reversed(places)),
+    }
+
+
+def _on_the_sketch(session: Session, student: Student) -> Facts:
+    """The sheet with the sketch, and its joints; nothing where there is none."""
+    standing = session.standing()
+    for sheet, document in enumerate(student.report.reading.sheets):
+        figure = document.figures.get("mechanism")
+        if figure is not None:
+            asked = {"student": student.key, "sheet": sheet, "run": session.runs}
+            nodes = [
+                {
+                    "figure": MECHANISM,
+                    "name": name,
+                    "x": node.x_mm,
+                    "y": node.y_mm,
+                    "seen": mark_of(standing.of(student, f"node:{MECHANISM}:{name}")),
+                }
+                for name, node in figure.nodes.items()
+            ]
+            return {"sheet": sheet, "scan": "scan?" + urlencode(asked), "nodes": nodes}
+    return {}
+
+
+def _place_marks(choice: Choice, wide_mm: float) -> Markup:
+    """A candidate stroke with its letter."""
+    (x, y), (sx, sy) = choice.at or (0.0, 0.0), choice.start or choice.at or (0.0, 0.0)
+    size = wide_mm / 100.0
+    away = complex(x - sx, y - sy)
+    away = away / abs(away) if away else 1.0
+    beside = {"a": -1j, "b": 1j}.get(choice.key, 1.0 + 0j)
+    lx, ly = (
+        x + size * (2.2 * away + 2.6 * away * beside).real,
+        y + size * (2.2 * away + 2.6 * away * beside).imag,
+    )
+    return Markup(
+        '<g class="place place-{key}" style="--mm:{size:.3f}">'
+        '<line x1="{sx:.2f}" y1="{sy:.2f}" x2="{x:.2f}" y2="{y:.2f}"/>'
+        '<circle cx="{x:.2f}" cy="{y:.2f}" r="{r:.2f}"/>'
+        '<text x="{lx:.2f}" y="{ly:.2f}">{letter}</text></g>'
+    ).format(
+        key=choice.key,
+        size=size,
+        sx=sx,
+        sy=sy,
+        x=x,
+        y=y,
+        r=0.9 * size,
+        lx=lx,
+        ly=ly,
+        letter=choice.key.upper(),
+    )
+
+
+def _written_at(session: Session, student: Student, doubt: Doubt, look: Facts) -> Facts:
+    """The box of a printed sheet that a scale is written in; the place of a caption is not known.
+
+    Then the lower right quarter is shown, where title blocks are, and the page says so.
+    """
+    scale = next((one.name for one in session.batch.rubric.criterion if one.id == doubt.id), doubt.id[-2:])
+    for sheet, page in enumerate(session.pages_of(student)):
+        if page.sheet is not None and any(SCALE_OF.get(figure) == scale for figure in page.sheet.zones):
+            x, y, wide, high = SCALE_BOXES[scale]
+            margin = 0.25 * wide
+            box = (x - margin, y - margin, wide + 2 * margin, high + 2 * margin)
+            asked = {"student": student.key, "sheet": sheet, "run": session.runs}
+            return {"sheet": sheet, "scan": "scan?" + urlencode(asked), "box": box, "marks": "", "nodes": []}
+    wide, high = look["page_mm"]
+    return {
+        "box": (0.5 * wide, 0.6 * high, 0.5 * wide, 0.4 * high),
+        "marks": "",
+        "nodes": [],
+        "note": "no_place",
+    }
