@@ -244,7 +244,9 @@ def _places(asked: _Asked, about: Sequence[CriterionDocument], node: str, figure
             candidates.append(place)
     sure = _right_as_read(touching, read)
     likely = sorted(_shared(candidates[:MOST_PLACES], sure), key=lambda one: -one[1])
-    starts = ((one, _start(asked, _vector(asked, one), node)) for one in touching)
+    starts = [(one, _start(asked, _vector(asked, one), node)) for one in touching]
+    if all(at is None for _, at in starts):
+        starts = [(one, _start(asked, _vector(asked, one), node, least=0.0)) for one in touching]
     vector, start = next(
         ((_vector(asked, one), at[0].at) for one, at in starts if at is not None), (None, None)
     )
@@ -265,7 +267,8 @@ def _places(asked: _Asked, about: Sequence[CriterionDocument], node: str, figure
         for key, (at, each) in zip("abc", likely, strict=False)
     )
     missing = tuple((one.id, "none") for one in touching)
-    return (*places, Choice("neither", missing)) if len(places) > 1 else ()
+    is_stroke = read is not None and start is not None
+    return (*places, Choice("neither", missing)) if len(places) > 1 or is_stroke else ()
 
 
 def _joint(asked: _Asked, about: Sequence[CriterionDocument], node: str, figure: str) -> tuple[Choice, ...]:
@@ -326,14 +329,17 @@ def _expected(asked: _Asked, about: Sequence[CriterionDocument], node: str) -> I
             yield start[0].at + start[1] * along
 
 
-def _start(asked: _Asked, vector: Vector, node: str) -> tuple[ReadNode, float] | None:
+def _start(
+    asked: _Asked, vector: Vector, node: str, least: float | None = None
+) -> tuple[ReadNode, float] | None:
     """The other end of a vector, if it was read for certain, and the sign of the vector from there."""
     if node not in {vector.tail, vector.head}:
         return None
     other, sign = (vector.tail, 1.0) if node == vector.head else (vector.head, -1.0)
-    if _sure(asked, other) < asked.least:
+    figure = asked.figures[asked.task.construction.figure_of(other)]
+    if other not in figure.nodes or _sure(asked, other) < (asked.least if least is None else least):
         return None
-    return asked.figures[asked.task.construction.figure_of(other)].nodes[other], sign
+    return figure.nodes[other], sign
 
 
 # What was read --------------------------------------------------------------------------------------

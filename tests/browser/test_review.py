@@ -99,7 +99,8 @@ def test_a_killed_server_has_kept_every_key(open_window, process):
     assert sorted(row.verdict for row in server.decisions().values()) == ["full", "none", "partial"]
     server.start()
     again = open_window(process)
-    assert again.open <= was_open - 3
+    # What was decided is evidence for other verdicts, and may leave one of them open.
+    assert again.open <= was_open - 2
     assert len(server.decisions()) == 3
 
 

@@ -304,6 +304,7 @@ function fetchQuestion(key) {
 async function showQuestion(keepView = false) {
   const row = current();
   if (!row) { showMode("done"); return; }
+  setReady(false);
   const question = await fetchQuestion(keyOf(row));
   if (current() !== row && keyOf(current() || {}) !== keyOf(row)) return;
   const same = state.question && keyOf(state.question) === keyOf(question);
