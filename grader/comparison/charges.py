@@ -10,11 +10,24 @@ from grader.comparison.follow_through import NO_SPREAD, Expectation, Explain, Fo
 from grader.comparison.own import known
 from grader.comparison.scales import Scale, followed_scales, used_scales
 from grader.comparison.task import Task, TaskSegment
-from grader.comparison.verdicts import EVEN, FULL, NONE, MarkRange, at_worst, the_better, tolerances, widened
+from grader.comparison.verdicts import (
+    EVEN,
+    FULL,
+    NONE,
+    OPENING,
+    MarkRange,
+    at_worst,
+    the_better,
+    tolerances,
+    widened,
+)
 from grader.outcomes import Reason
 from reference.construction.mistakes import line_of
 from reference.construction.steps import Given
 from reference.construction.uncertainty import EndSpread
+
+BY_HAND = frozenset({"hand_may_miss", "near_limit"})
+"""Reasons why a vector's verdict is open although it was read well."""
 
 
 class Against(Protocol):
@@ -68,6 +81,7 @@ class Charges:
     by_length : those of them whose direction is not known: they may be laid off the wrong way
     inherited : nodes that are right only as they follow from something charged
     doubtful : nodes and scales whose verdict is open
+    either : nodes that drafting errors may explain, or a mistake: read well, what follows from them is right
     shown : what the current criterion is the first to show; it is charged there, and followed after it
     known_causes : by node, the causes of its position (cache)
     factors : by scale, the common factor by which all values are wrong, or None (cache)
@@ -84,6 +98,7 @@ class Charges:
     by_length: set[str] = field(default_factory=set)
     inherited: set[str] = field(default_factory=set)
     doubtful: set[str] = field(default_factory=set)
+    either: set[str] = field(default_factory=set)
     shown: set[str] = field(default_factory=set)
     known_causes: dict[str, frozenset[str]] = field(default_factory=dict)
     factors: dict[str, float | None] = field(default_factory=dict)
@@ -263,10 +278,10 @@ class Charges:
         The first mistake that has not been is charged here.
         """
         causes = self.causes(expectation)
-        unpaid = causes - self.charged
+        unpaid = causes - self.charged - self.either
         if not unpaid and not causes & self.doubtful & self.settled.keys():
             return mark
-        if causes & self.doubtful:
+        if causes & (self.doubtful - self.either):
             return MarkRange(NONE, NONE, mark.best, mark.reasons, min(mark.sure, EVEN))
         if mark.is_full:
             self.shown.add(self.first(unpaid))
@@ -281,6 +296,9 @@ class Charges:
         """Record whether a node or scale has cost something, is in doubt, or is right."""
         if not mark.is_certain:
             self.doubtful.add(name)
+            opening = {reason.code for reason in mark.reasons} & OPENING
+            if opening and opening <= BY_HAND:
+                self.either.add(name)
         elif mark.share != FULL:
             self.charged.add(name)
         else:
