@@ -261,23 +261,17 @@ def _place_marks(choice: Choice, wide_mm: float) -> Markup:
         x + size * (2.2 * away + 2.6 * away * beside).real,
         y + size * (2.2 * away + 2.6 * away * beside).imag,
     )
+    # No style attributes: the page's policy refuses them.
     return Markup(
-        '<g class="place place-{key}" style="--mm:{size:.3f}">'
-        '<line x1="{sx:.2f}" y1="{sy:.2f}" x2="{x:.2f}" y2="{y:.2f}"/>'
-        '<circle cx="{x:.2f}" cy="{y:.2f}" r="{r:.2f}"/>'
-        '<text x="{lx:.2f}" y="{ly:.2f}">{letter}</text></g>'
+        '<g class="place place-{key}">'
+        '<line x1="{sx:.2f}" y1="{sy:.2f}" x2="{x:.2f}" y2="{y:.2f}" stroke-width="{thin:.2f}"'
+        ' stroke-dasharray="{dash:.2f} {gap:.2f}"/>'
+        '<circle cx="{x:.2f}" cy="{y:.2f}" r="{r:.2f}" stroke-width="{thin:.2f}"/>'
+        '<text x="{lx:.2f}" y="{ly:.2f}" font-size="{font:.2f}" stroke-width="{halo:.2f}">{letter}</text></g>'
     ).format(
-        key=choice.key,
-        size=size,
-        sx=sx,
-        sy=sy,
-        x=x,
-        y=y,
-        r=0.9 * size,
-        lx=lx,
-        ly=ly,
-        letter=choice.key.upper(),
-    )
+        key=choice.key, sx=sx, sy=sy, x=x, y=y, r=0.9 * size, lx=lx, ly=ly, letter=choice.key.upper(),
+        thin=0.4 * size, dash=2.0 * size, gap=1.2 * size, font=4.0 * size, halo=0.8 * size,
+    )  # fmt: skip
 
 
 def _written_at(session: Session, student: Student, doubt: Doubt, look: Facts) -> Facts:
