@@ -10,7 +10,7 @@ two hide no owner. The posterior has "somebody's data, but these" and "own data,
 import cmath
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -51,6 +51,7 @@ class Owner:
     probability : that the part follows these data
     not_own : that it does not follow the own data, whosever it follows
     rivals : other sets that it may follow as well, with their probabilities
+    has_directions : whether any direction is known, not lengths alone
     """
 
     data: Data
@@ -58,23 +59,30 @@ class Owner:
     probability: float
     not_own: float
     rivals: tuple[tuple[Data, float], ...] = ()
+    has_directions: bool = True
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether it is sure enough to be said."""
+        return self.not_own >= (NAMED if self.has_directions else NAMED_BY_LENGTHS)
 
     @property
     def of_whole(self) -> Data | None:
         """The data that the whole drawing follows, where that is sure."""
-        return self.data if self.part == MECHANISM and self.not_own >= NAMED else None
+        return self.data if self.part == MECHANISM and self.is_sure else None
 
     @property
     def named(self) -> NamedMistake | None:
         """The mistake that it is; None where that is not sure."""
-        if self.not_own < NAMED:
+        if not self.is_sure:
             return None
         others = tuple(_named(data, self.part, chance) for data, chance in self.rivals)
         return _named(self.data, self.part, self.probability, others)
 
 
-NAMED = 0.7
-"""From this probability on it is said whose data they are; below, a person is asked."""
+NAMED, NAMED_BY_LENGTHS = 0.9, 0.99
+"""From this probability on it is said whose data they are; below, a person is asked. Two mistakes may leave
+the lengths of another variant, hardly its directions."""
 
 
 def _named(data: Data, part: str, chance: float, rivals: tuple[NamedMistake, ...] = ()) -> NamedMistake:
@@ -113,7 +121,8 @@ def owner_of(task: Task, evidence: Evidence, declared: Mapping[str, str]) -> Own
         posterior = posterior_of(task, evidence, drawn, sets, scales)
         if posterior.not_own < LIKELY:
             return _crank_elsewhere(task, drawn)
-    return posterior.owner()
+    directed = any(one.is_angle.any() for one in rows.values())
+    return replace(posterior.owner(), has_directions=directed)
 
 
 def _crank_elsewhere(task: Task, drawn: DrawnParts) -> Owner | None:

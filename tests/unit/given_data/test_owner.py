@@ -8,7 +8,7 @@ import pytest
 
 from grader.comparison.evidence import Submission, gather
 from grader.comparison.task import Task, task_of
-from grader.given_data.owner import NAMED, owner_of
+from grader.given_data.owner import owner_of
 from grader.given_data.sets import CRANK
 from grader.marking.mark import judge
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Reading
@@ -71,7 +71,7 @@ def test_half_a_copy_is_known_with_the_plan_that_was_copied(source, plan):
     own, other = (handed_in(PUMP, drawn_nodes(task), source) for task in (PUMP, OTHER))
     found = owner(PUMP, with_plan(own, other, plan))
     assert (found.data.variant, found.part) == (Variant(n=20), plan)
-    assert found.not_own > NAMED
+    assert found.is_sure
 
 
 @pytest.mark.parametrize("source", SOURCES)
