@@ -78,7 +78,7 @@ def rows_of(task: Task, evidence: Evidence, drawn: Mapping[str, DrawnVector], ex
         np.array([one.reading for one in found]),
         np.array([one.by_scale == 0.0 for one in found], np.bool_),
         np.array([one.by_scale for one in found]),
-        np.array([max(LEAST_DOUBT, 1.0 - one.sure) for one in found]),
+        np.clip([1.0 - one.sure for one in found], LEAST_DOUBT, 1.0 - LEAST_DOUBT),
         np.array([one.is_back for one in found]).T.reshape(len(exact.data), len(found)),
     )
 
