@@ -15,8 +15,8 @@ from reference.construction.mistakes import Mistake, affected
 from reference.replay.explanations import COST_WINDOW, RARITY, Observations, by_node, cost_of_any
 from reference.replay.replay import Replay
 
-NOTHING_FITS = 11.0
-"""Cost of a plan, or of all, that follows no construction: one submission in about 250."""
+NOTHING_FITS, ONE_PLAN = 11.0, 15.0
+"""Cost of a submission that follows no construction, one in about 250; of one plan alone, rarer."""
 LEAST_NODES = 2
 """A plan with fewer observed nodes is not explained apart from the others."""
 
@@ -51,10 +51,15 @@ def with_nothing(
                 one.spent[figure] + observations.apart.get(figure, 0.0) - anything[figure]
                 for figure in figures
             )
-            if one.cost + NOTHING_FITS - gain > least + COST_WINDOW:
+            gain -= NOTHING_FITS if figures.issuperset(plans) else ONE_PLAN
+            if one.cost - gain > least + COST_WINDOW:
                 continue
             other = _without(one, figures, construction, gain, anything.keys() - figures, nodes)
-            key = (figures, frozenset((made.code, made.at) for made in other.made), other.unexplained)
+            key = (
+                figures,
+                frozenset((made.code, made.at) for made in other.made),
+                frozenset(other.unexplained),
+            )
             if key not in cheapest or other.cost < cheapest[key].cost:
                 cheapest[key] = other
     return sorted((*explanations, *cheapest.values()), key=lambda one: one.cost)
@@ -78,7 +83,7 @@ def _without(
     nodes: Mapping[str, Sequence[str]],
 ) -> Replay:
     """An explanation in which these figures are not explained, which costs less by the gain."""
-    cost, kept = explanation.cost + NOTHING_FITS - gain, []
+    cost, kept = explanation.cost - gain, []
     for one in explanation.made:
         at, shown = _figures_of(one, construction)
         if shown.intersection(others):
