@@ -88,7 +88,9 @@ def case_of(task: Task, evidence: Evidence, settled: Mapping[str, Scale], owner:
     if taken is not None:
         parameters |= taken.parameters
         parameters |= _scales_of_the_drawn_driver(task, evidence, parameters)
-    entries = _lengths_observed(task, evidence, parameters)
+    # Lengths have the errors of what was drawn, at whatever scale that was.
+    drawn_at = {name: np.asarray(other) for name, other in others.items()}
+    entries = _lengths_observed(task, evidence, {**parameters, **drawn_at})
     directions = _directions_of_the_sketch(task, evidence, {name: float(one) for name, one in used.items()})
     blank = _components_left_blank(task, evidence)
     best, *otherwise = (
