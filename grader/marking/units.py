@@ -84,7 +84,9 @@ def undone(
             if found is not None:
                 submission = replace(submission, measured=_changed(submission.measured, found.change))
                 slips += [(one, found.probability) for one in found.mistakes]
-    of_values = _values(task, submission.values, settled)
+    # Lengths in another unit looked like another scale.
+    are_lengths_off = any(mistake.at == "lengths" for mistake, _ in slips)
+    of_values = _values(task, submission.values, {} if are_lengths_off else settled)
     if of_values is not None:
         mistake, names, probability = of_values
         values = {
@@ -332,9 +334,9 @@ def _values(
     They are computed at the scales declared, right or wrong.
     """
     followed = {name: one.used.used / (one.other or one.used.used) for name, one in settled.items()}
-    right = {name: abs(real) * followed[task.scale_of(name)] for name, real in task.real.items()}
+    right = {name: abs(real) * followed.get(task.scale_of(name), 1.0) for name, real in task.real.items()}
     for name, rate in task.rates.items():
-        right[name] = rate * followed[task.scale_of(task.construction.rates[name].vector)]
+        right[name] = rate * followed.get(task.scale_of(task.construction.rates[name].vector), 1.0)
     known = {name: value for name, value in values.items() if value and right.get(name)}
     for unit, (kinds, factor) in VALUE_UNITS.items():
         names = [name for name in known if name[0] in kinds]
