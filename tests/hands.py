@@ -5,6 +5,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -73,7 +74,7 @@ def drawn_nodes(
     return nodes
 
 
-def changed(reading: Reading, name: str, **change: object) -> Reading:
+def changed(reading: Reading, name: str, **change: Any) -> Reading:
     """A reading with one vector changed."""
     figures = {}
     for plan, figure in reading.figures.items():
