@@ -404,6 +404,7 @@ CHANGES = {
     "least_confidence": 0.5,
     "follow_through": False,
     "least_followed_share": 0.4,
+    "values_alone": True,
     "criterion": criteria_with(points=7.0, follow_through=False, tolerance={"length_mm": 0.5}),
 }
 
