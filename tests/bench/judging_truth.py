@@ -5,7 +5,8 @@ forms: as its step rightly makes it from the student's own nodes before it (*due
 step makes it from the same nodes (*made*), and as it is in the exact plan at the scales that the
 drawing follows (*exact*). They are compared by the rubric's plain tolerances, without any widening:
 
-- *wrong*: made is off due by more than 2.5 tolerances. It is to be charged: ``none`` or ``partial``.
+- *wrong*: made is off due by more than 2.5 tolerances. It is to be charged: ``none`` or ``partial``. Of
+  several vectors that show one mistake where it was made, one is enough (`charged_once`).
 - *right*, or *follows* where due is off the exact by more than 2.5 tolerances: made is within one
   tolerance of due. It is to be credited, as full or as following.
 - *either*: between the two; what was wrongly made and came out nearly right; what follows from a mistake so
@@ -208,11 +209,27 @@ def verdicts_due(work: StudentWork, source: Source, visible: Visible) -> dict[st
 
 
 def charged_once(work: StudentWork, due: Mapping[str, Due], said: Mapping[str, str]) -> dict[str, Due]:
-    """A plan at a wrong scale is as well charged at the driven link's vector, from which the rest follows.
+    """The verdicts due, where a mistake is charged at one of several criteria that show it.
+
+    A wrong line moves its node, and all vectors that end there; letters exchanged touch several vectors: one
+    of them pays. A plan at a wrong scale is as well charged at the driven link's vector, from which the rest
+    follows.
 
     Arguments: `said` is the judge's verdict by criterion.
     """
-    found, vectors = dict(due), work.construction.vectors
+    found, vectors, ends = dict(due), work.construction.vectors, ends_of(work.construction)
+    for mistake in work.task.mistakes:
+        nodes = set(mistake.other) if mistake.code == "labels_swapped" else {mistake.at}
+        shown = [
+            one.id
+            for one in work.rubric.criterion
+            if one.name in vectors
+            and due[one.id] == "wrong"
+            and nodes & (set(ends[one.name]) if mistake.code == "labels_swapped" else {ends[one.name][1]})
+        ]
+        paying = [name for name in shown if said[name] in {"none", "partial"}]
+        if paying:
+            found.update(dict.fromkeys(set(shown) - set(paying), "either"))
     for scale in (one for one in work.rubric.criterion if one.scale and due[one.id] == "wrong"):
         first = [
             one.id
