@@ -2,7 +2,7 @@
 
 import cmath
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from grader.comparison.evidence import Submission
@@ -16,6 +16,7 @@ from reference.construction.mistakes import Mistake
 
 CERTAIN = 0.9
 """From this confidence on lines are judged under the right letters; below it each vector as it is named."""
+CREDITED = frozenset({"full", "follow_through"})
 Pair = tuple[str, str]
 
 
@@ -103,22 +104,30 @@ def _by_its_length(
 
 
 def letters_charged(
-    task: Task, outcomes: Sequence[Outcome], mistakes: Sequence[NamedMistake]
+    task: Task,
+    outcomes: Sequence[Outcome],
+    mistakes: Sequence[NamedMistake],
+    as_lettered: Callable[[Pair], Sequence[Outcome]],
 ) -> tuple[Outcome, ...]:
-    """The outcomes, one vector charged for each certain exchange of letters, and all that it touches told."""
+    """The outcomes, one vector charged for each certain exchange of letters, and all that it touches told.
+
+    Arguments: `as_lettered` gives the outcomes under the letters as they stand; the charged one is of these.
+    """
     found = list(outcomes)
     for one in mistakes:
         if one.code == "labels_swapped" and one.confidence >= CERTAIN:
-            reason = Reason(
-                "letters_exchanged", {"first": one.mistake.other[0], "second": one.mistake.other[1]}
-            )
+            first, second = one.mistake.other
+            reason = Reason("letters_exchanged", {"first": first, "second": second})
             touched = [place for place in _in_order(task, found) if _touches(task, found[place], one.mistake)]
+            paying = [place for place in touched if found[place].verdict in CREDITED]
+            lettered = as_lettered((first, second)) if paying else ()
+            shown = [place for place in paying if lettered[place].verdict not in CREDITED]
             for place in touched:
                 found[place] = replace(found[place], reasons=(reason, *found[place].reasons))
-            paying = [place for place in touched if found[place].verdict in {"full", "follow_through"}]
-            if paying:
-                lost = settled(found[paying[0]], NONE, one.confidence, reason)
-                found[paying[0]] = replace(lost, reasons=(reason,), mistake=one.code, cause=one)
+            for place in (shown or paying)[:1]:
+                lost = settled(lettered[place], NONE, one.confidence)
+                reasons = tuple(other for other in lost.reasons if other.code != "right") or (reason,)
+                found[place] = replace(lost, reasons=reasons, mistake=one.code, cause=one)
     return tuple(found)
 
 

@@ -100,9 +100,9 @@ def _judged(task: Task, submission: Submission, comparison: Comparison, owner: O
     explanations, lost = _explanations(task, comparison, owner)
     mistakes = _named(task, comparison, owner, explanations, lost)
     pair = exchanged_pair(mistakes)
+    used = {name: scale.used for name, scale in comparison.scales.items()}
     if pair is not None:
         letters = [one for one in mistakes if one.code == "labels_swapped"]
-        used = {name: scale.used for name, scale in comparison.scales.items()}
         submission = with_letters_exchanged(task, submission, pair, used)
         comparison = compare(task, submission, search)
         explanations, lost = _explanations(task, comparison, owner)
@@ -111,7 +111,12 @@ def _judged(task: Task, submission: Submission, comparison: Comparison, owner: O
     mistakes = (*mistakes, *_swapped_letters(task, submission, mistakes))
     mistakes = (*mistakes, *_not_drawn(task, comparison, mistakes))
     mistakes = (*mistakes, *_slips(task, comparison, mistakes))
-    outcomes = letters_charged(task, comparison.outcomes, mistakes)
+    outcomes = letters_charged(
+        task,
+        comparison.outcomes,
+        mistakes,
+        lambda pair: compare(task, with_letters_exchanged(task, submission, pair, used)).outcomes,
+    )
     outcomes, unfit = of_nothing(task, outcomes, not_explained(explanations))
     outcomes = at_stake(task.rubric, outcomes)
     if unfit is None or (owner is not None and owner.named is not None):
