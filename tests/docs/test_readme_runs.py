@@ -51,7 +51,11 @@ def _serves(command: list[str], desk: Path, environment: dict[str, str]) -> None
             said = [server.stdout.readline() for _ in range(2)]
         finally:
             server.send_signal(signal.SIGINT)
-        server.wait(timeout=60)
+        try:
+            server.wait(timeout=60)
+        finally:
+            # Nothing hangs where the signal is ignored, as below a shell's background job.
+            server.kill()
     assert "http://127.0.0.1:" in "".join(said)
 
 
