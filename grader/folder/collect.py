@@ -19,7 +19,7 @@ import numpy as np
 
 from grader.documents import CriterionDocument, ReportDocument, SaidDocument
 from grader.feedback.words import environment
-from grader.files import make_folder, write_whole
+from grader.files import guarded, make_folder, write_whole
 from grader.folder.batch import Batch, Graded, pages_read
 from grader.folder.cache import digest_of
 from grader.inputs.decision_texts import audit_answer
@@ -153,7 +153,7 @@ def _lines(rows: Sequence[Row]) -> str:
 
 def _table(cells: Sequence[tuple[str, str, str]]) -> str:
     buffer = io.StringIO()
-    csv.writer(buffer, lineterminator="\r\n").writerows([COLUMNS, *cells])
+    csv.writer(buffer, lineterminator="\r\n").writerows(map(guarded, row) for row in [COLUMNS, *cells])
     return buffer.getvalue()
 
 

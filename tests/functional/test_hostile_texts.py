@@ -26,7 +26,8 @@ FORMULAS = ["=1+1", "+1", "-1", "@SUM(A1)", " =1", "\ufeff=1", "＝1+1"]
 PDF_MARKUP = "<a href='http://evil.example'>Ana</a> <img src='/etc/passwd'/> (a\\) \u202eJohn & <b>"
 WRITERS = {
     "grader/authoring/variant_table.py", "grader/cli/checking.py", "grader/cycle/quantities.py",
-    "grader/folder/draft_roster.py", "grader/inputs/decisions.py", "grader/inputs/measurements.py",
+    "grader/folder/collect.py", "grader/folder/draft_roster.py", "grader/inputs/decisions.py",
+    "grader/inputs/measurements.py",
     "grader/lms/table.py",
 }  # fmt: skip
 """The files with a writer of tables: `grader/inputs/measurements.py` writes into memory, to read it again."""
