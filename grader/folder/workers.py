@@ -30,6 +30,8 @@ LOG = logging.getLogger("planmark")
 
 ENDED = frozenset({"crashed", "too_slow", "too_much_memory"})
 """Problems for which a call is tried once more, alone: another sheet may have taken time or memory."""
+_END_S = 3.0
+"""Seconds in which the threads of a pool end; they are daemons, and hold nothing up after that."""
 _WATCH_S = 0.05
 """The workers' memory is measured at this interval: a worker fills at most some 100 MB in this time."""
 _LOOK_S = 0.5
@@ -221,7 +223,12 @@ class Workers:
             for worker in _workers():
                 worker.kill()
             pool.stop()  # type: ignore[no-untyped-call]
-            pool.join()
+            # Interrupted while it starts, the pool's scheduler may wait for a call that never comes.
+            ending = threading.Thread(target=pool.join, daemon=True)
+            ending.start()
+            ending.join(_END_S)
+            for worker in _workers():
+                worker.kill()
 
     def _watch_memory(self) -> None:
         limit = self._limits.memory_mb * _MEGABYTE
