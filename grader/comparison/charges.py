@@ -71,8 +71,7 @@ def new_charges(task: Task, evidence: Evidence, settled: Mapping[str, Scale], ex
 class Charges:
     """The charges while criteria are marked in the order of construction.
 
-    A value that depends on a wrong node or scale may follow through only when that mistake has cost
-    something.
+    A value may follow through only when every mistake that it depends on has cost something.
 
     Attributes
     ----------

@@ -1,8 +1,7 @@
 """What is settled once all verdicts and mistakes are known together.
 
 A verdict that waits is settled where so little is left open that no verdict changes the score by more than
-the rubric's `stake`. Another student's
-data are never marked without saying so.
+the rubric's `stake`. Another student's data are never marked without saying so.
 """
 
 from collections.abc import Mapping, Sequence
