@@ -285,7 +285,7 @@ def result(made=(), **verdicts):
 
 def test_false_charges_and_false_credits_are_counted_apart():
     right = result(v_B="none", v_C="review")
-    wrong = result([Mistake("parallel_for_perpendicular", "b", 0)], v_B="full", v_BA="none")
+    wrong = result([Mistake("parallel_for_perpendicular", "b", 0)], v_B="full", v_BA="full")
     tally = JudgingTally()
     tally.add(right)
     assert tally.false_charges.hits == 1
@@ -293,10 +293,16 @@ def test_false_charges_and_false_credits_are_counted_apart():
     assert tally.false_credits.of == 0
     assert tally.accused.of == 1
     tally.add(wrong)
-    assert (tally.false_credits.hits, tally.false_credits.of) == (1, 2)
+    assert (tally.false_credits.hits, tally.false_credits.of) == (2, 2)
     assert (tally.named.hits, tally.named.of) == (0, 1)
     assert "v_B full (due: wrong)" in str(wrong)
     assert not right.is_clean
+
+
+def test_a_mistake_charged_at_one_of_the_vectors_that_show_it_is_no_false_credit_at_the_other():
+    tally = JudgingTally()
+    tally.add(result([Mistake("parallel_for_perpendicular", "b", 0)], v_B="full", v_BA="none"))
+    assert (tally.false_credits.hits, tally.false_credits.of) == (0, 1)
 
 
 def test_credit_given_for_what_follows_is_counted_of_all_that_follows():
