@@ -41,9 +41,10 @@ def measured(
     *,
     directions: bool = True,
     mistakes: tuple[Mistake, ...] = (),
+    by_similarity: bool = False,
 ) -> Reading:
     """All vectors as a perfect hand measures them, at some scales, with some mistakes followed through."""
-    nodes = drawn_nodes(task, scales, mistakes)
+    nodes = drawn_nodes(task, scales, mistakes, by_similarity=by_similarity)
     figures = {}
     for plan in task.construction.poles:
         vectors = {}
@@ -57,12 +58,16 @@ def measured(
 
 
 def drawn_nodes(
-    task: Task, scales: Mapping[str, float] | None = None, mistakes: tuple[Mistake, ...] = ()
+    task: Task,
+    scales: Mapping[str, float] | None = None,
+    mistakes: tuple[Mistake, ...] = (),
+    *,
+    by_similarity: bool = False,
 ) -> dict[str, complex]:
-    """All nodes as a perfect hand draws and names them."""
+    """All nodes as a perfect hand draws and names them, images of plates' points by similar triangles or not."""
     used = scales or rule_scales(task)
     parameters = {**task.parameters, **{name: np.asarray(used[name]) for name in ("kL", "kv", "ka")}}
-    drawing = Drawing(task.construction, parameters)
+    drawing = Drawing(task.by_similarity if by_similarity else task.construction, parameters)
     for mistake in mistakes:
         drawing = commit(mistake, drawing)
     found = evaluate(drawing.construction, drawing.parameters)

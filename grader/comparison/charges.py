@@ -82,7 +82,7 @@ class Charges:
     doubtful : nodes and scales whose verdict is open
     either : nodes that drafting errors may explain, or a mistake: read well, what follows from them is right
     shown : what the current criterion is the first to show; it is charged there, and followed after it
-    known_causes : by node, the causes of its position (cache)
+    known_causes : by node, and whether only its sense is open, the causes of its position (cache)
     factors : by scale, the common factor by which all values are wrong, or None (cache)
     """
 
@@ -99,7 +99,7 @@ class Charges:
     doubtful: set[str] = field(default_factory=set)
     either: set[str] = field(default_factory=set)
     shown: set[str] = field(default_factory=set)
-    known_causes: dict[str, frozenset[str]] = field(default_factory=dict)
+    known_causes: dict[tuple[str, bool], frozenset[str]] = field(default_factory=dict)
     factors: dict[str, float | None] = field(default_factory=dict)
 
     def best(self, segment: TaskSegment, against: Against, *, follows_through: bool) -> ComparedMark:
@@ -112,6 +112,8 @@ class Charges:
             marked = ComparedMark(against(exact, uncertainty), exact, uncertainty)
         if not marked.mark.is_full and follows_through:
             marked = self.followed_through(segment, against, marked)
+        if marked.mark.is_full:
+            self.shown.clear()
         self.charge_shown()
         if marked.is_trivial:
             return marked
@@ -251,10 +253,14 @@ class Charges:
     # What is wrong --------------------------------------------------------------------------------
 
     def causes_at(self, node: str) -> frozenset[str]:
-        """The causes of an own node's position, see `FollowThrough.causes_at`."""
-        if node not in self.known_causes:
-            self.known_causes[node] = self.following.causes_at(node)
-        return self.known_causes[node]
+        """The causes of an own node's position, see `FollowThrough.causes_at`.
+
+        Of a vector whose length was judged right only its sense is open.
+        """
+        key = node, node in self.by_length & self.cleared
+        if key not in self.known_causes:
+            self.known_causes[key] = self.following.causes_at(node, only_sense=key[1])
+        return self.known_causes[key]
 
     def is_by_length(self, segment: TaskSegment) -> bool:
         """Whether only the length is known of a vector that is laid off: its sense may be wrong."""
@@ -265,7 +271,7 @@ class Charges:
     def causes(self, expectation: Expectation) -> frozenset[str]:
         """The causes of what an expectation relies on, charged or not."""
         right = self.cleared - self.by_length
-        nodes = known(self.following.own(self.used)) | self.evidence.nodes.keys()
+        nodes = {step.node for step in self.task.construction.steps}
         found = set(expectation.causes)
         for name in expectation.relies_on - right:
             found |= self.causes_at(name) if name in nodes else {name}
@@ -282,7 +288,7 @@ class Charges:
             return mark
         if causes & (self.doubtful - self.either):
             return MarkRange(NONE, NONE, mark.best, mark.reasons, min(mark.sure, EVEN))
-        if mark.is_full:
+        if mark.share > NONE:
             self.shown.add(self.first(unpaid))
         return MarkRange(NONE, NONE, NONE, mark.reasons, mark.sure)
 

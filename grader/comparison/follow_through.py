@@ -25,6 +25,7 @@ from reference.construction.mistakes import Drawing, Mistake, commit, line_of
 from reference.construction.steps import Divide, Given, Similar, TwoLines
 from reference.construction.uncertainty import EndSpread, OwnNode, TracedDrawing, spread, trace
 from reference.geometry import ComplexArray
+from reference.numbers import dot
 from reference.replay.replay import Replay
 
 NO_SPREAD = EndSpread(0.0, 0.0)
@@ -330,14 +331,17 @@ class FollowThrough:
         made = self.from_nodes(segment, self.followed)
         return replace(made, vector=vector, causes=frozenset({segment.head}))
 
-    def causes_at(self, node: str) -> frozenset[str]:
+    def causes_at(self, node: str, *, only_sense: bool = False) -> frozenset[str]:
         """The causes of an own node's position beside the student's own earlier nodes.
 
         None where its step leads there; wrong scales, the first node of a turned plan, or wrong steps that
         lead there; the node itself where no known way does.
+
+        Arguments: with `only_sense` a step leads there that lays the node off to the same side.
         """
+        makes = self._lays_off if only_sense else self._makes
         for causes, scales, basis, by_similarity in self._ways(node):
-            if self._makes(node, self.traced(scales, basis, by_similarity=by_similarity)):
+            if makes(node, self.traced(scales, basis, by_similarity=by_similarity)):
                 return causes
         return frozenset({node})
 
@@ -359,6 +363,13 @@ class FollowThrough:
             basis = self.drawn_instead()
             if basis is not None and node not in basis.wrong:
                 yield self.causes_of(node, basis) | wrong, self.followed, basis, False
+
+    def _lays_off(self, node: str, traced: TracedDrawing) -> bool:
+        """Whether a drawing lays a node off to the side where the student has it; a short one to either."""
+        step = self.task.construction.step(node)
+        start = traced.nodes[step.start].at if isinstance(step, Given) else 0j
+        own, made = traced.nodes[node].at - start, traced.made[node].at - start
+        return abs(own) < self.task.tolerance_at(node).least_mm or dot(own, made) > 0.0
 
     def _makes(self, node: str, traced: TracedDrawing) -> bool:
         """Whether a drawing puts a node where the student has it, within tolerance or drafting errors."""

@@ -122,14 +122,16 @@ def nodes_from_lengths(task: Task, evidence: Evidence, sketch: PlanBasis) -> dic
     with np.errstate(all="ignore"):
         for step in sketch.construction.steps:
             ends = tracking.ends.get(step.node, [])
-            made = np.asarray(step.place(view)) + np.zeros(len(tracking.cost))
+            image = sketch.construction.images.get(step.node, step)
+            ways = [step] if image == step else [step, image]
+            made = [np.asarray(way.place(view)) + np.zeros(len(tracking.cost)) for way in ways]
             if ends:
                 tracking.settle(step, made, ends)
             elif _is_component(step) and step.node not in poles:
                 tracking.guessed.add(step.node)
                 tracking.part(step.node, [tracking.nodes[step.start]], made, [], [])
             else:
-                tracking.nodes[step.node] = made
+                tracking.nodes[step.node] = made[0]
     return tracking.best()
 
 
@@ -166,27 +168,32 @@ class _LengthBranches:
         """A rough standard error of a node by drawing and measuring: half the tolerance."""
         return self.task.rubric.tolerance.length_mm / 2.0
 
-    def settle(self, step: Step, made: ComplexArray, ends: Sequence[_Measured]) -> None:
-        """Place a node in each branch; branches divide where its lengths admit two positions."""
+    def settle(self, step: Step, made: Sequence[ComplexArray], ends: Sequence[_Measured]) -> None:
+        """Place a node in each branch; branches divide where its lengths admit several positions.
+
+        Arguments: `made` is where its step puts it, and where similar triangles would.
+        """
         directed = [one for one in ends if one.drawn.direction_rad is not None]
         if directed:
             directed.sort(key=lambda one: one.vector.tail in self.guessed)
             self.direct(step.node, made, directed)
         elif len(ends) == 1:
-            self.part(step.node, self._along(step, made, ends[0]), made, ends, ends)
+            positions = [place for one in made for place in self._along(step, one, ends[0])]
+            self.part(step.node, positions, made, ends, ends)
         else:
             pair, positions = self._meeting(ends)
             self.part(step.node, positions, made, pair, ends)
 
-    def direct(self, node: str, made: ComplexArray, ends: Sequence[_Measured]) -> None:
+    def direct(self, node: str, made: Sequence[ComplexArray], ends: Sequence[_Measured]) -> None:
         """Place a node at the end of the first of some vectors with directions.
 
         Branches in which its step or the other vectors put it elsewhere cost more.
         """
         positions = [self.nodes[one.vector.tail] + (one.drawn.as_complex or 0j) for one in ends]
         self.nodes[node] = place = positions[0]
-        for other in (made, *positions[1:]):
-            squared = (np.abs(other - place) / self.sigma_mm) ** 2
+        residuals = [_nearest(made, place), *(np.abs(other - place) for other in positions[1:])]
+        for residual in residuals:
+            squared = (residual / self.sigma_mm) ** 2
             self.cost = self.cost + np.where(squared <= AS_EXPECTED**2, squared, UNEXPECTED)
         self.is_known[node] = np.ones(len(self.cost), np.bool_)
         self.sources[node] = ends[:1]
@@ -211,15 +218,15 @@ class _LengthBranches:
         self,
         node: str,
         positions: Sequence[ComplexArray],
-        made: ComplexArray,
+        made: Sequence[ComplexArray],
         sources: Sequence[_Measured],
         ends: Sequence[_Measured],
     ) -> None:
         """Continue with each position and, where none is as expected, with the one that the step gives."""
         count, ways = len(self.cost), len(positions) + 1
-        every, index = np.concatenate([*positions, made]), np.tile(np.arange(count), ways)
+        every, index = np.concatenate([*positions, made[0]]), np.tile(np.arange(count), ways)
         is_known = np.arange(len(index)) < count * len(positions)
-        residual = np.abs(every - made[index]) / self.sigma_mm
+        residual = _nearest([one[index] for one in made], every) / self.sigma_mm
         is_expected = residual <= AS_EXPECTED
         total = (
             self.cost[index]
@@ -295,6 +302,11 @@ class _LengthBranches:
         row = np.asarray(u * r)
         row[column + 1] += across
         return row
+
+
+def _nearest(made: Sequence[ComplexArray], place: ComplexArray) -> FloatArray:
+    """The distances to the nearest of the places where a node may have been made, mm."""
+    return np.asarray(np.fmin.reduce([np.abs(one - place) for one in made]))
 
 
 def _is_component(step: Step) -> TypeGuard[Given]:

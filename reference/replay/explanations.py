@@ -46,6 +46,8 @@ SLIPS = (0.1, 0.5, 2.0, 10.0)
 """A decimal point, a half or a double: the commonest slips in computing a length."""
 RARER = 3.0
 """What a mistake costs more that is seldom made."""
+ANOTHER_WAY = 2.0
+"""Of an image found by similar triangles rather than by lines: one in three."""
 AN_OTHER_LINE = 3.0
 """And what it costs more to take a whole line that belongs to another vector: there are many."""
 SOMETHING_ELSE = 9.0
@@ -65,6 +67,7 @@ TINY = 1e-6
 SETTLING = 2
 """Steps in which a node is moved to the observed lengths."""
 
+BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 Covariance = tuple[float, float, float]
 """mm^2: variance along x, covariance, variance along y."""
 
@@ -278,7 +281,7 @@ class Repertoire:
         self.skill = skill
         self._wrong: dict[str, WrongSteps] = {}
         self._rarer: dict[str, WrongSteps] = {}
-        self._errors: dict[tuple[str, int], Errors] = {}
+        self._errors: dict[tuple[str, type[Step], int], Errors] = {}
 
     def wrong(self, step: Step) -> WrongSteps:
         """The mistakes that can be made in a step, with the step as each makes it."""
@@ -296,7 +299,7 @@ class Repertoire:
 
     def errors(self, step: Step, further: int) -> Errors:
         """The errors of a step's acts, with so many rows left free for further errors at the end."""
-        key = (step.node, further)
+        key = (step.node, type(step), further)
         if key not in self._errors:
             free = np.zeros((further, 1))
             own = step_errors(step, self.skill)
@@ -402,6 +405,14 @@ class StepContext:
     def right(self, step: Step) -> StepAlternatives:
         """The step as it should be made."""
         return self._alternatives(step, [(None, step)])
+
+    def by_similarity(self, step: Step, is_tried: BoolArray) -> StepAlternatives:
+        """The image of a link's point by similar triangles, where it is made by lines; in some branches."""
+        image = self.repertoire.construction.images.get(step.node)
+        if image is None or not isinstance(step, TwoLines):
+            return self._alternatives(step, [])
+        found = self._alternatives(image, [(None, image)])
+        return replace(found, cost=np.where(is_tried, found.cost + ANOTHER_WAY, np.inf))
 
     def wrong(self, step: Step) -> StepAlternatives:
         """The step with each usual mistake in it."""

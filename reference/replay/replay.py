@@ -23,6 +23,7 @@ from reference.replay.explanations import (
     COST_WINDOW,
     MOST_BRANCHES,
     SUSPECT,
+    BoolArray,
     NodeObservations,
     Observation,
     Observations,
@@ -35,7 +36,6 @@ from reference.replay.explanations import (
 )
 
 IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
-BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +152,7 @@ def _alternatives(
     is_guess = blind and not observed.fixes_place
     if not is_guess and not is_suspect.any():
         return right
-    wrong = context.wrong(step)
+    wrong = context.by_similarity(step, is_suspect) + context.wrong(step)
     if is_suspect.any() or isinstance(step, Given):
         rarer = context.rarer(step)
         if not isinstance(step, Given):
