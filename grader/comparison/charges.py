@@ -214,11 +214,11 @@ class Charges:
         )
 
     def the_better(self, marked: ComparedMark, expectation: Expectation, against: Against) -> ComparedMark:
-        """The mark so far, or the one against an expectation where that is better."""
+        """The mark so far, with that against an expectation where it leaves more, for certain or at best."""
         candidate = self.allowed(
             expectation, against(expectation.vector, expectation.uncertainty, expectation.se)
         )
-        if not candidate.is_better(marked.mark):
+        if not candidate.is_better(marked.mark) and candidate.best <= marked.mark.best:
             return marked
         return ComparedMark(
             the_better(candidate, marked.mark, *self.why(expectation)),
@@ -272,10 +272,11 @@ class Charges:
         """The causes of what an expectation relies on, charged or not."""
         right = self.cleared - self.by_length
         nodes = {step.node for step in self.task.construction.steps}
-        found = set(expectation.causes)
+        found: set[str] = set()
         for name in expectation.relies_on - right:
             found |= self.causes_at(name) if name in nodes else {name}
-        return frozenset(found - right) | (expectation.relies_on & self.charged)
+        # A wrong step may have left one vector within its tolerance and show in another.
+        return frozenset(found - right) | expectation.causes | (expectation.relies_on & self.charged)
 
     def allowed(self, expectation: Expectation, mark: MarkRange) -> MarkRange:
         """The mark for what follows, where every mistake that it follows from has been charged.

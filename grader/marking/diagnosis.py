@@ -419,14 +419,17 @@ def named(explanations: Sequence[Replay], construction: Construction, lost: Lost
 
 
 def sure_of(explanations: Sequence[Replay], least: float) -> list[Mistake]:
-    """The mistakes of the likeliest explanation that are this sure, unless they are slight."""
+    """The mistakes of the likeliest explanation that are this sure, unless they are slight.
+
+    Mistakes of one line, or of one vector laid off, are one here: all of them explain what was drawn there.
+    """
     if not explanations:
         return []
     shares = _Shares(explanations)
     return [
         one
         for one in explanations[0].made
-        if shares.of(_key(one)) >= least and not _is_slight(one, explanations[0])
+        if shares.made_at(one) >= least and not _is_slight(one, explanations[0])
     ]
 
 
@@ -469,6 +472,20 @@ class _Shares:
     def of(self, key: Key) -> float:
         """The share of the explanations with a mistake."""
         return sum(weight for made, weight in self._weights if key in made)
+
+    def made_at(self, mistake: Mistake) -> float:
+        """The share of the explanations with some mistake where one was made."""
+        if mistake.code in OF_THE_WHOLE | NO_STEPS:
+            return self.of(_key(mistake))
+        place = mistake.at, mistake.slot
+        return sum(
+            weight
+            for made, weight in self._weights
+            if any(
+                (one.at, one.slot) == place and one.code not in OF_THE_WHOLE | NO_STEPS
+                for one in made.values()
+            )
+        )
 
     def instead(self, key: Key, other: Key) -> float:
         """The share of the explanations with another mistake and without the first."""
