@@ -99,9 +99,11 @@ def _searched_further(case: Case, scales: Sequence[Root], explanations: Sequence
     scales = [*scales, *_scales_of_the_driver(case, best)]
     if not _is_explained(best) or not all(one.has_direction for one in case.observations.entries):
         whole = [Root(), *_of_the_whole(case)]
-    roots = [_both(scale, one) for one in whole for scale in scales]
+    by_scale = [[_both(scale, one) for one in whole] for scale in scales]
+    roots = [one for some in by_scale for one in some]
     cares = sorted({best.care, min(best.care, USUAL)})
-    found = _replayed(case, roots, cares) or [*explanations]
+    # Apart, as a search drops what costs much before anything is observed.
+    found = _by_cost(*(_replayed(case, some, cares) for some in by_scale)) or [*explanations]
     swaps = [*_swaps(case, found[0])]
     found = _by_cost(found, *(_replayed(case, scales, cares, swap) for swap in swaps))
     scale = _scale_of_slips(case, found[0])
@@ -306,7 +308,8 @@ def _swaps(case: Case, explanation: Replay) -> Iterator[Mistake]:
             v.head for v in construction.vectors_of(figure) if v.tail == pole and v.part not in {"n", "c"}
         )
         for pair in combinations(images, 2):
-            if off >= set(pair) or (off and _has_lengths_swapped(case, figure, pair, nodes)):
+            is_off = off or explanation.care > USUAL
+            if off >= set(pair) or (is_off and _has_lengths_swapped(case, figure, pair, nodes)):
                 yield Mistake("labels_swapped", pair[0], other=pair)
 
 
