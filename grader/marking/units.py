@@ -331,7 +331,7 @@ def _values(
 ) -> tuple[Mistake, frozenset[str], float] | None:
     """The unit of all computed values of a kind, where that is not the SI's, and which values these are.
 
-    They are computed at the scales declared, right or wrong.
+    They are computed at the scales declared, right or wrong. A unit is held against any other common factor.
     """
     followed = {name: one.used.used / (one.other or one.used.used) for name, one in settled.items()}
     right = {name: abs(real) * followed.get(task.scale_of(name), 1.0) for name, real in task.real.items()}
@@ -345,9 +345,12 @@ def _values(
         logs = np.log([abs(known[name] / right[name]) for name in names])
         sigmas = np.full(len(names), RELATIVE_SIGMA)
         residuals = (logs, logs - math.log(factor))
-        costs = [_cost(one, sigmas, VALUE_RANGE) for one in residuals]
-        best, probability = _chosen((costs[0], costs[1] + PRICE), 2.0 * math.log(VALUE_RANGE) * len(names))
-        if best and probability >= SURE and _share(residuals[0], sigmas) <= MOST_FIT:
+        as_asked, in_unit = (_cost(one, sigmas, VALUE_RANGE) for one in residuals)
+        any_factor = min(_cost(logs - one, sigmas, VALUE_RANGE) for one in logs)
+        any_factor += 2.0 * math.log(VALUE_RANGE * math.sqrt(len(names) / math.tau) / RELATIVE_SIGMA)
+        costs = (as_asked, in_unit + PRICE, any_factor + PRICE)
+        best, probability = _chosen(costs, 2.0 * math.log(VALUE_RANGE) * len(names))
+        if best == 1 and probability >= SURE and _share(residuals[0], sigmas) <= MOST_FIT:
             mistake = Mistake(UNITS, "values", other=("values", unit), factor=factor)
             return mistake, frozenset(names), probability
     return None
