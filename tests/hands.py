@@ -64,7 +64,7 @@ def drawn_nodes(
     *,
     by_similarity: bool = False,
 ) -> dict[str, complex]:
-    """All nodes as a perfect hand draws and names them, images of plates' points by similar triangles or not."""
+    """All nodes as a perfect hand draws and names them; images of plates' points by lines or similarity."""
     used = scales or rule_scales(task)
     parameters = {**task.parameters, **{name: np.asarray(used[name]) for name in ("kL", "kv", "ka")}}
     drawing = Drawing(task.by_similarity if by_similarity else task.construction, parameters)

@@ -1,5 +1,6 @@
 """The perfect hand has full marks everywhere; 0.9 of a tolerance costs nothing, 1.1 that criterion alone."""
 
+import cmath
 import random
 from dataclasses import replace
 
@@ -7,10 +8,11 @@ import pytest
 
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
-from grader.marking.mark import judge
+from grader.marking.mark import CHARGED, judge
 from grader.rubric import HandTable, rubric_of
 from reference.authored.assignment import built_in, load_assignment
-from tests.hands import changed, measured, task_for
+from reference.construction.mistakes import Drawing, single_mistakes
+from tests.hands import changed, drawn_nodes, measured, sheet, task_for
 
 WITHIN, BEYOND = 0.9, 1.1
 """Of a tolerance."""
@@ -87,3 +89,25 @@ def test_every_criterion_has_its_tolerance_to_itself(name, n, position):
         for criterion, reading in perturbations(task, share):
             judgement = judge(task, Submission(measured=reading))
             assert lost(judgement) == ([] if share < 1.0 else [criterion])
+
+
+TASKS = [("pump", 8, None), ("shaper", 5, None)]
+
+
+@pytest.mark.parametrize(("name", "n", "position"), TASKS)
+@pytest.mark.parametrize("source", ["sheet", "directions", "lengths"])
+def test_one_mistake_of_a_perfect_hand_costs_the_vectors_of_one_node(name, n, position, source):
+    """Whatever it is: what is drawn from there follows, and is not charged a second time."""
+    task = task_for(name, n, position)
+    drawing = Drawing(task.construction, task.parameters)
+    for mistake in (one for plan in task.construction.figures for one in single_mistakes(drawing, plan)):
+        if not all(map(cmath.isfinite, drawn_nodes(task, mistakes=(mistake,)).values())):
+            continue
+        if source == "sheet":
+            submission = Submission(readings=(sheet(task, mistakes=(mistake,)),))
+        else:
+            directions = source == "directions"
+            submission = Submission(measured=measured(task, directions=directions, mistakes=(mistake,)))
+        charged = [one.name for one in judge(task, submission).outcomes if one.verdict in CHARGED]
+        vectors = task.construction.vectors
+        assert len({vectors[one].head for one in charged if one in vectors}) <= 1, (mistake, charged)

@@ -54,4 +54,6 @@ def test_what_follows_from_an_image_by_similar_triangles_is_not_charged(n):
     """The image of C was found from a wrong b' by similarity: d' follows from it rightly."""
     left_out = ("a_CA_n", "a_CA_t", "a_CB_n", "a_CB_t")
     mistake = Mistake("normal_from_absolute", "n_BA")
-    assert charged_by_lengths(task_for("pump", n), mistake, by_similarity=True, left_out=left_out) <= {"a_BA_n"}
+    assert charged_by_lengths(task_for("pump", n), mistake, by_similarity=True, left_out=left_out) <= {
+        "a_BA_n"
+    }
