@@ -18,12 +18,12 @@ from grader.comparison.evidence import DrawnVector
 from grader.comparison.task import Task
 from grader.records import MECHANISM
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
-from reference.construction.elements import Parameters
+from reference.construction.elements import Nodes, Parameters, View
 from reference.construction.graph import Construction, evaluate, parameters_of
 from reference.construction.mistakes import (
     Drawing,
     Mistake,
-    commit,
+    changed_step,
     rarer_mistakes_of_step,
     single_mistakes,
 )
@@ -131,7 +131,11 @@ def _at(parameters: Parameters, index: int, count: int) -> dict[str, FloatArray]
 
 def _exact(construction: Construction, parameters: Parameters, data: tuple[Data, ...]) -> ExactDrawings:
     """The exact drawings; `parameters` are arrays over the sets."""
-    nodes = evaluate(construction, {**parameters, **AT_SCALE_ONE})
+    return _between(construction, evaluate(construction, {**parameters, **AT_SCALE_ONE}), data)
+
+
+def _between(construction: Construction, nodes: Nodes, data: tuple[Data, ...]) -> ExactDrawings:
+    """The vectors and links between nodes, arrays over the sets."""
     ends = {one.name: (one.tail, one.head) for one in construction.vectors.values()} | dict(
         construction.links
     )
@@ -166,16 +170,33 @@ def _own_otherwise(task: Task) -> ExactDrawings | None:
 
 
 def _own_with_mistakes(task: Task) -> ExactDrawings | None:
-    """The own data with each single mistake in a plan."""
-    right = Drawing(task.construction, {**task.parameters, **AT_SCALE_ONE})
-    own, made = Data("own", task.variant), []
-    for figure in task.construction.poles:
-        further = _driven_along(task.construction, figure), _letters_swapped(task.construction, figure)
-        for mistake in chain(single_mistakes(right, figure), *further):
-            if mistake.code not in {"scale_wrong", "rpm_not_converted", "figure_rotated"}:
-                drawing = commit(mistake, right)
-                made.append(_exact(drawing.construction, drawing.parameters, (own,)))
-    return _together(made)
+    """The own data with each single mistake in a plan: all of them drawn together, step by step."""
+    construction, parameters = task.construction, {**task.parameters, **AT_SCALE_ONE}
+    right = Drawing(construction, parameters)
+    made = [
+        mistake
+        for figure in construction.poles
+        for mistake in chain(
+            single_mistakes(right, figure),
+            _driven_along(construction, figure),
+            _letters_swapped(construction, figure),
+        )
+        if mistake.code not in {"scale_wrong", "rpm_not_converted", "figure_rotated"}
+    ]
+    nodes: dict[str, ComplexArray] = {}
+    view = View(nodes, parameters)
+    with np.errstate(all="ignore"):
+        for step in construction.steps:
+            nodes[step.node] = np.array(np.broadcast_to(step.place(view), len(made)))
+            for row, mistake in enumerate(made):
+                if mistake.at == step.node and mistake.code != "labels_swapped":
+                    place = np.broadcast_to(changed_step(mistake, construction).place(view), len(made))
+                    nodes[step.node][row] = place[row]
+    for row, mistake in enumerate(made):
+        if mistake.code == "labels_swapped":
+            first, second = (nodes[name] for name in mistake.other)
+            first[row], second[row] = second[row], first[row]
+    return _between(construction, nodes, (Data("own", task.variant),) * len(made)) if made else None
 
 
 def _letters_swapped(construction: Construction, figure: str) -> Iterator[Mistake]:
