@@ -9,16 +9,17 @@ two hide no owner. The posterior has "somebody's data, but these" and "own data,
 
 import cmath
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import chain, combinations
 
 import numpy as np
 
 from grader.comparison.evidence import DrawnVector, Evidence
 from grader.comparison.task import Task
-from grader.given_data.fit import ALIKE, TURNS, fit_of, is_clearly_own, nobodys
-from grader.given_data.rows import rows_of
-from grader.given_data.scales import by_scale, declared_scales, is_at_own_scales
+from grader.given_data.fit import fit_of, nobodys
+from grader.given_data.rows import joined, rows_of
+from grader.given_data.scales import by_scale, declared_scales
 from grader.given_data.sets import (
     CRANK,
     ELSEWHERE,
@@ -112,16 +113,13 @@ def owner_of(task: Task, evidence: Evidence, declared: Mapping[str, str]) -> Own
         return None
     everybody = own_first(drawn_by_variants(task), task)
     scales = declared_scales(task, declared)
-    rows = {part: rows_of(task, evidence, vectors, everybody) for part, vectors in drawn.items()}
-    if all(is_clearly_own(one) for one in rows.values()) and is_at_own_scales(task, evidence, scales):
-        return None
     for mistakes in (False, True):
         # Single mistakes are tried only where something else than the own data is likely.
         sets = sets_of(task, drawn, everybody, mistakes=mistakes)
         posterior = posterior_of(task, evidence, drawn, sets, scales)
         if posterior.not_own < LIKELY:
             return _crank_elsewhere(task, drawn)
-    directed = any(one.is_angle.any() for one in rows.values())
+    directed = any(one.direction_rad is not None for vectors in drawn.values() for one in vectors.values())
     return replace(posterior.owner(), has_directions=directed)
 
 
@@ -217,25 +215,31 @@ def posterior_of(
     exact, prior = sets
     is_own = np.array([one.kind == "own" for one in exact.data])
     is_other = np.array([one.kind == "other_variant" for one in exact.data])
-    likely, turn_rad = [], None
-    for part, vectors in drawn.items():
-        rows = rows_of(task, evidence, vectors, exact)
-        if not len(rows):
-            likely.append(np.zeros(len(prior)))
-            continue
-        turned = rows if turn_rad is None else rows.turned_back(turn_rad)
-        turns = TURNS if turn_rad is None or len(evidence.sketches) > 1 else ALIKE
-        fit = fit_of(turned, is_own, turns, is_plan=part != MECHANISM)
-        turn_rad = fit.turn_rad if turn_rad is None else turn_rad
-        likely.append(np.logaddexp(math.log1p(-NOBODYS) + fit.likely, math.log(NOBODYS) + nobodys(rows)))
-    together = np.array(likely) + np.array([by_scale(task, drawn[part], scales, exact) for part in drawn])
-    whole = np.log(prior) + together.sum(axis=0)
-    half = np.where(is_other, math.log(HALF_COPIED / max(int(is_other.sum()), 1)), -np.inf)
-    parts = {
-        part: half + together[row] + _rest(prior, together, row, is_own)
-        for row, part in enumerate(drawn)
-        if part != MECHANISM and len(drawn) > 1
+    rows = {part: rows_of(task, evidence, vectors, exact) for part, vectors in drawn.items()}
+    on_one_sheet = len(evidence.sketches) <= 1
+    fits = {
+        parts: fit_of(joined([rows[part] for part in parts]), is_own, on_one_sheet=on_one_sheet)
+        for parts in _subsets(tuple(drawn))
+        if parts
     }
+    scaled = {part: by_scale(task, drawn[part], scales, exact) for part in drawn}
+
+    def likely(parts: tuple[str, ...]) -> FloatArray:
+        """The log probability of parts that follow each set of data, or some of them none."""
+        ways = []
+        for follow in _subsets(parts):
+            none = sum(math.log(NOBODYS) + nobodys(rows[part]) for part in parts if part not in follow)
+            ways.append(len(follow) * math.log1p(-NOBODYS) + none + fits.get(follow, np.zeros(len(prior))))
+        return np.asarray(np.logaddexp.reduce(ways) + sum(scaled[part] for part in parts))
+
+    whole = np.log(prior) + likely(tuple(drawn))
+    half = np.where(is_other, math.log(HALF_COPIED / max(int(is_other.sum()), 1)), -np.inf)
+    parts = {}
+    for part in drawn:
+        rest = tuple(one for one in drawn if one != part)
+        if part != MECHANISM and rest:
+            of_rest = np.logaddexp.reduce((np.log(prior) + likely(rest))[is_own])
+            parts[part] = half + likely((part,)) + of_rest
     every = np.concatenate([whole, *parts.values()])
     top = float(every.max())
     total = float(np.exp(every - top).sum())
@@ -243,7 +247,6 @@ def posterior_of(
     return Posterior(exact.data, np.exp(whole - top) / total, chances)
 
 
-def _rest(prior: FloatArray, together: FloatArray, row: int, is_own: np.ndarray) -> float:
-    """The log probability of all parts but one by the own data."""
-    other = np.delete(together, row, axis=0).sum(axis=0)
-    return float(np.logaddexp.reduce((np.log(prior) + other)[is_own]))
+def _subsets(parts: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
+    """All subsets of parts, in their order; the empty one, too."""
+    return chain.from_iterable(combinations(parts, count) for count in range(len(parts) + 1))

@@ -4,8 +4,8 @@ Residuals are arrays (sets, rows) with the drafting errors that the construction
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,6 +23,7 @@ RULED_MM, SEEN_MM = 0.25, 0.1
 sheet, beside those of its ends."""
 NOTED_DEG = 0.5
 """Of a direction noted to a degree, beside that of the protractor."""
+IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 ZERO, ZERO_MM = 1e-9, 1e-6
 NO_DIRECTION = math.pi / 4.0
 """The residual of a direction that was drawn where the exact vector is zero: it fits in no way."""
@@ -30,7 +31,7 @@ NO_DIRECTION = math.pi / 4.0
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """The measurements of one part: residuals against each set of data, and their errors.
+    """The measurements of a drawing or a part of it: residuals against each set of data, and their errors.
 
     Attributes
     ----------
@@ -41,6 +42,7 @@ class Rows:
     by_scale : (rows,) how far a row moves with the logarithm of the plan's scale
     doubt : (rows,) probability that a row is of another vector
     reversed : (sets, rows) whether a direction fits only the opposite way
+    part : (rows,) the part of the drawing that a row is of
     """
 
     residuals: FloatArray
@@ -50,15 +52,25 @@ class Rows:
     by_scale: FloatArray
     doubt: FloatArray
     reversed: FloatArray
+    part: IntArray
 
     def __len__(self) -> int:
         return len(self.reading)
 
-    def turned_back(self, turn_rad: float) -> "Rows":
-        """The same rows of a drawing turned back by an angle."""
-        back = self.residuals - turn_rad
-        folded = back - math.pi * np.round(back / math.pi)
-        return replace(self, residuals=np.where(self.is_angle, folded, self.residuals))
+
+def joined(parts: Sequence[Rows]) -> Rows:
+    """The rows of several parts as those of one drawing."""
+    counts = [len(one) for one in parts]
+    return Rows(
+        np.concatenate([one.residuals for one in parts], axis=1),
+        np.concatenate([one.drafting for one in parts]),
+        np.concatenate([one.reading for one in parts]),
+        np.concatenate([one.is_angle for one in parts]),
+        np.concatenate([one.by_scale for one in parts]),
+        np.concatenate([one.doubt for one in parts]),
+        np.concatenate([one.reversed for one in parts], axis=1),
+        np.repeat(np.arange(len(parts)), counts),
+    )
 
 
 def rows_of(task: Task, evidence: Evidence, drawn: Mapping[str, DrawnVector], exact: ExactDrawings) -> Rows:
@@ -74,12 +86,13 @@ def rows_of(task: Task, evidence: Evidence, drawn: Mapping[str, DrawnVector], ex
             found.append(_length(task, evidence, name, one, expected))
     return Rows(
         np.array([one.residual for one in found]).T.reshape(len(exact.data), len(found)),
-        np.array([one.drafting for one in found]),
+        np.array([one.drafting for one in found]).reshape(len(found), -1),
         np.array([one.reading for one in found]),
         np.array([one.by_scale == 0.0 for one in found], np.bool_),
         np.array([one.by_scale for one in found]),
         np.clip([1.0 - one.sure for one in found], LEAST_DOUBT, 1.0 - LEAST_DOUBT),
         np.array([one.is_back for one in found]).T.reshape(len(exact.data), len(found)),
+        np.zeros(len(found), np.int64),
     )
 
 

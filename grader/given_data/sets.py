@@ -5,7 +5,9 @@ data with a crank angle that was misread. Exact drawings are arrays over the set
 """
 
 import cmath
+import functools
 import math
+import operator
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -241,6 +243,8 @@ COPIED, HALF_COPIED, MISREAD, ELSEWHERE_SHARE, NOBODYS = 0.01, 0.002, 0.005, 2e-
 crank's angle is misread; that the crank stands at any other angle; that a part follows no data at all."""
 IN_OTHER_ASSEMBLY, WITH_MISTAKE = 0.02, 0.3
 """Of the own data: in another assembly; with a single mistake in a plan, if that is looked at."""
+QUARTER = 0.02
+"""Of the own data: that a plan is turned by a quarter as a whole."""
 LEAST_TURNED_MM = 5.0
 """The direction of a shorter vector is too vague to tell anything."""
 
@@ -260,7 +264,25 @@ def sets_of(
         if more is not None:
             exact += more
             prior += [share / len(more.data)] * len(more.data)
-    return exact, np.array(prior)
+    return _with_plans_turned(task, exact, np.array(prior))
+
+
+def _with_plans_turned(
+    task: Task, exact: ExactDrawings, prior: FloatArray
+) -> tuple[ExactDrawings, FloatArray]:
+    """All sets, and the own ones with one or two of the plans turned by a quarter as a whole."""
+    own = np.array([one.kind == "own" for one in exact.data])
+    made, plans = [exact], tuple(task.construction.poles)
+    for turned in chain.from_iterable(combinations(plans, count) for count in range(1, len(plans) + 1)):
+        scales = {task.construction.vectors_of(plan)[0].scale for plan in turned}
+        with np.errstate(invalid="ignore"):
+            real = {
+                name: one[own] * (1j if task.segments[name].scale in scales else 1.0)
+                for name, one in exact.real.items()
+            }
+        made.append(ExactDrawings((Data("own", task.variant),) * int(own.sum()), real))
+        prior = np.concatenate([prior, prior[: len(own)][own] * QUARTER ** len(turned)])
+    return functools.reduce(operator.add, made), prior
 
 
 SAME_RAD = math.radians(2.5)
