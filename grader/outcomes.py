@@ -35,7 +35,7 @@ not_certainly_within  beyond, good_to, what                                  wit
 at_stake                                                                     too little is left open
 other_variant,        whose                                                  another student's data; the own
 data_misread                                                                 ones misread
-data_unclear                                                                 it may follow other data
+data_unclear          whose, confidence                                      it may follow other data
 not_explained         unfit, of                                              no explanation fits the plan
 hand_may_miss                                                                off by no more than a careful
                                                                              hand may miss what is

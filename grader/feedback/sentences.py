@@ -129,6 +129,10 @@ FULL: dict[str, str] = {
         " only what is certainly within counts."
     ),
     "other_variant": N_("The drawing follows another student's data (%(whose)s)."),
+    "data_unclear": N_(
+        "It may follow other data than the student's own (%(whose)s; probability %(confidence)s):"
+        " a person must look."
+    ),
     "letters_exchanged": N_(
         "The letters %(first)s and %(second)s stand at each other's point:"
         " it is compared under the right ones."

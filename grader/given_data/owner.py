@@ -73,12 +73,15 @@ class Owner:
         return self.data if self.part == MECHANISM and self.is_sure else None
 
     @property
-    def named(self) -> NamedMistake | None:
-        """The mistake that it is; None where that is not sure."""
-        if not self.is_sure:
-            return None
+    def likeliest(self) -> NamedMistake:
+        """The mistake that it is, if it is one."""
         others = tuple(_named(data, self.part, chance) for data, chance in self.rivals)
         return _named(self.data, self.part, self.probability, others)
+
+    @property
+    def named(self) -> NamedMistake | None:
+        """The mistake that it is; None where that is not sure."""
+        return self.likeliest if self.is_sure else None
 
 
 NAMED, NAMED_BY_LENGTHS = 0.9, 0.99
@@ -95,9 +98,12 @@ def _named(data: Data, part: str, chance: float, rivals: tuple[NamedMistake, ...
 
 # The posterior --------------------------------------------------------------------------------------
 
-LIKELY = 0.15
+LIKELY = 0.05
 """From this probability on that the data are not the own, single mistakes are tried beside them; if it stays
-as high, a person is asked."""
+as high, a person is asked: a copy marked in silence is as bad as twenty questions about honest sheets. The
+priors together are less."""
+CRANK_ASKED = 0.15
+"""Probability that is given to a crank which was sketched beyond all tolerances and not followed."""
 LEAST_RIVAL = 0.04
 """A set of data that is likelier is named beside the best. Between sets that are not the own, differences of
 the likelihood count half: errors of a hand are more alike than independent ones."""
@@ -139,7 +145,7 @@ def _crank_elsewhere(task: Task, drawn: DrawnParts) -> Owner | None:
         return None
     angle = float(task.parameters[CRANK]) + sketched
     data = Data("data_misread", task.variant, ELSEWHERE, {**task.parameters, CRANK: np.asarray(angle)})
-    return Owner(data, MECHANISM, LIKELY, LIKELY)
+    return Owner(data, MECHANISM, CRANK_ASKED, CRANK_ASKED)
 
 
 def _turned_by(task: Task, drawn: DrawnParts, name: str) -> float:

@@ -171,11 +171,11 @@ def _own_otherwise(task: Task) -> ExactDrawings | None:
     return _together(made)
 
 
-def _own_with_mistakes(task: Task) -> ExactDrawings | None:
-    """The own data with each single mistake in a plan: all of them drawn together, step by step."""
-    construction, parameters = task.construction, {**task.parameters, **AT_SCALE_ONE}
-    right = Drawing(construction, parameters)
-    made = [
+def mistakes_in_plans(task: Task) -> list[Mistake]:
+    """Each single mistake in a plan that changes its shape."""
+    construction = task.construction
+    right = Drawing(construction, {**task.parameters, **AT_SCALE_ONE})
+    return [
         mistake
         for figure in construction.poles
         for mistake in chain(
@@ -185,6 +185,12 @@ def _own_with_mistakes(task: Task) -> ExactDrawings | None:
         )
         if mistake.code not in {"scale_wrong", "rpm_not_converted", "figure_rotated"}
     ]
+
+
+def drawn_with_mistakes(task: Task) -> ExactDrawings | None:
+    """The own data with each of `mistakes_in_plans`: all of them drawn together, step by step."""
+    made = mistakes_in_plans(task)
+    construction, parameters = task.construction, {**task.parameters, **AT_SCALE_ONE}
     nodes: dict[str, ComplexArray] = {}
     view = View(nodes, parameters)
     with np.errstate(all="ignore"):
@@ -256,7 +262,7 @@ def sets_of(
     exact, others = everybody, max(len(everybody.data) - 1, 1)
     prior = [1.0 - COPIED - MISREAD, *([COPIED / others] * (len(everybody.data) - 1))]
     assemblies = task.cached(("owner", "assemblies"), lambda: _own_otherwise(task))
-    wrong = task.cached(("owner", "mistakes"), lambda: _own_with_mistakes(task)) if mistakes else None
+    wrong = task.cached(("owner", "mistakes"), lambda: drawn_with_mistakes(task)) if mistakes else None
     misread = task.cached(("owner", "misread"), lambda: _misread(task, _misread_angles(task)))
     elsewhere = _misread(task, _drawn_angles(task, drawn))
     shares = (IN_OTHER_ASSEMBLY, WITH_MISTAKE, MISREAD, ELSEWHERE_SHARE)

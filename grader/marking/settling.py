@@ -64,8 +64,7 @@ def is_of(task: Task, name: str, part: str) -> bool:
 def _of_another(outcome: Outcome, named: NamedMistake, *, earns_none: bool) -> Outcome:
     if outcome.verdict == "not_judged":
         return outcome
-    detail = {key: value for key, value in named.detail.items() if key != "part"}
-    whose = Reason(named.code, {"whose": ", ".join(f"{key} = {value}" for key, value in detail.items())})
+    whose = Reason(named.code, {"whose": _whose(named)})
     if earns_none:
         lost = settled(outcome, NONE, named.confidence, whose)
         return replace(lost, mistake=named.code, cause=named)
@@ -76,7 +75,14 @@ def _unclear(outcome: Outcome, owner: Owner) -> Outcome:
     """An outcome that a person decides, as likely as the data are the own."""
     if outcome.verdict == "not_judged":
         return outcome
-    return _asked(outcome, Reason("data_unclear"), outcome.probability * (1.0 - owner.not_own))
+    each = "; ".join(_whose(one) for one in (owner.likeliest, *owner.likeliest.rivals))
+    why = Reason("data_unclear", {"whose": each, "confidence": owner.not_own})
+    return _asked(outcome, why, outcome.probability * (1.0 - owner.not_own))
+
+
+def _whose(mistake: NamedMistake) -> str:
+    """The number of another student, or the angle at which the crank stands."""
+    return ", ".join(f"{key} = {value}" for key, value in mistake.detail.items() if key != "part")
 
 
 def _asked(outcome: Outcome, why: Reason, probability: float) -> Outcome:

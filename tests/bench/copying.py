@@ -15,7 +15,6 @@ were used to set the constants of `grader.given_data`; the rest measure.
 import argparse
 import pickle
 import tempfile
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -70,8 +69,25 @@ class Copied:
     source: Source
     how: str
     apart: int
-    is_told: bool
-    is_named_rightly: bool
+    said: "Said"
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What was made of one submission.
+
+    Attributes
+    ----------
+    is_named : other data are named as a mistake
+    is_asked : a person is asked whether the data are others
+    has_number : the number whose data they are is among those named or asked for
+    waits : it is not marked without a person
+    share : of the points, that it may get
+    """
+
+    is_named: bool
+    is_asked: bool
+    has_number: bool
     waits: bool
     share: float
 
@@ -124,7 +140,7 @@ def judged_copy(key: StudentKey, source: Source, how: How) -> Copied:
     """A copied submission, judged."""
     task, handed_in, other = copied(key, source, how)
     judgement = judge(task, handed_in)
-    return Copied(key, source, how, _apart(task.variant, other), *_said(judgement, other))
+    return Copied(key, source, how, _apart(task.variant, other), _said(judgement, other))
 
 
 def _apart(one: Variant, other: Variant) -> int:
@@ -132,12 +148,26 @@ def _apart(one: Variant, other: Variant) -> int:
     return abs((one.n or 0) - (other.n or 0)) + abs((one.position or 0) - (other.position or 0))
 
 
-def _said(judgement: Judgement, other: Variant | None) -> tuple[bool, bool, bool, float]:
-    told = [one for one in judgement.mistakes if one.code in OWNERS]
-    numbers = {(each.mistake.n, each.mistake.position) for one in told for each in (one, *one.rivals)}
-    is_right = other is not None and (other.n, other.position) in numbers
+def _said(judgement: Judgement, other: Variant | None) -> Said:
+    named = [one for one in judgement.mistakes if one.code in OWNERS]
+    asked = {
+        str(reason.params["whose"])
+        for one in judgement.outcomes
+        for reason in one.reasons
+        if reason.code == "data_unclear"
+    }
+    numbers = {f"{each.mistake.n}, {each.mistake.position}" for one in named for each in (one, *one.rivals)}
+    numbers |= {_number(one) for each in asked for one in each.split("; ")}
+    has_number = other is not None and f"{other.n}, {other.position}" in numbers
     waits = judgement.needs_review or judgement.score.high == 0.0
-    return bool(told), is_right, waits, judgement.score.high / judgement.score.maximum
+    share = judgement.score.high / judgement.score.maximum
+    return Said(bool(named), bool(asked), has_number, waits, share)
+
+
+def _number(whose: str) -> str:
+    """The number and position in what a question says."""
+    said = dict(one.split(" = ") for one in whose.split(", "))
+    return f"{said.get('n')}, {said.get('position')}"
 
 
 def honest(key: StudentKey, source: Source) -> Copied | None:
@@ -149,7 +179,7 @@ def honest(key: StudentKey, source: Source) -> Copied | None:
     if any(one.code == "other_variant" for one in work.task.mistakes):
         return None
     judgement = judge(task_of(work.assignment, work.rubric, work.variant), submission(work, source))
-    return Copied(key, source, "honest", 0, *_said(judgement, None))
+    return Copied(key, source, "honest", 0, _said(judgement, None))
 
 
 # Scans ---------------------------------------------------------------------------------------------
@@ -222,11 +252,10 @@ def judged_scan(kind: str, read: ReadCopy) -> Copied:
     is_copy = read.own != read.drawn
     how = f"{kind}, copied" if is_copy else "honest"
     if not drawn:
-        return Copied(
-            read.key, "scans", how, 99, is_told=False, is_named_rightly=False, waits=True, share=0.0
-        )
+        unread = Said(is_named=False, is_asked=False, has_number=False, waits=True, share=0.0)
+        return Copied(read.key, "scans", how, 99, unread)
     judgement = judge(task, Submission(readings=drawn, declared=read.declared))
-    return Copied(read.key, "scans", how, _apart(read.own, read.drawn), *_said(judgement, read.drawn))
+    return Copied(read.key, "scans", how, _apart(read.own, read.drawn), _said(judgement, read.drawn))
 
 
 @dataclass(slots=True)
@@ -240,10 +269,11 @@ class CopyingFigures:
         heads = [
             "copies",
             "submissions",
-            "told",
-            "with the number",
+            "named",
+            "told with the number",
             "settled without a person",
             "of it neighbours",
+            "of it right by the own data",
         ]
         copies = [one for one in self.submissions if one.how != "honest"]
         groups = {f"{source}, {how}": [one for one in copies if (one.source, one.how) == (source, how)]
@@ -261,22 +291,35 @@ class CopyingFigures:
         groups["all"] = own
         yield (
             "Honest submissions",
-            ["own data", "submissions", "accused"],
+            ["own data", "submissions", "accused", "a person asked"],
             [
-                [name, str(len(ones)), str(sum(one.is_told for one in ones))]
+                [
+                    name,
+                    str(len(ones)),
+                    str(sum(one.said.is_named for one in ones)),
+                    str(sum(one.said.is_asked for one in ones)),
+                ]
                 for name, ones in groups.items()
                 if ones
             ],
         )
 
 
+RIGHT = 0.95
+"""From this share of the points on a drawing counts as right by the own data."""
+
+
 def _row(name: str, ones: Sequence[Copied]) -> list[str]:
-    missed = [one for one in ones if not one.waits]
-    count = Counter({True: sum(one.apart < LEAST_APART for one in missed)})
+    settled = [one for one in ones if not one.said.waits]
     return [
-        name, str(len(ones)), _percent(sum(one.is_told for one in ones), len(ones)),
-        _percent(sum(one.is_named_rightly for one in ones), len(ones)), str(len(missed)), str(count[True]),
-    ]  # fmt: skip
+        name,
+        str(len(ones)),
+        _percent(sum(one.said.is_named for one in ones), len(ones)),
+        _percent(sum(one.said.has_number for one in ones), len(ones)),
+        str(len(settled)),
+        str(sum(one.apart < LEAST_APART for one in settled)),
+        str(sum(one.said.share >= RIGHT for one in settled)),
+    ]
 
 
 def _percent(part: int, whole: int) -> str:

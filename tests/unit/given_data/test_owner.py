@@ -8,14 +8,16 @@ import pytest
 
 from grader.comparison.evidence import Submission, gather
 from grader.comparison.task import Task, task_of
+from grader.feedback.sentences import reason_sentence
 from grader.given_data.owner import owner_of
-from grader.given_data.sets import CRANK
+from grader.given_data.sets import AT_SCALE_ONE, CRANK, drawn_with_mistakes, mistakes_in_plans
+from grader.language import tongue
 from grader.marking.mark import judge
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Reading
 from grader.rubric import DoubtTable
 from reference.authored.assignment import Variant
 from reference.construction.graph import evaluate
-from reference.construction.mistakes import Mistake
+from reference.construction.mistakes import Drawing, Mistake, commit
 from samples.simulation import TYPICAL
 from samples.simulation.wording import declared_texts
 from tests.hands import drawn_by, drawn_nodes, handed_in, measured, rule_scales, sheet, task_for
@@ -139,24 +141,55 @@ def test_another_variants_data_earn_none_where_the_rubric_says_so_whatever_is_de
     assert judge(task, copied).score.total == 0.0
 
 
-def test_what_is_less_sure_is_left_to_a_person_without_a_name(monkeypatch):
+def test_what_is_less_sure_is_left_to_a_person_with_the_number_without_a_name(monkeypatch):
     monkeypatch.setattr("grader.given_data.owner.NAMED", 1.1)
     judgement = judge(PUMP, Submission(measured=measured(OTHER)))
     assert judgement.score.total is None
     assert "other_variant" not in {one.code for one in judgement.mistakes}
-    assert "data_unclear" in {one.reasons[0].code for one in judgement.outcomes if one.reasons}
+    first = [one.reasons[0] for one in judgement.outcomes if one.verdict == "review"]
+    asked = [one for one in first if one.code == "data_unclear"]
+    assert asked
+    assert str(asked[0].params["whose"]).startswith("n = 20")
+    assert "(n = 20" in reason_sentence(asked[0], tongue("en"), "full")
+
+
+def test_all_mistakes_together_draw_what_each_draws_by_itself():
+    right = Drawing(PUMP.construction, {**PUMP.parameters, **AT_SCALE_ONE})
+    made, together = mistakes_in_plans(PUMP), drawn_with_mistakes(PUMP)
+    assert {"labels_swapped", "wrong_link", "image_mirrored", "normal_missing"} <= {one.code for one in made}
+    for row, mistake in enumerate(made):
+        drawing = commit(mistake, right)
+        nodes = evaluate(drawing.construction, drawing.parameters)
+        for name, vector in drawing.construction.vectors.items():
+            with np.errstate(invalid="ignore"):
+                alone = complex(nodes[vector.head] - nodes[vector.tail])
+            np.testing.assert_allclose(together.real[name][row], alone, atol=1e-9, err_msg=f"{mistake}")
+
+
+@pytest.mark.parametrize("source", ["sheet", "directions"])
+@pytest.mark.parametrize("plan", [VELOCITY_PLAN, ACCELERATION_PLAN])
+def test_a_plan_that_does_not_follow_the_error_of_its_own_sketch_is_known(plan, source):
+    near = task_of(PUMP.assignment, PUMP.rubric, Variant(n=9))
+    off = misread_by(PUMP, float(PUMP.parameters[CRANK]) - math.radians(1.6))
+    own, other = handed_in(PUMP, drawn_nodes(off), source), handed_in(near, drawn_nodes(near), source)
+    assert owner(PUMP, own) is None
+    found = owner(PUMP, with_plan(own, other, plan))
+    assert (found.data.variant, found.part) == (Variant(n=9), plan)
+    assert found.is_sure
 
 
 def test_neighbours_that_drafting_errors_may_make_of_each_other_are_not_accused():
     near = task_of(PUMP.assignment, PUMP.rubric, Variant(n=8))
-    assert owner(PUMP, Submission(measured=measured(near))) is None
+    found = owner(PUMP, Submission(measured=measured(near)))
+    assert found is None or not found.is_sure
 
 
 def test_little_evidence_accuses_nobody():
     few = measured(OTHER)
     plan = few.figures[VELOCITY_PLAN]
     one = replace(plan, vectors={"v_B": plan.vectors["v_B"]})
-    assert owner(PUMP, Submission(measured=Reading({VELOCITY_PLAN: one}))) is None
+    found = owner(PUMP, Submission(measured=Reading({VELOCITY_PLAN: one})))
+    assert found is None or not found.is_sure
     assert owner(PUMP, Submission()) is None
 
 
