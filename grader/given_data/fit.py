@@ -26,12 +26,10 @@ SCREENED = 8
 """So many sets of data, the nearest ones, are held against a part in full."""
 
 
-def fit_of(rows: Rows, is_own: BoolArray, *, on_one_sheet: bool) -> FloatArray:
+def fit_of(rows: Rows, is_own: BoolArray) -> FloatArray:
     """The log probability of rows by each set of data, the first of which is the own; (sets,).
 
     Sets that are far from all rows are -inf.
-
-    Arguments: `on_one_sheet` where all parts of the drawing are turned alike.
     """
     found = np.full(len(rows.residuals), -np.inf)
     is_there: BoolArray = np.asarray(np.isfinite(rows.residuals).all(axis=1))
@@ -39,7 +37,7 @@ def fit_of(rows: Rows, is_own: BoolArray, *, on_one_sheet: bool) -> FloatArray:
     is_like_own = (np.abs(residuals - residuals[0]) < ZERO).all(axis=1)
     chosen = _nearest(np.where(is_there & ~is_like_own, _apart_from(rows, residuals), np.inf), is_own)
     chosen[0] = is_there[0]
-    found[chosen] = _fitted(rows, residuals[chosen], on_one_sheet=on_one_sheet)
+    found[chosen] = _fitted(rows, residuals[chosen])
     # A mistake in another part leaves these as they are.
     found[is_like_own] = found[0]
     for part in np.unique(rows.part):
@@ -87,7 +85,7 @@ OUTLYING = 16.0
 """Squared standard deviations from which on it does not matter how far a row is off."""
 
 
-def _fitted(rows: Rows, residuals: FloatArray, *, on_one_sheet: bool) -> FloatArray:
+def _fitted(rows: Rows, residuals: FloatArray) -> FloatArray:
     """The log likelihoods of residuals over all sizes of drafting errors and turns; (sets,).
 
     The rows are jointly normal: errors propagate, so that one error of the crank turns all of them. Outliers
@@ -95,7 +93,7 @@ def _fitted(rows: Rows, residuals: FloatArray, *, on_one_sheet: bool) -> FloatAr
     (a Cholesky factorisation of it with pivots).
     """
     ways = [(care, math.radians(turn), one * other) for care, one in CARES for turn, other in TURNS]
-    covariance = np.array([_covariance(rows, care, turn, on_one_sheet) for care, turn, _ in ways])
+    covariance = np.array([_covariance(rows, care, turn) for care, turn, _ in ways])
     start = np.linalg.inv(covariance)
     sets, count = residuals.shape
     way = np.repeat(np.arange(len(ways)), sets)
@@ -126,14 +124,14 @@ def _fitted(rows: Rows, residuals: FloatArray, *, on_one_sheet: bool) -> FloatAr
     return np.asarray(np.logaddexp.reduce(likely.reshape(len(ways), sets) + shares[:, None]))
 
 
-def _covariance(rows: Rows, care: float, turn_rad: float, on_one_sheet: bool) -> FloatArray:
+def _covariance(rows: Rows, care: float, turn_rad: float) -> FloatArray:
     """The covariance matrix of the rows with one size of drafting errors and of turns on the sheet."""
     moved, angles = care * rows.drafting, np.outer(rows.is_angle, rows.is_angle)
     same = rows.part[:, None] == rows.part
     covariance = moved @ moved.T + np.diag(rows.reading**2)
     covariance += ANY_SCALE**2 * same * np.outer(rows.by_scale, rows.by_scale)
     covariance += ALIKE_RAD**2 * same * angles
-    return np.asarray(covariance + turn_rad**2 * (angles if on_one_sheet else same * angles))
+    return np.asarray(covariance + turn_rad**2 * angles * (rows.sheet[:, None] == rows.sheet))
 
 
 def _of_outliers(rows: Rows, residuals: FloatArray) -> FloatArray:

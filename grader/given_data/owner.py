@@ -102,6 +102,9 @@ LIKELY = 0.05
 """From this probability on that the data are not the own, single mistakes are tried beside them; if it stays
 as high, a person is asked: a copy marked in silence is as bad as twenty questions about honest sheets. The
 priors together are less."""
+APART = 0.01
+"""Probability that the parts were not drawn from each other: a sketch drawn anew after the plans, a plan
+drawn with another care."""
 CRANK_ASKED = 0.15
 """Probability that is given to a crank which was sketched beyond all tolerances and not followed."""
 LEAST_RIVAL = 0.04
@@ -221,10 +224,13 @@ def posterior_of(
     exact, prior = sets
     is_own = np.array([one.kind == "own" for one in exact.data])
     is_other = np.array([one.kind == "other_variant" for one in exact.data])
-    rows = {part: rows_of(task, evidence, vectors, exact) for part, vectors in drawn.items()}
-    on_one_sheet = len(evidence.sketches) <= 1
+    second = () if _has_one_sketch(task, evidence) else (ACCELERATION_PLAN,)
+    rows = {
+        part: rows_of(task, evidence, vectors, exact, sheet=int(part in second))
+        for part, vectors in drawn.items()
+    }
     fits = {
-        parts: fit_of(joined([rows[part] for part in parts]), is_own, on_one_sheet=on_one_sheet)
+        parts: fit_of(joined([rows[part] for part in parts]), is_own)
         for parts in _subsets(tuple(drawn))
         if parts
     }
@@ -235,7 +241,10 @@ def posterior_of(
         ways = []
         for follow in _subsets(parts):
             none = sum(math.log(NOBODYS) + nobodys(rows[part]) for part in parts if part not in follow)
-            ways.append(len(follow) * math.log1p(-NOBODYS) + none + fits.get(follow, np.zeros(len(prior))))
+            none += len(follow) * math.log1p(-NOBODYS)
+            ways.append(none + fits.get(follow, np.zeros(len(prior))))
+            if len(follow) > 1:
+                ways.append(none + math.log(APART) + sum(fits[(part,)] for part in follow))
         return np.asarray(np.logaddexp.reduce(ways) + sum(scaled[part] for part in parts))
 
     whole = np.log(prior) + likely(tuple(drawn))
@@ -251,6 +260,15 @@ def posterior_of(
     total = float(np.exp(every - top).sum())
     chances = {part: np.exp(one - top) / total for part, one in parts.items()}
     return Posterior(exact.data, np.exp(whole - top) / total, chances)
+
+
+def _has_one_sketch(task: Task, evidence: Evidence) -> bool:
+    """Whether both plans follow the same sketch: as read, else as the assignment has its pages."""
+    sketches = list(evidence.sketches.values())
+    if len(sketches) > 1:
+        return all(one == sketches[0] for one in sketches)
+    pages = task.assignment.file.page
+    return any({VELOCITY_PLAN, ACCELERATION_PLAN} <= set(page.figures) for page in pages)
 
 
 def _subsets(parts: tuple[str, ...]) -> Iterator[tuple[str, ...]]:

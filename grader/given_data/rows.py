@@ -12,6 +12,8 @@ import numpy as np
 from grader.comparison.evidence import DrawnVector, Evidence
 from grader.comparison.task import Task
 from grader.given_data.sets import LEAST_TURNED_MM, BoolArray, ExactDrawings
+from grader.records import MECHANISM
+from reference.construction.uncertainty import acts
 from reference.geometry import ComplexArray, FloatArray
 
 LEAST_DOUBT = 0.06
@@ -43,6 +45,7 @@ class Rows:
     doubt : (rows,) probability that a row is of another vector
     reversed : (sets, rows) whether a direction fits only the opposite way
     part : (rows,) the part of the drawing that a row is of
+    sheet : (rows,) the sheet on which it is drawn
     """
 
     residuals: FloatArray
@@ -53,6 +56,7 @@ class Rows:
     doubt: FloatArray
     reversed: FloatArray
     part: IntArray
+    sheet: IntArray
 
     def __len__(self) -> int:
         return len(self.reading)
@@ -70,11 +74,17 @@ def joined(parts: Sequence[Rows]) -> Rows:
         np.concatenate([one.doubt for one in parts]),
         np.concatenate([one.reversed for one in parts], axis=1),
         np.repeat(np.arange(len(parts)), counts),
+        np.concatenate([one.sheet for one in parts]),
     )
 
 
-def rows_of(task: Task, evidence: Evidence, drawn: Mapping[str, DrawnVector], exact: ExactDrawings) -> Rows:
-    """Directions of all that was drawn; lengths of links, and of vectors without a direction."""
+def rows_of(
+    task: Task, evidence: Evidence, drawn: Mapping[str, DrawnVector], exact: ExactDrawings, *, sheet: int = 0
+) -> Rows:
+    """Directions of all that was drawn; lengths of links, and of vectors without a direction.
+
+    Arguments: `sheet` is 1 for a plan that follows the sketch on a second sheet.
+    """
     found: list[_Row] = []
     drawn_mm, real = _largest(drawn, exact)
     for name, one in drawn.items():
@@ -86,13 +96,14 @@ def rows_of(task: Task, evidence: Evidence, drawn: Mapping[str, DrawnVector], ex
             found.append(_length(task, evidence, name, one, expected))
     return Rows(
         np.array([one.residual for one in found]).T.reshape(len(exact.data), len(found)),
-        np.array([one.drafting for one in found]).reshape(len(found), -1),
+        _by_sheet(task, np.array([one.drafting for one in found]), sheet),
         np.array([one.reading for one in found]),
         np.array([one.by_scale == 0.0 for one in found], np.bool_),
         np.array([one.by_scale for one in found]),
         np.clip([1.0 - one.sure for one in found], LEAST_DOUBT, 1.0 - LEAST_DOUBT),
         np.array([one.is_back for one in found]).T.reshape(len(exact.data), len(found)),
         np.zeros(len(found), np.int64),
+        np.full(len(found), sheet),
     )
 
 
@@ -149,6 +160,15 @@ def _shifts(task: Task, name: str) -> ComplexArray:
     traced, ends = task.traced(task.rule_scales), task.segments[name]
     shifts = traced.made[ends.head].shifts - traced.nodes[ends.tail].shifts
     return np.asarray(shifts * np.conj(_unit(ends.real)))
+
+
+def _by_sheet(task: Task, drafting: FloatArray, sheet: int) -> FloatArray:
+    """(rows, acts) with the errors of a second sheet's sketch, which is drawn anew, behind all others."""
+    every = acts(task.construction)
+    of_sketch = np.array([task.construction.figure_of(node) == MECHANISM for node, _, _ in every])
+    first = drafting.reshape(len(drafting), len(every))
+    second = first[:, of_sketch]
+    return np.hstack([first * ~of_sketch, second] if sheet else [first, np.zeros_like(second)])
 
 
 def _unit(vector: complex) -> complex:

@@ -166,12 +166,11 @@ def test_all_mistakes_together_draw_what_each_draws_by_itself():
             np.testing.assert_allclose(together.real[name][row], alone, atol=1e-9, err_msg=f"{mistake}")
 
 
-@pytest.mark.parametrize("source", ["sheet", "directions"])
 @pytest.mark.parametrize("plan", [VELOCITY_PLAN, ACCELERATION_PLAN])
-def test_a_plan_that_does_not_follow_the_error_of_its_own_sketch_is_known(plan, source):
+def test_a_plan_that_does_not_follow_the_error_of_its_own_sketch_is_known(plan):
     near = task_of(PUMP.assignment, PUMP.rubric, Variant(n=9))
     off = misread_by(PUMP, float(PUMP.parameters[CRANK]) - math.radians(1.6))
-    own, other = handed_in(PUMP, drawn_nodes(off), source), handed_in(near, drawn_nodes(near), source)
+    own, other = (handed_in(task, drawn_nodes(task), "sheet") for task in (off, near))
     assert owner(PUMP, own) is None
     found = owner(PUMP, with_plan(own, other, plan))
     assert (found.data.variant, found.part) == (Variant(n=9), plan)
