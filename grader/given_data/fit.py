@@ -12,6 +12,9 @@ CARES = ((0.7, 0.3), (1.3, 0.4), (2.4, 0.2), (4.0, 0.1))
 """Drafting errors as multiples of the rubric's hand, and how often they are met."""
 TURNS = ((0.7, 0.85), (25.0, 0.15))
 """By how many degrees a drawing is turned on its sheet (standard deviation), and how often."""
+AS_IT_LIES = ((0.0, 1.0),)
+FITS_WELL = 2.0
+"""Nats a row above nobody's data from which on the own data fit as a drawing lies: it is not tried turned."""
 ALIKE_RAD = math.radians(0.7)
 """The same of a figure beside the others of a sheet."""
 ANY_SCALE = 2.0
@@ -37,7 +40,11 @@ def fit_of(rows: Rows, is_own: BoolArray) -> FloatArray:
     is_like_own = (np.abs(residuals - residuals[0]) < ZERO).all(axis=1)
     chosen = _nearest(np.where(is_there & ~is_like_own, _apart_from(rows, residuals), np.inf), is_own)
     chosen[0] = is_there[0]
-    found[chosen] = _fitted(rows, residuals[chosen])
+    for turn_deg, share in TURNS if rows.is_angle.any() else AS_IT_LIES:
+        if found[0] > nobodys(rows) + FITS_WELL * len(rows):
+            break
+        fitted = math.log(share) + _fitted(rows, residuals[chosen], math.radians(turn_deg))
+        found[chosen] = np.logaddexp(found[chosen], fitted)
     # A mistake in another part leaves these as they are.
     found[is_like_own] = found[0]
     for part in np.unique(rows.part):
@@ -85,27 +92,26 @@ OUTLYING = 16.0
 """Squared standard deviations from which on it does not matter how far a row is off."""
 
 
-def _fitted(rows: Rows, residuals: FloatArray) -> FloatArray:
-    """The log likelihoods of residuals over all sizes of drafting errors and turns; (sets,).
+def _fitted(rows: Rows, residuals: FloatArray, turn_rad: float) -> FloatArray:
+    """The log likelihoods of residuals over all sizes of drafting errors; (sets,).
 
     The rows are jointly normal: errors propagate, so that one error of the crank turns all of them. Outliers
     are left out one by one; what leaving a row out changes follows from the precision matrix in closed form
     (a Cholesky factorisation of it with pivots).
     """
-    ways = [(care, math.radians(turn), one * other) for care, one in CARES for turn, other in TURNS]
-    covariance = np.array([_covariance(rows, care, turn) for care, turn, _ in ways])
+    covariance = np.array([_covariance(rows, care, turn_rad) for care, _ in CARES])
     start = np.linalg.inv(covariance)
     sets, count = residuals.shape
-    way = np.repeat(np.arange(len(ways)), sets)
-    every = np.arange(len(way))
-    pull = (residuals @ start).reshape(len(way), count)
-    outlier = np.tile(_of_outliers(rows, residuals) - np.log1p(-rows.doubt), (len(ways), 1))
-    likely = -0.5 * (pull * np.tile(residuals, (len(ways), 1))).sum(axis=1)
-    likely += np.log1p(-rows.doubt).sum() - 0.5 * np.linalg.slogdet(math.tau * covariance)[1][way]
-    own = np.diagonal(start, axis1=1, axis2=2)[way]
+    care = np.repeat(np.arange(len(CARES)), sets)
+    every = np.arange(len(care))
+    pull = (residuals @ start).reshape(len(care), count)
+    outlier = np.tile(_of_outliers(rows, residuals) - np.log1p(-rows.doubt), (len(CARES), 1))
+    likely = -0.5 * (pull * np.tile(residuals, (len(CARES), 1))).sum(axis=1)
+    likely += np.log1p(-rows.doubt).sum() - 0.5 * np.linalg.slogdet(math.tau * covariance)[1][care]
+    own = np.diagonal(start, axis1=1, axis2=2)[care]
     kept = np.ones_like(pull, np.bool_)
-    columns = np.zeros((len(way), count, count))
-    for turn in range(count):
+    columns = np.zeros((len(care), count, count))
+    for step in range(count):
         gain = np.where(kept, 0.5 * pull**2 / own + 0.5 * np.log(math.tau / own) + outlier, -np.inf)
         worst = gain.argmax(axis=1)
         best = gain[every, worst]
@@ -113,15 +119,15 @@ def _fitted(rows: Rows, residuals: FloatArray) -> FloatArray:
         if not is_left.any():
             break
         likely += np.where(is_left, best, 0.0)
-        before = columns[:, :turn]
-        column = start[way, :, worst] - (before * before[every, :, worst][:, :, None]).sum(axis=1)
+        before = columns[:, :step]
+        column = start[care, :, worst] - (before * before[every, :, worst][:, :, None]).sum(axis=1)
         column *= (is_left / np.sqrt(own[every, worst]))[:, None]
         pull -= column * (pull[every, worst] / np.sqrt(own[every, worst]))[:, None]
         own = np.maximum(own - column**2, ZERO)
         kept[every, worst] &= ~is_left
-        columns[:, turn] = column
-    shares = np.log([share for *_, share in ways])
-    return np.asarray(np.logaddexp.reduce(likely.reshape(len(ways), sets) + shares[:, None]))
+        columns[:, step] = column
+    shares = np.log([share for _, share in CARES])
+    return np.asarray(np.logaddexp.reduce(likely.reshape(len(CARES), sets) + shares[:, None]))
 
 
 def _covariance(rows: Rows, care: float, turn_rad: float) -> FloatArray:
