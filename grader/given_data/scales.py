@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from grader.comparison.evidence import DrawnVector, Evidence
+from grader.comparison.evidence import DrawnVector
 from grader.comparison.task import Task
 from grader.given_data.sets import ExactDrawings
 from grader.inputs.scale_text import Declared, parse_scale
@@ -40,18 +40,6 @@ def _driven(
         if name in drawn and f"k{kind}" in scales and task.real.get(name):
             return name, scales[f"k{kind}"]
     return None
-
-
-def is_at_own_scales(task: Task, evidence: Evidence, scales: Mapping[str, float]) -> bool:
-    """Whether the driven link's vectors have the lengths that the own data give at the declared scales."""
-    drawn = {name: one for name in task.real if (one := evidence.vector(name)) is not None}
-    for name, scale in scales.items():
-        found = _driven(task, drawn, {name: scale})
-        if found is not None:
-            off, sigma = _off_scale(drawn[found[0]], scale, np.array([abs(task.real[found[0]])]))
-            if abs(off[0]) > 3.0 * sigma:
-                return False
-    return True
 
 
 def _off_scale(drawn: DrawnVector, scale: float, real: FloatArray) -> tuple[FloatArray, float]:
