@@ -244,7 +244,8 @@ def posterior_of(
             none += len(follow) * math.log1p(-NOBODYS)
             ways.append(none + fits.get(follow, np.zeros(len(prior))))
             if len(follow) > 1:
-                ways.append(none + math.log(APART) + sum(fits[(part,)] for part in follow))
+                apart = np.sum([fits[(part,)] for part in follow], axis=0)
+                ways.append(none + math.log(APART) + apart)
         return np.asarray(np.logaddexp.reduce(ways) + sum(scaled[part] for part in parts))
 
     whole = np.log(prior) + likely(tuple(drawn))
