@@ -177,6 +177,18 @@ def test_a_plan_that_does_not_follow_the_error_of_its_own_sketch_is_known(plan):
     assert found.is_sure
 
 
+def test_on_two_sheets_the_sketches_have_errors_of_their_own(monkeypatch):
+    read = [sheet(misread_by(PUMP, float(PUMP.parameters[CRANK]) + off)).figures for off in (-0.035, 0.035)]
+    pages = tuple(
+        Reading({name: figures[name] for name in (MECHANISM, plan)})
+        for figures, plan in zip(read, (VELOCITY_PLAN, ACCELERATION_PLAN), strict=True)
+    )
+    found = owner(PUMP, Submission(readings=pages))
+    assert found is None or not found.is_sure
+    monkeypatch.setattr("grader.given_data.owner._has_one_sketch", lambda *_: True)
+    assert owner(PUMP, Submission(readings=pages)).is_sure
+
+
 def test_neighbours_that_drafting_errors_may_make_of_each_other_are_not_accused():
     near = task_of(PUMP.assignment, PUMP.rubric, Variant(n=8))
     found = owner(PUMP, Submission(measured=measured(near)))
