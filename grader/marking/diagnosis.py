@@ -298,19 +298,37 @@ def _of_the_whole(case: Case) -> Iterator[Root]:
 def _swaps(case: Case, explanation: Replay) -> Iterator[Mistake]:
     """Pairs of images in one plan that may have each other's letters.
 
-    Both are wrong in the explanation, or the right plan has the lengths observed with the letters swapped.
+    Both are wrong in the explanation, or the right plan is more like what was drawn with the letters swapped.
     """
     construction = case.drawing.construction
     off = {*explanation.unexplained, *(mistake.at for mistake in explanation.made)}
     nodes = evaluate(construction, case.drawing.parameters)
     for figure, pole in construction.poles.items():
+        if off & {figure, *(one.scale for one in construction.vectors_of(figure))}:
+            # The whole plan is wrong as its first vector is, which may have another's letter.
+            off.add(next(step.node for step in construction.figures[figure] if step.node != pole))
         images = sorted(
             v.head for v in construction.vectors_of(figure) if v.tail == pole and v.part not in {"n", "c"}
         )
         for pair in combinations(images, 2):
             is_off = off or explanation.care > USUAL
-            if off >= set(pair) or (is_off and _has_lengths_swapped(case, figure, pair, nodes)):
+            is_swapped = _lie_nearer_swapped(case, pole, pair, nodes) or _has_lengths_swapped(
+                case, figure, pair, nodes
+            )
+            if off >= set(pair) or (is_off and is_swapped):
                 yield Mistake("labels_swapped", pair[0], other=pair)
+
+
+def _lie_nearer_swapped(case: Case, pole: str, pair: tuple[str, str], nodes: Nodes) -> bool:
+    """Whether two nodes, as drawn, lie nearer to each other's right place than to their own."""
+    drawn = {
+        one.node: one.value for one in case.observations.entries if one.tail is None and one.has_direction
+    }
+    if not drawn.keys() >= set(pair):
+        return False
+    first, second = (complex(np.ravel(nodes[name] - nodes[pole])[0]) for name in pair)
+    as_named = abs(drawn[pair[0]] - first) + abs(drawn[pair[1]] - second)
+    return abs(drawn[pair[0]] - second) + abs(drawn[pair[1]] - first) < as_named
 
 
 MOST_FIT, FIT_MM, FIT_SHARE = 0.9, 1.5, 0.03
