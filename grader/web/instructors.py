@@ -27,6 +27,7 @@ from grader.web.guard import INVITATION, RefusedError, hash_of, is_password, mis
 from grader.web.places import (
     AUTHORED,
     SUBMITTED,
+    Places,
     assignment_of,
     safe_name,
     store,
@@ -41,6 +42,7 @@ from grader.web.store import (
     LtiActivity,
     Publication,
     Regrading,
+    Sheet,
     Visit,
     digest_of,
 )
@@ -258,7 +260,7 @@ def publication(call: Called, key: Key) -> dict[str, Any]:
     return {
         **facts(own),
         "authored": sorted(path.name for path in places.authored.glob("*")),
-        "files": [{"name": path.name, "bytes": path.stat().st_size} for path in places.submitted()],
+        "files": files_of(call.session, own, places),
         "students": students_of(places.roster),
         "job": None if job is None else state_of(call, job).model_dump(),
         "requests": len(waiting),
@@ -383,6 +385,16 @@ def students_of(roster: pathlib.Path) -> list[dict[str, Any]]:
     return [{"student_id": student, "name": name} for student, name in names.items()]
 
 
+def files_of(session: Session, publication: Publication, places: Places) -> list[dict[str, Any]]:
+    """The files handed in, each with its time; of a student's version also what the student calls it."""
+    sheets = session.scalars(select(Sheet).where(Sheet.publication_id == publication.id))
+    shown = {one.file: one.shown for one in sheets}
+    return [
+        {"name": path.name, "bytes": stat.st_size, "at": stat.st_mtime, "shown": shown.get(path.name, "")}
+        for path, stat in ((path, path.stat()) for path in places.submitted())
+    ]
+
+
 def _remove(call: Call, publication: Publication) -> None:
     job = last_job(call.session, publication)
     if job is not None and job.state in {"queued", "running"}:
@@ -435,6 +447,9 @@ def put_file(call: Called, key: Key, name: FileName, body: Body, *, replace: boo
         raise RefusedError(
             422, "file_name", "upload the roster as the roster; decisions are made in the review"
         )
+    sent = select(Sheet.id).where(Sheet.publication_id == own.id, Sheet.file == safe)
+    if call.session.scalar(sent) is not None:
+        raise RefusedError(409, "file_exists", f"{safe}: a student has handed this in; choose another name")
     is_same = store(call.places(own).handed_in, safe, body, replace=replace)
     call.note("file", f"{key} {safe}")
     return {"name": safe, "is_same": is_same}

@@ -112,10 +112,11 @@ def self_check(call: Called, key: Key) -> Response:
     assignment = assignment_of(call.service.settings.data, publication)
     own = students.own_reports(call, publication) if link is not None and publication.is_released else []
     requests = [] if link is None else students.own_requests(call, key)
+    sheets = [] if link is None else students.own_sheets(call, key)
     row = _row(call, publication, "" if link is None else link.student_id)
     return page(
         call, "self_check.html", publication=publication, form=form_of(assignment, call.lang), link=link,
-        own=own, requests=requests, row=row,
+        own=own, requests=requests, sheets=sheets, row=row,
         is_open=publication.is_open or call.visitor.is_member(publication),
     )  # fmt: skip
 

@@ -115,6 +115,25 @@ class Link(Table):
     created: Mapped[float] = mapped_column(default=time.time)
 
 
+class Sheet(Table):
+    """A version that a student handed in; its row outlives the file, so that no name is given twice.
+
+    Attributes
+    ----------
+    file : the name under which it is stored
+    shown : the person's own name of it, for people alone
+    """
+
+    __tablename__ = "sheets"
+    __table_args__ = (UniqueConstraint("publication_id", "file"),)
+    id: Mapped[int] = mapped_column(primary_key=True)
+    publication_id: Mapped[int] = mapped_column(ForeignKey("publications.id", ondelete="CASCADE"), index=True)
+    student_id: Mapped[str] = mapped_column(String(80), index=True)
+    file: Mapped[str] = mapped_column(String(120))
+    shown: Mapped[str] = mapped_column(String(200), default="")
+    sent: Mapped[float] = mapped_column(default=time.time)
+
+
 class Attempt(Table):
     """How often somebody has checked a variant."""
 

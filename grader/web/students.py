@@ -1,9 +1,11 @@
 """What students may do: check values and photos, see their feedback, hand in, ask for regrading."""
 
 import contextlib
+import hashlib
 import re
 import secrets
 import threading
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -21,7 +23,7 @@ from grader.web.guard import RefusedError, forbidden, missing
 from grader.web.places import assignment_of
 from grader.web.self_check import checked_values, form_of, variant_of
 from grader.web.service import FILE_BODY, Body, Call, Called, Key, Route
-from grader.web.store import Attempt, Job, Link, Publication, Regrading
+from grader.web.store import Attempt, Job, Link, Publication, Regrading, Sheet
 from reference.authored.assignment import Variant
 
 router = APIRouter(route_class=Route, prefix="/api/v1", tags=["students"])
@@ -234,8 +236,15 @@ def ask_again(call: Called, key: Key, request: Request) -> dict[str, str]:
 
 
 @router.post("/publications/{key}/sheets", status_code=201, openapi_extra=FILE_BODY)
-def hand_in(call: Called, key: Key, body: Body) -> dict[str, str]:
-    """Hand in a sheet; it is one more file of the student, and none is ever replaced."""
+def hand_in(
+    call: Called,
+    key: Key,
+    body: Body,
+    name: Annotated[
+        str, Query(max_length=200, pattern=WITHOUT_NUL, description="as the student calls it")
+    ] = "",
+) -> dict[str, Any]:
+    """Hand in a sheet: one more version, stored by its time and content; none is ever replaced."""
     publication = call.publication(key)
     link = personal(call, publication)
     if not publication.takes_sheets:
@@ -247,10 +256,33 @@ def hand_in(call: Called, key: Key, body: Body) -> dict[str, str]:
         taken = len(list(folder.glob(f"{link.student_id}_sent*")))
         if taken >= MOST_SHEETS:
             raise RefusedError(403, "sheets", N_("%(count)s sheets of yours are there already"), count=taken)
-        name = f"{link.student_id}_sent{taken + 1:02}{ending}"
-        write_whole(folder / name, body)
-    call.note("handed in", f"{publication.key} {name}")
-    return {"file": name}
+        at = datetime.now(UTC)
+        digest = hashlib.sha256(body).hexdigest()[:8]
+        file = f"{link.student_id}_sent{at:%Y%m%dT%H%M%S%f}-{digest}{ending}"
+        sheet = Sheet(
+            publication_id=publication.id, student_id=link.student_id, file=file, shown=name,
+            sent=at.timestamp(),
+        )  # fmt: skip
+        call.session.add(sheet)
+        call.session.flush()
+        write_whole(folder / file, body)
+    call.note("handed in", f"{publication.key} {file}")
+    return version_of(sheet)
+
+
+@router.get("/publications/{key}/sheets")
+def own_sheets(call: Called, key: Key) -> list[dict[str, Any]]:
+    """The versions that the student has handed in, in the order of their time."""
+    publication = call.publication(key)
+    link = personal(call, publication)
+    there = {path.name for path in call.places(publication).submitted()}
+    own = select(Sheet).where(Sheet.publication_id == publication.id, Sheet.student_id == link.student_id)
+    return [version_of(one) for one in call.session.scalars(own.order_by(Sheet.id)) if one.file in there]
+
+
+def version_of(sheet: Sheet) -> dict[str, Any]:
+    """A version as people are told of it."""
+    return {"file": sheet.file, "name": sheet.shown, "sent": sheet.sent}
 
 
 # What they share ----------------------------------------------------------------------------------

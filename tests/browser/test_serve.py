@@ -218,7 +218,7 @@ def test_a_student_checks_values_and_a_photo_and_asks_again(served, visit, local
     student.look(f"{name}-photo")
     page.click("#hand-in")
     page.wait_for_selector("#photo .said.good:not(:empty)")
-    assert "s01_sent01" in page.inner_text("#photo .said")
+    assert "s01_sent2" in page.inner_text("#photo .said")
     page.click("main summary >> nth=0")
     page.fill("#why", "The arrow of a_B is there.")
     student.look(f"{name}-asks")

@@ -184,8 +184,9 @@ $("hand-in")?.addEventListener("click", (event) => {
   const form = $("photo"), place = form.querySelector(".said"), file = $("picture").files[0];
   if (!file) { form.reportValidity(); return; }
   doing(event.target, place, async () => {
-    const { file: name } = await call("POST", `/api/v1/publications/${form.dataset.key}/sheets`, file, { raw: true });
-    tell(place, name, true);
+    const asked = new URLSearchParams({ name: file.name.slice(0, 200) });
+    const { file: stored } = await call("POST", `/api/v1/publications/${form.dataset.key}/sheets?${asked}`, file, { raw: true });
+    tell(place, stored, true);
   });
 });
 

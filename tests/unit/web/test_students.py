@@ -242,10 +242,37 @@ def test_sheets_are_handed_in_under_the_students_own_name(graded, admin, student
         sent = student.act("POST", f"/publications/{key}/sheets", content=b"\xff\xd8\xff first")
         assert sent.status_code == 201
     assert visitor.act("POST", f"/publications/{key}/sheets", content=b"\xff\xd8\xff").status_code == 401
-    names = sorted(path.name for path in settings.data.rglob("s09_sent*"))
-    assert names == ["s09_sent01.jpg", "s09_sent02.jpg"]
+    assert len(list(settings.data.rglob("s09_sent*.jpg"))) == 2
     admin.act("PATCH", f"/publications/{key}", json={"takes_sheets": False})
     assert student.act("POST", f"/publications/{key}/sheets", content=b"\xff\xd8\xff").status_code == 403
+
+
+def test_a_handed_in_sheet_is_a_version_that_nothing_replaces(graded, admin, student, settings):
+    """Three are sent and the first is deleted: the next one is a fourth, and no name comes back."""
+    key, _ = graded
+    path = f"/publications/{key}/sheets"
+    sent = [
+        student.act("POST", f"{path}?name=план {one}.jpg", content=b"\xff\xd8\xff%d" % one)
+        for one in range(3)
+    ]
+    first, *others = [one.json()["file"] for one in sent]
+    assert admin.act("DELETE", f"/publications/{key}/files/{first}").status_code == 200
+    again = student.act("POST", path, content=b"\xff\xd8\xff0").json()["file"]
+    there = {one.name: one.read_bytes() for one in settings.data.rglob("s09_sent*")}
+    assert there == {others[0]: b"\xff\xd8\xff1", others[1]: b"\xff\xd8\xff2", again: b"\xff\xd8\xff0"}
+    assert again not in {first, *others}
+    for name in (first, again):
+        taken = admin.act("PUT", f"/publications/{key}/files/{name}?replace=true", content=b"\xff\xd8\xff9")
+        assert taken.status_code == 409, name
+    own = student.get(f"/api/v1{path}").json()
+    assert [one["name"] for one in own] == ["план 1.jpg", "план 2.jpg", ""]
+    assert [one["sent"] for one in own] == sorted(one["sent"] for one in own)
+    listed = {one["name"]: one for one in admin.get(f"/api/v1/publications/{key}").json()["files"]}
+    assert listed[others[0]]["shown"] == "план 1.jpg"
+    assert listed[others[0]]["at"] == pytest.approx(own[0]["sent"], abs=5.0)
+    for page in (student.get(f"/c/{key}").text, admin.get(f"/publications/{key}").text):
+        assert "план 1.jpg" in page
+        assert time.strftime("%Y-%m-%d %H:", time.gmtime(own[0]["sent"])) in page
 
 
 def test_all_of_a_student_is_deleted_and_nothing_of_the_others(graded, admin, student, settings, app):
