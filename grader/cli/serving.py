@@ -25,8 +25,8 @@ def serve(
     a host that others reach without an address.
     """
     try:
-        from grader.web.app import LOOPBACK, application, first_invitation
-        from grader.web.settings import settings_of
+        from grader.web.app import application, first_invitation
+        from grader.web.settings import LOOPBACK, settings_of
     except ImportError as error:
         raise CallError("extra_missing", f"{MISSING} ({error})") from error
     if address is None and host not in LOOPBACK:

@@ -16,18 +16,17 @@ from starlette.exceptions import HTTPException
 
 from grader import __version__
 from grader.language import tongue
-from grader.web import instructors, lti, pages, students
+from grader.web import claims, instructors, lti, pages, students
 from grader.web.guard import Guard, RefusedError, Rim
 from grader.web.queue import Photo, Queue
 from grader.web.reviews import Reviews
 from grader.web.self_check import checked_photo
 from grader.web.service import Call, Service, language_of
-from grader.web.settings import Settings
+from grader.web.settings import LOOPBACK, Settings
 from grader.web.store import Account, Store
 from reference.errors import PlanmarkError
 
 LOG = logging.getLogger("planmark")
-LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
 DAY_S = 86400.0
 DESCRIPTION = """
 Everything that the pages of planmark do. A program sends a token, made on the account's page, as
@@ -70,15 +69,14 @@ def application(settings: Settings, photo: Photo = checked_photo) -> FastAPI:
         responses={code: {"description": HTTPStatus(code).phrase, "model": Fault} for code in REFUSALS},
     )  # fmt: skip
     app.state.service = service
-    for router in (students.router, instructors.router, lti.router, pages.router):
+    for router in (students.router, instructors.router, lti.router, claims.router, pages.router):
         app.include_router(router)
     app.mount("/review", Reviews(service))
     app.add_exception_handler(PlanmarkError, _told)
     app.add_exception_handler(RequestValidationError, _invalid)
     app.add_exception_handler(HTTPException, _refused)
     app.add_exception_handler(Exception, _fault)
-    is_local = settings.host.partition(":")[0] in LOOPBACK
-    app.add_middleware(Rim, settings=settings, hosts=LOOPBACK if is_local else frozenset())
+    app.add_middleware(Rim, settings=settings, hosts=LOOPBACK if settings.is_local else frozenset())
     return app
 
 

@@ -17,7 +17,7 @@ from grader.inputs.measurements import students_in
 from grader.inputs.roster import read_roster
 from grader.lms.export import read_results
 from grader.web.places import Places
-from grader.web.store import Attempt, Audit, Link, Publication, Regrading, Sheet, digest_of
+from grader.web.store import Attempt, Audit, Link, LtiClaim, Publication, Regrading, Sheet, digest_of
 from reference.authored.variant_table import delimiter_of
 
 PAGES = ("index.html", "summary.csv")
@@ -29,7 +29,7 @@ def erase_student(session: Session, publication: Publication, places: Places, st
 
     The class must not be graded meanwhile.
     """
-    for table in (Link, Regrading, Sheet):
+    for table in (Link, Regrading, Sheet, LtiClaim):
         session.execute(
             delete(table).where(table.publication_id == publication.id, table.student_id == student)
         )

@@ -1,97 +1,64 @@
 """LTI 1.3: launches from a learning platform, and grades returned to it (1EdTech LTI Core 1.3, AGS 2.0).
 
 A platform is registered by an administrator. Its instructors get accounts, its students their personal
-links, by launches; which publication an activity shows is chosen at an instructor's first launch, or by
-deep linking. PyLTI1p3 checks messages; states and nonces are kept here, and each is good for one launch.
+links, by launches (`grader.web.launch`, `grader.web.claims`); which publication an activity shows is chosen
+at an instructor's first launch, or by deep linking. PyLTI1p3 speaks with the platform's services.
 """
 
 import json
 import secrets
 import time
 from collections.abc import Iterator, Mapping
-from ipaddress import ip_address
 from typing import Annotated, Any
-from urllib.parse import urlsplit
 
 import requests
 from fastapi import APIRouter, Form
 from fastapi.responses import JSONResponse, RedirectResponse, Response
 from jwcrypto.jwk import JWK
-from pydantic import AfterValidator, Field
+from pydantic import Field
 from pylti1p3.assignments_grades import AssignmentsGradesService
-from pylti1p3.cookie import CookieService
 from pylti1p3.deep_link_resource import DeepLinkResource
-from pylti1p3.deployment import Deployment
-from pylti1p3.exception import LtiException, LtiServiceException, OIDCException
+from pylti1p3.exception import LtiException
 from pylti1p3.grade import Grade
-from pylti1p3.launch_data_storage.base import LaunchDataStorage
 from pylti1p3.lineitem import LineItem
-from pylti1p3.message_launch import MessageLaunch
-from pylti1p3.oidc_login import OIDCLogin
-from pylti1p3.redirect import Redirect
 from pylti1p3.registration import Registration
-from pylti1p3.request import Request
 from pylti1p3.service_connector import ServiceConnector
-from pylti1p3.session import SessionService
-from pylti1p3.tool_config.abstract import ToolConfAbstract
 from sqlalchemy import delete, select
 
 from grader.files import write_whole
-from grader.inputs.roster import RosterRow, read_roster
 from grader.language import N_
 from grader.lms.export import draft, read_results
 from grader.lms.grades import Options, Person
+from grader.web.claims import claimed, row_of, take_back_links
 from grader.web.guard import RefusedError, missing
+from grader.web.instructors import Row
+from grader.web.launch import STATE_S, Message, began, checked, platform_of
+from grader.web.outside import caller, check_url
 from grader.web.service import Call, Called, Key, Route
 from grader.web.settings import Settings
 from grader.web.store import (
     Account,
     Link,
     LtiActivity,
+    LtiClaim,
     LtiPlatform,
     LtiState,
     LtiUser,
+    Member,
     Publication,
+    Visit,
     digest_of,
 )
 from grader.web.students import Strict
-from reference.errors import PlanmarkError
 
 router = APIRouter(route_class=Route, tags=["lti"])
-CLAIM = "https://purl.imsglobal.org/spec/lti/claim/"
-AGS = "https://purl.imsglobal.org/spec/lti-ags/claim/endpoint"
-DEEP = "https://purl.imsglobal.org/spec/lti-dl/claim/deep_linking_settings"
-STATE_S = 600.0
-"""A person may have to sign in to the platform between the two requests of a launch."""
-TIMEOUT_S = (5.0, 20.0)
-"""For a platform to answer: to connect, and to send."""
-LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
+REFUSED = "the platform does not answer as it should"
 
 
 # What a platform is registered with ---------------------------------------------------------------
 
 
-def checked_url(url: str) -> str:
-    """An address of a platform, over https; for tests on the own machine http. Raises ValueError.
-
-    An address within the own network is refused: the server would be asked to reach into it.
-    """
-    parts = urlsplit(url)
-    host = parts.hostname or ""
-    if parts.scheme == "http" and host in LOOPBACK:
-        return url
-    if parts.scheme != "https" or not host or parts.username:
-        raise ValueError("must begin with https://")
-    try:
-        is_inside = not ip_address(host).is_global
-    except ValueError:
-        is_inside = host == "localhost" or host.endswith((".local", ".internal"))
-    if is_inside:
-        raise ValueError("is an address within a network")
-    return url
-
-
-Url = Annotated[str, Field(max_length=500), AfterValidator(checked_url)]
+Url = Annotated[str, Field(min_length=1, max_length=500)]
 
 
 class Platform(Strict):
@@ -109,7 +76,12 @@ class Platform(Strict):
 def register(call: Called, platform: Platform) -> dict[str, Any]:
     """Register a platform; one that is there already has its data changed."""
     admin = call.admin
-    known = _platform(call, platform.issuer, platform.client_id)
+    for name in ("auth_login_url", "auth_token_url", "key_set_url"):
+        try:
+            check_url(getattr(platform, name), is_local=call.service.settings.is_local)
+        except ValueError as error:
+            raise RefusedError(422, "address", f"{name}: {error}") from error
+    known = platform_of(call, platform.issuer, platform.client_id)
     if known is None:
         known = LtiPlatform()
         call.session.add(known)
@@ -129,14 +101,38 @@ def platforms(call: Called) -> list[dict[str, Any]]:
 
 
 @router.delete("/api/v1/lti/platforms/{number}")
-def unregister(call: Called, number: int) -> dict[str, str]:
-    """Remove a platform; the accounts of its instructors stay, and nobody launches from it any more."""
+def unregister(call: Called, number: Row) -> dict[str, str]:
+    """Remove a platform, and with it what launches from it gave: membership, visits, students' links."""
     admin, found = call.admin, call.session.get(LtiPlatform, number)
     if found is None:
         raise missing("platform")
-    call.session.delete(found)
+    session, users = call.session, select(LtiUser.id).where(LtiUser.platform_id == number)
+    take_back_links(call, session.scalars(select(LtiClaim.id).where(LtiClaim.user_id.in_(users))).all())
+    session.execute(delete(Member).where(Member.platform_id == number))
+    accounts = select(LtiUser.account_id).where(LtiUser.platform_id == number)
+    session.execute(delete(Visit).where(Visit.account_id.in_(accounts)))
+    session.delete(found)
     call.note("platform removed", f"{found.issuer} by {admin.name}")
     return {"state": "removed"}
+
+
+@router.get("/api/v1/lti/members")
+def members(call: Called) -> list[dict[str, Any]]:
+    """The publications that people from platforms work on, and whether a launch let them in."""
+    _ = call.admin
+    found = call.session.execute(
+        select(Publication, Account, LtiPlatform, Member)
+        .join(Member, Member.publication_id == Publication.id)
+        .join(Account, Account.id == Member.account_id)
+        .join(LtiUser, LtiUser.account_id == Account.id)
+        .join(LtiPlatform, LtiPlatform.id == LtiUser.platform_id)
+        .order_by(Publication.id, Account.id)
+    )
+    return [
+        {"publication": one.key, "title": one.title, "id": account.id, "name": account.name,
+         "platform": platform.issuer, "by_launch": member.platform_id is not None}
+        for one, account, platform, member in found
+    ]  # fmt: skip
 
 
 @router.get("/lti/config")
@@ -177,141 +173,6 @@ def own_key(settings: Settings) -> JWK:
     return JWK.from_json(path.read_text(encoding="utf-8"))
 
 
-# PyLTI1p3 at work on our requests -------------------------------------------------------------------
-
-
-class _Request(Request):
-    def __init__(self, call: Call, form: Mapping[str, Any]) -> None:
-        self.call, self.form = call, form
-
-    @property
-    def session(self) -> dict[str, Any]:
-        return {}
-
-    def is_secure(self) -> bool:
-        return self.call.service.settings.is_https
-
-    def get_param(self, key: str) -> str:
-        value = self.form.get(key, self.call.request.query_params.get(key, ""))
-        return value if isinstance(value, str) else ""
-
-
-class _Cookies(CookieService):
-    """The state's cookie; a launch is posted by another site, so that it must be sent from there, too."""
-
-    def __init__(self, call: Call) -> None:
-        self.call, self.wanted = call, dict[str, str]()
-
-    def get_cookie(self, name: str) -> str | None:
-        return self.call.request.cookies.get(f"planmark-{name}")
-
-    def set_cookie(self, name: str, value: str | int, exp: int | None = 3600) -> None:
-        del exp
-        self.wanted[f"planmark-{name}"] = str(value)
-
-    def put_on(self, response: Response) -> Response:
-        secure = self.call.service.settings.is_https
-        for name, value in self.wanted.items():
-            response.set_cookie(
-                name, value, max_age=int(STATE_S), secure=secure, httponly=True,
-                samesite="none" if secure else "lax", path="/lti",
-            )  # fmt: skip
-        return response
-
-
-class _Storage(LaunchDataStorage[Any]):
-    """Nonces in the data base, each good for one launch."""
-
-    def __init__(self, call: Call) -> None:
-        self.call = call
-
-    def get_session_cookie_name(self) -> str | None:
-        return None
-
-    def can_set_keys_expiration(self) -> bool:
-        return False
-
-    def get_value(self, key: str) -> Any:  # noqa: ANN401 - PyLTI1p3's own
-        del key
-
-    def set_value(self, key: str, value: Any, exp: int | None = None) -> None:  # noqa: ANN401 - as above
-        del value, exp
-        if "nonce" in key:
-            expires = time.time() + STATE_S
-            self.call.session.add(LtiState(id=digest_of(key), expires=expires))
-
-    def check_value(self, key: str) -> bool:
-        now, session = time.time(), self.call.session
-        session.execute(delete(LtiState).where(LtiState.expires < now))
-        taken = session.execute(delete(LtiState).where(LtiState.id == digest_of(key)))
-        session.commit()
-        return bool(taken.rowcount)  # type: ignore[attr-defined]
-
-
-class _Tool(ToolConfAbstract[_Request]):
-    """The registered platforms as PyLTI1p3 asks for them."""
-
-    def __init__(self, call: Call) -> None:
-        self.call = call
-
-    def check_iss_has_one_client(self, iss: str) -> bool:
-        del iss
-        return False
-
-    def check_iss_has_many_clients(self, iss: str) -> bool:
-        del iss
-        return True
-
-    def find_registration_by_issuer(self, iss: str, *_rest: object, **_known: object) -> Registration:
-        return self.find_registration_by_params(iss, None)
-
-    def find_registration_by_params(
-        self, iss: str, client_id: str | None, *_rest: object, **_known: object
-    ) -> Registration:
-        found = _platform(self.call, iss, client_id)
-        if found is None:
-            raise LtiException("the platform is not registered here")
-        return registration_of(found, self.call.service.settings)
-
-    def find_deployment(self, iss: str, deployment_id: str) -> Deployment | None:
-        return self.find_deployment_by_params(iss, deployment_id, "")
-
-    def find_deployment_by_params(
-        self, iss: str, deployment_id: str, client_id: str, *_rest: object, **_known: object
-    ) -> Deployment | None:
-        found = _platform(self.call, iss, client_id)
-        if found is None or deployment_id not in found.deployments:
-            return None
-        return Deployment().set_deployment_id(deployment_id)
-
-
-class _Redirect(Redirect[Response]):
-    def __init__(self, address: str, cookies: _Cookies) -> None:
-        self.address, self.cookies = address, cookies
-
-    def do_redirect(self) -> Response:
-        return self.cookies.put_on(RedirectResponse(self.address, 303))
-
-    def do_js_redirect(self) -> Response:
-        return self.do_redirect()
-
-    def set_redirect_url(self, location: str) -> None:
-        self.address = location
-
-    def get_redirect_url(self) -> str:
-        return self.address
-
-
-class _Login(OIDCLogin[_Request, _Tool, SessionService, _Cookies, Response]):
-    def get_redirect(self, url: str) -> _Redirect:
-        return _Redirect(url, self._cookie_service)
-
-
-class _Launch(MessageLaunch[_Request, _Tool, SessionService, _Cookies]):
-    def _get_request_param(self, key: str) -> str:
-        return self._request.get_param(key)
-
-
 class _Registration(Registration):
     """A platform with our key; the key's name goes into the header of what we sign."""
 
@@ -334,41 +195,21 @@ def registration_of(platform: LtiPlatform, settings: Settings) -> Registration:
     return made
 
 
-def caller() -> requests.Session:
-    """What asks a platform: with limits of time, and without being led elsewhere."""
-
-    class Bounded(requests.Session):
-        def request(self, *arguments: Any, **known: Any) -> requests.Response:  # noqa: ANN401 - as requests has it
-            known |= {"timeout": TIMEOUT_S, "allow_redirects": False}
-            return super().request(*arguments, **known)
-
-    return Bounded()
-
-
-def _platform(call: Call, issuer: str, client_id: str | None) -> LtiPlatform | None:
-    own = select(LtiPlatform).where(LtiPlatform.issuer == issuer)
-    found = call.session.scalars(
-        own if not client_id else own.where(LtiPlatform.client_id == client_id)
-    ).all()
-    return found[0] if len(found) == 1 else None
-
-
 # Launches -------------------------------------------------------------------------------------------
 
 
-def _login(call: Call, form: Mapping[str, Any]) -> Response:
-    request, cookies = _Request(call, form), _Cookies(call)
-    try:
-        login = _Login(request, _Tool(call), SessionService(request), cookies, _Storage(call))
-        return login.redirect(f"{call.service.settings.address}/lti/launch")
-    except (OIDCException, LtiException, KeyError) as error:
-        raise RefusedError(400, "lti_login", f"the platform's login is refused: {error}") from error
+def _login(call: Call, form: Mapping[str, str]) -> Response:
+    platform = platform_of(call, form.get("iss", ""), form.get("client_id", ""))
+    if platform is None or not form.get("login_hint"):
+        why = "the platform is not registered here" if platform is None else "it does not say for whom it is"
+        raise RefusedError(400, "lti_login", f"the platform's login is refused: {why}")
+    return began(call, platform, form)
 
 
 @router.get("/lti/login")
 def login_by_address(call: Called) -> Response:
     """The first request of a launch."""
-    return _login(call, {})
+    return _login(call, dict(call.request.query_params))
 
 
 @router.post("/lti/login")
@@ -398,42 +239,22 @@ def launch(
 ) -> Response:
     """The second request of a launch, which the platform has signed."""
     if error:
-        raise RefusedError(400, "lti_launch", f"the platform does not launch: {error}")
-    data, message = _validated(call, {"id_token": id_token, "state": state})
-    platform = _platform(call, data["iss"], message.get_client_id())
-    if platform is None:
-        raise missing("platform")
-    is_teacher = message.check_teacher_access() or message.check_staff_access()
-    user = _user(call, platform, data, is_teacher=is_teacher)
-    if is_teacher:
-        return _taught(call, message, user, data)
-    return _learnt(call, user, data)
+        raise RefusedError(400, "lti_launch", "the platform does not launch: sign in there again")
+    call.service.guard.count("address", [call.visitor.address])
+    message, platform = checked(call, state, id_token)
+    user = _user(call, platform, message)
+    return _taught(call, user, message) if message.is_teacher else _learnt(call, user, message)
 
 
-def _validated(call: Call, form: Mapping[str, str]) -> tuple[dict[str, Any], _Launch]:
-    request, cookies = _Request(call, form), _Cookies(call)
-    message = _Launch(
-        request, _Tool(call), SessionService(request), cookies, _Storage(call), requests_session=caller()
-    )
-    try:
-        return dict(message.get_launch_data()), message
-    except (LtiException, KeyError, TypeError, ValueError, AttributeError) as error:
-        why = f"the launch is refused: {error}"
-        if "State not found" in str(error):
-            why += ": allow cookies of this server, or open the activity in a new window"
-        raise RefusedError(403, "lti_launch", why) from error
-
-
-def _user(call: Call, platform: LtiPlatform, data: Mapping[str, Any], *, is_teacher: bool) -> LtiUser:
+def _user(call: Call, platform: LtiPlatform, message: Message) -> LtiUser:
     """The platform's user as known here; a teacher gets an account at the first launch."""
-    subject = str(data["sub"])[:255]
-    own = select(LtiUser).where(LtiUser.platform_id == platform.id, LtiUser.subject == subject)
+    own = select(LtiUser).where(LtiUser.platform_id == platform.id, LtiUser.subject == message.sub)
     user = call.session.scalar(own)
     if user is None:
-        user = LtiUser(platform_id=platform.id, subject=subject)
+        user = LtiUser(platform_id=platform.id, subject=message.sub)
         call.session.add(user)
-    if is_teacher and user.account is None:
-        name = str(data.get("name") or subject)[:60]
+    if message.is_teacher and user.account is None:
+        name = (message.name or message.sub)[:60]
         taken = call.session.scalar(select(Account).where(Account.name == name))
         account = Account(name=name if taken is None else f"{name} {secrets.token_hex(4)}")
         call.session.add(account)
@@ -442,35 +263,35 @@ def _user(call: Call, platform: LtiPlatform, data: Mapping[str, Any], *, is_teac
     return user
 
 
-def _activity(call: Call, user: LtiUser, data: Mapping[str, Any]) -> LtiActivity:
+def _activity(call: Call, user: LtiUser, message: Message) -> LtiActivity:
     """The platform's activity, with where its grades go; made at its first launch."""
-    link = str(data.get(f"{CLAIM}resource_link", {}).get("id", ""))[:255]
-    deployment = str(data[f"{CLAIM}deployment_id"])[:200]
+    link = "" if message.link is None else message.link.id
     own = select(LtiActivity).where(
-        LtiActivity.platform_id == user.platform_id, LtiActivity.deployment == deployment,
+        LtiActivity.platform_id == user.platform_id, LtiActivity.deployment == message.deployment,
         LtiActivity.resource_link == link,
     )  # fmt: skip
     activity = call.session.scalar(own)
     if activity is None:
-        activity = LtiActivity(platform_id=user.platform_id, deployment=deployment, resource_link=link)
+        activity = LtiActivity(
+            platform_id=user.platform_id, deployment=message.deployment, resource_link=link
+        )
         call.session.add(activity)
-    activity.grades = data.get(AGS) or {}
+    activity.grades = {} if message.grades is None else message.grades.model_dump(exclude_none=True)
     return activity
 
 
-def _taught(call: Call, message: _Launch, user: LtiUser, data: Mapping[str, Any]) -> Response:
+def _taught(call: Call, user: LtiUser, message: Message) -> Response:
     """An instructor's launch: to the publication, or to the choice of one."""
     account = user.account
     if account is None:
         raise missing("account")
     call.service.guard.begin(call.session, call.visitor, account)
     call.note("launched")
-    if message.is_deep_link_launch():
-        waiting = {"settings": dict(data[DEEP])}
-        waiting |= {"platform": user.platform_id, "deployment": data[f"{CLAIM}deployment_id"]}  # type: ignore[dict-item]
-        return _led(call, f"/lti/choose?for={_kept(call, waiting)}")
-    activity = _activity(call, user, data)
-    custom = str(data.get(f"{CLAIM}custom", {}).get("publication", ""))
+    if message.choice is not None and message.link is None:
+        waiting = {"settings": message.choice.model_dump(), "platform": user.platform_id}
+        return _led(call, f"/lti/choose?for={_kept(call, {**waiting, 'deployment': message.deployment})}")
+    activity = _activity(call, user, message)
+    custom = str((message.custom or {}).get("publication", ""))
     if activity.publication_id is None and custom:
         wanted = call.session.scalar(select(Publication).where(Publication.key == custom))
         if wanted is not None and call.visitor.is_member(wanted):
@@ -481,46 +302,48 @@ def _taught(call: Call, message: _Launch, user: LtiUser, data: Mapping[str, Any]
     publication = call.session.get_one(Publication, activity.publication_id)
     if not call.visitor.is_member(publication):
         # Who teaches the activity on the platform works on its class here.
-        publication.members.append(account)
+        own = Member(publication_id=publication.id, account_id=account.id, platform_id=user.platform_id)
+        call.session.add(own)
         call.note("member added", f"{publication.key} {account.name}")
     return _led(call, f"/publications/{publication.key}")
 
 
-def _learnt(call: Call, user: LtiUser, data: Mapping[str, Any]) -> Response:
+def _learnt(call: Call, user: LtiUser, message: Message) -> Response:
     """A student's launch: to the publication, as the student of its roster who has the same id or e-mail."""
-    activity = _activity(call, user, data)
+    activity = _activity(call, user, message)
     publication = (
         None if activity.publication_id is None else call.session.get(Publication, activity.publication_id)
     )
     if publication is None:
         why = N_("your instructor has not chosen yet what this activity shows")
         raise RefusedError(404, "lti_unchosen", why)
-    row = _row_of(call, publication, data)
-    visit = call.service.guard.begin(call.session, call.visitor)
+    _let_out(call, user, publication)
+    visit = call.visitor.visit
+    if visit is not None:  # whoever used this browser before is not the one who comes now
+        visit.links = {name: link for name, link in visit.links.items() if name != str(publication.id)}
+    row = row_of(call, publication, message)
+    link = None
     if row is not None:
-        user.students = {**user.students, str(publication.id): row.student_id}
+        claim = claimed(call, user, publication, row.student_id, message)
         expires = time.time() + call.service.settings.link_days * 86400.0
-        link = Link(publication=publication, student_id=row.student_id, expires=expires)
+        link = Link(publication=publication, student_id=row.student_id, expires=expires, claim_id=claim.id)
         call.session.add(link)
         call.session.flush()
-        visit.links = {**visit.links, str(publication.id): link.id}
+    call.service.guard.begin(call.session, call.visitor, link=link)
     return _led(call, f"/c/{publication.key}")
 
 
-def _row_of(call: Call, publication: Publication, data: Mapping[str, Any]) -> RosterRow | None:
-    """The student's line of the roster: by the platform's id of the person, or by e-mail."""
-    roster = call.places(publication).roster
-    try:
-        rows = read_roster(roster).rows if roster.is_file() else ()
-    except PlanmarkError:
-        return None
-    lis = data.get(f"{CLAIM}lis") or {}
-    ids = {str(one) for one in (lis.get("person_sourcedid"), data["sub"]) if one}
-    email = str(data.get("email") or "").casefold()
-    named = [row for row in rows if row.student_id in ids]
-    mailed = [row for row in rows if email and (row.email or "").casefold() == email]
-    found = {row.student_id: row for row in (named or mailed)}
-    return next(iter(found.values())) if len(found) == 1 else None
+def _let_out(call: Call, user: LtiUser, publication: Publication) -> None:
+    """End the membership that an earlier launch gave to somebody who does not teach the course now."""
+    ended = call.session.execute(
+        delete(Member).where(
+            Member.publication_id == publication.id, Member.account_id == user.account_id,
+            Member.platform_id == user.platform_id,
+        )
+    )  # fmt: skip
+    if ended.rowcount:  # type: ignore[attr-defined]
+        name = "" if user.account is None else user.account.name
+        call.note("member removed", f"{publication.key} {name}: no role in the course")
 
 
 def _led(call: Call, path: str) -> Response:
@@ -603,13 +426,13 @@ def send_scores(call: Called, key: Key) -> dict[str, Any]:
     results = read_results(call.places(own).results)
     told: dict[str, Any] = {"sent": [], "same": [], "refused": {}, "withheld": {}}
     for activity in activities:
-        users = {
-            user.students[str(own.id)]: user.subject
-            for user in call.session.scalars(
-                select(LtiUser).where(LtiUser.platform_id == activity.platform_id)
-            )
-            if str(own.id) in user.students
-        }
+        holding = select(LtiClaim.student_id, LtiUser.subject).join(LtiUser, LtiUser.id == LtiClaim.user_id)
+        of_activity = (
+            LtiClaim.publication_id == own.id, LtiClaim.holds,
+            LtiUser.platform_id == activity.platform_id,
+        )  # fmt: skip
+        found = call.session.execute(holding.where(*of_activity))
+        users: dict[str, str] = {row.student_id: row.subject for row in found}
         people = {student: Person(platform_id=subject) for student, subject in users.items()}
         delivery = draft(results, Options(to="lti", people=people, item=own.title))
         told["withheld"] |= {**delivery.withheld, **delivery.unplaced}
@@ -630,9 +453,12 @@ def _sent(
 ) -> Iterator[tuple[str, str]]:
     """Each student with ``sent``, ``same``, or why the platform did not take the grade."""
     platform = call.session.get_one(LtiPlatform, activity.platform_id)
-    registration = registration_of(platform, call.service.settings)
+    settings = call.service.settings
+    registration = registration_of(platform, settings)
     endpoint: Any = {"scope": [], **activity.grades}
-    service = AssignmentsGradesService(ServiceConnector(registration, caller()), endpoint)
+    service = AssignmentsGradesService(
+        ServiceConnector(registration, caller(is_local=settings.is_local)), endpoint
+    )
     item = document["lineItem"]
     line = None
     for score in document["scores"]:
@@ -652,9 +478,16 @@ def _sent(
             grade.set_activity_progress(score["activityProgress"]).set_user_id(score["userId"])
             grade.set_grading_progress(score["gradingProgress"]).set_timestamp(score["timestamp"])
             service.put_grade(grade.set_comment(score["comment"]), line)
-        except (LtiException, LtiServiceException, requests.RequestException, KeyError, ValueError) as error:
+        except (
+            LtiException,
+            requests.RequestException,
+            LookupError,
+            AttributeError,
+            TypeError,
+            ValueError,
+        ) as error:
             response = getattr(error, "response", None)
-            yield student, f"{error}" if response is None else f"the platform answers {response.status_code}"
+            yield student, REFUSED if response is None else f"the platform answers {response.status_code}"
         else:
             activity.sent = {**activity.sent, student: mark}
             call.session.commit()

@@ -14,7 +14,7 @@ from grader.feedback.words import STATES, environment
 from grader.inputs.roster import read_roster
 from grader.language import LANGUAGES, N_, tongue
 from grader.lms.export import TARGETS
-from grader.web import instructors, lti, students
+from grader.web import claims, instructors, lti, students
 from grader.web.guard import HEADERS, missing
 from grader.web.places import assignment_of
 from grader.web.self_check import form_of
@@ -138,7 +138,7 @@ def publication(call: Called, key: Key) -> Response:
     return page(
         call, "publication.html", one=known, links=links, requests=instructors.requests(call, key),
         assignments=built_in(), colleagues=instructors.accounts(call), platforms=TARGETS, states=STATES,
-        address=f"{call.service.settings.address}/c/{key}",
+        claims=claims.listed(call, key),        address=f"{call.service.settings.address}/c/{key}",
     )  # fmt: skip
 
 
@@ -165,6 +165,7 @@ def account(call: Called) -> Response:
         call, "account.html", tokens=instructors.tokens(call), accounts=instructors.accounts(call),
         audit=instructors.audit(call) if own.is_admin else [], tool=lti.config(call),
         lti_platforms=lti.platforms(call) if own.is_admin else [],
+        lti_members=lti.members(call) if own.is_admin else [],
     )  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from reference.errors import CallError
 
 SECRET = "PLANMARK_SECRET"  # noqa: S105 - the name of the variable
 DATABASE = "PLANMARK_DATABASE"
+LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
 LEAST_SECRET = 32
 """Signs of the secret that signs links and forms: fewer could be tried out."""
 
@@ -50,6 +51,11 @@ class Settings:
     def is_https(self) -> bool:
         """Whether cookies are sent over https alone."""
         return self.address.startswith("https://")
+
+    @property
+    def is_local(self) -> bool:
+        """Whether only this machine is served."""
+        return urlsplit(self.address).hostname in LOOPBACK
 
     @property
     def host(self) -> str:

@@ -10,10 +10,23 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from sqlalchemy import JSON, ForeignKey, String, UniqueConstraint, create_engine, delete, event, update
+from sqlalchemy import (
+    JSON,
+    ForeignKey,
+    String,
+    UniqueConstraint,
+    create_engine,
+    delete,
+    event,
+    inspect,
+    select,
+    text,
+    update,
+)
 from sqlalchemy.engine import Engine, make_url
 from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 from sqlalchemy.orm import DeclarativeBase, Mapped, Session, mapped_column, relationship, sessionmaker
+from sqlalchemy.schema import CreateColumn
 
 from reference.errors import CallError
 
@@ -93,13 +106,14 @@ class Publication(Table):
 
 
 class Member(Table):
-    """An instructor's access to a publication."""
+    """An instructor's access to a publication; one that a launch gave ends with its `platform_id`."""
 
     __tablename__ = "members"
     publication_id: Mapped[int] = mapped_column(
         ForeignKey("publications.id", ondelete="CASCADE"), primary_key=True
     )
     account_id: Mapped[int] = mapped_column(ForeignKey("accounts.id", ondelete="CASCADE"), primary_key=True)
+    platform_id: Mapped[int | None] = mapped_column(ForeignKey("lti_platforms.id", ondelete="CASCADE"))
 
 
 class Link(Table):
@@ -113,6 +127,8 @@ class Link(Table):
     expires: Mapped[float]
     is_revoked: Mapped[bool] = mapped_column(default=False)
     created: Mapped[float] = mapped_column(default=time.time)
+    claim_id: Mapped[int | None] = mapped_column(ForeignKey("lti_claims.id", ondelete="SET NULL"))
+    """Of a link that a launch gave."""
 
 
 class Sheet(Table):
@@ -202,7 +218,12 @@ class LtiPlatform(Table):
 
 
 class LtiUser(Table):
-    """Somebody who came from a platform: an instructor's account, or a student's ids by publication."""
+    """Somebody who came from a platform; an instructor has an account.
+
+    Attributes
+    ----------
+    students : as older versions kept what is now `LtiClaim`
+    """
 
     __tablename__ = "lti_users"
     __table_args__ = (UniqueConstraint("platform_id", "subject"),)
@@ -212,6 +233,25 @@ class LtiUser(Table):
     account_id: Mapped[int | None] = mapped_column(ForeignKey("accounts.id", ondelete="SET NULL"))
     account: Mapped[Account | None] = relationship(lazy="joined")
     students: Mapped[dict[str, Any]] = mapped_column(default=dict)
+
+
+class LtiClaim(Table):
+    """That somebody from a platform is a student of a roster; of several who want to be one, one `holds` it.
+
+    Attributes
+    ----------
+    who : name and e-mail as the platform says them, for the instructor who decides
+    """
+
+    __tablename__ = "lti_claims"
+    __table_args__ = (UniqueConstraint("publication_id", "user_id", "student_id"),)
+    id: Mapped[int] = mapped_column(primary_key=True)
+    publication_id: Mapped[int] = mapped_column(ForeignKey("publications.id", ondelete="CASCADE"), index=True)
+    user_id: Mapped[int] = mapped_column(ForeignKey("lti_users.id", ondelete="CASCADE"), index=True)
+    student_id: Mapped[str] = mapped_column(String(80))
+    who: Mapped[str] = mapped_column(String(200), default="")
+    holds: Mapped[bool] = mapped_column(default=False)
+    created: Mapped[float] = mapped_column(default=time.time)
 
 
 class LtiActivity(Table):
@@ -235,7 +275,7 @@ class LtiActivity(Table):
 
 
 class LtiState(Table):
-    """A nonce of a launch, or what an instructor is asked about; good for minutes, and once."""
+    """A launch that has begun, or what an instructor is asked about; good for minutes, and once."""
 
     __tablename__ = "lti_states"
     id: Mapped[str] = mapped_column(String(64), primary_key=True)
@@ -270,10 +310,13 @@ class Store:
         try:
             self.engine = _engine(url)
             Table.metadata.create_all(self.engine)
+            _add_columns(self.engine)
         except (ArgumentError, ImportError, SQLAlchemyError) as error:
             why = str(getattr(error, "orig", None) or error).splitlines()[0]
             raise CallError("data_base", f"--database: the data base cannot be opened ({why})") from error
         self._sessions = sessionmaker(self.engine, expire_on_commit=False)
+        with self.session() as session:
+            _take_over(session)
 
     def close(self) -> None:
         """Close the connections that nobody uses."""
@@ -305,6 +348,50 @@ class Store:
             session.execute(delete(Visit).where(Visit.used < before, Visit.title == ""))
             session.execute(delete(Job).where(Job.created < moment - 86400.0, Job.kind == "photo"))
             session.execute(delete(Audit).where(Audit.at < before))
+
+
+def _add_columns(engine: Engine) -> None:
+    """Add what tables of an older version lack: columns that may be empty, or have a default there."""
+    known = inspect(engine)
+    with engine.begin() as connection:
+        for table in Table.metadata.sorted_tables:
+            there = {column["name"] for column in known.get_columns(table.name)}
+            for column in table.columns:
+                if column.name not in there:
+                    made = CreateColumn(column).compile(dialect=engine.dialect)
+                    connection.execute(text(f"ALTER TABLE {table.name} ADD COLUMN {made}"))
+
+
+def _take_over(session: Session) -> None:
+    """Take over what an older version kept of launches: who is which student, and who became a member.
+
+    A student as whom several came is nobody's until the instructor decides, and the links end.
+    """
+    there = set(session.scalars(select(Publication.id)))
+    came: dict[tuple[int, str], list[LtiUser]] = {}
+    for user in session.scalars(select(LtiUser)):
+        for number, student in user.students.items():
+            if int(number) in there:
+                came.setdefault((int(number), student), []).append(user)
+        user.students = {}
+    for (publication, student), users in came.items():
+        own = {"publication_id": publication, "student_id": student}
+        is_one = len(users) == 1
+        session.add_all(
+            LtiClaim(**own, user_id=user.id, who=user.subject[:200], holds=is_one) for user in users
+        )
+        if not is_one:
+            session.execute(update(Link).filter_by(**own).values(is_revoked=True))
+    joined = (
+        select(Member, LtiUser.platform_id)
+        .join(LtiUser, LtiUser.account_id == Member.account_id)
+        .join(Account, Account.id == Member.account_id)
+        .join(Publication, Publication.id == Member.publication_id)
+        .join(Audit, (Audit.who == Account.name) & (Audit.about == Publication.key + " " + Account.name))
+        .where(Member.platform_id.is_(None), Audit.act == "member added")
+    )
+    for member, platform in session.execute(joined):
+        member.platform_id = platform
 
 
 def _engine(url: str) -> Engine:

@@ -8,7 +8,7 @@ import pytest
 from jwcrypto.jwk import JWK
 
 from tests.unit.web.conftest import Browser
-from tests.unit.web.platform import CLAIM, ROLE, Platform
+from tests.unit.web.platform import CLAIM, CLIENT, ROLE, Platform
 
 TEACHER = {f"{CLAIM}roles": [f"{ROLE}Instructor"], "sub": "teacher-1", "name": "Doina"}
 
@@ -129,15 +129,196 @@ STRANGER = JWK.generate(kty="RSA", size=2048, kid="platform-key")
     "changed",
     [
         {"nonce": "another"}, {"nonce": None}, {"aud": "another-client"}, {"iss": "https://evil.example"},
-        {"exp": int(time.time()) - 600}, {f"{CLAIM}deployment_id": "another"}, {f"{CLAIM}version": "1.1"},
+        {"exp": int(time.time()) - 600}, {"exp": None}, {"iat": None}, {"iat": int(time.time()) + 600},
+        {"iat": int(time.time()) - 3600}, {"azp": "another-client"}, {"aud": [CLIENT, "another-client"]},
+        {"aud": [CLIENT, "another-client"], "azp": "another-client"}, {"aud": []},
+        {f"{CLAIM}deployment_id": "another"}, {f"{CLAIM}version": "1.1"},
         {f"{CLAIM}message_type": "Unknown"}, {f"{CLAIM}message_type": None}, {"sub": None},
         {f"{CLAIM}resource_link": None}, {f"{CLAIM}roles": None},
     ],
 )  # fmt: skip
 def test_a_message_that_is_not_right_is_refused(platform, visitor, changed):
     answer = platform.launch(visitor, **changed)
-    assert answer.status_code in {403, 404}, answer.text
+    assert answer.status_code in {400, 403}, answer.text
     assert visitor.get("/api/v1/publications").status_code == 401
+
+
+def test_a_message_for_several_says_who_may_use_it(platform, app):
+    audiences = {"aud": ["another-client", CLIENT], "azp": CLIENT}
+    assert platform.launch(Browser(app), **TEACHER, **audiences).status_code == 303
+
+
+def test_odd_claims_are_told_even_where_they_are_signed(platform, visitor):
+    grades = "https://purl.imsglobal.org/spec/lti-ags/claim/endpoint"
+    for changed in (
+        {f"{CLAIM}roles": [1]}, {f"{CLAIM}roles": "Instructor"}, {f"{CLAIM}roles": [["Instructor"]]},
+        {"sub": {"a": 1}}, {"sub": "s09\0"}, {"name": [1]}, {"email": 7}, {"exp": "soon"}, {"exp": True},
+        {"exp": 1e400}, {"aud": {"a": 1}}, {f"{CLAIM}resource_link": "x"}, {"nonce": 5},
+        {f"{CLAIM}resource_link": {"id": 5}}, {f"{CLAIM}lis": [1]}, {f"{CLAIM}custom": "x"},
+        {f"{CLAIM}deployment_id": [1]}, {grades: {"scope": "all", "lineitems": 1}},
+    ):  # fmt: skip
+        answer = platform.launch(visitor, **{**TEACHER, **changed})
+        assert (answer.status_code, answer.json()["code"]) == (400, "lti_launch"), changed
+    assert visitor.get("/api/v1/publications").status_code == 401
+
+
+def test_state_nonce_and_platform_are_of_one_launch(platform, admin, app):
+    """A message of platform B, or with the nonce of another browser, does not pass with A's state."""
+    other = Platform()
+    assert admin.act("POST", "/lti/platforms", json=other.registration).status_code == 201
+    try:
+        browser, second = Browser(app), Browser(app)
+        asked = platform.begun(browser)
+        form = {"state": asked["state"], "id_token": other.signed(other.claims(asked, **TEACHER))}
+        assert browser.post("/lti/launch", data=form).status_code == 403
+        mine, theirs = platform.begun(browser), platform.begun(second)
+        token = platform.signed(platform.claims(theirs, **TEACHER))
+        assert (
+            browser.post("/lti/launch", data={"state": mine["state"], "id_token": token}).status_code == 403
+        )
+        token = platform.signed(platform.claims(mine, **TEACHER))
+        again = browser.post("/lti/launch", data={"state": mine["state"], "id_token": token})
+        assert again.status_code == 403
+    finally:
+        other.stop()
+
+
+def test_the_state_alone_is_no_proof_of_the_browser(platform, app):
+    """Whoever has read state and message on their way cannot make the cookie that belongs to them."""
+    asked = platform.begun(Browser(app))
+    thief = Browser(app)
+    for name in (f"planmark-{asked['state']}", *(f"{one}" for one in thief.cookies)):
+        thief.cookies.set(name, asked["state"])
+    form = {"state": asked["state"], "id_token": platform.signed(platform.claims(asked, **TEACHER))}
+    assert thief.post("/lti/launch", data=form).status_code == 403
+
+
+# Roles in the course -------------------------------------------------------------------------------
+
+INSTITUTION = "http://purl.imsglobal.org/vocab/lis/v2/institution/person#"
+
+
+def test_what_somebody_is_elsewhere_is_no_role_in_the_course(activity, platform, app):
+    key, _ = activity
+    for role in (
+        *(f"{INSTITUTION}{name}" for name in ("Instructor", "Staff", "Faculty", "Administrator")),
+        "http://purl.imsglobal.org/vocab/lis/v2/system/person#Administrator",
+        "http://purl.imsglobal.org/vocab/lis/v2/person#Instructor",
+        f"{ROLE.removesuffix('#')}/Instructor#TeachingAssistant", f"{ROLE}Mentor", "instructor", "Staff",
+    ):  # fmt: skip
+        student = Browser(app)
+        answer = platform.launch(student, sub="s09", **{f"{CLAIM}roles": [f"{ROLE}Learner", role]})
+        assert answer.headers["location"] == f"/c/{key}", role
+        assert student.get(f"/api/v1/publications/{key}").status_code == 401, role
+
+
+def colleague_by_launch(platform, app):
+    browser = Browser(app)
+    platform.launch(browser, **{**TEACHER, "sub": "teacher-2", "name": "Radu"})
+    return browser
+
+
+def test_membership_by_a_launch_ends_with_a_later_launch_without_the_role(activity, platform, app, admin):
+    key, _ = activity
+    browser = colleague_by_launch(platform, app)
+    assert browser.get(f"/api/v1/publications/{key}").status_code == 200
+    assert platform.launch(Browser(app), sub="teacher-2").status_code == 303
+    assert browser.get(f"/api/v1/publications/{key}").status_code == 404
+    assert "no role in the course" in admin.get("/api/v1/audit").text
+
+
+def test_a_colleague_whom_a_person_let_in_stays(activity, platform, app):
+    key, teacher = activity
+    assert platform.launch(Browser(app), sub="teacher-1").status_code == 303
+    assert teacher.get(f"/api/v1/publications/{key}").status_code == 200
+
+
+def test_what_a_platforms_launches_gave_ends_with_the_platform(activity, platform, app, admin):
+    key, teacher = activity
+    browser, student = colleague_by_launch(platform, app), Browser(app)
+    platform.launch(student, sub="s09")
+    (known,) = admin.get("/api/v1/lti/platforms").json()
+    assert admin.act("DELETE", f"/lti/platforms/{known['id']}").status_code == 200
+    assert browser.get(f"/api/v1/publications/{key}").status_code == 401
+    assert teacher.get(f"/api/v1/publications/{key}").status_code == 401
+    assert student.get(f"/api/v1/publications/{key}/feedback").status_code == 401
+    names = [one["name"] for one in admin.get(f"/api/v1/publications/{key}").json()["members"]]
+    assert "Radu" not in names
+
+
+def test_members_who_came_from_platforms_are_listed_to_the_administrator(activity, platform, app, admin):
+    key, teacher = activity
+    colleague_by_launch(platform, app)
+    listed = {one["name"]: one for one in admin.get("/api/v1/lti/members").json()}
+    assert (listed["Radu"]["publication"], listed["Radu"]["by_launch"]) == (key, True)
+    assert listed["Doina"]["by_launch"] is False
+    assert "Radu" in admin.get("/account").text
+    assert teacher.get("/api/v1/lti/members").status_code == 403
+
+
+# Who is which student ------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def contested(activity, platform, app, admin):
+    """Two who come as s09; the first has it."""
+    key, _ = activity
+    roster = b"student_id,name,n,email\ns09,Student 9,27,s09@example.org\ns11,Student 11,5,s11@example.org\n"
+    assert admin.act("PUT", f"/publications/{key}/roster/files/roster.csv", content=roster).status_code == 200
+    first, second = Browser(app), Browser(app)
+    mail = {"email": "S09@example.org"}
+    assert platform.launch(first, sub="user-9", name="Vlad", **mail).status_code == 303
+    refused = platform.launch(second, sub="user-8", name="Ovidiu", **mail)
+    assert (refused.status_code, refused.json()["code"]) == (409, "lti_claimed")
+    return key, first, second
+
+
+def claims_of(admin, key):
+    found = admin.get(f"/api/v1/publications/{key}/lti/claims").json()
+    return {one["who"].partition(" ")[0]: one for one in found}
+
+
+def test_a_second_one_who_comes_as_a_student_sees_and_gets_nothing(contested, platform, admin):
+    key, first, second = contested
+    assert first.get(f"/api/v1/publications/{key}/feedback").status_code == 200
+    assert second.get(f"/api/v1/publications/{key}/feedback").status_code == 401
+    assert {who: one["holds"] for who, one in claims_of(admin, key).items()} == {
+        "Vlad": True,
+        "Ovidiu": False,
+    }
+    page = admin.get(f"/publications/{key}").text
+    assert "Vlad" in page
+    assert "Ovidiu" in page
+    admin.act("POST", f"/publications/{key}/lti/scores")
+    assert [score["userId"] for _, score in platform.scores] == ["user-9"]
+
+
+def test_the_instructor_decides_who_the_student_is(contested, platform, admin):
+    key, first, second = contested
+    number = claims_of(admin, key)["Ovidiu"]["id"]
+    assert first.act("PUT", f"/publications/{key}/lti/claims/{number}").status_code == 401
+    assert admin.act("PUT", f"/publications/{key}/lti/claims/{number}").status_code == 200
+    assert first.get(f"/api/v1/publications/{key}/feedback").status_code == 401
+    assert platform.launch(second, sub="user-8", email="s09@example.org").status_code == 303
+    assert second.get(f"/api/v1/publications/{key}/feedback").status_code == 200
+    assert platform.launch(first, sub="user-9", email="s09@example.org").status_code == 409
+    admin.act("POST", f"/publications/{key}/lti/scores")
+    assert [score["userId"] for _, score in platform.scores] == ["user-8"]
+
+
+def test_nobody_is_two_students(contested, platform, admin, app):
+    """A changed e-mail address makes nobody another student."""
+    key, *_ = contested
+    assert platform.launch(Browser(app), sub="user-9", email="s11@example.org").status_code == 409
+    number = claims_of(admin, key)["Vlad"]["id"]
+    assert admin.act("DELETE", f"/publications/{key}/lti/claims/{number}").status_code == 200
+    assert platform.launch(Browser(app), sub="user-9", email="s09@example.org").status_code == 409
+
+
+def test_the_next_one_at_the_same_computer_is_not_the_one_before(contested, platform):
+    key, first, _ = contested
+    assert platform.launch(first, sub="nobody").status_code == 303
+    assert first.get(f"/api/v1/publications/{key}/feedback").status_code == 401
 
 
 def test_a_message_that_another_has_signed_is_refused(platform, visitor):
@@ -180,8 +361,11 @@ def test_a_login_of_a_platform_that_is_not_registered_is_refused(visitor):
     "address",
     [
         "http://platform.example/token", "https://10.0.0.5/token", "https://169.254.169.254/latest",
-        "https://localhost/token", "https://[::1]/token", "file:///etc/passwd", "https://a:b@platform.example/",
-        "https://printer.local/", "gopher://platform.example",
+        "https://localhost/token", "https://localhost./token", "https://[::1]/token", "file:///etc/passwd",
+        "https://a:b@platform.example/", "https://printer.local/", "gopher://platform.example", "https://0/",
+        "https://2130706433/", "https://0x7f.1/", "https://127.1/", "https://[::ffff:127.0.0.1]/",
+        "https://[64:ff9b::7f00:1]/", "https://[2002:7f00:1::]/", "https://224.0.0.1/", "https://x:99999/",
+        "https://" + "a" * 300 + ".example/",
     ],
 )  # fmt: skip
 def test_the_server_is_not_sent_into_its_own_network(admin, address):

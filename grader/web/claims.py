@@ -1,0 +1,122 @@
+"""Who from a platform is which student of a roster: whoever comes first, until the instructor decides.
+
+A student is found by the platform's id of the person, or by e-mail; the platform lets people change both.
+Whoever comes as a student whom somebody else is already, or as a second one, is refused and listed.
+"""
+
+import threading
+from collections.abc import Sequence
+from typing import Any
+
+from fastapi import APIRouter
+from sqlalchemy import select, update
+
+from grader.inputs.roster import RosterRow, read_roster
+from grader.language import N_
+from grader.web.guard import RefusedError, missing
+from grader.web.instructors import Row
+from grader.web.launch import Message
+from grader.web.service import Call, Called, Key, Route
+from grader.web.store import Link, LtiClaim, LtiUser, Publication
+from reference.errors import PlanmarkError
+
+router = APIRouter(route_class=Route, prefix="/api/v1/publications/{key}/lti/claims", tags=["lti"])
+_CLAIMING = threading.Lock()
+"""Of two who come as the same student at once, one is first."""
+
+
+def row_of(call: Call, publication: Publication, message: Message) -> RosterRow | None:
+    """The student's line of the roster: by the platform's id of the person, or by e-mail."""
+    roster = call.places(publication).roster
+    try:
+        rows = read_roster(roster).rows if roster.is_file() else ()
+    except PlanmarkError:
+        return None
+    ids = {one for one in (message.person and message.person.person_sourcedid, message.sub) if one}
+    email = (message.email or "").casefold()
+    named = [row for row in rows if row.student_id in ids]
+    mailed = [row for row in rows if email and (row.email or "").casefold() == email]
+    found = {row.student_id: row for row in (named or mailed)}
+    return next(iter(found.values())) if len(found) == 1 else None
+
+
+def claimed(call: Call, user: LtiUser, publication: Publication, student: str, message: Message) -> LtiClaim:
+    """The claim by which somebody is the student. Raises RefusedError where another came first."""
+    of_publication = LtiClaim.publication_id == publication.id
+    with _CLAIMING:
+        others = call.session.scalars(select(LtiClaim).where(of_publication)).all()
+        own = [one for one in others if (one.user_id, one.student_id) == (user.id, student)]
+        claim = own[0] if own else None
+        if claim is None:
+            is_first = not any(
+                one.student_id == student or (one.user_id == user.id and one.holds) for one in others
+            )
+            who = " ".join(filter(None, (message.name, message.email))) or message.sub
+            claim = LtiClaim(
+                publication_id=publication.id,
+                user_id=user.id,
+                student_id=student,
+                who=who[:200],
+                holds=is_first,
+            )
+            call.session.add(claim)
+            call.note("came as a student" if is_first else "claim waits", f"{publication.key} {student}")
+        call.session.commit()
+    if not claim.holds:
+        why = N_("somebody else has come as this student: your instructor decides who it is")
+        raise RefusedError(409, "lti_claimed", why)
+    return claim
+
+
+# What the instructor decides ------------------------------------------------------------------------
+
+
+@router.get("")
+def listed(call: Called, key: Key) -> list[dict[str, Any]]:
+    """Who has come from platforms as which student, those first of whom several want to be the same."""
+    own = call.own(key)
+    found = call.session.scalars(select(LtiClaim).where(LtiClaim.publication_id == own.id)).all()
+    names = ("id", "student_id", "who", "holds", "created")
+    waiting = {one.student_id for one in found if not one.holds}
+    rows = [{name: getattr(one, name) for name in names} for one in found]
+    return sorted(rows, key=lambda row: (row["student_id"] not in waiting, row["student_id"], row["id"]))
+
+
+@router.put("/{number}")
+def decide(call: Called, key: Key, number: Row) -> dict[str, str]:
+    """Say that this one is the student; whoever was it before is it no more."""
+    claim = _own_claim(call, key, number)
+    others = call.session.scalars(
+        select(LtiClaim).where(
+            LtiClaim.publication_id == claim.publication_id, LtiClaim.id != claim.id, LtiClaim.holds,
+            (LtiClaim.student_id == claim.student_id) | (LtiClaim.user_id == claim.user_id),
+        )
+    ).all()  # fmt: skip
+    for other in others:
+        other.holds = False
+    take_back_links(call, [one.id for one in others])
+    claim.holds = True
+    call.note("claim decided", f"{key} {claim.student_id}")
+    return {"state": "decided"}
+
+
+@router.delete("/{number}")
+def refuse(call: Called, key: Key, number: Row) -> dict[str, str]:
+    """Say that this one is not the student, and take back what the launch gave."""
+    claim = _own_claim(call, key, number)
+    take_back_links(call, [claim.id])
+    call.session.delete(claim)
+    call.note("claim refused", f"{key} {claim.student_id}")
+    return {"state": "refused"}
+
+
+def _own_claim(call: Call, key: str, number: int) -> LtiClaim:
+    own, claim = call.own(key), call.session.get(LtiClaim, number)
+    if claim is None or claim.publication_id != own.id:
+        raise missing("claim")
+    return claim
+
+
+def take_back_links(call: Call, numbers: Sequence[int]) -> None:
+    """Revoke the links that launches gave by some claims."""
+    call.session.execute(update(Link).where(Link.claim_id.in_(numbers)).values(is_revoked=True))

@@ -1,0 +1,23 @@
+-- The tables as the first version made them in SQLite (November 2026).
+CREATE TABLE accounts ( id INTEGER NOT NULL, name VARCHAR(80) NOT NULL, password VARCHAR(200) NOT NULL, is_admin BOOLEAN NOT NULL, created DOUBLE NOT NULL, PRIMARY KEY (id), UNIQUE (name) );
+CREATE TABLE publications ( id INTEGER NOT NULL, "key" VARCHAR(20) NOT NULL, title VARCHAR(120) NOT NULL, term VARCHAR(40) NOT NULL, assignment VARCHAR(120) NOT NULL, lang VARCHAR(2) NOT NULL, level VARCHAR(10) NOT NULL, attempts INTEGER, is_open BOOLEAN NOT NULL, is_released BOOLEAN NOT NULL, takes_sheets BOOLEAN NOT NULL, pages_per_student INTEGER, created DOUBLE NOT NULL, PRIMARY KEY (id), UNIQUE ("key") );
+CREATE INDEX ix_publications_term ON publications (term);
+CREATE TABLE lti_platforms ( id INTEGER NOT NULL, issuer VARCHAR(500) NOT NULL, client_id VARCHAR(200) NOT NULL, auth_login_url VARCHAR(500) NOT NULL, auth_token_url VARCHAR(500) NOT NULL, key_set_url VARCHAR(500) NOT NULL, deployments JSON NOT NULL, PRIMARY KEY (id), UNIQUE (issuer, client_id) );
+CREATE TABLE lti_states ( id VARCHAR(64) NOT NULL, expires DOUBLE NOT NULL, what JSON NOT NULL, PRIMARY KEY (id) );
+CREATE TABLE audit ( id INTEGER NOT NULL, at DOUBLE NOT NULL, who VARCHAR(100) NOT NULL, act VARCHAR(40) NOT NULL, about VARCHAR(200) NOT NULL, PRIMARY KEY (id) );
+CREATE INDEX ix_audit_at ON audit (at);
+CREATE TABLE visits ( id VARCHAR(64) NOT NULL, account_id INTEGER, title VARCHAR(80) NOT NULL, links JSON NOT NULL, created DOUBLE NOT NULL, used DOUBLE NOT NULL, PRIMARY KEY (id), FOREIGN KEY(account_id) REFERENCES accounts (id) ON DELETE CASCADE );
+CREATE TABLE members ( publication_id INTEGER NOT NULL, account_id INTEGER NOT NULL, PRIMARY KEY (publication_id, account_id), FOREIGN KEY(publication_id) REFERENCES publications (id) ON DELETE CASCADE, FOREIGN KEY(account_id) REFERENCES accounts (id) ON DELETE CASCADE );
+CREATE TABLE links ( id INTEGER NOT NULL, publication_id INTEGER NOT NULL, student_id VARCHAR(80) NOT NULL, expires DOUBLE NOT NULL, is_revoked BOOLEAN NOT NULL, created DOUBLE NOT NULL, PRIMARY KEY (id), FOREIGN KEY(publication_id) REFERENCES publications (id) ON DELETE CASCADE );
+CREATE INDEX ix_links_student_id ON links (student_id);
+CREATE INDEX ix_links_publication_id ON links (publication_id);
+CREATE TABLE attempts ( id INTEGER NOT NULL, publication_id INTEGER NOT NULL, who VARCHAR(100) NOT NULL, variant VARCHAR(60) NOT NULL, count INTEGER NOT NULL, PRIMARY KEY (id), UNIQUE (publication_id, who, variant), FOREIGN KEY(publication_id) REFERENCES publications (id) ON DELETE CASCADE );
+CREATE INDEX ix_attempts_publication_id ON attempts (publication_id);
+CREATE TABLE jobs ( id INTEGER NOT NULL, "key" VARCHAR(20) NOT NULL, publication_id INTEGER NOT NULL, kind VARCHAR(10) NOT NULL, state VARCHAR(10) NOT NULL, asked JSON NOT NULL, result JSON NOT NULL, message VARCHAR NOT NULL, stage VARCHAR(40) NOT NULL, done INTEGER NOT NULL, total INTEGER NOT NULL, visit_id VARCHAR(64) NOT NULL, created DOUBLE NOT NULL, started DOUBLE, ended DOUBLE, PRIMARY KEY (id), UNIQUE ("key"), FOREIGN KEY(publication_id) REFERENCES publications (id) ON DELETE CASCADE );
+CREATE INDEX ix_jobs_state ON jobs (state);
+CREATE INDEX ix_jobs_publication_id ON jobs (publication_id);
+CREATE TABLE regrading ( id INTEGER NOT NULL, publication_id INTEGER NOT NULL, student_id VARCHAR(80) NOT NULL, position INTEGER, criterion VARCHAR(80) NOT NULL, text VARCHAR NOT NULL, answer VARCHAR NOT NULL, created DOUBLE NOT NULL, answered DOUBLE, PRIMARY KEY (id), FOREIGN KEY(publication_id) REFERENCES publications (id) ON DELETE CASCADE );
+CREATE INDEX ix_regrading_publication_id ON regrading (publication_id);
+CREATE INDEX ix_regrading_student_id ON regrading (student_id);
+CREATE TABLE lti_users ( id INTEGER NOT NULL, platform_id INTEGER NOT NULL, subject VARCHAR(255) NOT NULL, account_id INTEGER, students JSON NOT NULL, PRIMARY KEY (id), UNIQUE (platform_id, subject), FOREIGN KEY(platform_id) REFERENCES lti_platforms (id) ON DELETE CASCADE, FOREIGN KEY(account_id) REFERENCES accounts (id) ON DELETE SET NULL );
+CREATE TABLE lti_activities ( id INTEGER NOT NULL, platform_id INTEGER NOT NULL, deployment VARCHAR(200) NOT NULL, resource_link VARCHAR(255) NOT NULL, publication_id INTEGER, grades JSON NOT NULL, sent JSON NOT NULL, PRIMARY KEY (id), UNIQUE (platform_id, deployment, resource_link), FOREIGN KEY(platform_id) REFERENCES lti_platforms (id) ON DELETE CASCADE, FOREIGN KEY(publication_id) REFERENCES publications (id) ON DELETE SET NULL );
