@@ -113,6 +113,7 @@ class Review:
             title=title,
             texts=questions.texts(self.speaker),
             by=_user() if self.by is None else self.by,
+            is_known=self.by is not None,
             verdicts=VERDICTS,
         )
         return Response(page, media_type="text/html")
@@ -253,27 +254,27 @@ class Review:
     def undo(self, said: Said) -> dict[str, Any]:
         """The last decision of a window taken back."""
         since = self.session.version
-        students, row = self.session.undo(said.window)
+        students, row = self.session.undo(said.window, said.by)
         undone = "" if row is None else f"{students[0].key}/{row.criterion}" if students else row.criterion
         return {**self._facts(since), "undone": undone}
 
     # The end --------------------------------------------------------------------------------------
 
-    def finish(self, _said: Said) -> dict[str, Any]:
+    def finish(self, said: Said) -> dict[str, Any]:
         """Start to bring all pages up to date and to export."""
         if not self.run.running:
             self.run = Run(running=True)
-            threading.Thread(target=self._finish, args=(self.run,), daemon=True).start()
+            threading.Thread(target=self._finish, args=(self.run, said.by), daemon=True).start()
         return {}
 
-    def _finish(self, run: Run) -> None:
+    def _finish(self, run: Run, by: str) -> None:
         speaker, out = self.speaker, self.session.batch.out
 
         def progress(_what: str, done: int, total: int) -> None:
             run.progress = speaker.gettext(WORKING) % {"done": done, "total": total}
 
         try:
-            results = self.session.bring_up_to_date(progress).results
+            results = self.session.bring_up_to_date(progress, by).results
             options = Options(to="csv", what="grades", out=out, lang=self.lang)
             table = out / usual_name(options)
             export(results, table, options)
@@ -442,6 +443,8 @@ def _posted(review: Review, model: type[Said], act: Callable[[Any], dict[str, An
             fault = error.errors(include_url=False, include_context=False, include_input=False)[0]
             where = ".".join(map(str, fault["loc"]))
             return JSONResponse({"message": f"{where}: {fault['msg']}".lstrip(": ")}, 400)
+        if review.by is not None:  # who decides is known, and takes back what is their own
+            said = said.model_copy(update={"by": review.by, "window": f"{review.by} {said.window}"})
         return await run_in_threadpool(lambda: _told(review, lambda: JSONResponse(act(said))))
 
     return handler

@@ -5,7 +5,7 @@ and pages on the disk are of the last run, and `bring_up_to_date` makes them ane
 """
 
 import threading
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Annotated
@@ -14,7 +14,13 @@ from pydantic import BaseModel, ConfigDict, Field
 from pydantic.dataclasses import dataclass as posted
 
 from grader.comparison.task import task_of
-from grader.documents import CriterionDocument, ProblemDocument, ReportDocument
+from grader.documents import (
+    CriterionDocument,
+    ProblemDocument,
+    ReportDocument,
+    ResultsDocument,
+    StandingDocument,
+)
 from grader.folder.batch import Batch, Graded, Job, graded, pages_read
 from grader.folder.decisions import basis_of, decided, page_basis
 from grader.folder.workers import Pool
@@ -131,6 +137,27 @@ class Change:
     before: tuple[Decision, ...]
 
 
+Note = Callable[[str, str, str, str], None]
+"""Told of a change of a mark: who made it, what it is about, before, after."""
+
+
+def unnoted(_who: str, _about: str, _before: str, _after: str) -> None:
+    """Nobody asks who changed a mark."""
+
+
+def moves(results: ResultsDocument) -> Iterator[tuple[str, str, str]]:
+    """The marks that a run changed: about whom, before, after."""
+    for one in results.moved:
+        about = one.student_id if one.position is None else f"{one.student_id} {one.position}"
+        yield about, _stands(one.before), _stands(one.after)
+
+
+def _stands(standing: StandingDocument | None) -> str:
+    if standing is None:
+        return ""
+    return standing.status if standing.score is None else f"{standing.score:g}"
+
+
 class Standing:
     """What stands decided: rows by what they are about."""
 
@@ -155,6 +182,7 @@ class Session:
     Arguments
     ---------
     workers : what grades, processes of its own where not given
+    note : is told of every change of a mark
     """
 
     batch: Batch
@@ -167,6 +195,7 @@ class Session:
     """How many decisions were made here since the pages were brought up to date."""
     scans: Scans = field(default_factory=Scans)
     graded: Graded | None = None
+    note: Note = unnoted
     _file: DecisionFile = field(init=False)
     _stamp: tuple[int, int] = (0, 0)
     _rows: list[Decision] = field(default_factory=list)
@@ -178,10 +207,12 @@ class Session:
 
     # The class ------------------------------------------------------------------------------------
 
-    def bring_up_to_date(self, progress: Callable[[str, int, int], None]) -> Graded:
+    def bring_up_to_date(self, progress: Callable[[str, int, int], None], by: str = "") -> Graded:
         """Grade what has changed, so that results and pages on the disk are of all decisions.
 
         Raises as `grader.folder.batch.graded`.
+
+        Arguments: `by` is who asks for it.
         """
         stamp, made, rows = self._file_stamp(), self.made, self._file.all()
         run = graded(self.batch, progress, self.workers)
@@ -198,6 +229,8 @@ class Session:
             # What was decided meanwhile is taken in by the next `refresh`.
             self.made -= made
             self._stamp, self._rows = stamp, rows
+        for about, before, after in moves(run.results):
+            self.note(by, about, before, after)
         return run
 
     def student(self, key: str) -> Student:
@@ -245,7 +278,7 @@ class Session:
                     student.criterion(answer.criterion)
                 row = self._row(student, answer.criterion, answer.verdict, by, there)
                 wanted.append((replace(row, comment=answer.comment), answer.seen))
-            self._write(wanted, there, window)
+            self._write(wanted, there, window, by)
             return self._marked_anew({answer.student for answer in answers})
 
     def decide_whole(self, answer: Whole) -> list[Student]:
@@ -261,7 +294,8 @@ class Session:
             gone = [
                 (row, seen) for row, seen, said in wanted if not said and there.rows.get(row.key) is not None
             ]
-            self._write([(row, seen) for row, seen, said in wanted if said], there, answer.window, gone)
+            kept = [(row, seen) for row, seen, said in wanted if said]
+            self._write(kept, there, answer.window, answer.by, gone)
             return self._marked_anew({answer.student})
 
     def move(self, answer: Answer, by: str, window: str) -> list[Student]:
@@ -272,7 +306,7 @@ class Session:
         with self._lock:
             student, there = self.student(answer.student), self.standing()
             row = self._row(student, answer.criterion, answer.verdict, by, there)
-            self._write([(row, answer.seen)], there, window)
+            self._write([(row, answer.seen)], there, window, by)
             return self._marked_anew({answer.student})
 
     def decide_page(self, ref: PageRef, row: Decision, seen: str, window: str) -> None:
@@ -282,9 +316,9 @@ class Session:
         """
         with self._lock:
             dated = replace(row, at=_now(), basis=page_basis(ref))
-            self._write([(dated, seen)], self.standing(), window)
+            self._write([(dated, seen)], self.standing(), window, row.by)
 
-    def undo(self, window: str) -> tuple[list[Student], Decision | None]:
+    def undo(self, window: str, by: str = "") -> tuple[list[Student], Decision | None]:
         """Take back the last thing decided in a window: the students concerned, and a row of it.
 
         Raises ChangedError where somebody has changed it since.
@@ -299,6 +333,7 @@ class Session:
             except ClashError as error:
                 raise ChangedError(error.rows[0] if error.rows else None) from error
             self.made -= 1
+            self._tell(by, change.before, change.written)
             row = (*change.written, *change.before)[0]
             own = [one for one in self.students if one.report.student_id == row.student_id]
             fitting = [one for one in own if row.position in {None, one.report.position}]
@@ -326,6 +361,7 @@ class Session:
         wanted: Sequence[tuple[Decision, str]],
         there: Standing,
         window: str,
+        by: str,
         gone: Sequence[tuple[Decision, str]] = (),
     ) -> None:
         """Write rows, and take others out, each with the mark of what the person saw in its place."""
@@ -344,6 +380,21 @@ class Session:
             raise ChangedError(error.rows[0] if error.rows else None) from error
         self._undo.setdefault(window, []).append(Change(tuple(rows), (*before, *out)))
         self.made += 1
+        self._tell(by, rows, (*before, *out))
+
+    def _tell(self, by: str, written: Sequence[Decision], before: Sequence[Decision]) -> None:
+        """Note what stands decided now, and what stood there before or was marked without a person."""
+        there, now = ({row.key: row for row in rows} for rows in (before, written))
+        for key in {**there, **now}:
+            about = " ".join(str(part) for part in key if part not in {"", None})
+            self.note(by, about, _said(there.get(key)) or self._marked(key), _said(now.get(key)))
+
+    def _marked(self, key: Key) -> str:
+        """What the program says of what a decision is about."""
+        for student in self.students:
+            if key[0] == student.report.student_id and key[1] in {None, student.report.position}:
+                return next((one.verdict for one in student.report.criteria if one.id == key[2]), "")
+        return ""
 
     def _file_stamp(self) -> tuple[int, int]:
         try:
@@ -556,6 +607,14 @@ def page_criterion(ref: PageRef) -> str:
 def mark_of(row: Decision | None) -> str:
     """A mark of what stands decided; empty where nothing is."""
     return "" if row is None else f"{row.at} {row.by} {row.verdict} {row.points} {row.comment}"
+
+
+def _said(row: Decision | None) -> str:
+    """What a row decides, in short."""
+    if row is None:
+        return ""
+    points = "" if row.points is None else f"{row.points:g}"
+    return " ".join(filter(None, (row.verdict, points))) or row.comment
 
 
 def _now() -> str:

@@ -6,7 +6,7 @@ import shutil
 from collections.abc import Iterable
 from pathlib import Path
 
-from sqlalchemy import delete, select
+from sqlalchemy import delete, or_, select
 from sqlalchemy.orm import Session
 
 from grader.documents import ResultsDocument
@@ -77,13 +77,19 @@ def _student_named(stem: str, students: Iterable[str]) -> str | None:
 def _erase_audit(session: Session, publication: Publication, student: str, students: Iterable[str]) -> None:
     """Put a digest in the place of the student's id, and of names of files that begin with it."""
     told = Audit.about.startswith(f"{publication.key} ", autoescape=True)
-    for entry in session.scalars(select(Audit).where(told, Audit.about.contains(student, autoescape=True))):
-        entry.about = " ".join(
-            f"({digest_of(student)[:8]})"
-            if student in {word, _student_named(Path(word).stem, students)}
-            else word
-            for word in entry.about.split(" ")
-        )
+    texts = (Audit.about, Audit.before, Audit.after)
+    named = or_(*(text.contains(student, autoescape=True) for text in texts))
+    for entry in session.scalars(select(Audit).where(told, named)):
+        for text in texts:
+            words = getattr(entry, text.key).split(" ")
+            setattr(entry, text.key, " ".join(_without(word, student, students) for word in words))
+
+
+def _without(word: str, student: str, students: Iterable[str]) -> str:
+    """A word of the audit trail; a digest where it is the student, or a file or page of theirs."""
+    bare = word.removeprefix("page:").removeprefix("owner=").rstrip(";:")
+    is_own = student in {bare, _student_named(Path(bare).stem, students)}
+    return f"({digest_of(student)[:8]})" if is_own else word
 
 
 def _erase_rows(places: Places, student: str) -> None:

@@ -479,7 +479,7 @@ def grade_class(call: Called, key: Key) -> JobState:
     if job is not None and job.state in {"queued", "running"}:
         return state_of(call, job)
     call.note("grading", key)
-    return queued(call, Job(publication=own, kind="grade", asked={}))
+    return queued(call, Job(publication=own, kind="grade", asked={"by": call.account.name}))
 
 
 @router.get("/publications/{key}/jobs/{job}")
@@ -665,5 +665,5 @@ def audit(
     _ = call.admin
     asked = select(Audit).order_by(Audit.id.desc()).limit(200)
     asked = asked if before is None else asked.where(Audit.id < before)
-    names = ("id", "at", "who", "act", "about")
+    names = ("id", "at", "who", "act", "about", "before", "after")
     return [{name: getattr(one, name) for name in names} for one in call.session.scalars(asked)]

@@ -21,6 +21,7 @@ from sqlalchemy import select, update
 from grader.folder.batch import Batch, grade
 from grader.folder.workers import Workers, guarded, result_of
 from grader.records import Problem
+from grader.review.session import moves
 from grader.web.places import batch_of, places_of
 from grader.web.settings import Settings
 from grader.web.store import Job, Store
@@ -180,6 +181,8 @@ class Queue:
                         with self.store.session() as session:
                             row = update(Job).where(Job.id == job.id)
                             session.execute(row.values(stage=stage, done=done, total=total))
+                case ("moved", about, before, after):
+                    self.store.note_mark(job.publication.key, job.asked.get("by", ""), about, before, after)
                 case ("done", result):
                     return result  # type: ignore[no-any-return]
                 case ("failed", Problem() as problem):
@@ -203,6 +206,8 @@ def _graded(batch: Batch, reports: Connection) -> None:
     if isinstance(results, Problem):
         reports.send(("failed", results))
         return
+    for move in moves(results):
+        reports.send(("moved", *move))
     states = [report.status for report in results.reports]
     counts = {state: states.count(state) for state in dict.fromkeys(states)}
     reports.send(("done", {"states": counts, "unmatched": len(results.unmatched)}))

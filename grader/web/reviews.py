@@ -5,6 +5,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import partial
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session as Store
@@ -71,18 +72,19 @@ class Reviews:
             requests = _requests(_waiting(store, publication))
             name, lang = call.account.name, call.lang
         with self._lock:
-            session = self._session(publication, None if job is None else job.id)
+            session = self._session(publication, None if job is None else job.id, name)
         session.ask(requests)
         return session, name, lang
 
-    def _session(self, publication: Publication, job: int | None) -> Session:
+    def _session(self, publication: Publication, job: int | None, name: str) -> Session:
         known = self._open.get((publication.id, job))
         if known is None:
             batch = batch_of(self.service.settings.data, publication)
             if not (batch.out / "results.json").is_file():
                 raise CallError("results_missing", "grade the class first")
-            known = Session(batch, self.service.queue.workers)
-            known.bring_up_to_date(lambda *_: None)
+            note = partial(self.service.store.note_mark, publication.key)
+            known = Session(batch, self.service.queue.workers, note=note)
+            known.bring_up_to_date(lambda *_: None, name)
             self._open = OrderedDict(
                 (which, session) for which, session in self._open.items() if which[0] != publication.id
             )

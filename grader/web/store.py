@@ -6,7 +6,7 @@ What people hand in, and results, are files (`grader.web.places`). Times are sec
 import hashlib
 import secrets
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -284,7 +284,12 @@ class LtiState(Table):
 
 
 class Audit(Table):
-    """Who did what, and when; nothing is ever taken out but what is older than is kept."""
+    """Who did what, and when; nothing is ever taken out but what is older than is kept.
+
+    Attributes
+    ----------
+    before, after : of a mark that was changed
+    """
 
     __tablename__ = "audit"
     id: Mapped[int] = mapped_column(primary_key=True)
@@ -292,6 +297,8 @@ class Audit(Table):
     who: Mapped[str] = mapped_column(String(100))
     act: Mapped[str] = mapped_column(String(40))
     about: Mapped[str] = mapped_column(String(200), default="")
+    before: Mapped[str] = mapped_column(String(200), default="", server_default="")
+    after: Mapped[str] = mapped_column(String(200), default="", server_default="")
 
 
 CONNECTIONS = 60
@@ -329,9 +336,15 @@ class Store:
             yield session
             session.commit()
 
-    def note(self, session: Session, who: str, act: str, about: str = "") -> None:
-        """Add to the audit trail."""
-        session.add(Audit(who=who[:100], act=act, about=about[:200]))
+    def note(self, session: Session, who: str, act: str, about: str = "", change: Sequence[str] = ()) -> None:
+        """Add to the audit trail; `change` are a mark before and after."""
+        before, after = (*change, "", "")[:2]
+        session.add(Audit(who=who[:100], act=act, about=about[:200], before=before[:200], after=after[:200]))
+
+    def note_mark(self, key: str, who: str, about: str, before: str, after: str) -> None:
+        """Add a changed mark of a publication to the audit trail."""
+        with self.session() as session:
+            self.note(session, who, "mark changed", f"{key} {about}", (before, after))
 
     def claimed(self, job_id: int) -> bool:
         """Whether a queued job is now ours to run."""

@@ -805,7 +805,7 @@ $("save-whole").onclick = () => busy(async () => {
   tell(texts.saved, [[texts.close, () => tell("")]]);
   await showQuestion(true);
 });
-$("by").value = stored.get("by", document.body.dataset.by);
+$("by").value = $("by").readOnly ? document.body.dataset.by : stored.get("by", document.body.dataset.by);
 $("by").onchange = () => stored.set("by", $("by").value.trim());
 $("anonymous").checked = stored.get("anonymous", "") === "1";
 $("anonymous").onchange = () => { stored.set("anonymous", $("anonymous").checked ? "1" : ""); jumps(); refreshScreen().catch(failed); };
