@@ -59,11 +59,6 @@ HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
-PAGE_HEADERS = {
-    "Content-Security-Policy": "default-src 'none'; img-src 'self' data:; style-src 'unsafe-inline';"
-    " script-src 'unsafe-inline'; frame-ancestors 'none'",
-}
-"""Of the pages that `planmark grade` wrote, which have their styles in them."""
 EXPORTS = ("moodle", "canvas", "gradescope")
 WORKING = N_("Bringing the pages up to date: %(done)d of %(total)d")
 UP_TO_DATE = N_("The pages are up to date.")
@@ -206,7 +201,7 @@ class Review:
             or any(part.startswith(".") for part in path.relative_to(top).parts)
         ):
             return Response("not found", 404)
-        return FileResponse(path, headers=PAGE_HEADERS)
+        return page_file(path)
 
     # Decisions ------------------------------------------------------------------------------------
 
@@ -306,6 +301,18 @@ class Review:
                 else [f"planmark export {_quoted(out)} --to {name}" for name in EXPORTS],
             }
         )
+
+
+def page_file(path: Path) -> FileResponse:
+    """A page or picture that `planmark grade` wrote, which has its styles and its script in it.
+
+    It is alone in a sandbox: whatever it does, it reaches neither cookies nor the server.
+    """
+    policy = (
+        "default-src 'none'; img-src 'self' data:; style-src 'unsafe-inline'; script-src 'unsafe-inline';"
+        " frame-ancestors 'none'; sandbox allow-scripts allow-popups allow-downloads"
+    )
+    return FileResponse(path, headers={"Content-Security-Policy": policy})
 
 
 def _user() -> str:

@@ -14,6 +14,7 @@ from grader.feedback.words import STATES, environment
 from grader.inputs.roster import read_roster
 from grader.language import LANGUAGES, N_, tongue
 from grader.lms.export import TARGETS
+from grader.review.server import page_file
 from grader.web import claims, instructors, lti, students
 from grader.web.guard import HEADERS, missing
 from grader.web.places import assignment_of
@@ -154,7 +155,7 @@ def result_page(call: Called, key: Key, path: str) -> Response:
         raise missing()
     if not wanted.is_file():
         raise missing()
-    return students.page_file(wanted)
+    return page_file(wanted)
 
 
 @router.get("/account")

@@ -365,8 +365,8 @@ class Store:
 
 def _add_columns(engine: Engine) -> None:
     """Add what tables of an older version lack: columns that may be empty, or have a default there."""
-    known = inspect(engine)
     with engine.begin() as connection:
+        known = inspect(connection)
         for table in Table.metadata.sorted_tables:
             there = {column["name"] for column in known.get_columns(table.name)}
             for column in table.columns:

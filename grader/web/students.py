@@ -6,7 +6,6 @@ import re
 import secrets
 import threading
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query
@@ -19,6 +18,7 @@ from grader.documents import ReportDocument
 from grader.files import result_folders, write_whole
 from grader.language import N_
 from grader.lms.export import read_results
+from grader.review.server import page_file
 from grader.web.guard import RefusedError, forbidden, missing
 from grader.web.places import assignment_of
 from grader.web.self_check import checked_values, form_of, variant_of
@@ -360,18 +360,6 @@ def ending_of(body: bytes) -> str:
     if ending is None:
         raise RefusedError(415, "file_type", N_("send a photo or scan: JPEG, PNG, TIFF or PDF"))
     return ending
-
-
-def page_file(path: Path) -> FileResponse:
-    """A page or picture that `planmark grade` wrote, which has its styles and its script in it.
-
-    It is alone in a sandbox: whatever it does, it reaches neither cookies nor the server.
-    """
-    policy = (
-        "default-src 'none'; img-src 'self' data:; style-src 'unsafe-inline'; script-src 'unsafe-inline';"
-        " frame-ancestors 'none'; sandbox allow-scripts allow-popups allow-downloads"
-    )
-    return FileResponse(path, headers={"Content-Security-Policy": policy})
 
 
 def queued(call: Call, job: Job) -> JobState:

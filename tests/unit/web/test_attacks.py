@@ -123,6 +123,13 @@ def test_results_are_read_from_their_folder_alone(graded, admin, path):
     assert admin.get(f"/publications/{graded[0]}/results/{path}").status_code == 404
 
 
+@pytest.mark.parametrize("top", ["publications/{}/results", "review/{}/out"])
+def test_a_page_of_results_is_alone_in_a_sandbox(graded, admin, top):
+    policy = admin.get(f"/{top.format(graded[0])}/index.html").headers["Content-Security-Policy"]
+    assert "sandbox allow-scripts" in policy
+    assert "allow-same-origin" not in policy
+
+
 def test_an_assignment_names_no_file_outside_its_own_folder(admin, tmp_path, settings):
     """What it names is read, and faults are told with what stands in the file."""
     (settings.data / "other").mkdir(parents=True)
