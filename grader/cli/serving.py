@@ -1,19 +1,67 @@
 """``planmark serve``."""
 
+import asyncio
+import contextlib
 import logging
 import os
 import socket
 from pathlib import Path
 from urllib.parse import urlsplit
 
+import h11
 import typer
 import uvicorn
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from grader.cli import terminal
 from grader.cli.reviewing import listener_on
 from reference.errors import CallError
 
 MISSING = "planmark serve needs its extra: install it with pip install 'planmark[web]'"
+
+HEAD_S = 10.0
+"""For the lines before a body: a browser sends them at once."""
+MOST_CONNECTIONS = 1000
+MOST_OF_ONE = 500
+"""Connections of one address: the others always have as many."""
+MOST_FILES = 4096
+"""Open files of the process, where the system lets it: connections, the data base's and the workers'."""
+
+
+class Bounded(H11Protocol):
+    """HTTP in which the head of a request must come in time, and one address has some connections only."""
+
+    _head: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Begin to wait for a request, unless its sender has too many."""
+        super().connection_made(transport)
+        addresses = [(getattr(one, "client", None) or ("",))[0] for one in self.connections]
+        if self.client is not None and addresses.count(self.client[0]) > MOST_OF_ONE:
+            transport.abort()
+        else:
+            self._watch()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Wait no longer."""
+        self._stop_watching()
+        super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        """Take a part of a request in."""
+        super().data_received(data)
+        self._watch()
+
+    def _watch(self) -> None:
+        if self.conn.their_state is not h11.IDLE:
+            self._stop_watching()
+        elif self._head is None:
+            self._head = self.loop.call_later(HEAD_S, self.transport.abort)
+
+    def _stop_watching(self) -> None:
+        if self._head is not None:
+            self._head.cancel()
+            self._head = None
 
 
 def serve(
@@ -56,8 +104,14 @@ def _run(app: object, listener: socket.socket) -> None:
     logging.getLogger("uvicorn").setLevel(logging.WARNING)
     config = uvicorn.Config(
         app, log_level="warning", access_log=False, ws="none", timeout_graceful_shutdown=2,  # type: ignore[arg-type]
-        server_header=False, limit_concurrency=1000, timeout_keep_alive=20,
+        server_header=False, limit_concurrency=MOST_CONNECTIONS, timeout_keep_alive=20, http=Bounded,
     )  # fmt: skip
+    with contextlib.suppress(ImportError, OSError, ValueError):
+        import resource  # not on Windows
+
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        wanted = MOST_FILES if hard == resource.RLIM_INFINITY else min(MOST_FILES, hard)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, wanted), hard))
     try:
         uvicorn.Server(config).run(sockets=[listener])
     except KeyboardInterrupt:

@@ -5,6 +5,7 @@ a header with the visit's own token, which a page of another site can neither re
 token in the header `Authorization` needs none, because no browser sends it by itself.
 """
 
+import asyncio
 import contextlib
 import hashlib
 import hmac
@@ -12,8 +13,10 @@ import json
 import re
 import secrets
 import time
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from math import inf
 from urllib.parse import urlsplit
 
 from argon2 import PasswordHasher
@@ -283,7 +286,7 @@ class Guard:
 
 @dataclass(slots=True)
 class Rim:
-    """Refuses requests for other hosts and bodies that are too large; adds the headers of safety.
+    """Refuses other hosts, and bodies that are too large, too slow or too many; adds the headers of safety.
 
     Arguments: `most` are the bytes of a body that is no file, `room` those of all bodies at one time.
     """
@@ -293,7 +296,10 @@ class Rim:
     most: int = 1_000_000
     room: int = 1_000_000_000
     hosts: frozenset[str] = field(default_factory=frozenset)
-    _held: int = 0
+    _held: Counter[str] = field(default_factory=Counter)
+    """Bytes of bodies, by the sender's address."""
+    _sending: Counter[str] = field(default_factory=Counter)
+    """Bodies that are not all there yet, by address."""
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """ASGI."""
@@ -304,21 +310,33 @@ class Rim:
         if host != self.settings.host and _name_of(host) not in self.hosts:
             await _refuse(send, 421, "this address is not served here: open the server's own address")
             return
-        most = self._most(scope["path"])
-        taken, is_refused = 0, False
+        most, sender = self._most(scope["path"]), str((scope.get("client") or [""])[0])
+        taken, until, refusal = 0, 0.0, None
 
         async def bounded() -> Message:
-            nonlocal taken, is_refused
-            message = await receive()
-            taken += len(message.get("body", b""))
-            self._held += len(message.get("body", b""))
-            is_refused = taken > most or self._held > self.room
-            if is_refused:
-                raise _TooLargeError
+            nonlocal taken, until, refusal
+            if until == inf:  # all of it is there: the application waits for the end of the connection
+                return await receive()
+            if not until:
+                until = asyncio.get_running_loop().time() + GRACE_S
+                self._sending[sender] += 1
+            refusal = CROWDED if self._sending[sender] > MOST_SENDING else None
+            if refusal is None:
+                message, refusal = await _in_time(receive, until + taken / LEAST_PACE)
+                size = len(message.get("body", b""))
+                taken += size
+                self._held[sender] += size
+                held = self._held.total() > self.room or self._held[sender] > SHARE * self.room
+                too_large = (413, f"larger than {most // 1_000_000} MB: send a smaller file")
+                refusal = refusal or (too_large if taken > most else CROWDED if held else None)
+            if refusal is not None:
+                raise _RefusedBodyError
+            if not message.get("more_body"):
+                until = self._ended(sender)
             return message
 
         async def with_headers(message: Message) -> None:
-            if is_refused:  # whatever the application answers to that
+            if refusal is not None:  # whatever the application answers to that
                 return
             if message["type"] == "http.response.start":
                 known = {name for name, _ in message["headers"]}
@@ -327,14 +345,20 @@ class Rim:
             await send(message)
 
         try:
-            with contextlib.suppress(_TooLargeError):
+            with contextlib.suppress(_RefusedBodyError):
                 await self.app(scope, bounded, with_headers)
         finally:
-            self._held -= taken
-        if taken > most:
-            await _refuse(send, 413, f"larger than {most // 1_000_000} MB: send a smaller file")
-        elif is_refused:
-            await _refuse(send, 503, "too many files are being sent: wait a minute, then send it again")
+            self._held -= Counter({sender: taken})
+            if 0.0 < until < inf:
+                self._ended(sender)
+        if refusal is not None:
+            await _refuse(send, *refusal)
+
+    def _ended(self, sender: str) -> float:
+        """Forget a body that is being sent; a time that never comes."""
+        self._sending[sender] -= 1
+        self._sending = +self._sending
+        return inf
 
     def _most(self, path: str) -> int:
         files = _FILES.fullmatch(path)
@@ -348,6 +372,15 @@ class Rim:
         return HEADERS
 
 
+GRACE_S = 30.0
+"""For a body to come, besides the time that it needs at `LEAST_PACE`."""
+LEAST_PACE = 50_000.0
+"""Bytes a second of a bad mobile network: a photo of 5 MB then takes 100 s."""
+MOST_SENDING = 60
+"""Bodies that come from one address at one time: a class behind a school's address that sends its photos."""
+SHARE = 2 / 3
+"""Of the room for all bodies that one address may take."""
+CROWDED = (503, "too many files are being sent: wait a minute, then send it again")
 _FILES = re.compile(
     r"/api/v1/publications/[^/]+/(?:(?P<photo>photos|sheets)|(?:assignment/|roster/|exports/[^/]+/)?files/.+)/?"
 )
@@ -362,8 +395,17 @@ def _name_of(host: str) -> str | None:
         return None
 
 
-class _TooLargeError(Exception):
+class _RefusedBodyError(Exception):
     pass
+
+
+async def _in_time(receive: Receive, until: float) -> tuple[Message, tuple[int, str] | None]:
+    """The next part of a body, or why it is waited for no longer."""
+    try:
+        async with asyncio.timeout_at(until):
+            return await receive(), None
+    except TimeoutError:
+        return {}, (408, "it came too slowly: send it again, where the network is better")
 
 
 async def _refuse(send: Send, status: int, text: str) -> None:

@@ -8,7 +8,7 @@ import threading
 from datetime import UTC, datetime
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Depends, Query, Request
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, ConfigDict, Field
 from sqlalchemy import func, select, update
@@ -22,7 +22,7 @@ from grader.review.server import page_file
 from grader.web.guard import RefusedError, forbidden, missing
 from grader.web.places import assignment_of
 from grader.web.self_check import checked_values, form_of, variant_of
-from grader.web.service import FILE_BODY, Body, Call, Called, Key, Route
+from grader.web.service import FILE_BODY, Call, Called, Key, Route
 from grader.web.store import Attempt, Job, Link, Publication, Regrading, Sheet
 from reference.authored.assignment import Variant
 
@@ -105,7 +105,7 @@ class JobState(BaseModel):
     seconds: float | None = None
 
 
-class Request(Strict):
+class Again(Strict):
     """A student's request to look again at a mark."""
 
     text: str = Field(min_length=1, max_length=2000, pattern=WITHOUT_NUL)
@@ -133,17 +133,34 @@ def check(call: Called, key: Key, values: Values) -> Told:
     return Told(**told, attempts_left=left)
 
 
-@router.post("/publications/{key}/photos", status_code=202, openapi_extra=FILE_BODY)
-def check_photo(
-    call: Called, key: Key, body: Body, n: Number = None, position: Number = None, lang: Lang = "en"
-) -> JobState:
-    """Check a photo or scan of a sheet; the answer is the job's result."""
+def may_check_photo(call: Called, key: Key) -> Publication:
+    """The publication of a photo that may be sent now, which is asked before any of it is read."""
     publication = open_for_checks(call, key)
     call.count("photo")
-    ending = ending_of(body)
     waiting = select(func.count()).select_from(Job).where(Job.kind == "photo", Job.state == "queued")
     if (call.session.scalar(waiting) or 0) >= MOST_WAITING:
         raise RefusedError(503, "busy", N_("very many photos wait now: send yours again in some minutes"))
+    call.session.commit()
+    return publication
+
+
+async def photo_of(request: Request, publication: Annotated[Publication, Depends(may_check_photo)]) -> bytes:
+    """The photo."""
+    _ = publication
+    return await request.body()
+
+
+@router.post("/publications/{key}/photos", status_code=202, openapi_extra=FILE_BODY)
+def check_photo(
+    call: Called,
+    publication: Annotated[Publication, Depends(may_check_photo)],
+    body: Annotated[bytes, Depends(photo_of)],
+    n: Number = None,
+    position: Number = None,
+    lang: Lang = "en",
+) -> JobState:
+    """Check a photo or scan of a sheet; the answer is the job's result."""
+    ending = ending_of(body)
     assignment = assignment_of(call.service.settings.data, publication)
     variant = variant_of(assignment, n, position)
     left = use_attempt(call, publication, variant)
@@ -213,7 +230,7 @@ def own_requests(call: Called, key: Key) -> list[dict[str, Any]]:
 
 
 @router.post("/publications/{key}/regrading", status_code=201)
-def ask_again(call: Called, key: Key, request: Request) -> dict[str, str]:
+def ask_again(call: Called, key: Key, request: Again) -> dict[str, str]:
     """Ask for a mark to be looked at again; it waits in the instructor's queue."""
     publication = own_publication(call, key)
     link = personal(call, publication)
@@ -235,21 +252,34 @@ def ask_again(call: Called, key: Key, request: Request) -> dict[str, str]:
     return {"state": "waits"}
 
 
-@router.post("/publications/{key}/sheets", status_code=201, openapi_extra=FILE_BODY)
-def hand_in(
-    call: Called,
-    key: Key,
-    body: Body,
-    name: Annotated[
-        str, Query(max_length=200, pattern=WITHOUT_NUL, description="as the student calls it")
-    ] = "",
-) -> dict[str, Any]:
-    """Hand in a sheet: one more version, stored by its time and content; none is ever replaced."""
+def may_hand_in(call: Called, key: Key) -> tuple[Publication, Link]:
+    """The publication and the student of a sheet that may be sent now, asked before any of it is read."""
     publication = call.publication(key)
     link = personal(call, publication)
     if not publication.takes_sheets:
         raise forbidden(N_("sheets are not handed in here now"))
     call.count("photo")
+    call.session.commit()
+    return publication, link
+
+
+async def sheet_of(request: Request, asked: Annotated[object, Depends(may_hand_in)]) -> bytes:
+    """The sheet."""
+    _ = asked
+    return await request.body()
+
+
+@router.post("/publications/{key}/sheets", status_code=201, openapi_extra=FILE_BODY)
+def hand_in(
+    call: Called,
+    asked: Annotated[tuple[Publication, Link], Depends(may_hand_in)],
+    body: Annotated[bytes, Depends(sheet_of)],
+    name: Annotated[
+        str, Query(max_length=200, pattern=WITHOUT_NUL, description="as the student calls it")
+    ] = "",
+) -> dict[str, Any]:
+    """Hand in a sheet: one more version, stored by its time and content; none is ever replaced."""
+    publication, link = asked
     folder = call.places(publication).handed_in
     ending = ending_of(body)
     with _HANDING_IN:

@@ -176,8 +176,8 @@ def test_a_long_body_is_for_files_alone(admin, method, path):
     assert admin.act(method, path, content=b"[" * 1_500_000).status_code == 413
 
 
-def test_all_bodies_together_have_a_bound(settings):
-    """Of three that are sent at once two find room; whoever comes when they have gone finds it again."""
+def rim_of(settings, **known):
+    """The rim around an application that waits for the whole body."""
 
     async def application(_scope, receive, send):
         message = {"more_body": True}
@@ -187,27 +187,90 @@ def test_all_bodies_together_have_a_bound(settings):
         await send({"type": "http.response.start", "status": 200, "headers": []})
         await send({"type": "http.response.body", "body": b""})
 
-    async def sent():
+    rim = Rim(application, settings, **known)
+
+    async def sent(address, *, stops=False):
         parts, statuses = iter([True, True, False]), []
 
         async def receive():
-            await asyncio.sleep(0.01)
+            await asyncio.sleep(3600.0 if stops else 0.01)
             return {"type": "http.request", "body": bytes(200), "more_body": next(parts)}
 
         async def send(message):
             statuses.append(message.get("status"))
 
-        head = [(b"host", settings.host.encode())]
-        await rim({"type": "http", "path": "/api/v1/publications/x/photos", "headers": head}, receive, send)
+        scope = {
+            "type": "http", "path": "/api/v1/publications/x/photos", "client": (address, 1),
+            "headers": [(b"host", settings.host.encode())],
+        }  # fmt: skip
+        await rim(scope, receive, send)
         return statuses[0]
 
-    async def all_sent():
-        return sorted(await asyncio.gather(*(sent() for _ in range(3)))), await sent()
+    return sent
 
-    rim = Rim(application, settings, room=1500)
-    # In a thread of its own: the browser of other tests keeps an event loop running in this one.
+
+def finished(coroutine):
+    """Its result, from a thread of its own: a browser of other tests keeps an event loop in this one."""
     with ThreadPoolExecutor(1) as apart:
-        assert apart.submit(lambda: asyncio.run(all_sent())).result() == ([200, 200, 503], 200)
+        return apart.submit(asyncio.run, coroutine).result()
+
+
+def test_all_bodies_together_have_a_bound(settings):
+    """Of three that are sent at once two find room; whoever comes when they have gone finds it again."""
+    sent = rim_of(settings, room=1500)
+
+    async def all_sent():
+        return sorted(await asyncio.gather(*(sent(f"10.0.0.{one}") for one in range(3)))), await sent(
+            "10.0.0.1"
+        )
+
+    assert finished(all_sent()) == ([200, 200, 503], 200)
+
+
+def test_one_address_does_not_fill_the_room_of_all(settings):
+    sent = rim_of(settings, room=3000)
+
+    async def all_sent():
+        greedy = asyncio.gather(*(sent("10.0.0.1") for _ in range(4)))
+        return await sent("10.0.0.2"), await greedy
+
+    other, greedy = finished(all_sent())
+    assert (other, 503 in greedy) == (200, True)
+
+
+def test_a_body_that_does_not_come_is_waited_for_no_longer(settings, monkeypatch):
+    monkeypatch.setattr("grader.web.guard.GRACE_S", 0.05)
+    sent = rim_of(settings)
+    assert finished(sent("10.0.0.1", stops=True)) == 408
+
+
+def test_unfinished_bodies_of_one_address_stop_nobody_else(settings, monkeypatch):
+    monkeypatch.setattr("grader.web.guard.GRACE_S", 0.3)
+    monkeypatch.setattr("grader.web.guard.MOST_SENDING", 3)
+    sent = rim_of(settings)
+
+    async def all_sent():
+        stuck = [asyncio.create_task(sent("10.0.0.1", stops=True)) for _ in range(3)]
+        await asyncio.sleep(0)
+        others = await sent("10.0.0.1"), await sent("10.0.0.2")
+        return others, await asyncio.gather(*stuck), await sent("10.0.0.1")
+
+    assert finished(all_sent()) == ((503, 200), [408] * 3, 200)
+
+
+@pytest.mark.parametrize("what", ["photos?n=7", "sheets"])
+def test_a_photo_too_many_is_refused_before_it_is_read(graded, student, what):
+    key, _ = graded
+    read = []
+
+    def pieces():
+        read.append(1)
+        yield b"\xff\xd8\xff"
+
+    statuses = [
+        student.act("POST", f"/publications/{key}/{what}", content=pieces()).status_code for _ in range(12)
+    ]
+    assert statuses[-1] == 429
 
 
 def test_files_in_folders_and_sheets_may_be_long(graded, admin, student):

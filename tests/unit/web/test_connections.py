@@ -1,0 +1,90 @@
+"""Connections: the head of a request comes in time, and one address does not take all of them."""
+
+import socket
+import threading
+import time
+
+import pytest
+import uvicorn
+
+from grader.cli import serving
+
+ANSWER = [(b"content-length", b"2")]
+
+
+async def application(_scope, receive, send):
+    await receive()
+    await send({"type": "http.response.start", "status": 200, "headers": ANSWER})
+    await send({"type": "http.response.body", "body": b"ok"})
+
+
+@pytest.fixture
+def server():
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        config = uvicorn.Config(
+            application, log_level="error", lifespan="off", ws="none", http=serving.Bounded
+        )
+        server = uvicorn.Server(config)
+        thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]}, daemon=True)
+        thread.start()
+        while not server.started:
+            time.sleep(0.01)
+        server.port = listener.getsockname()[1]
+        yield server
+        server.should_exit = True
+        thread.join()
+
+
+def opened(server, text):
+    connection = socket.create_connection(("127.0.0.1", server.port), timeout=30.0)
+    connection.sendall(text)
+    return connection
+
+
+def is_closed(connection):
+    """Whether the server ends it; waits for that."""
+    try:
+        return connection.recv(1000) == b""
+    except ConnectionError:
+        return True
+
+
+def answered(connection):
+    connection.sendall(b"GET / HTTP/1.1\r\nHost: x\r\n\r\n")
+    text = b""
+    while not text.endswith(b"ok"):
+        text += connection.recv(1000)
+    return text.startswith(b"HTTP/1.1 200")
+
+
+@pytest.mark.parametrize("head", [b"", b"GET / HTTP/1.1\r\nHost: x\r\n"])
+def test_half_a_head_is_waited_for_no_longer(server, monkeypatch, head):
+    monkeypatch.setattr(serving, "HEAD_S", 0.1)
+    with opened(server, head) as first:
+        assert is_closed(first)
+
+
+def test_half_a_head_after_a_request_is_waited_for_no_longer(server, monkeypatch):
+    with opened(server, b"") as connection:
+        assert answered(connection)
+        monkeypatch.setattr(serving, "HEAD_S", 0.1)
+        connection.sendall(b"GET / HT")
+        assert is_closed(connection)
+
+
+def test_nothing_is_waited_for_once_a_head_is_there(server):
+    with opened(server, b"") as connection:
+        assert answered(connection)
+        (protocol,) = server.server_state.connections
+        assert protocol._head is None
+
+
+def test_one_address_has_some_connections_only(server, monkeypatch):
+    monkeypatch.setattr(serving, "MOST_OF_ONE", 2)
+    waiting = [opened(server, b"GET") for _ in range(2)]
+    with opened(server, b"") as third:
+        assert is_closed(third)
+    for one in waiting:
+        one.sendall(b" / HTTP/1.1\r\nHost: x\r\n\r\n")
+        assert one.recv(1000).startswith(b"HTTP/1.1 200")
+        one.close()
