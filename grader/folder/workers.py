@@ -5,6 +5,7 @@ import importlib
 import logging
 import multiprocessing
 import os
+import signal
 import threading
 import time
 from collections import deque
@@ -42,8 +43,12 @@ _AHEAD = 4
 """Tasks of each process that the pool holds: it never waits for one, and thousands are not held at once."""
 _ROUNDS = 3
 """Pools started one after the other without a single result: then what is left has the problem `crashed`."""
+_PATIENCE = 4
+"""Times the limit by the clock: a machine that is busy with other work takes longer, and refuses nobody."""
 _KILLED = -9
 """Exit code of a process that somebody else killed: the system for want of memory, or a person."""
+_OUT_OF_TIME = -getattr(signal, "SIGPROF", 0) or None
+"""Exit code of a process that has used up its processor time; none on Windows."""
 _LOST = object()
 """In the place of a result that there is not; None is a result."""
 _MEGABYTE = 1_000_000
@@ -52,7 +57,10 @@ _ADVICE = "scan or export it again"
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What one file or sheet may take: seconds, and megabytes of memory."""
+    """What one file or sheet may take: seconds of processor time, and megabytes of memory.
+
+    By the clock it may take `_PATIENCE` times as long; so may, where the system measures no other time, all.
+    """
 
     seconds: float = 60.0
     memory_mb: int = 1500
@@ -150,7 +158,7 @@ class Workers:
         while left and rounds and not self._closed.is_set():
             rounds -= 1
             waiting, futures = deque(sorted(left)), dict[Future[Any], int]()
-            longest = max(seconds[index] for index in left)
+            longest = _PATIENCE * max(seconds[index] for index in left)
             while waiting or futures:
                 self._fill(futures, waiting, tasks, seconds)
                 if not futures:
@@ -181,7 +189,8 @@ class Workers:
         pool = self._started_pool()
         with contextlib.suppress(RuntimeError):
             while waiting and len(futures) < self._jobs * _AHEAD:
-                future = pool.schedule(guarded, tasks[waiting[0]], timeout=seconds[waiting[0]])
+                limit = seconds[waiting[0]]
+                future = pool.schedule(_timed, (limit, *tasks[waiting[0]]), timeout=_PATIENCE * limit)
                 futures[future] = waiting.popleft()
 
     def _result(self, future: "Future[Any]") -> Any:  # noqa: ANN401 - whatever the function returns
@@ -189,10 +198,10 @@ class Workers:
         try:
             return future.result()
         except TimeoutError:
-            return Problem(
-                "too_slow", f"took more than {self._limits.seconds:g} s; {_ADVICE}, or raise --time-limit"
-            )
+            return self._too_slow()
         except ProcessExpired as error:
+            if error.exitcode == _OUT_OF_TIME:
+                return self._too_slow()
             if error.pid in self._over_memory:
                 return self._too_much_memory()
             if error.exitcode == _KILLED:
@@ -202,6 +211,10 @@ class Workers:
             return self._too_much_memory()
         except BrokenProcessPool:
             return _LOST
+
+    def _too_slow(self) -> Problem:
+        why = f"took more than {self._limits.seconds:g} s; {_ADVICE}, or raise --time-limit"
+        return Problem("too_slow", why)
 
     def _too_much_memory(self) -> Problem:
         asked = f"needs more than {self._limits.memory_mb} MB of memory"
@@ -278,6 +291,17 @@ def _start(module: str, log: Path | None, is_verbose: bool) -> None:
 def _end_with(parent: BaseProcess) -> None:
     parent.join()
     os._exit(1)
+
+
+def _timed(seconds: float, function: Callable[..., Result], *call: object) -> Result | Problem:
+    """As `guarded`, in a process that the system ends after so many seconds of its processor time."""
+    if not hasattr(signal, "setitimer"):  # Windows
+        return guarded(function, *call)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        return guarded(function, *call)
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
 
 
 def guarded(function: Callable[..., Result], *call: object) -> Result | Problem:

@@ -25,6 +25,14 @@ def sleeps(seconds):
     return seconds
 
 
+def spins(seconds):
+    """Uses the processor for so long, whatever the clock says."""
+    until = time.process_time() + seconds
+    while time.process_time() < until:
+        pass
+    return seconds
+
+
 def fills_memory(_):
     blocks = []
     while True:

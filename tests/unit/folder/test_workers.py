@@ -13,6 +13,7 @@ import psutil
 import pytest
 from pebble.pool.process import WORKERS_NAME
 
+from grader.folder import workers as workers_module
 from grader.folder.workers import Limits, Workers, result_of
 from grader.records import Problem
 from reference.errors import InputFileError
@@ -47,11 +48,20 @@ def test_what_breaks_a_process_or_a_limit_costs_that_call_alone(jobs):
     assert codes(jobs, work) == [answer for code in broken.values() for answer in (code, 42)]
 
 
-def test_what_takes_too_long_is_ended_though_it_would_go_on_for_minutes():
+def test_what_takes_too_long_is_ended_though_it_would_go_on_for_minutes(monkeypatch):
+    monkeypatch.setattr(workers_module, "_PATIENCE", 1)
     assert codes(1, [("sleeps", 600), ("doubled", 1)]) == ["too_slow", 2]
 
 
-def test_a_call_of_several_sheets_has_the_time_of_all_of_them():
+def test_processor_time_ends_a_call_and_waiting_for_a_busy_machine_does_not():
+    with Workers(1, Limits(seconds=0.5), calls.__name__) as workers:
+        results = dict(workers.run(calls.does, [("sleeps", 1.0), ("spins", 600)]))
+    assert results[0] == 1.0
+    assert results[1].code == "too_slow"
+
+
+def test_a_call_of_several_sheets_has_the_time_of_all_of_them(monkeypatch):
+    monkeypatch.setattr(workers_module, "_PATIENCE", 1)
     with Workers(1, Limits(seconds=1.0), calls.__name__) as workers:
         assert result_of(workers, calls.sleeps, 1.5, sheets=3) == 1.5
         with pytest.raises(InputFileError, match="more than 1 s"):
