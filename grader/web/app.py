@@ -10,13 +10,13 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
 from pydantic import BaseModel
-from sqlalchemy import func, select
+from sqlalchemy import select
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 
 from grader import __version__
 from grader.language import tongue
-from grader.web import claims, instructors, lti, pages, students
+from grader.web import accounts, claims, instructors, lti, pages, students
 from grader.web.guard import Guard, RefusedError, Rim
 from grader.web.queue import Photo, Queue
 from grader.web.reviews import Reviews
@@ -69,7 +69,14 @@ def application(settings: Settings, photo: Photo = checked_photo) -> FastAPI:
         responses={code: {"description": HTTPStatus(code).phrase, "model": Fault} for code in REFUSALS},
     )  # fmt: skip
     app.state.service = service
-    for router in (students.router, instructors.router, lti.router, claims.router, pages.router):
+    for router in (
+        students.router,
+        accounts.router,
+        instructors.router,
+        lti.router,
+        claims.router,
+        pages.router,
+    ):
         app.include_router(router)
     app.mount("/review", Reviews(service))
     app.add_exception_handler(PlanmarkError, _told)
@@ -89,12 +96,12 @@ async def _forget(store: Store, days: float, ended: asyncio.Event) -> None:
 
 
 def first_invitation(settings: Settings) -> str | None:
-    """The address at which the first administrator makes the account; None once there is one."""
+    """The address at which an administrator makes the account; None while one has a password."""
     with closing(Store(settings.database)) as store, store.session() as session:
-        joined = select(func.count()).select_from(Account).where(Account.password != "")
-        if session.scalar(joined):
+        admins = session.scalars(select(Account).where(Account.is_admin)).all()
+        if any(one.password for one in admins):
             return None
-        token = instructors.invitation(session, "admin", is_admin=True)
+        token = accounts.invitation(session, admins[0].name if admins else "admin", is_admin=True)
     return f"{settings.address}/join?token={token}"
 
 

@@ -14,9 +14,8 @@ from sqlalchemy import select, update
 from grader.inputs.roster import RosterRow, read_roster
 from grader.language import N_
 from grader.web.guard import RefusedError, missing
-from grader.web.instructors import Row
 from grader.web.launch import Message
-from grader.web.service import Call, Called, Key, Route
+from grader.web.service import Call, Called, Key, Route, Row
 from grader.web.store import Link, LtiClaim, LtiUser, Publication
 from reference.errors import PlanmarkError
 

@@ -16,6 +16,7 @@ import time
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from ipaddress import ip_address, ip_network
 from math import inf
 from urllib.parse import urlsplit
 
@@ -23,13 +24,14 @@ from argon2 import PasswordHasher
 from argon2.exceptions import VerificationError
 from fastapi import Request, Response
 from itsdangerous import BadSignature, URLSafeSerializer
-from limits import RateLimitItem, RateLimitItemPerMinute
+from limits import RateLimitItem, RateLimitItemPerHour, RateLimitItemPerMinute
 from limits.storage import MemoryStorage
 from limits.strategies import MovingWindowRateLimiter
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from zxcvbn import zxcvbn
 
 from grader.language import N_, Tongue
 from grader.web.settings import Settings
@@ -40,8 +42,16 @@ COOKIE = "planmark_visit"
 FORM_HEADER = "X-Planmark-Form"
 INVITATION = "invitation"
 """The title of a visit that stands for an invitation: it makes an account, and opens nothing else."""
+RESET = "reset"
+"""The title of a visit that stands for a link to a new password."""
+NO_TOKENS = frozenset({"", INVITATION, RESET})
+"""Titles of visits that are no program's token."""
+SESSION_S = 7 * 86400.0
+"""A visit in which an instructor is signed in ends after a week, however it is used."""
 IDLE_S = 12 * 3600.0
 """A working day: an instructor who was away longer signs in again."""
+LEAST_GUESSES = 1e10
+"""To find a password by its words, names and patterns: more than is tried on a stolen hash in years."""
 LEAST_PASSWORD = 12
 """Signs of a password (NIST SP 800-63B asks for at least 8, and for 15 where nothing else is asked)."""
 HEADERS = {
@@ -57,6 +67,7 @@ HEADERS = {
 }
 RATES: dict[str, RateLimitItem] = {
     "sign_in": RateLimitItemPerMinute(10),
+    "code": RateLimitItemPerHour(20),
     "check": RateLimitItemPerMinute(60),
     "photo": RateLimitItemPerMinute(10),
     "key": RateLimitItemPerMinute(60),
@@ -67,6 +78,8 @@ RATES: dict[str, RateLimitItem] = {
 visits of an address count as `address`, too: new cookies cost nothing. That lets 200 students of a school
 open a page and check values some times in a minute."""
 _HASHER = PasswordHasher()
+_LOOKED_AT = 72
+"""Signs of a password that are weighed: the time grows with their square."""
 _NOBODY = _HASHER.hash(secrets.token_urlsafe())
 """Compared with where there is no such account: the time tells nothing."""
 
@@ -99,14 +112,18 @@ def missing(what: str = "page") -> RefusedError:
     return RefusedError(404, "not_found", NO_SUCH.get(what, f"there is no such {what}"))
 
 
-def hash_of(password: str) -> str:
-    """What is stored of a password. Raises RefusedError for a short one."""
+def hash_of(password: str, name: str) -> str:
+    """What is stored of a password of somebody. Raises RefusedError for a short or a common one."""
     if not LEAST_PASSWORD <= len(password) <= 200:
         raise RefusedError(
             422,
             "password_short",
             N_("the password must have %(least)s to 200 signs: a sentence is good"),
             least=LEAST_PASSWORD,
+        )
+    if zxcvbn(password[:_LOOKED_AT], [name, "planmark"])["guesses"] < LEAST_GUESSES:
+        raise RefusedError(
+            422, "password_common", N_("this password is easily guessed: a sentence of your own is good")
         )
     return _HASHER.hash(password)
 
@@ -118,6 +135,26 @@ def is_password(account: Account | None, password: str) -> bool:
         return _HASHER.verify(stored, password[:200]) and account is not None and bool(account.password)
     except VerificationError:
         return False
+
+
+def address_of(scope: Scope) -> str:
+    """Whose a request is, for counting: an address, of IPv6 the network that one household has."""
+    text = str((scope.get("client") or ("",))[0])
+    try:
+        return (
+            text
+            if ip_address(text).version == 4
+            else str(ip_network(f"{text.partition('%')[0]}/64", strict=False))
+        )
+    except ValueError:  # a socket of this machine
+        return text
+
+
+def _is_over(visit: Visit) -> bool:
+    """Whether an instructor signs in again; a student's personal link has an end of its own."""
+    now = time.time()
+    is_old = now - visit.used > IDLE_S or now - visit.created > SESSION_S
+    return visit.account_id is not None and is_old
 
 
 @dataclass(slots=True)
@@ -172,16 +209,16 @@ class Guard:
 
     def visitor(self, request: Request, session: Session) -> Visitor:
         """Who a request is from. Raises RefusedError for a token that is not known."""
-        address = request.client.host if request.client else ""
+        address = address_of(request.scope)
         kind, _, token = request.headers.get("authorization", "").partition(" ")
         if kind.lower() == "bearer":
             visit = session.get(Visit, digest_of(token.strip()))
-            if visit is None or visit.title in {"", INVITATION}:
+            if visit is None or visit.title in NO_TOKENS:
                 raise RefusedError(401, "token", "the token is not known")
             return Visitor(token, visit, is_program=True, address=address)
         secret = request.cookies.get(COOKIE, "")
         visit = session.get(Visit, digest_of(secret)) if secret else None
-        if visit is not None and (visit.title or (time.time() - visit.used > IDLE_S and visit.account_id)):
+        if visit is not None and (visit.title or _is_over(visit)):
             visit = None
         if visit is not None and time.time() - visit.used > 60.0:
             visit.used = time.time()
@@ -203,7 +240,7 @@ class Guard:
             known = before if link is not None else None
             visitor.visit = Visit(
                 id=digest_of(visitor.secret), account=account or (known.account if known else None),
-                links=dict(known.links) if known else {},
+                links=dict(known.links) if known else {}, created=known.created if known else time.time(),
             )  # fmt: skip
             session.add(visitor.visit)
         if link is not None:
@@ -310,7 +347,7 @@ class Rim:
         if host != self.settings.host and _name_of(host) not in self.hosts:
             await _refuse(send, 421, "this address is not served here: open the server's own address")
             return
-        most, sender = self._most(scope["path"]), str((scope.get("client") or [""])[0])
+        most, sender = self._most(scope["path"]), address_of(scope)
         taken, until, refusal = 0, 0.0, None
 
         async def bounded() -> Message:

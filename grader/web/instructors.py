@@ -1,4 +1,4 @@
-"""What instructors may do: sign in, publish, upload, grade, release, export, answer, delete."""
+"""What instructors may do: publish, upload, grade, release, export, answer, delete."""
 
 import pathlib
 import secrets
@@ -11,19 +11,18 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Path, Query
 from fastapi.responses import Response
 from pydantic import Field
-from sqlalchemy import delete, select
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from grader.authoring.lint import lint, lint_document
 from grader.documents import LintDocument
 from grader.folder.workers import result_of
 from grader.inputs.roster import read_roster
-from grader.language import N_
 from grader.lms.export import TARGETS, export, read_results, usual_name
 from grader.lms.grades import Options, people_of
 from grader.rubric import rubric_of
 from grader.web.erase import erase_student
-from grader.web.guard import INVITATION, RefusedError, hash_of, is_password, missing
+from grader.web.guard import RefusedError, missing
 from grader.web.places import (
     AUTHORED,
     SUBMITTED,
@@ -33,7 +32,7 @@ from grader.web.places import (
     store,
     stored,
 )
-from grader.web.service import FILE_BODY, Body, Call, Called, Key, Route
+from grader.web.service import FILE_BODY, LARGEST_ROW, Body, Call, Called, Key, Route, Row
 from grader.web.store import (
     Account,
     Audit,
@@ -43,7 +42,6 @@ from grader.web.store import (
     Publication,
     Regrading,
     Sheet,
-    Visit,
     digest_of,
 )
 from grader.web.students import WITHOUT_NUL, JobState, Lang, Strict, queued, state_of
@@ -51,152 +49,8 @@ from reference.authored.assignment import built_in
 from reference.errors import PlanmarkError
 
 router = APIRouter(route_class=Route, prefix="/api/v1", tags=["instructors"])
-Name = Annotated[str, Field(min_length=1, max_length=80, pattern=r"^[^\x00-\x1f\x7f]+$")]
-Password = Annotated[str, Field(min_length=1, max_length=200)]
 FileName = Annotated[str, Path(max_length=200)]
 StudentId = Annotated[str, Path(pattern=r"^[A-Za-z0-9._-]{1,80}$")]
-LARGEST_ROW = 2**31 - 1
-"""The largest number of a row in PostgreSQL."""
-Row = Annotated[int, Path(ge=1, le=LARGEST_ROW)]
-INVITED_S = 7 * 86400.0
-"""An invitation is valid for a week."""
-
-
-# Accounts -----------------------------------------------------------------------------------------
-
-
-class SignIn(Strict):
-    """Who signs in."""
-
-    name: Name
-    password: Password
-
-
-class Invited(SignIn):
-    """Who answers an invitation, or sets the server up, by a token."""
-
-    token: Annotated[str, Field(min_length=1, max_length=200)]
-
-
-@router.post("/session")
-def sign_in(call: Called, who: SignIn) -> dict[str, Any]:
-    """Sign in; the visit begins anew."""
-    call.service.guard.count("sign_in", [f"address {call.visitor.address}", f"name {who.name}"])
-    account = call.session.scalar(select(Account).where(Account.name == who.name))
-    if not is_password(account, who.password):
-        call.note("sign-in refused", who.name)
-        call.session.commit()
-        raise RefusedError(401, "sign_in", N_("the name or the password is wrong"))
-    return _entered(call, account)
-
-
-@router.delete("/session")
-def sign_out(call: Called) -> dict[str, str]:
-    """Sign out: the visit is deleted."""
-    if call.visitor.visit is not None:
-        call.session.delete(call.visitor.visit)
-    call.response.delete_cookie("planmark_visit")
-    return {"state": "signed out"}
-
-
-@router.post("/accounts", status_code=201)
-def invite(call: Called, name: Annotated[Name, Query()], *, is_admin: bool = False) -> dict[str, str]:
-    """Invite an instructor; the token makes the account once, within a week."""
-    admin = call.admin
-    token = invitation(call.session, name, is_admin=is_admin)
-    call.note("invited", f"{name} by {admin.name}")
-    return {"name": name, "address": f"{call.service.settings.address}/join?token={token}"}
-
-
-@router.post("/accounts/join")
-def join(call: Called, who: Invited) -> dict[str, Any]:
-    """Answer an invitation: the account gets its password."""
-    call.service.guard.count("sign_in", [f"address {call.visitor.address}"])
-    waiting = call.session.get(Visit, digest_of(who.token))
-    account = None if waiting is None else waiting.account
-    if account is None or waiting is None or waiting.title != INVITATION or account.password:
-        raise RefusedError(403, "invitation", N_("this invitation is not valid any more: ask for a new one"))
-    if time.time() - waiting.created > INVITED_S:
-        raise RefusedError(403, "invitation", N_("this invitation is too old: ask for a new one"))
-    other = call.session.scalar(select(Account).where(Account.name == who.name, Account.id != account.id))
-    if other is not None:
-        raise RefusedError(409, "name_taken", "somebody has this name already: choose another")
-    account.name, account.password = who.name, hash_of(who.password)
-    call.session.delete(waiting)
-    call.note("joined", who.name)
-    return _entered(call, account)
-
-
-@router.get("/accounts")
-def accounts(call: Called) -> list[dict[str, Any]]:
-    """All instructors."""
-    own = call.account
-    found = call.session.scalars(select(Account).order_by(Account.name))
-    return [
-        {"id": one.id, "name": one.name, "is_admin": one.is_admin, "has_joined": bool(one.password)}
-        for one in found if own.is_admin or one.password
-    ]  # fmt: skip
-
-
-@router.delete("/accounts/{number}")
-def remove_account(call: Called, number: Row) -> dict[str, str]:
-    """Remove an instructor; the publications stay."""
-    if call.admin.id == number:
-        raise RefusedError(409, "own_account", "nobody removes the own account: let another do it")
-    found = call.session.get(Account, number)
-    if found is None:
-        raise missing("account")
-    call.session.execute(delete(Visit).where(Visit.account_id == number))
-    call.session.delete(found)
-    call.note("account removed", found.name)
-    return {"state": "removed"}
-
-
-@router.post("/tokens", status_code=201)
-def new_token(call: Called, title: Annotated[Name, Query()]) -> dict[str, str]:
-    """A token for a program, shown once: it may do what its instructor may."""
-    account, token = call.account, secrets.token_urlsafe(32)
-    if title == INVITATION:
-        raise RefusedError(422, "title", "choose another title")
-    call.session.add(Visit(id=digest_of(token), account=account, title=title, links={}))
-    call.note("token made", title)
-    return {"title": title, "token": token}
-
-
-@router.get("/tokens")
-def tokens(call: Called) -> list[dict[str, Any]]:
-    """The instructor's tokens, without their secrets."""
-    own = select(Visit).where(Visit.account_id == call.account.id, Visit.title.not_in(("", INVITATION)))
-    return [{"id": one.id, "title": one.title, "created": one.created} for one in call.session.scalars(own)]
-
-
-@router.delete("/tokens/{number}")
-def remove_token(call: Called, number: Key) -> dict[str, str]:
-    """Take a token back."""
-    found = call.session.get(Visit, number)
-    if found is None or found.account_id != call.account.id or not found.title:
-        raise missing("token")
-    call.session.delete(found)
-    call.note("token removed", found.title)
-    return {"state": "removed"}
-
-
-def invitation(session: Session, name: str, *, is_admin: bool) -> str:
-    """A token by which somebody makes their account. Raises RefusedError where the name is taken."""
-    account = session.scalar(select(Account).where(Account.name == name))
-    if account is not None and account.password:
-        raise RefusedError(409, "name_taken", f"there is an account '{name}' already")
-    account = account or Account(name=name, is_admin=is_admin)
-    token = secrets.token_urlsafe(32)
-    session.add_all([account, Visit(id=digest_of(token), account=account, title=INVITATION, links={})])
-    return token
-
-
-def _entered(call: Call, account: Account | None) -> dict[str, Any]:
-    call.service.guard.begin(call.session, call.visitor, account)
-    call.service.guard.set_cookie(call.response, call.visitor)
-    call.note("signed in")
-    return {"name": "" if account is None else account.name}
 
 
 # Publications -------------------------------------------------------------------------------------

@@ -31,10 +31,9 @@ from grader.lms.export import draft, read_results
 from grader.lms.grades import Options, Person
 from grader.web.claims import claimed, row_of, take_back_links
 from grader.web.guard import RefusedError, missing
-from grader.web.instructors import Row
 from grader.web.launch import STATE_S, Message, began, checked, platform_of
 from grader.web.outside import caller, check_url
-from grader.web.service import Call, Called, Key, Route
+from grader.web.service import Call, Called, Key, Route, Row
 from grader.web.settings import Settings
 from grader.web.store import (
     Account,

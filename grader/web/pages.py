@@ -15,7 +15,7 @@ from grader.inputs.roster import read_roster
 from grader.language import LANGUAGES, N_, tongue
 from grader.lms.export import TARGETS
 from grader.review.server import page_file
-from grader.web import claims, instructors, lti, students
+from grader.web import accounts, claims, instructors, lti, students
 from grader.web.guard import HEADERS, missing
 from grader.web.places import assignment_of
 from grader.web.self_check import form_of
@@ -90,13 +90,19 @@ def home(call: Called) -> Response:
 @router.get("/sign-in")
 def sign_in(call: Called) -> Response:
     """The form to sign in."""
-    return page(call, "sign_in.html", invitation="")
+    return page(call, "sign_in.html", secret="", kind="session")
 
 
 @router.get("/join")
 def join(call: Called, token: str = "") -> Response:
     """The form by which an invited instructor makes the account."""
-    return page(call, "sign_in.html", invitation=token[:200])
+    return page(call, "sign_in.html", secret=token[:200], kind="join")
+
+
+@router.get("/reset")
+def reset(call: Called, token: str = "") -> Response:
+    """The form by which somebody chooses a new password, by an administrator's link."""
+    return page(call, "sign_in.html", secret=token[:200], kind="reset")
 
 
 @router.get("/c/{key}")
@@ -138,7 +144,7 @@ def publication(call: Called, key: Key) -> Response:
     links = {one["student_id"]: one for one in instructors.links(call, key) if not one["is_revoked"]}
     return page(
         call, "publication.html", one=known, links=links, requests=instructors.requests(call, key),
-        assignments=built_in(), colleagues=instructors.accounts(call), platforms=TARGETS, states=STATES,
+        assignments=built_in(), colleagues=accounts.listed(call), platforms=TARGETS, states=STATES,
         claims=claims.listed(call, key),        address=f"{call.service.settings.address}/c/{key}",
     )  # fmt: skip
 
@@ -163,7 +169,7 @@ def account(call: Called) -> Response:
     """The instructor's own account: tokens, and for administrators colleagues and the audit trail."""
     own = call.account
     return page(
-        call, "account.html", tokens=instructors.tokens(call), accounts=instructors.accounts(call),
+        call, "account.html", tokens=accounts.tokens(call), accounts=accounts.listed(call),
         audit=instructors.audit(call) if own.is_admin else [], tool=lti.config(call),
         lti_platforms=lti.platforms(call) if own.is_admin else [],
         lti_members=lti.members(call) if own.is_admin else [],

@@ -137,6 +137,9 @@ def called(request: Request, response: Response) -> Iterator[Call]:
 
 
 Called = Annotated[Call, Depends(called, scope="function")]
+LARGEST_ROW = 2**31 - 1
+"""The largest number of a row in PostgreSQL."""
+Row = Annotated[int, Path(ge=1, le=LARGEST_ROW)]
 Key = Annotated[str, Path(pattern=r"^[A-Za-z0-9_-]{1,64}$", description="the publication's key")]
 
 

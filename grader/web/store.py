@@ -51,7 +51,14 @@ class Table(DeclarativeBase):
 
 
 class Account(Table):
-    """An instructor; `password` is an Argon2 hash, empty until an invitation is answered."""
+    """An instructor.
+
+    Attributes
+    ----------
+    password : an Argon2 hash, empty until an invitation is answered
+    totp : the secret of the second factor, empty without one
+    totp_used : the last step of time of which a code was taken
+    """
 
     __tablename__ = "accounts"
     id: Mapped[int] = mapped_column(primary_key=True)
@@ -59,6 +66,8 @@ class Account(Table):
     password: Mapped[str] = mapped_column(String(200), default="")
     is_admin: Mapped[bool] = mapped_column(default=False)
     created: Mapped[float] = mapped_column(default=time.time)
+    totp: Mapped[str] = mapped_column(String(64), default="", server_default="")
+    totp_used: Mapped[int] = mapped_column(default=0, server_default="0")
 
 
 class Visit(Table):

@@ -75,6 +75,12 @@ for (const form of document.querySelectorAll("form[data-query]")) {
     });
   });
 }
+$("offer")?.addEventListener("click", (event) => doing(event.target, null, async () => {
+  const { secret, picture } = await call("POST", "/api/v1/account/second-factor"), form = $("second-factor");
+  form.elements.secret.value = secret;
+  form.querySelector("img").src = picture;
+  form.hidden = false;
+}));
 for (const form of document.querySelectorAll("form[data-erase]")) {
   form.addEventListener("submit", (event) => {
     event.preventDefault();

@@ -1,0 +1,290 @@
+"""Accounts of instructors: sign in, invite, passwords, the second factor, tokens for programs."""
+
+import hmac
+import secrets
+import time
+from typing import Annotated, Any
+
+import pyotp
+import segno
+from fastapi import APIRouter, Query
+from pydantic import Field
+from sqlalchemy import delete, select
+from sqlalchemy.orm import Session
+
+from grader.language import N_
+from grader.web.guard import INVITATION, NO_TOKENS, RESET, RefusedError, hash_of, is_password, missing
+from grader.web.service import Call, Called, Key, Route, Row
+from grader.web.store import Account, Visit, digest_of
+from grader.web.students import Strict
+
+router = APIRouter(route_class=Route, prefix="/api/v1", tags=["accounts"])
+Name = Annotated[str, Field(min_length=1, max_length=80, pattern=r"^[^\x00-\x1f\x7f]+$")]
+Password = Annotated[str, Field(min_length=1, max_length=200)]
+Token = Annotated[str, Field(min_length=1, max_length=200)]
+Code = Annotated[str, Field(pattern=r"^([0-9]{6})?$")]
+INVITED_S = 7 * 86400.0
+"""An invitation is valid for a week."""
+STEP_S = 30
+"""A code of a device is for so long (RFC 6238)."""
+OVER = N_("this invitation is not valid any more: ask for a new one")
+
+
+class SignIn(Strict):
+    """Who signs in; `code` of the second factor, where the account has one."""
+
+    name: Name
+    password: Password
+    code: Code = ""
+
+
+class Reset(Strict):
+    """Who chooses a new password by an administrator's link."""
+
+    token: Token
+    password: Password
+
+
+class Invited(Reset):
+    """Who answers an invitation, or sets the server up, by a token."""
+
+    name: Name
+
+
+class NewPassword(Strict):
+    """A password in the place of another."""
+
+    old: Password
+    password: Password
+
+
+class SecondFactor(Strict):
+    """A secret that a device has, proved by a code of it."""
+
+    secret: Annotated[str, Field(pattern=r"^[A-Z2-7]{32,64}$")]
+    code: Code
+    password: Password
+
+
+@router.post("/session")
+def sign_in(call: Called, who: SignIn) -> dict[str, Any]:
+    """Sign in; the visit begins anew.
+
+    Tries count by address: nobody can keep the owner out by trying.
+    """
+    call.service.guard.count("sign_in", [call.visitor.address])
+    account = call.session.scalar(select(Account).where(Account.name == who.name))
+    if not is_password(account, who.password) or account is None:
+        call.note("sign-in refused", who.name)
+        call.session.commit()
+        raise RefusedError(401, "sign_in", N_("the name or the password is wrong"))
+    if account.totp:
+        _check_code(call, account, account.totp, who.code)
+    return _entered(call, account)
+
+
+@router.delete("/session")
+def sign_out(call: Called) -> dict[str, str]:
+    """Sign out: the visit is deleted."""
+    if call.visitor.visit is not None:
+        call.session.delete(call.visitor.visit)
+    call.response.delete_cookie("planmark_visit")
+    return {"state": "signed out"}
+
+
+@router.post("/accounts", status_code=201)
+def invite(call: Called, name: Annotated[Name, Query()], *, is_admin: bool = False) -> dict[str, str]:
+    """Invite an instructor; the token makes the account once, within a week."""
+    admin = call.admin
+    token = invitation(call.session, name, is_admin=is_admin)
+    call.note("invited", f"{name} by {admin.name}")
+    return {"name": name, "address": f"{call.service.settings.address}/join?token={token}"}
+
+
+@router.post("/accounts/join")
+def join(call: Called, who: Invited) -> dict[str, Any]:
+    """Answer an invitation: the account gets its password."""
+    waiting, account = _answered(call, who.token, INVITATION)
+    if account.password:
+        raise RefusedError(403, "invitation", OVER)
+    other = call.session.scalar(select(Account).where(Account.name == who.name, Account.id != account.id))
+    if other is not None:
+        raise RefusedError(409, "name_taken", "somebody has this name already: choose another")
+    account.name, account.password = who.name, hash_of(who.password, who.name)
+    call.session.delete(waiting)
+    call.note("joined", who.name)
+    return _entered(call, account)
+
+
+@router.post("/accounts/{number}/reset", status_code=201)
+def allow_reset(call: Called, number: Row) -> dict[str, str]:
+    """A link by which somebody chooses a new password, once, within a week."""
+    admin, account = call.admin, call.session.get(Account, number)
+    if account is None or not account.password:
+        raise missing("account")
+    token = secrets.token_urlsafe(32)
+    call.session.add(Visit(id=digest_of(token), account=account, title=RESET, links={}))
+    call.note("reset allowed", f"{account.name} by {admin.name}")
+    return {"name": account.name, "address": f"{call.service.settings.address}/reset?token={token}"}
+
+
+@router.post("/accounts/reset")
+def reset(call: Called, who: Reset) -> dict[str, str]:
+    """Choose a new password by a link; all visits and tokens of the account end."""
+    _, account = _answered(call, who.token, RESET)
+    account.password = hash_of(who.password, account.name)
+    call.session.execute(delete(Visit).where(Visit.account_id == account.id))
+    call.note("password reset", account.name)
+    return {"state": "changed"}
+
+
+@router.put("/account/password")
+def change_password(call: Called, new: NewPassword) -> dict[str, Any]:
+    """Change the own password; the account's other visits end."""
+    account = _proved(call, new.old)
+    account.password = hash_of(new.password, account.name)
+    call.session.execute(delete(Visit).where(Visit.account_id == account.id, Visit.title == ""))
+    call.visitor.visit = None
+    call.note("password changed", account.name)
+    return _entered(call, account)
+
+
+# The second factor --------------------------------------------------------------------------------
+
+
+@router.post("/account/second-factor")
+def offer_second_factor(call: Called) -> dict[str, str]:
+    """A new secret for a device, as text, as an address and as a picture; it counts once it is proved."""
+    secret = pyotp.random_base32()
+    address = pyotp.TOTP(secret).provisioning_uri(name=call.account.name, issuer_name="planmark")
+    return {"secret": secret, "address": address, "picture": segno.make(address).svg_data_uri(scale=4)}
+
+
+@router.put("/account/second-factor")
+def set_second_factor(call: Called, new: SecondFactor) -> dict[str, str]:
+    """Ask for codes of a device from now on."""
+    account = _proved(call, new.password)
+    _check_code(call, account, new.secret, new.code)
+    account.totp = new.secret
+    call.note("second factor set", account.name)
+    return {"state": "set"}
+
+
+@router.delete("/accounts/{number}/second-factor")
+def remove_second_factor(call: Called, number: Row) -> dict[str, str]:
+    """Ask for codes no longer, of somebody whose device is lost."""
+    admin, account = call.admin, call.session.get(Account, number)
+    if account is None:
+        raise missing("account")
+    account.totp = ""
+    call.note("second factor removed", f"{account.name} by {admin.name}")
+    return {"state": "removed"}
+
+
+def _check_code(call: Call, account: Account, secret: str, code: str) -> None:
+    """Raise RefusedError for a code that is wrong, or was used."""
+    if not code:
+        raise RefusedError(401, "second_factor", N_("give the code of your second factor, too"))
+    call.service.guard.count("code", [f"account {account.id}"])
+    totp, now = pyotp.TOTP(secret), int(time.time()) // STEP_S
+    for step in range(now - 1, now + 2):
+        if step > account.totp_used and hmac.compare_digest(totp.generate_otp(step), code):
+            account.totp_used = step
+            return
+    call.note("code refused", account.name)
+    call.session.commit()
+    raise RefusedError(401, "second_factor", N_("the code is wrong or was used: wait for the next one"))
+
+
+@router.get("/accounts")
+def listed(call: Called) -> list[dict[str, Any]]:
+    """All instructors."""
+    own = call.account
+    found = call.session.scalars(select(Account).order_by(Account.name))
+    return [
+        {"id": one.id, "name": one.name, "is_admin": one.is_admin, "has_joined": bool(one.password),
+         "has_second_factor": bool(one.totp)}
+        for one in found if own.is_admin or one.password
+    ]  # fmt: skip
+
+
+@router.delete("/accounts/{number}")
+def remove_account(call: Called, number: Row) -> dict[str, str]:
+    """Remove an instructor; the publications stay."""
+    if call.admin.id == number:
+        raise RefusedError(409, "own_account", "nobody removes the own account: let another do it")
+    found = call.session.get(Account, number)
+    if found is None:
+        raise missing("account")
+    call.session.execute(delete(Visit).where(Visit.account_id == number))
+    call.session.delete(found)
+    call.note("account removed", found.name)
+    return {"state": "removed"}
+
+
+@router.post("/tokens", status_code=201)
+def new_token(call: Called, title: Annotated[Name, Query()]) -> dict[str, str]:
+    """A token for a program, shown once: it may do what its instructor may."""
+    account, token = call.account, secrets.token_urlsafe(32)
+    if title in NO_TOKENS:
+        raise RefusedError(422, "title", "choose another title")
+    call.session.add(Visit(id=digest_of(token), account=account, title=title, links={}))
+    call.note("token made", title)
+    return {"title": title, "token": token}
+
+
+@router.get("/tokens")
+def tokens(call: Called) -> list[dict[str, Any]]:
+    """The instructor's tokens, without their secrets."""
+    own = select(Visit).where(
+        Visit.account_id == call.account.id, Visit.title.not_in(("", INVITATION, RESET))
+    )
+    return [{"id": one.id, "title": one.title, "created": one.created} for one in call.session.scalars(own)]
+
+
+@router.delete("/tokens/{number}")
+def remove_token(call: Called, number: Key) -> dict[str, str]:
+    """Take a token back."""
+    found = call.session.get(Visit, number)
+    if found is None or found.account_id != call.account.id or not found.title:
+        raise missing("token")
+    call.session.delete(found)
+    call.note("token removed", found.title)
+    return {"state": "removed"}
+
+
+def invitation(session: Session, name: str, *, is_admin: bool) -> str:
+    """A token by which somebody makes their account. Raises RefusedError where the name is taken."""
+    account = session.scalar(select(Account).where(Account.name == name))
+    if account is not None and account.password:
+        raise RefusedError(409, "name_taken", f"there is an account '{name}' already")
+    account = account or Account(name=name, is_admin=is_admin)
+    token = secrets.token_urlsafe(32)
+    session.add_all([account, Visit(id=digest_of(token), account=account, title=INVITATION, links={})])
+    return token
+
+
+def _answered(call: Call, token: str, kind: str) -> tuple[Visit, Account]:
+    """What a link that was sent stands for. Raises RefusedError for one that is used, too old, or none."""
+    call.service.guard.count("sign_in", [call.visitor.address])
+    waiting = call.session.get(Visit, digest_of(token))
+    if waiting is None or waiting.title != kind or waiting.account is None:
+        raise RefusedError(403, "invitation", OVER)
+    if time.time() - waiting.created > INVITED_S:
+        raise RefusedError(403, "invitation", N_("this invitation is too old: ask for a new one"))
+    return waiting, waiting.account
+
+
+def _proved(call: Call, password: str) -> Account:
+    """The instructor who is signed in, and has said the password again. Raises RefusedError."""
+    call.service.guard.count("sign_in", [call.visitor.address])
+    if call.visitor.is_program or not is_password(call.account, password):
+        raise RefusedError(403, "password", N_("the password is wrong"))
+    return call.account
+
+
+def _entered(call: Call, account: Account) -> dict[str, Any]:
+    call.service.guard.begin(call.session, call.visitor, account)
+    call.service.guard.set_cookie(call.response, call.visitor)
+    call.note("signed in")
+    return {"name": account.name}
