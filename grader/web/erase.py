@@ -17,7 +17,7 @@ from grader.inputs.measurements import students_in
 from grader.inputs.roster import read_roster
 from grader.lms.export import read_results
 from grader.web.places import Places
-from grader.web.store import Attempt, Audit, Link, LtiClaim, Publication, Regrading, Sheet, digest_of
+from grader.web.store import Attempt, Audit, Job, Link, LtiClaim, Publication, Regrading, Sheet, digest_of
 from reference.authored.variant_table import delimiter_of
 
 PAGES = ("index.html", "summary.csv")
@@ -33,8 +33,9 @@ def erase_student(session: Session, publication: Publication, places: Places, st
         session.execute(
             delete(table).where(table.publication_id == publication.id, table.student_id == student)
         )
-    of_student = Attempt.who == f"student:{student}"
-    session.execute(delete(Attempt).where(Attempt.publication_id == publication.id, of_student))
+    who = f"student:{student}"
+    session.execute(delete(Attempt).where(Attempt.publication_id == publication.id, Attempt.who == who))
+    session.execute(delete(Job).where(Job.publication_id == publication.id, Job.sender == who))
     rows = read_roster(places.roster).rows if places.roster.is_file() else ()
     students = {student, *(row.student_id for row in rows)}
     _erase_audit(session, publication, student, students)

@@ -2,14 +2,15 @@
 
 A job is a row of the data base and files; what was queued or running when the server ended begins again
 with the next start, and a class goes on where it was. A class is graded in a process of its own, which a
-person may cancel; photos are checked in workers with limits of time and memory.
+person may cancel; photos are checked in workers with limits of time and memory. Classes take turns: of each
+one photo after the other is checked, and one that is graded for long lets those that wait go first.
 """
 
 import logging
 import multiprocessing
-import queue
 import threading
 import time
+from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
@@ -30,8 +31,62 @@ from reference.errors import PlanmarkError
 LOG = logging.getLogger("planmark")
 _TELL_S = 0.5
 """Progress is written at this interval: a person cannot read faster."""
+TURN_S = 120.0
+"""A class is graded for so long where others wait; the next time twice, then three times as long."""
 Photo = Callable[..., dict[str, Any]]
 """Checks a photo: its path, the assignment, n, position, language and level."""
+
+
+class Turns:
+    """Jobs that wait, of one kind: one of each class comes in turn."""
+
+    def __init__(self) -> None:
+        self._waiting: dict[int, deque[int]] = {}
+        self._changed = threading.Condition()
+        self._has_ended = False
+
+    def put(self, job: Job) -> None:
+        """Let a job wait behind those of its class."""
+        with self._changed:
+            self._waiting.setdefault(job.publication_id, deque()).append(job.id)
+            self._changed.notify()
+
+    def get(self) -> int | None:
+        """The id of the next job, as soon as there is one; None at the end."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._waiting or self._has_ended)
+            if self._has_ended:
+                return None
+            publication, jobs = next(iter(self._waiting.items()))
+            del self._waiting[publication]
+            job = jobs.popleft()
+            if jobs:
+                self._waiting[publication] = jobs
+            return job
+
+    def before(self, job: Job) -> int:
+        """How many jobs come first; 0 for one that does not wait."""
+        with self._changed:
+            own, classes = self._waiting.get(job.publication_id, deque()), list(self._waiting)
+            if job.id not in own:
+                return 0
+            place, first = own.index(job.id), classes.index(job.publication_id)
+            others = (
+                min(len(self._waiting[one]), place + (index < first))
+                for index, one in enumerate(classes)
+                if index != first
+            )
+            return place + sum(others)
+
+    def is_empty(self) -> bool:
+        """Whether nothing waits."""
+        return not self._waiting
+
+    def end(self) -> None:
+        """Give nothing any more."""
+        with self._changed:
+            self._has_ended = True
+            self._changed.notify_all()
 
 
 @dataclass(slots=True)
@@ -44,8 +99,10 @@ class Queue:
     settings: Settings
     store: Store
     photo: Photo
-    _classes: "queue.Queue[int | None]" = field(default_factory=queue.Queue)
-    _photos: "queue.Queue[int | None]" = field(default_factory=queue.Queue)
+    _classes: Turns = field(default_factory=Turns)
+    _photos: Turns = field(default_factory=Turns)
+    _turns: Counter[int] = field(default_factory=Counter)
+    """How often each class that is graded has let others go first."""
     _threads: list[threading.Thread] = field(default_factory=list)
     _workers: Workers | None = None
     _running: dict[int, SpawnProcess] = field(default_factory=dict)
@@ -73,9 +130,8 @@ class Queue:
         running = list(self._running.values())
         for process in running:
             process.terminate()
-        for jobs in (self._classes, self._photos):
-            for _ in self._threads:
-                jobs.put(None)
+        self._classes.end()
+        self._photos.end()
         for process in running:
             process.join()
         if workers is not None:
@@ -92,7 +148,10 @@ class Queue:
 
     def put(self, job: Job) -> None:
         """Queue a job that is committed."""
-        (self._classes if job.kind == "grade" else self._photos).put(job.id)
+        self._of_kind(job).put(job)
+
+    def _of_kind(self, job: Job) -> Turns:
+        return self._classes if job.kind == "grade" else self._photos
 
     def cancel(self, job_id: int) -> None:
         """End a job, wherever it is; what was marked is kept."""
@@ -105,13 +164,11 @@ class Queue:
 
     def waiting_before(self, job: Job) -> int:
         """How many jobs of its kind come first."""
-        with self.store.session() as session:
-            before = select(Job.id).where(Job.kind == job.kind, Job.state == "queued", Job.id < job.id)
-            return len(session.scalars(before).all())
+        return self._of_kind(job).before(job)
 
     # Work -----------------------------------------------------------------------------------------
 
-    def _work(self, jobs: "queue.Queue[int | None]") -> None:
+    def _work(self, jobs: Turns) -> None:
         while (job_id := jobs.get()) is not None:
             if not self.store.claimed(job_id):
                 continue
@@ -121,6 +178,8 @@ class Queue:
                 self._end(job, "done", self._grade(job) if job.kind == "grade" else self._check(job))
             except _StoppedError:
                 continue
+            except _TurnOverError:
+                self._again(job)
             except PlanmarkError as error:
                 self._end(job, "failed", {"code": error.code}, error.message)
             except Exception as error:
@@ -132,6 +191,15 @@ class Queue:
         with self.store.session() as session:
             ended = update(Job).where(Job.id == job.id, Job.state == "running")
             session.execute(ended.values(state=state, result=result, message=message, ended=time.time()))
+
+    def _again(self, job: Job) -> None:
+        """Let a class that others wait for wait behind them, unless it was cancelled."""
+        self._turns[job.id] += 1
+        with self.store.session() as session:
+            waits = update(Job).where(Job.id == job.id, Job.state == "running").values(state="queued")
+            if not session.execute(waits).rowcount:  # type: ignore[attr-defined]
+                return
+        self.put(job)
 
     def _check(self, job: Job) -> dict[str, Any]:
         """Check a photo, and delete it."""
@@ -157,13 +225,16 @@ class Queue:
         self._running[job.id] = process
         try:
             return self._followed(job, mine)
+        except _TurnOverError:
+            process.terminate()
+            raise
         finally:
             del self._running[job.id]
             process.join()
 
     def _followed(self, job: Job, reports: Connection) -> dict[str, Any]:
         """What a process that grades reports, until its end."""
-        told = 0.0
+        told, began = 0.0, time.monotonic()
         while True:
             try:
                 said = reports.recv()
@@ -176,6 +247,9 @@ class Queue:
                 raise PlanmarkError("crashed", why) from None
             match said:
                 case ("progress", stage, done, total):
+                    turn_s = TURN_S * (1 + self._turns[job.id])
+                    if time.monotonic() - began > turn_s and not self._classes.is_empty():
+                        raise _TurnOverError
                     if time.monotonic() - told > _TELL_S or done == total:
                         told = time.monotonic()
                         with self.store.session() as session:
@@ -191,6 +265,10 @@ class Queue:
 
 class _StoppedError(Exception):
     """The job was cancelled, or the server ends."""
+
+
+class _TurnOverError(Exception):
+    """Another class waits, and this one was graded for long."""
 
 
 def _graded(batch: Batch, reports: Connection) -> None:

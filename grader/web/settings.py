@@ -31,6 +31,9 @@ class Settings:
     jobs, limits : worker processes of a class that is graded, and what a file may take in one
     photos : photos that are checked at once, each in a process with these limits
     upload_mb, photo_mb : what a file of a class, and a photo, may have
+    student_pages, class_pages : that a student may hand in, and all students of a class together
+    photo_pages : of a file that is checked
+    student_seconds, class_seconds : of checking photos in an hour
     keep_days : how long visits, photos' results and the audit trail are kept
     link_days : how long a personal link is valid
     """
@@ -44,6 +47,11 @@ class Settings:
     photos: int = 1
     upload_mb: int = 200
     photo_mb: int = 30
+    student_pages: int = 40
+    class_pages: int = 4000
+    photo_pages: int = 10
+    student_seconds: float = 300.0
+    class_seconds: float = 3600.0
     keep_days: float = 365.0
     link_days: float = 200.0
 

@@ -147,6 +147,7 @@ class Sheet(Table):
     ----------
     file : the name under which it is stored
     shown : the person's own name of it, for people alone
+    pages : that count for the budgets of the student and of the class
     """
 
     __tablename__ = "sheets"
@@ -156,6 +157,7 @@ class Sheet(Table):
     student_id: Mapped[str] = mapped_column(String(80), index=True)
     file: Mapped[str] = mapped_column(String(120))
     shown: Mapped[str] = mapped_column(String(200), default="")
+    pages: Mapped[int] = mapped_column(default=1)
     sent: Mapped[float] = mapped_column(default=time.time)
 
 
@@ -192,6 +194,8 @@ class Job(Table):
     total: Mapped[int] = mapped_column(default=0)
     visit_id: Mapped[str] = mapped_column(String(64), default="")
     """Whose photo it is."""
+    sender: Mapped[str] = mapped_column(String(100), default="", server_default="")
+    """``student:ID`` of a personal link, else ``visit:ID``: whose seconds it takes."""
     created: Mapped[float] = mapped_column(default=time.time)
     started: Mapped[float | None] = mapped_column(default=None)
     ended: Mapped[float | None] = mapped_column(default=None)

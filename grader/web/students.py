@@ -5,7 +5,10 @@ import hashlib
 import re
 import secrets
 import threading
+import time
+from collections.abc import Iterator
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Depends, Query, Request
@@ -15,16 +18,19 @@ from sqlalchemy import func, select, update
 from sqlalchemy.exc import IntegrityError
 
 from grader.documents import ReportDocument
-from grader.files import result_folders, write_whole
+from grader.files import make_folder, result_folders, write_whole
+from grader.folder.workers import result_of
 from grader.language import N_
 from grader.lms.export import read_results
 from grader.review.server import page_file
+from grader.scan.decode.pages import count_pages
 from grader.web.guard import RefusedError, forbidden, missing
 from grader.web.places import assignment_of
 from grader.web.self_check import checked_values, form_of, variant_of
 from grader.web.service import FILE_BODY, Call, Called, Key, Route
 from grader.web.store import Attempt, Job, Link, Publication, Regrading, Sheet
 from reference.authored.assignment import Variant
+from reference.errors import InputFileError
 
 router = APIRouter(route_class=Route, prefix="/api/v1", tags=["students"])
 Lang = Literal["en", "ro", "ru"]
@@ -140,8 +146,36 @@ def may_check_photo(call: Called, key: Key) -> Publication:
     waiting = select(func.count()).select_from(Job).where(Job.kind == "photo", Job.state == "queued")
     if (call.session.scalar(waiting) or 0) >= MOST_WAITING:
         raise RefusedError(503, "busy", N_("very many photos wait now: send yours again in some minutes"))
+    _check_seconds(call, publication)
     call.session.commit()
     return publication
+
+
+def _sender(call: Call, publication: Publication) -> str:
+    """Whose seconds a photo takes: a cookie costs nothing, a personal link is one student's."""
+    link, visit = call.link(publication), call.visitor.visit
+    return f"student:{link.student_id}" if link is not None else f"visit:{visit.id if visit else ''}"
+
+
+def _check_seconds(call: Call, publication: Publication) -> None:
+    """Raise RefusedError where the photos of an hour have taken as long as they may.
+
+    Each student by a personal link has an own budget; all without one share that of the class.
+    """
+    settings, sender = call.service.settings, _sender(call, publication)
+    spent = select(func.sum(Job.ended - Job.started)).where(
+        Job.kind == "photo", Job.publication_id == publication.id, Job.created > time.time() - 3600.0
+    )
+    if (call.session.scalar(spent.where(Job.sender == sender)) or 0.0) > settings.student_seconds:
+        why = N_("checking your photos took very long: send the next one in an hour")
+        raise RefusedError(429, "seconds", why)
+    strangers = spent.where(Job.sender.startswith("visit:"))
+    is_stranger = sender.startswith("visit:")
+    if is_stranger and (call.session.scalar(strangers) or 0.0) > settings.class_seconds:
+        why = N_(
+            "checking the photos of this class took very long: use your personal link, or try in an hour"
+        )
+        raise RefusedError(429, "seconds", why)
 
 
 async def photo_of(request: Request, publication: Annotated[Publication, Depends(may_check_photo)]) -> bytes:
@@ -167,12 +201,24 @@ def check_photo(
     places = call.places(publication)
     name = f"{secrets.token_hex(12)}{ending}"
     write_whole(places.photos / name, body)
+    most = call.service.settings.photo_pages
+    with _without(places.photos / name):
+        pages = pages_in(call, places.photos / name)
+        if pages > most:
+            raise RefusedError(
+                413,
+                "pages",
+                N_("this file has %(pages)s pages: send %(most)s at most"),
+                pages=pages,
+                most=most,
+            )
     asked = {
         "file": name, "assignment": str(assignment.path), "n": n, "position": position, "lang": lang,
         "level": _level(publication), "attempts_left": left,
     }  # fmt: skip
     visit = call.service.guard.begin(call.session, call.visitor)
-    job = Job(publication=publication, kind="photo", asked=asked, visit_id=visit.id)
+    sender = _sender(call, publication)
+    job = Job(publication=publication, kind="photo", asked=asked, visit_id=visit.id, sender=sender)
     return queued(call, job)
 
 
@@ -280,24 +326,45 @@ def hand_in(
 ) -> dict[str, Any]:
     """Hand in a sheet: one more version, stored by its time and content; none is ever replaced."""
     publication, link = asked
-    folder = call.places(publication).handed_in
-    ending = ending_of(body)
-    with _HANDING_IN:
-        taken = len(list(folder.glob(f"{link.student_id}_sent*")))
-        if taken >= MOST_SHEETS:
-            raise RefusedError(403, "sheets", N_("%(count)s sheets of yours are there already"), count=taken)
-        at = datetime.now(UTC)
-        digest = hashlib.sha256(body).hexdigest()[:8]
-        file = f"{link.student_id}_sent{at:%Y%m%dT%H%M%S%f}-{digest}{ending}"
-        sheet = Sheet(
-            publication_id=publication.id, student_id=link.student_id, file=file, shown=name,
-            sent=at.timestamp(),
-        )  # fmt: skip
-        call.session.add(sheet)
-        call.session.flush()
-        write_whole(folder / file, body)
+    places = call.places(publication)
+    folder, ending = places.handed_in, ending_of(body)
+    trial = places.photos / f"{secrets.token_hex(12)}{ending}"
+    with _without(trial):
+        write_whole(trial, body)
+        pages = pages_in(call, trial)
+        with _HANDING_IN:
+            _check_pages(call, publication, link, pages)
+            at = datetime.now(UTC)
+            digest = hashlib.sha256(body).hexdigest()[:8]
+            file = f"{link.student_id}_sent{at:%Y%m%dT%H%M%S%f}-{digest}{ending}"
+            sheet = Sheet(
+                publication_id=publication.id, student_id=link.student_id, file=file, shown=name, pages=pages,
+                sent=at.timestamp(),
+            )  # fmt: skip
+            call.session.add(sheet)
+            call.session.flush()
+            make_folder(folder)
+            trial.replace(folder / file)
     call.note("handed in", f"{publication.key} {file}")
     return version_of(sheet)
+
+
+def _check_pages(call: Call, publication: Publication, link: Link, pages: int) -> None:
+    """Raise RefusedError where a student, or the class, has handed in as much as may be handed in."""
+    settings = call.service.settings
+    there = {path.name for path in call.places(publication).submitted()}
+    taken = sum(name.startswith(f"{link.student_id}_sent") for name in there)
+    if taken >= MOST_SHEETS:
+        raise RefusedError(403, "sheets", N_("%(count)s sheets of yours are there already"), count=taken)
+    sheets = call.session.scalars(select(Sheet).where(Sheet.publication_id == publication.id))
+    known = [(one.student_id, one.pages) for one in sheets if one.file in there]
+    left = min(
+        settings.student_pages - sum(count for student, count in known if student == link.student_id),
+        settings.class_pages - sum(count for _, count in known),
+    )
+    if pages > left:
+        why = N_("this file has %(pages)s pages: %(left)s more may be handed in")
+        raise RefusedError(403, "pages", why, pages=pages, left=max(0, left))
 
 
 @router.get("/publications/{key}/sheets")
@@ -390,6 +457,26 @@ def ending_of(body: bytes) -> str:
     if ending is None:
         raise RefusedError(415, "file_type", N_("send a photo or scan: JPEG, PNG, TIFF or PDF"))
     return ending
+
+
+def pages_in(call: Call, path: Path) -> int:
+    """Number of pages of a stored file, counted in a worker. Raises InputFileError for a damaged one."""
+    if path.suffix not in {".pdf", ".tif"}:
+        return 1
+    try:
+        return result_of(call.service.queue.workers, count_pages, path)
+    except InputFileError as error:
+        raise RefusedError(422, error.code, error.message.replace(path.name, "the file")) from error
+
+
+@contextlib.contextmanager
+def _without(path: Path) -> Iterator[None]:
+    """Delete a file again where what is done with it fails."""
+    try:
+        yield
+    except BaseException:
+        path.unlink(missing_ok=True)
+        raise
 
 
 def queued(call: Call, job: Job) -> JobState:
