@@ -33,7 +33,7 @@ Everything that the pages of planmark do. A program sends a token, made on the a
 `Authorization: Bearer TOKEN`. Errors are `{"code", "message"}`: what is wrong, where, and what to do.
 """
 
-REFUSALS = (400, 401, 403, 404, 409, 413, 415, 421, 422, 429, 503)
+REFUSALS = (400, 401, 403, 404, 408, 409, 413, 415, 421, 422, 429, 503)
 """Statuses of what is not answered, each with a `Fault`."""
 
 
