@@ -1,6 +1,7 @@
 """Files that are made to harm: each function gives the bytes of one, and says what is wrong with it."""
 
 import io
+import os
 import struct
 import zlib
 
@@ -27,6 +28,29 @@ def stored(image, kind="PNG", **options):
     buffer = io.BytesIO()
     Image.fromarray(image).save(buffer, kind, **options)
     return buffer.getvalue()
+
+
+# What is no file ----------------------------------------------------------------------------------
+
+
+def link_to_itself(path):
+    """A link that leads to itself."""
+    path.symlink_to(path.name)
+
+
+def link_to_nothing(path):
+    """A link to a file that is not there."""
+    path.symlink_to("not-there.jpg")
+
+
+def link_out(path):
+    """A link to a file that everybody may read, outside the folder."""
+    path.symlink_to("/etc/passwd")
+
+
+def pipe(path):
+    """A pipe into which nobody writes."""
+    os.mkfifo(path)
 
 
 # Pictures of a size that no drawing has -----------------------------------------------------------
@@ -261,6 +285,53 @@ def pdf_of_a_heavy_mask():
         page.Resources = DICTIONARY(ExtGState=DICTIONARY(G=DICTIONARY(Type=NAME.ExtGState, SMask=mask)))
         page.Contents = pdf.make_stream(b"/G gs 0 0 842 595 re f")
         return pdf_bytes(pdf)
+
+
+def pdf_of_a_shading(content=b"/S sh", **entries):
+    """PDF of a page that its commands fill with a shading, by name ``S`` or as the pattern ``P``."""
+    pdf = pikepdf.new()
+    page = pdf.add_blank_page(page_size=A4_PT)
+    grey = DICTIONARY(FunctionType=2, Domain=[0, 1], C0=[0], C1=[1], N=1)
+    known = {"ShadingType": 2, "ColorSpace": NAME.DeviceGray, "Coords": [0, 0, *A4_PT], "Function": grey}
+    program, mesh = entries.pop("program", None), entries.pop("mesh", None)
+    if program is not None:
+        function = pdf.make_stream(program)
+        function.FunctionType, function.Domain, function.Range = 4, [0, 1, 0, 1], [0, 1]
+        known = {**known, "Function": function, "Domain": [0, 1, 0, 1], "Matrix": [842, 0, 0, 595, 0, 0]}
+        del known["Coords"]
+    shading = DICTIONARY() if mesh is None else pdf.make_stream(mesh)
+    for name, value in (known | entries).items():
+        shading[f"/{name}"] = value
+    shading = pdf.make_indirect(shading)
+    pattern = DICTIONARY(P=DICTIONARY(PatternType=2, Shading=shading))
+    page.Resources = DICTIONARY(Shading=DICTIONARY(S=shading), Pattern=pattern)
+    page.Contents = pdf.make_stream(content)
+    return pdf_bytes(pdf)
+
+
+def pdf_of_many_shadings():
+    """PDF of 1 KB that fills its page a thousand times, each pixel with a colour of its own."""
+    return pdf_of_a_shading(b"/S sh " * 1000, ShadingType=3, Coords=[400, 300, 0, 400, 300, 500])
+
+
+def pdf_of_a_shading_by_a_program():
+    """PDF of 1 KB that carries out 4,000 commands for each pixel of its page."""
+    return pdf_of_a_shading(ShadingType=1, program=b"{ " + b"dup pop " * 2000 + b"pop }")
+
+
+def pdf_of_paints_by_a_shading():
+    """PDF of a shading as the pattern with which the page is filled a thousand times."""
+    return pdf_of_a_shading(b"/Pattern cs /P scn " + b"0 0 842 595 re f " * 1000)
+
+
+def pdf_of_a_shading_by_a_mesh(patches=3000):
+    """PDF of a mesh whose every patch covers the page."""
+    corners = ((0, 0), (0, 2), (0, 4), (0, 6), (2, 6), (4, 6), (6, 6), (6, 4), (6, 2), (6, 0), (4, 0), (2, 0))
+    patch = b"\0" + b"".join(struct.pack(">HH", 10_000 * x, 10_000 * y) for x, y in corners) + b"\0\xff\0\xff"
+    return pdf_of_a_shading(
+        ShadingType=6, BitsPerCoordinate=16, BitsPerComponent=8, BitsPerFlag=8,
+        Decode=[0, 842, 0, 595, 0, 1], mesh=patch * patches,
+    )  # fmt: skip
 
 
 def pdf_of_large_inline_images(count=40, side=30_000):

@@ -19,13 +19,23 @@ from reference.errors import InputFileError
 
 MAX_CONTENT = 32_000_000
 """Bytes of drawing commands on a page, each as often as it is carried out; exported drawings have 5 MB."""
-_OPERATORS = "Do gs scn SCN Tf Tj TJ ' \" BI ID EI"
+_OPERATORS = "Do gs scn SCN sh Tf Tj TJ ' \" BI ID EI"
 SHOWS_TEXT = frozenset(("Tj", "TJ", "'", '"'))
 _PIXELS_A_BYTE = 64
 """Pixels of an image that take as long as one byte of drawing commands."""
 _GROUP_PIXELS_A_BYTE = 24
 """Pixels of the page, which each transparency group takes a picture of: 0.3 s for A3 at 300 dpi."""
 _RENDERED_PIXELS_A_POINT = (300.0 / 72.0) ** 2
+_SHADED_PIXELS_A_BYTE = {2: 48.0, 3: 12.0}
+"""Pixels that an axial and a radial shading fill in the time of one byte: A3 takes 0.15 and 0.64 s."""
+_FUNCTION_BYTES, _FUNCTION_BYTES_A_BYTE, _SHADES = 50, 450, 256
+"""What calling a function takes, in bytes of its program; bytes carried out in the time of one byte of
+commands; colours that a shading along a line has. A shading over a plane calls for each pixel."""
+_MESH_BYTES_A_BYTE = 1000
+"""Of a mesh's data, as each of its patches may cover the page: 4 KB on A4."""
+_DEEPEST_FUNCTION = 8
+"""Functions made of functions."""
+_PAINTS = "f F f* B B* b b* S s"
 _MAX_TILES = 1_000_000
 """Tiles of a pattern on a page: A3 in millimetre squares has 125,000."""
 _SLACK = 1 << 16
@@ -103,8 +113,8 @@ class _ContentWalk:
         if cost > MAX_CONTENT:
             raise InputFileError(
                 "pdf_too_heavy",
-                f"{self.file.name}, page {self.number}: its drawing commands unpack to more than"
-                f" {MAX_CONTENT // 1_000_000} MB; export the page as an image (PNG, 300 dpi)",
+                f"{self.file.name}, page {self.number}: it takes longer to draw than"
+                f" {MAX_CONTENT // 1_000_000} MB of lines; export the page as an image (PNG, 300 dpi)",
             )
 
     def size(self, stream: pikepdf.Stream, most: int) -> int:
@@ -143,15 +153,22 @@ class _ContentWalk:
                 uses["pixels", ""] += int(image.width) * int(image.height)
             elif operands and isinstance(operands[0 if operator == "Tf" else -1], pikepdf.Name):
                 uses[operator, str(operands[0 if operator == "Tf" else -1])] += 1
+        if any(operator in {"scn", "SCN"} for operator, _ in uses):
+            uses["paints", ""] = len(pikepdf.parse_content_stream(holder, _PAINTS))
         return uses
 
     def cost(self, uses: Counter[tuple[str, str]], resources: pikepdf.Object | None) -> float:
         """Cost of what a stream names in its resources."""
-        total, letter = uses["pixels", ""] / _PIXELS_A_BYTE, 0.0
+        total, letter, paint = uses["pixels", ""] / _PIXELS_A_BYTE, 0.0, 0.0
+        groups = {"Do": "/XObject", "gs": "/ExtGState", "Tf": "/Font", "sh": "/Shading"}
         for (operator, name), count in uses.items():
-            group = {"Do": "/XObject", "gs": "/ExtGState", "Tf": "/Font"}.get(operator, "/Pattern")
-            resource = self.named(group, name, resources)
-            if isinstance(resource, pikepdf.Stream) and resource.get("/Subtype") == "/Image":
+            resource = self.named(groups.get(operator, "/Pattern"), name, resources)
+            if operator == "sh" and resource is not None:
+                total += count * self.shading(resource)
+            elif operator in {"scn", "SCN"} and isinstance(resource, pikepdf.Dictionary):
+                # All that is painted may be painted with it.
+                paint = max(paint, self.shading(resource.get("/Shading")))
+            elif isinstance(resource, pikepdf.Stream) and resource.get("/Subtype") == "/Image":
                 total += count * self.image(resource)
             elif isinstance(resource, pikepdf.Stream):
                 self.check_tiles(resource)
@@ -165,7 +182,29 @@ class _ContentWalk:
                 own = resource.get("/Resources", resources)
                 letter = max([letter, *(self.of_stream(form, own) for form in letters)])
             self.check(total)
-        return total + uses["letters", ""] * letter
+        return total + uses["letters", ""] * (letter + paint) + uses["paints", ""] * paint
+
+    def shading(self, shading: pikepdf.Object | None) -> float:
+        """Cost of filling the page with a shading once."""
+        if not isinstance(shading, pikepdf.Dictionary | pikepdf.Stream):
+            return 0.0
+        kind, pixels = int(shading.get("/ShadingType", 0)), self.area * _RENDERED_PIXELS_A_POINT
+        if isinstance(shading, pikepdf.Stream):
+            return pixels * self.size(shading, MAX_CONTENT) / _MESH_BYTES_A_BYTE
+        calls = _SHADES if kind in _SHADED_PIXELS_A_BYTE else pixels
+        program = _FUNCTION_BYTES + self.program(shading.get("/Function"))
+        fill = pixels / _SHADED_PIXELS_A_BYTE.get(kind, math.inf)
+        return fill + calls * program / _FUNCTION_BYTES_A_BYTE
+
+    def program(self, function: pikepdf.Object | None, deep: int = 0) -> float:
+        """Bytes of the programs that a function consists of."""
+        if deep > _DEEPEST_FUNCTION:
+            self.check(math.inf)
+        if isinstance(function, pikepdf.Stream):
+            return self.size(function, MAX_CONTENT)
+        parts = function.get("/Functions") if isinstance(function, pikepdf.Dictionary) else function
+        inner = list(parts) if isinstance(parts, pikepdf.Array) else []
+        return sum(_FUNCTION_BYTES + self.program(part, deep + 1) for part in inner)
 
     def named(self, group: str, name: str, resources: pikepdf.Object | None) -> pikepdf.Object | None:
         """What a name stands for; as in pdfium, among the page's resources where a form's own lack it."""

@@ -56,6 +56,10 @@ REFUSED = {
     hostile.pdf_of_a_heavy_font: "pdf_too_heavy",
     hostile.pdf_of_a_heavy_stamp: "pdf_too_heavy",
     hostile.pdf_of_a_heavy_mask: "pdf_too_heavy",
+    hostile.pdf_of_many_shadings: "pdf_too_heavy",
+    hostile.pdf_of_a_shading_by_a_program: "pdf_too_heavy",
+    hostile.pdf_of_paints_by_a_shading: "pdf_too_heavy",
+    hostile.pdf_of_a_shading_by_a_mesh: "pdf_too_heavy",
     hostile.pdf_of_large_inline_images: "pdf_too_heavy",
     hostile.pdf_of_a_large_image: "image_too_large",
     hostile.pdf_of_a_large_page: "image_too_large",
@@ -65,6 +69,11 @@ REFUSED = {
 @pytest.mark.parametrize(("build", "code"), REFUSED.items(), ids=lambda case: getattr(case, "__name__", case))
 def test_a_hostile_file_is_refused_before_it_takes_time_or_memory(build, code):
     assert code_of(build()) == code
+
+
+def test_a_drawing_with_some_shadings_is_rendered():
+    page = page_of(handed_in(hostile.pdf_of_a_shading(b"/S sh " * 5 + b"0 0 m 842 595 l S")), 1)
+    assert page.grey.min() < page.grey.max()
 
 
 def test_profiles_and_texts_of_a_png_are_not_unpacked():
