@@ -5,6 +5,7 @@ import logging
 import os
 import re
 import secrets
+import unicodedata
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from importlib.resources import files
@@ -79,6 +80,15 @@ def unguarded(text: str) -> str:
 def in_one_line(text: str) -> str:
     """The text with escapes in the place of signs that a terminal or a log would obey."""
     return _CONTROL.sub(lambda sign: sign[0].encode("unicode_escape").decode(), text)
+
+
+def shown_text(name: str) -> str:
+    """A name of a file as people read it and tables hold it: composed letters (NFC), in one line.
+
+    Bytes that are no text stand as numbers: archives from systems with other alphabets unpack to such names.
+    """
+    text = name.encode("utf-8", "backslashreplace").decode()
+    return in_one_line(unicodedata.normalize("NFC", text))
 
 
 class _Lines(logging.Formatter):

@@ -34,10 +34,11 @@ def declared_scales(task: Task, declared: Mapping[str, str]) -> dict[str, float]
 def _driven(
     task: Task, drawn: Mapping[str, DrawnVector], scales: Mapping[str, float]
 ) -> tuple[str, float] | None:
-    """The driven link's vector of a plan, and its scale as declared; None without either."""
+    """The driven link's vector of a plan, and its scale as declared; None without them or a length."""
     for kind in ("v", "a"):
         name = f"{kind}_{task.pin}"
-        if name in drawn and f"k{kind}" in scales and task.real.get(name):
+        has_length = name in drawn and drawn[name].length_mm > 0.0
+        if has_length and f"k{kind}" in scales and task.real.get(name):
             return name, scales[f"k{kind}"]
     return None
 

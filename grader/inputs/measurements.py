@@ -16,6 +16,7 @@ import io
 import json
 import math
 import re
+import stat
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -23,6 +24,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeGuard
 
 from grader.documents import LikeDocument, MeasurementsDocument
+from grader.files import shown_text
 from grader.inputs.roster import MAX_LINES, short, surplus_of, whole_number, why_no_id
 from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
 from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
@@ -53,6 +55,8 @@ MAX_BYTES = 1_000_000
 """A class of a thousand with every length, direction and value writes half of it."""
 MAX_LENGTH_MM = 2000.0
 """Longer than any sheet: a length in other units, or a slip of the pen."""
+NO_SIZE = 1e-12
+"""What is smaller is zero: nothing is drawn or computed so finely, and a quotient by it may overflow."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,7 +239,7 @@ def read_measurements(
     Raises InputFileError with every fault of the file as a whole.
     """
     path = Path(path)
-    source = _Source(file or path.name, names, tongue(lang), is_own)
+    source = _Source(file or shown_text(path.name), names, tongue(lang), is_own)
     text = _text_of(path, source)
     if path.suffix.lower() == ".json":
         return (_parse_json(text, source),)
@@ -258,13 +262,13 @@ def _text_of(path: Path, source: _Source) -> str:
     def unreadable(text: str, /, **known: object) -> InputFileError:
         return InputFileError("measurements_unreadable", f"{source.file}: {source.say(text, **known)}")
 
-    if not path.exists():
-        raise unreadable(N_("there is no such file"))
-    if not path.is_file():
-        raise unreadable(N_("it is a folder or a pipe, not a file"))
     try:
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise unreadable(N_("it is a folder or a pipe, not a file"))
         with path.open("rb") as stream:
             content = stream.read(MAX_BYTES + 1)
+    except FileNotFoundError as error:
+        raise unreadable(N_("there is no such file")) from error
     except OSError as error:
         raise unreadable(N_("cannot be read: %(why)s"), why=error.strerror or error) from error
     if len(content) > MAX_BYTES:
@@ -347,7 +351,7 @@ class _Entries:
         why = say(value.why) if isinstance(value, _NoValue) else self._refusal(column, value)
         if why is None and isinstance(value, float):
             table, name = self.columns[column]
-            self.tables[table][name] = value
+            self.tables[table][name] = value if abs(value) >= NO_SIZE else 0.0
         else:
             self.fault(path, f"'{text}': {why}")
             self.unread.append(Unread(self.columns[column][1], f"{column}: '{text}'"))

@@ -31,8 +31,8 @@ def largest(vectors) -> float:
     return size or 1.0
 
 
-def task_for(mechanism: Mechanism) -> Task:
-    """The task of a random mechanism: everything asked for, at scales that suit the paper."""
+def asked_of(mechanism: Mechanism) -> tuple[Assignment, RubricFile]:
+    """The assignment of a random mechanism: everything asked for, at scales that suit the paper."""
     motion = move(mechanism)
     scales = {
         "kL": largest(motion.position) / LARGEST_MM,
@@ -57,7 +57,12 @@ def task_for(mechanism: Mechanism) -> Task:
     asked += [("angular", name) for name in names.rates]
     criteria = [{"id": name, kind: name, "points": 1.0, "title": {"en": name}} for kind, name in asked]
     rubric = {"schema_version": 1, "id": "random", "title": {"en": "random"}, "criterion": criteria}
-    return task_of(assignment, validate(RubricFile, rubric, "random"), Variant())
+    return assignment, validate(RubricFile, rubric, "random")
+
+
+def task_for(mechanism: Mechanism) -> Task:
+    """The task of a random mechanism."""
+    return task_of(*asked_of(mechanism), Variant())
 
 
 def lost(judgement) -> list[tuple[str, str]]:
