@@ -9,6 +9,7 @@ from grader.feedback.advice import CheckedLine, checked_lines
 from grader.feedback.photos import PLANS_UNSEEN, flaw_sentence
 from grader.feedback.sentences import Level
 from grader.feedback.words import problem_sentence
+from grader.files import shown_text
 from grader.inputs.measurements import NOTHING_MEASURED, StudentSubmission
 from grader.language import Tongue, tongue
 from grader.marking.self_check import is_all_right
@@ -68,7 +69,7 @@ def photo_check(
             raise
         # The page will say why.
         count = 1
-    refs = [PageRef(path.name, number, count, path=path) for number in range(1, count + 1)]
+    refs = [PageRef(shown_text(path.name), number, count, path=path) for number in range(1, count + 1)]
     submission = StudentSubmission("", variant, tuple(refs), lang=lang)
     asked = asked_of(assignment, rubric)
     pages = read_submission(submission, [scan(ref, asked) for ref in refs], assignment, asked)

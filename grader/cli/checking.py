@@ -15,7 +15,7 @@ from grader.comparison.task import task_of
 from grader.documents import ProblemDocument, Quantity
 from grader.feedback.advice import RESULTS, CheckedLine, checked_lines
 from grader.feedback.sentences import mistake_feedback
-from grader.files import write_whole
+from grader.files import shown_text, write_whole
 from grader.inputs.measurements import Measurements, columns_of, names_of, read_measurements
 from grader.language import N_, Tongue, tongue
 from grader.marking.mark import judge
@@ -122,7 +122,7 @@ def check_photo(name: str, n: int | None, position: int | None, file: Path, lang
     variant = _variant(assignment, None, n, position, speaker)
     with Workers(1, Limits(), photo_check.__module__) as workers:
         told = result_of(workers, photo_check, file, assignment, rubric_of(assignment), variant, lang, wanted)
-    typer.secho(f"{file.name}, {variant}", bold=True)
+    typer.secho(f"{shown_text(file.name)}, {variant}", bold=True)
     for text in (*told.flaws.values(), *told.problems):
         _print(text, "  ", "yellow")
     if told.is_read:
@@ -247,6 +247,7 @@ def _tell(lines: list[CheckedLine], level: Level, speaker: Tongue) -> None:
 def _print(text: str, indent: str, colour: str | None = None, *, is_begun: bool = False) -> None:
     """Print a text wrapped to the terminal, every line but one that is begun already behind an indent."""
     wide = max(shutil.get_terminal_size().columns - 1, len(indent) + 30)
+    text = terminal.shown(text)
     lines = textwrap.wrap(text, wide, initial_indent=indent, subsequent_indent=indent) or [indent]
     typer.secho("\n".join(lines).removeprefix(indent if is_begun else ""), fg=colour)
 

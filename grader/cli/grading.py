@@ -22,7 +22,7 @@ from grader.documents import AlikeDocument, MovedDocument, ReadingDocument, Resu
 from grader.feedback.class_page import CAUSES, SIGNS, trust_sentences, write_demo_page
 from grader.feedback.class_statistics import waiting
 from grader.feedback.photos import flaw_problems
-from grader.files import make_folder, samples_folder
+from grader.files import make_folder, samples_folder, shown_text
 from grader.folder.batch import Batch, grade
 from grader.folder.changes import standing_text
 from grader.folder.watch import arrivals
@@ -219,12 +219,13 @@ def _variant(assignment: Assignment, n: int | None, position: int | None) -> Var
 
 def _refs(path: Path) -> list[PageRef]:
     """A file's pages; of a file that cannot be opened the first, which will say why."""
+    name = shown_text(path.name)
     try:
-        return [PageRef(path.name, page, path=path) for page in range(1, count_pages(path) + 1)]
+        return [PageRef(name, page, path=path) for page in range(1, count_pages(path) + 1)]
     except InputFileError as error:
         if error.code == "file_missing":
             raise
-        return [PageRef(path.name, path=path)]
+        return [PageRef(name, path=path)]
 
 
 def _doubtful(document: ReadingDocument) -> bool:

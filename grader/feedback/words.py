@@ -123,6 +123,7 @@ def environment(lang: str) -> Environment:
 
 PROBLEMS: dict[str, str] = {
     "file_missing": N_("The file could not be opened."),
+    "link_leads_out": N_("This is a link to a file elsewhere; hand in the file itself."),
     "file_empty": N_("The file is empty; hand it in again."),
     "file_type_unsupported": N_("The file is of a type that is not read: use JPEG, PNG, TIFF or PDF."),
     "image_too_large": N_("The image is too large; scan at 600 dpi or less."),

@@ -2,7 +2,7 @@
 
 import json
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -48,7 +48,7 @@ from grader.folder.changes import (
     noted_run,
 )
 from grader.folder.decisions import ClassDecisions, class_decisions, decisions_path
-from grader.folder.inventory import FileContent, Progress, submissions, take_inventory
+from grader.folder.inventory import FileContent, Progress, natural_key, submissions, take_inventory
 from grader.folder.lock import only_run
 from grader.folder.owners import Unmatched, assign_pages
 from grader.folder.submissions import Unusable, submissions_of
@@ -92,6 +92,7 @@ class Batch:
     roster : path of the roster, or None (a `roster.csv` in the folder is taken)
     decisions : path of what people decided, or None (`decisions.csv` in the folder is taken)
     growing : files that are still being written: this run passes them over
+    called : what people call files that are stored under other names
     pages_per_student : pages of each student in one class file, blank ones not counted
     jobs, limits : worker processes, and what a file or a sheet may take in one
     lang, level : of feedback, where the roster does not say
@@ -111,6 +112,7 @@ class Batch:
     with_ghosts: bool = True
     decisions: Path | None = None
     growing: tuple[Path, ...] = ()
+    called: Mapping[Path, str] = field(default_factory=dict)
 
     @property
     def roster_path(self) -> Path:
@@ -178,7 +180,9 @@ def _graded(
     try:
         with Workers(batch.jobs, batch.limits, __name__) if workers is None else nullcontext(workers) as some:
             pool = Whole(some)
-            contents = take_inventory(files, batch.folder, names, pool, progress, cache, decisions.place)
+            contents = take_inventory(
+                files, batch.folder, names, pool, progress, cache, decisions.place, batch.called
+            )
             students, unmatched = _submissions(batch, listed, contents, cache, pool)
             if not students and not unmatched:
                 raise _nothing(batch)
@@ -269,7 +273,12 @@ def files_of(batch: Batch) -> list[Path]:
     if not batch.folder.is_dir():
         raise CallError("folder_missing", f"{batch.folder}: there is no such folder")
     others = (batch.out, batch.decisions_path, *batch.growing, *batch.assignment.own_files)
-    return submissions(batch.folder, batch.roster, passed_over=others)
+    files = submissions(batch.folder, batch.roster, passed_over=others)
+    return (
+        sorted(files, key=lambda path: natural_key(batch.called.get(path, path.name)))
+        if batch.called
+        else files
+    )
 
 
 def _submissions(

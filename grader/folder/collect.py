@@ -20,8 +20,9 @@ import numpy as np
 from grader.documents import CriterionDocument, ReportDocument, SaidDocument
 from grader.feedback.words import environment
 from grader.files import guarded, make_folder, write_whole
-from grader.folder.batch import Batch, Graded, pages_read
+from grader.folder.batch import Batch, Graded, files_of, pages_read
 from grader.folder.cache import digest_of
+from grader.folder.inventory import shown_names
 from grader.inputs.decision_texts import audit_answer
 from grader.marking.trust import said_of
 from grader.overlay.covered import Keep, bare_png, covered, painted, reopened, upright_pixels
@@ -90,7 +91,7 @@ def check_target(file: Path) -> None:
 def check_scans(batch: Batch, reports: Sequence[ReportDocument]) -> None:
     """Raise CallError where scans that the results came from are no longer in their folder."""
     files = {sheet.source for report in reports for sheet in report.reading.sheets}
-    gone = sorted(file for file in files if not (batch.folder / file).is_file())
+    gone = sorted(files.difference(shown_names(files_of(batch), batch.folder, batch.called)))
     if gone:
         named = f"{', '.join(gone[:3])}{' ...' if len(gone) > 3 else ''}"
         raise CallError(

@@ -11,10 +11,11 @@ import re
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
+from pathlib import Path, PurePath
+from types import MappingProxyType
 
 from grader.documents import UnmatchedDocument
-from grader.files import Stamp, stamp_of, write_whole
+from grader.files import Stamp, shown_text, stamp_of, write_whole
 from grader.folder.cache import PageCache, packed, unpacked
 from grader.folder.workers import ENDED, Pool
 from grader.inputs.measurements import Measurements, Names, read_measurements, students_in
@@ -59,32 +60,56 @@ def submissions(folder: Path, roster: Path | None = None, passed_over: Iterable[
         folder's top is none either
     passed_over : files and folders that are none, such as the folder of results
 
-    A folder that cannot be opened counts as a file, and so does an empty folder named as one: both are
-    reported. Links that lead out of the folder are left out.
+    A folder that cannot be opened counts as a file, and so do an empty folder named as one and a link to a
+    folder elsewhere: they are reported.
     """
-    top = folder.resolve()
-    none = {path.resolve() for path in (*passed_over, *([roster] if roster else []), folder / "roster.csv")}
+    none = {_real(path) for path in (*passed_over, *([roster] if roster else []), folder / "roster.csv")}
     paths: list[Path] = []
     shut: list[Path] = []
     for where, folders, files in os.walk(folder, onerror=lambda error: shut.append(Path(error.filename))):
         folders[:] = [
-            name for name in folders if not is_tool_file(name) and (Path(where) / name).resolve() not in none
+            name for name in folders if not is_tool_file(name) and _real(Path(where) / name) not in none
         ]
         for name in files:
             path = Path(where) / name
-            real = path.resolve()
-            if not is_tool_file(name) and real not in none and real.is_relative_to(top):
+            if not is_tool_file(name) and _real(path) not in none:
                 paths.append(path)
-        paths += [Path(where) / name for name in folders if _named_as_file(Path(where) / name)]
+        paths += [
+            path for path in (Path(where) / name for name in folders)
+            if _named_as_file(path) or (path.is_symlink() and leads_out(path, folder))
+        ]  # fmt: skip
     return sorted(paths + shut, key=lambda path: natural_key(path.relative_to(folder).as_posix()))
 
 
 def shown_name(path: Path, folder: Path) -> str:
-    """A file's path in the folder, as messages name it; bytes that are no text stand as numbers.
+    """A file's path in the folder, as messages name it."""
+    return shown_text(path.relative_to(folder).as_posix())
 
-    Archives from systems with other alphabets unpack to such names.
+
+def shown_names(paths: Iterable[Path], folder: Path, called: Mapping[Path, str]) -> list[str]:
+    """What messages and tables name each file: as it is `called`, else its path; each name once.
+
+    Two names may look the same: their letters are composed or not, or a sign is not shown.
     """
-    return path.relative_to(folder).as_posix().encode("utf-8", "backslashreplace").decode()
+    names: dict[str, None] = {}
+    for path in paths:
+        name = plain = called.get(path) or shown_name(path, folder)
+        number = 1
+        while name in names:
+            number += 1
+            name = f"{PurePath(plain).with_suffix('')} ({number}){PurePath(plain).suffix}"
+        names[name] = None
+    return list(names)
+
+
+def leads_out(path: Path, folder: Path) -> bool:
+    """Whether a file is a link to one elsewhere, or lies behind such a link."""
+    return not _real(path).is_relative_to(_real(folder))
+
+
+def _real(path: Path) -> Path:
+    """Where a path leads; links that lead in a circle lead nowhere, and the path stays."""
+    return Path(os.path.realpath(path))
 
 
 def _named_as_file(folder: Path) -> bool:
@@ -134,6 +159,7 @@ def take_inventory(  # noqa: PLR0913, PLR0917 - what a folder is read with
     progress: Progress,
     cache: PageCache,
     place: Callable[[Sequence[PageRef]], Sequence[PageRef]] = tuple,
+    called: Mapping[Path, str] = MappingProxyType({}),
 ) -> list[FileContent]:
     """What each of a folder's files holds; never raises for a bad file.
 
@@ -141,15 +167,19 @@ def take_inventory(  # noqa: PLR0913, PLR0917 - what a folder is read with
     ---------
     cache : takes the pages as scanned; pages that are not there any more are dropped from it
     place : all pages with the turns and corners that people gave, in the same order
+    called : what people call files that are stored under other names
     """
-    shown = [shown_name(path, folder) for path in files]
+    shown = shown_names(files, folder, called)
     stamps = [stamp_of(path) for path in files]
     noted = _noted(cache)
     contents = [FileContent()] * len(files)
     anew: list[int] = []
     for index, (name, stamp) in enumerate(zip(shown, stamps, strict=True)):
         known = noted.get(name)
-        if known is not None and stamp is not None and known.stamp == stamp:
+        if leads_out(files[index], folder):
+            why = f"{name}: a link to a place outside the folder; put the file itself there"
+            contents[index] = _failed(name, Problem("link_leads_out", why))
+        elif known is not None and stamp is not None and known.stamp == stamp:
             contents[index] = FileContent(tuple(replace(page, path=files[index]) for page in known.pages))
         else:
             anew.append(index)
@@ -235,7 +265,7 @@ def open_file(path: Path, name: str, names: Names) -> FileContent:
         except InputFileError as error:
             refused = UnmatchedDocument(file=name, code=error.code, message=error.message)
             return FileContent(refused=refused, students=students_in(path))
-    file = load(path)
+    file = load(path, name)
     count = count_pages(file)
     return FileContent(
         tuple(PageRef(name, page, count, digest=file.digest, path=path) for page in range(1, count + 1))
@@ -262,6 +292,6 @@ def _with_problem(page: PageRef, problem: Problem, workers: Pool) -> PageRef:
 
 def _failed(name: str, problem: Problem) -> FileContent:
     """What is known of a file that could not be opened: it is there, and why."""
-    if Path(name).suffix.lower() in MEASUREMENT_TYPES:
+    if PurePath(name).suffix.lower() in MEASUREMENT_TYPES:
         return FileContent(refused=UnmatchedDocument(file=name, code=problem.code, message=problem.message))
     return FileContent((PageRef(name, problem=replace(problem, file=name)),))

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from grader.files import unguarded
+from grader.files import shown_text, unguarded
 from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
 from grader.language import LANGUAGES, N_, ROOT_LANGUAGE, Tongue, tongue
 from grader.records import Problem
@@ -288,6 +288,7 @@ def _faults_of(row: RosterRow, text: Mapping[str, str]) -> Iterator[tuple[str, s
 
 def parse_scan(text: str) -> ScanRef | str:
     """`class.pdf#3` or `extra.jpg`; a sentence about what is wrong where it is neither."""
+    text = shown_text(text)
     file, mark, page = text.rpartition("#")
     if not mark:
         return ScanRef(text)

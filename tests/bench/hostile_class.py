@@ -1,4 +1,4 @@
-"""A class of 50 in which ten files are hostile, graded whole, killed and interrupted on the way.
+"""A class of 40 good submissions and some hostile ones, graded whole, killed and interrupted on the way.
 
     OMP_NUM_THREADS=1 python -m tests.bench.hostile_class [--checkout OTHER]
 
@@ -28,7 +28,7 @@ import psutil
 from tests import hostile
 
 ROOT = Path(__file__).parents[2]
-GOOD, HOSTILE = 40, 10
+GOOD = 40
 MEASURED_EVERY = 4
 NUMBERS = {"s01": 7, "s02": 12, "s03": 3, "s06": 9, "s07": 15}
 """Students of the bundled samples who handed in scans, with their n."""
@@ -57,6 +57,15 @@ FILES = {
     "h08.jpg": negative,
     "h09.jpg": noise,
     "h10.pdf": hostile.pdf_of_a_class,
+    "h11.pdf": hostile.pdf_of_a_shading_by_a_program,
+}
+NO_FILES = {
+    "h12.pdf": hostile.link_to_itself,
+    "h13.jpg": hostile.link_to_nothing,
+    "h14.jpg": hostile.link_out,
+    "h15.png": hostile.pipe,
+    "h16_\n\x1b[2J.jpg": lambda path: path.write_bytes(b"junk"),
+    "h17_Иванов \u202egpj.jpg": lambda path: path.write_bytes(b"junk"),
 }
 
 
@@ -76,7 +85,7 @@ def make_class(folder: Path) -> None:
             continue
         for path in sorted(samples.glob(f"{of}_*")):
             shutil.copy(path, folder / path.name.replace(of, student, 1))
-    lines += [f"{Path(name).stem},Hostile {name},7" for name in FILES]
+    lines += [f"{name[:3]},Hostile,7" for name in (*FILES, *NO_FILES)]
     (folder / "roster.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -164,6 +173,8 @@ def main() -> None:
         shutil.copytree(good, mixed)
         for name, make in FILES.items():
             (mixed / name).write_bytes(make())
+        for name, put in NO_FILES.items():
+            put(mixed / name)
         for jobs in asked.jobs:
             out = Path(top) / f"{jobs}"
             if other is not None:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import struct
 import zlib
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from grader.cli.commands import app
+from tests import hostile
 
 REFUSED = {
     "s10_zero.jpg": "file_empty",
@@ -23,14 +25,19 @@ REFUSED = {
     "s17.pdf": "file_missing",
     "s18.jpg": "file_missing",
     "s19_două pagini 'x' \"y\" ж.jpg": "image_truncated",
+    "s21.pdf": "file_missing",
+    "s22.jpg": "file_missing",
+    "s23.jpg": "link_leads_out",
+    "s24_\\n\\x1b[2J\\u202e.jpg": "file_type_unsupported",
+    "s25_Петров_1.jpg": "file_type_unsupported",
 }
 """What is wrong with each file, under its owner's name."""
 NOBODYS = "bad\udcff\udcfename.jpg"
 """As an archive from a system with another alphabet unpacks it."""
 
 
-def graded(folder, out):
-    call = ["grade", folder, "--assignment", "pump", "--out", out, "--jobs", "1"]
+def graded(folder, out, *more):
+    call = ["grade", folder, "--assignment", "pump", "--out", out, "--jobs", "1", *more]
     return CliRunner().invoke(app, [str(part) for part in call])
 
 
@@ -60,14 +67,19 @@ def results(tmp_path_factory):
     (folder / "s15.gif").write_bytes(b"GIF89a" + bytes(30))
     (folder / "s16.heic").write_bytes(b"\0\0\0\x18ftypheic" + bytes(3000))
     (folder / "s17.pdf").mkdir()
-    os.mkfifo(folder / "s18.jpg")
+    hostile.pipe(folder / "s18.jpg")
     (folder / "s19_două pagini 'x' \"y\" ж.jpg").write_bytes(b"\xff\xd8\xff\xe0junk")
+    hostile.link_to_itself(folder / "s21.pdf")
+    hostile.link_to_nothing(folder / "s22.jpg")
+    hostile.link_out(folder / "s23.jpg")
+    (folder / "s24_\n\x1b[2J\u202e.jpg").write_bytes(b"junk")
+    (folder / "s25_Петров_1.jpg").write_bytes(b"junk")
     try:
         (folder / NOBODYS).write_bytes(b"junk")
     except OSError:  # a file system that takes text only
         (folder / NOBODYS.encode("utf-8", "backslashreplace").decode()).write_bytes(b"junk")
     (folder / "s20.json").write_text('{"student_id": "s20", "n": 7, "segments_mm": {"v_A": 60.0}}')
-    rows = "".join(f"s{number},Student {number},7\n" for number in range(10, 21))
+    rows = "".join(f"s{number},Student {number},7\n" for number in range(10, 26))
     (folder / "roster.csv").write_text("student_id,name,n\n" + rows, encoding="utf-8")
     out = folder.parent / (folder.name + "-out")
     run = graded(folder, out)
@@ -97,6 +109,19 @@ def test_the_good_work_beside_them_is_graded(results):
     report = next(one for one in results[2]["reports"] if one["student_id"] == "s20")
     assert report["status"] in {"graded", "needs_review"}
     assert report["criteria"]
+
+
+@pytest.mark.parametrize("name", ["s1_\n\x1b[2J\u202e.csv", "s1_\n\x1b[2J\u202e.jpg"])
+def test_no_name_moves_the_cursor_or_begins_a_line(tmp_path, name):
+    folder, out = tmp_path / "in", tmp_path / "out"
+    folder.mkdir()
+    (folder / name).write_bytes(b"junk")
+    run = graded(folder, out, "--log", out / "run.log")
+    shown = "s1_\\n\\x1b[2J\\u202e"
+    assert shown in run.output
+    assert shown in (out / "results.json").read_text("utf-8").replace("\\\\", "\\")
+    for text in (run.output, *(path.read_text("utf-8") for path in (out / "summary.csv", out / "run.log"))):
+        assert not re.search("\x1b|\u202e|s1_\n", text)
 
 
 def test_a_pipe_with_the_name_of_measurements_is_told_and_not_waited_for(tmp_path: Path):

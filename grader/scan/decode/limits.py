@@ -29,8 +29,9 @@ import os
 import stat
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePath
 
+from grader.files import shown_text
 from grader.records import Page
 from reference.errors import InputFileError
 
@@ -77,25 +78,28 @@ class InputFile:
     digest: str
 
 
-def load(path: Path | str) -> InputFile:
+def load(path: Path | str, shown: str = "") -> InputFile:
     """A file's content.
+
+    Arguments: `shown` is what people call it, where that is not its own name.
 
     Raises InputFileError (`file_missing`, `file_empty`, `file_too_large`, `file_changed`).
     """
     path = Path(path)
+    name = PurePath(shown).name or shown_text(path.name)
     try:
-        data = _content(path)
+        data = _content(path, name)
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputFileError(
-            "file_missing", f"{path.name}: cannot be opened ({reason}); check the path"
+            "file_missing", f"{name}: cannot be opened ({reason}); check the path"
         ) from error
     if not data:
-        raise InputFileError("file_empty", f"{path.name}: the file is empty (0 bytes); hand it in again")
-    return InputFile(path.name, data, hashlib.sha256(data).hexdigest())
+        raise InputFileError("file_empty", f"{name}: the file is empty (0 bytes); hand it in again")
+    return InputFile(name, data, hashlib.sha256(data).hexdigest())
 
 
-def _content(path: Path) -> bytes:
+def _content(path: Path, name: str) -> bytes:
     """All bytes of a regular file. A pipe or device is not read: it may never say anything, or end."""
     if path.exists() and not path.is_file():
         raise OSError(errno.EISDIR, "it is a folder or a pipe, not a file")
@@ -107,12 +111,12 @@ def _content(path: Path) -> bytes:
         if status.st_size > MAX_FILE_BYTES:
             raise InputFileError(
                 "file_too_large",
-                f"{path.name}: {status.st_size // 1_000_000} MB, more than {MAX_FILE_BYTES // 1_000_000} MB;"
+                f"{name}: {status.st_size // 1_000_000} MB, more than {MAX_FILE_BYTES // 1_000_000} MB;"
                 " split the file, or scan at 300 dpi",
             )
         data = file.read(status.st_size + 1)
     if len(data) != status.st_size:
-        raise changed(path.name)
+        raise changed(name)
     return data
 
 

@@ -61,7 +61,7 @@ def page_of(source: InputFile | Path | str, number: int) -> Page:
 
 def decode(ref: PageRef) -> Page:
     """The page's pixels. Raises as `pages_of`, and where the file is not what it was when it was listed."""
-    file = load(ref.path)
+    file = load(ref.path, ref.file)
     if ref.digest and ref.digest != file.digest:
         raise changed(ref.file)
     return replace(page_of(file, ref.page), source=ref.file)
