@@ -4,7 +4,7 @@ import csv
 import io
 import shutil
 from collections.abc import Iterable
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from sqlalchemy import delete, or_, select
 from sqlalchemy.orm import Session
@@ -41,12 +41,12 @@ def erase_student(session: Session, publication: Publication, places: Places, st
     _erase_audit(session, publication, student, students)
     owners = _owners(places)
     own = {
-        path for path in places.submitted()
-        if owners.get(path.name, {_student_named(path.stem, students)}) == {student}
+        path for path, name in places.called().items()
+        if owners.get(name, {_student_named(PurePath(name).stem, students)}) == {student}
     }  # fmt: skip
     shared = [name for name, students in owners.items() if student in students and len(students) > 1]
     for path in own:
-        path.unlink(missing_ok=True)
+        places.delete(path)
     _erase_rows(places, student)
     _erase_results(places, student)
     return shared
@@ -58,9 +58,9 @@ def _owners(places: Places) -> dict[str, set[str]]:
     for report in _reports(places).reports:
         for sheet in report.reading.sheets:
             owners.setdefault(sheet.source, set()).add(report.student_id)
-    for path in places.submitted():
+    for path, name in places.called().items():
         if path.suffix.lower() in {".csv", ".json"} and (students := students_in(path)):
-            owners[path.name] = set(students)
+            owners[name] = set(students)
     return owners
 
 

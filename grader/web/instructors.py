@@ -6,6 +6,7 @@ import shutil
 import tempfile
 import time
 from dataclasses import replace
+from pathlib import PurePath
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Path, Query
@@ -28,9 +29,10 @@ from grader.web.places import (
     SUBMITTED,
     Places,
     assignment_of,
+    person_name,
     safe_name,
     store,
-    stored,
+    stored_name,
 )
 from grader.web.service import FILE_BODY, LARGEST_ROW, Body, Call, Called, Key, Route, Row
 from grader.web.store import (
@@ -49,7 +51,8 @@ from reference.authored.assignment import built_in
 from reference.errors import PlanmarkError
 
 router = APIRouter(route_class=Route, prefix="/api/v1", tags=["instructors"])
-FileName = Annotated[str, Path(max_length=200)]
+FileName = Annotated[str, Path(max_length=400)]
+"""As people's systems allow them, with the folders above; see `grader.web.places.person_name`."""
 StudentId = Annotated[str, Path(pattern=r"^[A-Za-z0-9._-]{1,80}$")]
 
 
@@ -244,8 +247,8 @@ def files_of(session: Session, publication: Publication, places: Places) -> list
     sheets = session.scalars(select(Sheet).where(Sheet.publication_id == publication.id))
     shown = {one.file: one.shown for one in sheets}
     return [
-        {"name": path.name, "bytes": stat.st_size, "at": stat.st_mtime, "shown": shown.get(path.name, "")}
-        for path, stat in ((path, path.stat()) for path in places.submitted())
+        {"name": name, "bytes": stat.st_size, "at": stat.st_mtime, "shown": shown.get(path.name, "")}
+        for path, name, stat in ((path, name, path.stat()) for path, name in places.called().items())
     ]
 
 
@@ -268,7 +271,7 @@ def put_authored(call: Called, key: Key, name: FileName, body: Body) -> dict[str
     """Store a file of the assignment; it is checked when it is chosen."""
     own = call.own(key)
     safe = safe_name(name, AUTHORED)
-    is_same = store(call.places(own).authored, safe, body, replace=True)
+    is_same = store(call.places(own).authored / safe, body, replace=True)
     call.note("assignment file", f"{key} {safe}")
     return {"name": safe, "is_same": is_same}
 
@@ -280,13 +283,13 @@ def put_roster(call: Called, key: Key, body: Body) -> dict[str, Any]:
     places = call.places(own)
     trial = places.top / f"roster-{secrets.token_hex(6)}.csv"
     try:
-        store(places.top, trial.name, body)
+        store(trial, body)
         count = len(read_roster(trial).rows)
     except PlanmarkError as error:
         raise RefusedError(422, error.code, error.message.replace(str(trial), "roster.csv")) from error
     finally:
         trial.unlink(missing_ok=True)
-    store(places.handed_in, "roster.csv", body, replace=True)
+    store(places.roster, body, replace=True)
     call.note("roster", f"{key}: {count} lines")
     return {"lines": count}
 
@@ -296,27 +299,29 @@ def put_file(call: Called, key: Key, name: FileName, body: Body, *, replace: boo
     """Store a sheet, a class file or measurements that were handed in."""
     own = call.own(key)
     call.count("upload")
-    safe = safe_name(name, SUBMITTED)
-    if safe.lower() in {"roster.csv", "decisions.csv"}:
+    called = person_name(name, SUBMITTED)
+    if PurePath(called).name.lower() in {"roster.csv", "decisions.csv"}:
         raise RefusedError(
             422, "file_name", "upload the roster as the roster; decisions are made in the review"
         )
-    sent = select(Sheet.id).where(Sheet.publication_id == own.id, Sheet.file == safe)
+    stored = stored_name(called)
+    sent = select(Sheet.id).where(Sheet.publication_id == own.id, Sheet.file == stored)
     if call.session.scalar(sent) is not None:
-        raise RefusedError(409, "file_exists", f"{safe}: a student has handed this in; choose another name")
-    is_same = store(call.places(own).handed_in, safe, body, replace=replace)
-    call.note("file", f"{key} {safe}")
-    return {"name": safe, "is_same": is_same}
+        raise RefusedError(409, "file_exists", f"{called}: a student has handed this in; choose another name")
+    is_same = call.places(own).keep(called, body, replace=replace)
+    call.note("file", f"{key} {called}")
+    return {"name": called, "is_same": is_same}
 
 
 @router.delete("/publications/{key}/files/{name:path}")
 def remove_file(call: Called, key: Key, name: FileName) -> dict[str, str]:
     """Delete a file that was handed in."""
     own = call.own(key)
-    path = stored(call.places(own).handed_in, name)
-    if path not in call.places(own).submitted():
+    places = call.places(own)
+    path = next((path for path, called in places.called().items() if called == name), None)
+    if path is None:
         raise missing("file")
-    path.unlink()
+    places.delete(path)
     call.note("file removed", f"{key} {name}")
     return {"state": "removed"}
 
@@ -386,10 +391,13 @@ def filled_in(
 ) -> Response:
     """The platform's own worksheet or gradebook, which is sent as the body, filled in."""
     folder = call.places(call.own(key)).top / f"form-{secrets.token_hex(6)}"
-    form = folder / safe_name(name, (".csv", ".xls", ".txt"))
+    called = person_name(name, (".csv", ".xls", ".txt"))
+    form = folder / stored_name(called)
     try:
-        store(folder, form.name, body)
+        store(form, body)
         return _exported(call, key, Options(to=platform, what=what, form=form, rescale=rescale))
+    except PlanmarkError as error:
+        raise RefusedError(422, error.code, error.message.replace(form.name, called)) from error
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 

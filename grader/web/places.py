@@ -1,19 +1,22 @@
 """Where a publication's files are: the assignment's, what was handed in, results.
 
-A name that somebody sends never reaches a path as it is: it must be made of plain letters, and is looked
-for among the files that are there.
+A name that somebody sends never reaches a path as it is. A sheet keeps the name that people gave it, in their
+own script; where that is not plain, the file is stored under another and the name noted beside it. Files are
+looked for among those that are there.
 """
 
+import hashlib
 import re
 import shutil
 import tomllib
 import unicodedata
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 
-from grader.files import write_whole
+from grader.files import shown_text, write_whole
 from grader.folder.batch import Batch
 from grader.folder.inventory import is_tool_file
+from grader.inputs.roster import why_no_id
 from grader.rubric import rubric_of
 from grader.web.store import Publication
 from reference.authored.assignment import Assignment, built_in, load_assignment
@@ -67,6 +70,29 @@ class Places:
             if path.suffix.lower() in SUBMITTED and not is_tool_file(path.name) and path != self.roster
         )
 
+    def called(self) -> dict[Path, str]:
+        """What people call each file handed in."""
+        names = {path: self._note_of(path) for path in self.submitted()}
+        return {
+            path: note.read_text(encoding="utf-8") if note.is_file() else path.name
+            for path, note in names.items()
+        }
+
+    def keep(self, name: str, content: bytes, *, replace: bool = False) -> bool:
+        """Store a file handed in by what people call it; returns and raises as `store` does."""
+        path = self.handed_in / stored_name(name)
+        if path.name != name:
+            write_whole(self._note_of(path), name)
+        return store(path, content, replace=replace, shown=name)
+
+    def delete(self, path: Path) -> None:
+        """Delete a file handed in, with what it was called."""
+        path.unlink(missing_ok=True)
+        self._note_of(path).unlink(missing_ok=True)
+
+    def _note_of(self, path: Path) -> Path:
+        return self.top / "names" / path.name
+
     def remove(self) -> None:
         """Delete all of it."""
         shutil.rmtree(self.top, ignore_errors=True)
@@ -79,10 +105,38 @@ def places_of(data: Path, publication: Publication) -> Places:
     return Places(data / "publications" / publication.key)
 
 
-def safe_name(name: str, endings: tuple[str, ...]) -> str:
-    """The name under which a file is stored: letters, digits, ``.``, ``_``, ``-``, of a known kind.
+def person_name(name: str, endings: tuple[str, ...]) -> str:
+    """What people call a file: in any script, in one line, with the folders of an uploaded folder.
 
-    Folders of an uploaded folder become a part of the name. Raises CallError for a name of another kind.
+    Raises CallError for a file of another kind, and for one that a system or editor leaves behind.
+    """
+    parts = [shown_text(part) for part in re.split(r"[\\/]+", name) if part.strip() not in {"", ".", ".."}]
+    last = PurePath(parts[-1] if parts else "-")
+    if last.suffix.lower() not in endings:
+        raise _other_kind(name, endings)
+    if is_tool_file(last.name):
+        raise CallError(
+            "file_name", f"'{last.name[:60]}': a file that other programs leave behind, no submission"
+        )
+    return "/".join(parts)
+
+
+def stored_name(name: str) -> str:
+    """Where a file is stored: under its own name where that is plain, else under one made of it."""
+    if _PLAIN.fullmatch(name) and len(name) <= LONGEST_NAME and why_no_id(PurePath(name).stem) is None:
+        return name
+    made = hashlib.blake2b(name.encode(), digest_size=12).hexdigest()
+    return f"file-{made}{PurePath(name).suffix.lower()}"
+
+
+def _other_kind(name: str, endings: tuple[str, ...]) -> CallError:
+    return CallError("file_name", f"'{name[:60]}': the file's name must end in one of {', '.join(endings)}")
+
+
+def safe_name(name: str, endings: tuple[str, ...]) -> str:
+    """The name under which an assignment's file is stored: letters, digits, ``.``, ``_``, ``-``.
+
+    Raises CallError for a name of another kind, and for one without any of these.
     """
     plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
     parts = [part for part in re.split(r"[\\/]+", plain) if part not in {"", ".", ".."}]
@@ -90,8 +144,7 @@ def safe_name(name: str, endings: tuple[str, ...]) -> str:
     ending = next((one for one in endings if text.lower().endswith(one)), None)
     stem = "" if ending is None else text[: -len(ending)].strip("-._")
     if ending is None or not _PLAIN.fullmatch(stem or "-"):
-        known = ", ".join(endings)
-        raise CallError("file_name", f"'{name[:60]}': the file's name must end in one of {known}")
+        raise _other_kind(name, endings)
     return f"{stem[: LONGEST_NAME - len(ending)]}{ending}"
 
 
@@ -103,18 +156,17 @@ def stored(folder: Path, name: str) -> Path:
     raise CallError("file_missing", f"there is no file '{name[:60]}'")
 
 
-def store(folder: Path, name: str, content: bytes, *, replace: bool = False) -> bool:
+def store(path: Path, content: bytes, *, replace: bool = False, shown: str = "") -> bool:
     """Store a file; whether it was there already with the same content.
 
-    Raises CallError where another file has that name and may not be replaced.
+    Raises CallError where another file has that name, `shown` to people, and may not be replaced.
     """
-    path = folder / name
     if path.is_file():
         if path.read_bytes() == content:
             return True
         if not replace:
             why = "a file of this name is there already with other content; rename it, or replace it"
-            raise CallError("file_exists", f"{name}: {why}")
+            raise CallError("file_exists", f"{shown or path.name}: {why}")
     write_whole(path, content)
     return False
 
@@ -158,4 +210,5 @@ def batch_of(data: Path, publication: Publication, jobs: int = 1) -> Batch:
     return Batch(
         assignment, rubric_of(assignment), places.handed_in, places.results,
         pages_per_student=publication.pages_per_student, jobs=jobs, lang=publication.lang,
+        called=places.called(),
     )  # fmt: skip

@@ -120,6 +120,12 @@ def graded_here(_queue, job):
 
 
 @pytest.fixture
+def grades_here(monkeypatch):
+    """Lets jobs be graded in the test itself."""
+    monkeypatch.setattr(queue.Queue, "_grade", graded_here)
+
+
+@pytest.fixture
 def graded(admin, monkeypatch):
     """A publication with two students, who entered measurements, graded and released; and their links."""
     key = admin.publish()

@@ -1,35 +1,107 @@
 """Files that instructors upload: names, kinds, sizes; rosters and assignments with faults."""
 
+import json
+import re
+from urllib.parse import quote
+
 import pytest
 
 from grader.authoring.new import new_assignment
-from grader.web.places import AUTHORED, SUBMITTED, safe_name
+from grader.web.places import AUTHORED, SUBMITTED, person_name, safe_name, stored_name
 from reference.errors import CallError
 
+NAMES = {
+    "s01.jpg": "s01.jpg",
+    "../../etc/s01.jpg": "etc/s01.jpg",
+    "group 3/s01 scan.PDF": "group 3/s01 scan.PDF",
+    "C:\\scans\\s01.png": "C:/scans/s01.png",
+    "Иванов.jpg": "Иванов.jpg",
+    "Петров_1.jpg": "Петров_1.jpg",
+    "Сидоров_1.jpg": "Сидоров_1.jpg",
+    "S\u0327tefan.jpg": "\u015etefan.jpg",
+    "شكل.png": "شكل.png",
+    "\U0001f469\u200d\U0001f527.png": "\U0001f469\u200d\U0001f527.png",
+    "ж" * 195 + ".jpg": "ж" * 195 + ".jpg",
+    "a" * 300 + ".jpg": "a" * 300 + ".jpg",
+    "CON.jpg": "CON.jpg",
+    "aux.csv": "aux.csv",
+    "s01\r\nX: y.jpg": "s01\\r\\nX: y.jpg",
+    "s01\u202egpj.pdf": "s01\\u202egpj.pdf",
+    "s01\x00.jpg": "s01\\x00.jpg",
+}
 
-@pytest.mark.parametrize(
-    ("name", "stored"),
-    [
-        ("s01.jpg", "s01.jpg"),
-        ("../../etc/s01.jpg", "etc_s01.jpg"),
-        ("group 3/s01 scan.PDF", "group-3_s01-scan.pdf"),
-        ("C:\\scans\\s01.png", "C-_scans_s01.png"),
-        ("..jpg.jpg", "jpg.jpg"),
-        ("Ștefan.jpg", "Stefan.jpg"),
-        ("a" * 300 + ".jpg", "a" * 116 + ".jpg"),
-        ("s01\r\nX: y.jpg", "s01-X-y.jpg"),
-    ],
-)
-def test_a_name_never_reaches_a_path_as_it_is(name, stored):
-    assert safe_name(name, SUBMITTED) == stored
+
+@pytest.mark.parametrize(("name", "called"), NAMES.items())
+def test_a_name_is_kept_for_people_in_any_script(name, called):
+    assert person_name(name, SUBMITTED) == called
 
 
-@pytest.mark.parametrize(
-    "name", ["s01.exe", "s01.html", "s01.svg", ".jpg", "..", "", "/", "шрифт.jpg", "a.toml"]
-)
+def test_a_name_never_reaches_a_path_as_it_is():
+    stored = {called: stored_name(called) for called in NAMES.values()}
+    assert len(set(stored.values())) == len(NAMES)
+    assert stored["s01.jpg"] == "s01.jpg"
+    for name in stored.values():
+        assert re.fullmatch(r"[A-Za-z0-9_-]+\.(jpg|png|pdf|csv)", name, re.IGNORECASE)
+        assert name.partition(".")[0].lower() not in {"con", "aux"}
+        assert len(name) <= 120
+
+
+@pytest.mark.parametrize("name", ["s01.exe", "s01.html", "s01.svg", ".jpg", "..", "", "/", "a.toml"])
 def test_other_kinds_of_files_are_refused(name):
     with pytest.raises(CallError, match="must end in"):
-        safe_name(name, SUBMITTED)
+        person_name(name, SUBMITTED)
+
+
+@pytest.mark.parametrize("name", ["._s01.jpg", "~$class.csv", "class/.hidden.pdf", "results.json"])
+def test_what_other_programs_leave_behind_is_refused(name):
+    with pytest.raises(CallError, match="other programs"):
+        person_name(name, SUBMITTED)
+
+
+def test_files_in_any_script_are_listed_replaced_and_deleted_by_the_names_people_gave(admin, settings):
+    key = admin.publish()
+    names = ["Петров_1.jpg", "Сидоров_1.jpg", "ж" * 195 + ".jpg", "photos/s01 план.jpg"]
+    for name in names:
+        sent = admin.act("PUT", f"/publications/{key}/files/{quote(name)}", content=name.encode())
+        assert sent.json() == {"name": name, "is_same": False}
+    listed = admin.get(f"/api/v1/publications/{key}").json()["files"]
+    assert {one["name"] for one in listed} == set(names)
+    path = f"/publications/{key}/files/{quote(names[0])}"
+    assert admin.act("PUT", path, content=names[0].encode()).json()["is_same"] is True
+    refused = admin.act("PUT", path, content=b"other")
+    assert (refused.status_code, refused.json()["code"]) == (422, "file_exists")
+    assert refused.json()["message"].startswith("Петров_1.jpg: ")
+    assert admin.act("DELETE", path).status_code == 200
+    listed = admin.get(f"/api/v1/publications/{key}").json()["files"]
+    assert {one["name"] for one in listed} == set(names[1:])
+    assert all(path.name.isascii() for path in settings.data.rglob("*"))
+
+
+@pytest.mark.usefixtures("grades_here")
+def test_a_class_is_graded_by_the_names_that_people_gave(admin, settings):
+    key = admin.publish()
+    roster = "student_id,name,n,scans\ns01,Иванов,7,Иванов.jpg\ns02,Петров,7,\n".encode()
+    admin.act("PUT", f"/publications/{key}/roster/files/roster.csv", content=roster)
+    for name in ("Иванов.jpg", "photos/s02 план.jpg", "кто.jpg"):
+        admin.act("PUT", f"/publications/{key}/files/{quote(name)}", content=b"junk")
+    job = admin.act("POST", f"/publications/{key}/jobs").json()
+    assert admin.ended(f"/publications/{key}/jobs", job)["state"] == "done"
+    results = admin.get(f"/api/v1/publications/{key}/results").json()
+    files = {one["student_id"]: [told["file"] for told in one["problems"]] for one in results["reports"]}
+    assert files["s01"][0] == "Иванов.jpg"
+    assert [one["file"] for one in results["unmatched"]] == ["photos/s02 план.jpg", "кто.jpg"]
+    assert "file-" not in json.dumps(results)
+    assert admin.act("DELETE", f"/publications/{key}/students/s01").status_code == 200
+    assert not [path for path in settings.data.rglob("names/*") if "Иванов" in path.read_text("utf-8")]
+
+
+def test_a_platforms_file_may_have_a_name_in_any_script(admin):
+    key = admin.publish()
+    answer = admin.act(
+        "POST", f"/publications/{key}/exports/moodle/files/{quote('Оценки.csv')}", content=b"a"
+    )
+    assert "Оценки.csv" in answer.json()["message"] or answer.json()["code"] == "results_missing"
+    assert answer.json()["code"] != "file_name"
 
 
 def test_an_assignments_files_keep_their_double_endings():
@@ -39,9 +111,9 @@ def test_an_assignments_files_keep_their_double_endings():
 def test_a_file_goes_into_the_class_and_nowhere_else(admin, settings):
     key = admin.publish()
     sent = admin.act("PUT", f"/publications/{key}/files/..%2F..%2Fout%2Fs01.jpg", content=b"\xff\xd8\xffabc")
-    assert sent.json() == {"name": "out_s01.jpg", "is_same": False}
-    files = list(settings.data.rglob("*.jpg"))
-    assert files == [settings.data / "publications" / key / "handed-in" / "out_s01.jpg"]
+    assert sent.json() == {"name": "out/s01.jpg", "is_same": False}
+    top = settings.data / "publications" / key
+    assert {path.parent for path in settings.data.rglob("*.jpg")} == {top / "handed-in", top / "names"}
 
 
 def test_nothing_is_replaced_unless_asked_for(admin, settings):
