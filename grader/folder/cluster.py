@@ -7,9 +7,12 @@ the folder of submissions and the folder of results are replaced by the worker's
 back. A task whose worker was lost is done by another.
 """
 
+import asyncio
+import concurrent.futures
 import contextlib
 import importlib.metadata
 import io
+import logging
 import multiprocessing
 import os
 import pickle
@@ -21,7 +24,6 @@ import tempfile
 import threading
 import time
 import weakref
-from asyncio import CancelledError
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
@@ -29,6 +31,7 @@ from itertools import islice
 from pathlib import Path, PurePath, PurePosixPath
 from types import TracebackType
 from typing import Any, Self, TypeVar
+from urllib.parse import quote, unquote
 
 import distributed
 import fsspec
@@ -49,6 +52,8 @@ Result = TypeVar("Result")
 _Future = Any
 """Dask's, which has no types where it is not installed."""
 
+_LOST = (concurrent.futures.CancelledError, asyncio.CancelledError, distributed.comm.CommClosedError)
+"""What Dask raises, by its version and by what it was doing, when its scheduler is there no more."""
 CONNECT_S = 10.0
 """A scheduler in the same network answers within milliseconds; one behind a slow name service in seconds."""
 WAIT_S = 60.0
@@ -85,7 +90,7 @@ def image_of(address: str, out: Path) -> Path:
     try:
         files, root = fsspec.core.url_to_fs(address)
         names = {
-            entry["name"].removeprefix(root).strip("/"): entry
+            _name_in(files, entry["name"].removeprefix(root).strip("/")): entry
             for entry in files.find(root, detail=True).values()
             if entry["type"] == "file"
         }
@@ -96,9 +101,9 @@ def image_of(address: str, out: Path) -> Path:
                 path.unlink()
         write_whole(image.with_name(ADDRESS), address)
         if "roster.csv" in names:
-            write_whole(image / "roster.csv", files.cat_file(f"{root}/roster.csv"))
+            write_whole(image / "roster.csv", files.cat_file(_address_in(files, root, "roster.csv")))
         if DECISIONS in names and not (out / DECISIONS).exists():
-            write_whole(out / DECISIONS, files.cat_file(f"{root}/{DECISIONS}"))
+            write_whole(out / DECISIONS, files.cat_file(_address_in(files, root, DECISIONS)))
     except PlanmarkError:
         raise
     except Exception as error:
@@ -109,6 +114,25 @@ def image_of(address: str, out: Path) -> Path:
     if not names:
         raise CallError("folder_missing", f"{address}: there is no such folder, or nothing in it")
     return image
+
+
+def _is_web(files: fsspec.AbstractFileSystem) -> bool:
+    """Whether files are named by addresses of the web, which write what is not ASCII with escapes."""
+    return bool(
+        {"http", "https"}.intersection(
+            [files.protocol] if isinstance(files.protocol, str) else files.protocol
+        )
+    )
+
+
+def _name_in(files: fsspec.AbstractFileSystem, name: str) -> str:
+    """A file's name in its folder, of how a storage lists it."""
+    return unquote(name) if _is_web(files) else name
+
+
+def _address_in(files: fsspec.AbstractFileSystem, root: str, name: str) -> str:
+    """The address of a file by its name in a folder."""
+    return f"{root}/{quote(name) if _is_web(files) else name}"
 
 
 def _inside(folder: Path, name: str) -> Path:
@@ -142,7 +166,8 @@ def fill(folder: Path) -> None:
         files, root = fsspec.core.url_to_fs(address)
         for path in folder.rglob("*"):
             if path.is_file() and not (known := path.stat()).st_size:
-                data = files.cat_file(f"{root}/{path.relative_to(folder).as_posix()}")
+                name = path.relative_to(folder).as_posix()
+                data = files.cat_file(_address_in(files, root, name))
                 write_whole(path, data)
                 os.utime(path, ns=(known.st_mtime_ns, known.st_mtime_ns))
     except PlanmarkError:
@@ -292,7 +317,7 @@ class _Store:
         path = self.folder / name
         if self._is_local or path.exists():
             return
-        source = f"{self._root}/{name}"
+        source = _address_in(self.files, self._root, name)
         path.parent.mkdir(parents=True, exist_ok=True)
         part = path.with_name(f".{path.name[:40]}.part")
         with contextlib.suppress(FileNotFoundError):
@@ -397,6 +422,9 @@ class Cluster:
 
     def __enter__(self) -> Self:
         given = f"--cluster {self._address}"
+        for name in ("distributed", "distributed.client"):
+            # What it logs of a lost scheduler are tracebacks; the run says it in a sentence.
+            logging.getLogger(name).setLevel(logging.CRITICAL)
         try:
             get_address_host_port(self._address)
             self._client = distributed.Client(self._address, timeout=CONNECT_S, set_as_default=False)
@@ -404,8 +432,9 @@ class Cluster:
             why = f"no scheduler answers within {CONNECT_S:g} s; start one: dask scheduler"
             raise CallError("cluster_unreachable", f"{given}: {why}") from error
         try:
-            self._client.wait_for_workers(1, timeout=CONNECT_S)
-            self._check()
+            with self._connected():
+                self._client.wait_for_workers(1, timeout=CONNECT_S)
+                self._check()
         except TimeoutError as error:
             self._client.close()
             start = f"dask worker {self._address} --nworkers 2 --nthreads 1"
@@ -462,27 +491,28 @@ class Cluster:
             pending[future] = indices
 
         try:
-            while True:
-                workers = self._workers()
-                seconds = (time.monotonic() - started) * workers / done if done else _TASK_S
-                most = max(1, min(_MOST_CALLS, int(_TASK_S / seconds)))
-                while len(pending) < _AHEAD * workers and (chosen := [*islice(left, most)]):
-                    submit(chosen)
-                if not pending:
-                    return
-                for future in self._ended(pending):
-                    indices = pending.pop(future)
-                    results = self._results(future)
-                    if isinstance(results, Problem) and len(indices) > 1:
-                        # One of them did it: each alone.
-                        for index in indices:
-                            submit([index])
-                        continue
-                    for number, result in [(0, results)] if isinstance(results, Problem) else results:
-                        done += 1
-                        yield indices[number], result
+            with self._connected():
+                while True:
+                    workers = self._workers()
+                    seconds = (time.monotonic() - started) * workers / done if done else _TASK_S
+                    most = max(1, min(_MOST_CALLS, int(_TASK_S / seconds)))
+                    while len(pending) < _AHEAD * workers and (chosen := [*islice(left, most)]):
+                        submit(chosen)
+                    if not pending:
+                        return
+                    for future in self._ended(pending):
+                        indices = pending.pop(future)
+                        results = self._results(future)
+                        if isinstance(results, Problem) and len(indices) > 1:
+                            # One of them did it: each alone.
+                            for index in indices:
+                                submit([index])
+                            continue
+                        for number, result in [(0, results)] if isinstance(results, Problem) else results:
+                            done += 1
+                            yield indices[number], result
         finally:
-            with contextlib.suppress(Exception):
+            with contextlib.suppress(*_LOST, Exception):
                 self._client.cancel(list(pending), force=True)
 
     def _task(self, function: Callable[..., Any], calls: list[tuple[Any, ...]], counts: list[int]) -> Task:
@@ -509,8 +539,8 @@ class Cluster:
             answer = future.result()
         except distributed.KilledWorker:
             return Problem("crashed", "every worker that worked on it was lost; grade again")
-        except (CancelledError, distributed.comm.CommClosedError) as error:
-            raise self._lost("the scheduler has ended") from error
+        except _LOST:
+            raise
         except Exception as error:  # noqa: BLE001 - a storage raises whatever its library does
             return Problem(
                 "storage_unreadable", f"cannot be read ({type(error).__name__}: {error}); grade again"
@@ -541,12 +571,18 @@ class Cluster:
     def _workers(self) -> int:
         """How many workers there are now."""
         if time.monotonic() - self._asked > _LOOK_S:
-            try:
+            with self._connected(OSError, TimeoutError):
                 self._size = len(self._client.nthreads())
-            except (OSError, TimeoutError) as error:
-                raise self._lost("the scheduler has ended") from error
             self._asked = time.monotonic()
         return self._size
+
+    @contextlib.contextmanager
+    def _connected(self, *more: type[Exception]) -> Iterator[None]:
+        """Asks the scheduler. Raises CallError where it is there no more, and for `more` errors."""
+        try:
+            yield
+        except (*_LOST, *more) as error:
+            raise self._lost("the scheduler has ended") from error
 
     def _lost(self, why: str) -> CallError:
         return CallError(

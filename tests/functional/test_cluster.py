@@ -1,5 +1,6 @@
 """A class graded on a Dask cluster: as on this machine, with a worker killed, with a folder elsewhere."""
 
+import contextlib
 import functools
 import http.server
 import json
@@ -10,6 +11,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 
 import pytest
 
@@ -37,7 +39,9 @@ def without_times(value):
 
 
 def results_in(out):
-    return without_times(json.loads((out / "results.json").read_bytes()))
+    """The results without times, and the page of the class, wherever it was written."""
+    page = (out / "index.html").read_text("utf-8").replace(str(out), "OUT")
+    return without_times(json.loads((out / "results.json").read_bytes())), page
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +52,7 @@ def handed_in(tmp_path_factory):
         shutil.copy(ROOT / "samples" / "pump" / name, folder)
     (folder / "s02.jpg").write_bytes((folder / "s01_1.jpg").read_bytes()[:20_000])
     (folder / "s07.pdf").write_bytes(b"no PDF")
+    (folder / "кто.jpg").write_bytes(b"no JPEG")
     return folder
 
 
@@ -78,20 +83,40 @@ def dask(*arguments):
     )
 
 
-@pytest.fixture(scope="module")
-def address():
-    """A scheduler with two workers."""
+@contextlib.contextmanager
+def running(workers):
+    """The address of a scheduler with some workers, and its process."""
     where = f"tcp://127.0.0.1:{free_port()}"
     processes = [
         dask("scheduler", "--host", "127.0.0.1", "--port", where.rpartition(":")[2]),
-        dask("worker", where, "--nworkers", "2", "--nthreads", "1", "--host", "127.0.0.1"),
+        dask("worker", where, "--nworkers", str(workers), "--nthreads", "1", "--host", "127.0.0.1"),
     ]
-    with distributed.Client(where, timeout=120, set_as_default=False) as client:
-        client.wait_for_workers(2, timeout=120)
-    yield where
-    for process in reversed(processes):
-        process.terminate()
-        process.wait(timeout=60)
+    try:
+        with distributed.Client(where, timeout=120, set_as_default=False) as client:
+            client.wait_for_workers(workers, timeout=120)
+        yield where, processes[0]
+    finally:
+        for process in reversed(processes):
+            process.terminate()
+            process.wait(timeout=60)
+
+
+@pytest.fixture(scope="module")
+def address():
+    """A scheduler with two workers."""
+    with running(2) as (where, _):
+        yield where
+
+
+def test_a_lost_scheduler_is_told_and_what_was_done_is_kept(handed_in, tmp_path):
+    with running(1) as (where, scheduler), cluster.Cluster(where, handed_in, tmp_path, PATIENT) as pool:
+        results = pool.run(time.sleep, [(0.0,)] * 100)
+        assert next(results)[1] is None
+        scheduler.kill()
+        scheduler.wait(timeout=60)
+        with pytest.raises(CallError, match="the scheduler has ended; what was marked is kept") as caught:
+            list(results)
+    assert caught.value.code == "cluster_lost"
 
 
 def test_a_killed_worker_changes_nothing(address, handed_in, local, tmp_path):
