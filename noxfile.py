@@ -41,6 +41,30 @@ def translations(session: nox.Session) -> None:
     session.run("pybabel", "compile", "-D", "planmark", "-d", folder)
 
 
+STACKS = ("web", "cluster")
+"""The extras whose versions are held, with hashes, in `constraints`."""
+
+
+@nox.session
+def constraints(session: nox.Session) -> None:
+    """The versions of the web's and the cluster's stacks, with the hashes of their files."""
+    plain = ("--strip-extras", "--no-emit-index-url", "--no-emit-find-links", "--no-header", "--no-annotate")
+    for stack in STACKS:
+        extras = ("--extra", stack, "--extra", "plots")
+        out = ("-o", f"constraints/{stack}.txt", "pyproject.toml")
+        session.run("pip-compile", "--quiet", "--generate-hashes", *plain, *extras, *out)
+
+
+@nox.session
+def sbom(session: nox.Session) -> None:
+    """Bills of materials of both stacks, as CycloneDX: `sbom-web.json` and `sbom-cluster.json`."""
+    for stack in STACKS:
+        known = ("--pyproject", "pyproject.toml", "--output-reproducible")
+        session.run(
+            "cyclonedx-py", "requirements", f"constraints/{stack}.txt", *known, "-o", f"sbom-{stack}.json"
+        )
+
+
 @nox.session
 def bench(session: nox.Session) -> None:
     """The benchmarks of solver and reading."""
