@@ -111,3 +111,4 @@ def test_the_press_checked_as_the_pump_is_told_row_by_row(shared):
     for row in rows:
         cells = {name: text for name, text in row.items() if name not in {"student_id", "n", "position"}}
         assert checked_values(pump, pump.variant(7), cells, "en", "hint")["lines"]
+        marked(pump, rubric_of(pump), pump.variant(7), cells)
