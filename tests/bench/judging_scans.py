@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from grader.inputs.measurements import StudentSubmission
 from grader.pipeline import read_submission, scan
 from grader.records import PageRef, Reading
 from grader.rubric import asked_of
+from reference.construction.graph import Vector
 from samples.simulation import SimulatedSheet, any_settings, simulate
 from samples.simulation.mixture import Device
 from samples.simulation.student import drawn_by
@@ -123,7 +125,12 @@ def drawn_on(
             continue
         pages = simulate(assignment, variant, seed, settings, printed=printed)
         figures = [figure for page in pages for figure in page.truth["figures"].values()]
-        left_out = {name for figure in figures for name in figure.get("missing", {})} | desk.task.missing
+        left_out = {
+            name
+            for figure in figures
+            for name in figure.get("missing", {})
+            if not _lies_under_lines(figure, desk.task.right.construction.vectors[name])
+        }
         work = StudentWork(
             key,
             assignment,
@@ -136,6 +143,25 @@ def drawn_on(
         )
         return work, pages
     return None
+
+
+ON_LINE_MM, STEPS = 0.6, 50
+
+
+def _lies_under_lines(figure: Mapping[str, Any], vector: Vector) -> bool:
+    """Whether other lines of a plan, as thick as vectors, lie along a vector that is not drawn out.
+
+    Nobody who sees the sheet could tell that it is not drawn.
+    """
+    lines = [one["line_mm"] for one in figure["vectors"].values()] + [*figure["sides"].values()]
+    ends = np.array([[complex(*p), complex(*q)] for p, q in filter(None, lines)]).reshape(-1, 2)
+    tail, head = (complex(*figure["nodes"][end]) for end in (vector.tail, vector.head))
+    points = tail + (head - tail) * np.linspace(0.0, 1.0, STEPS)[:, None]
+    along = ends[:, 1] - ends[:, 0]
+    share = np.clip(((points - ends[:, 0]) * np.conj(along)).real / np.abs(along) ** 2, 0.0, 1.0)
+    apart = np.abs(points - ends[:, 0] - share * along)
+    is_point = abs(head - tail) < 2.0 * ON_LINE_MM
+    return not is_point and bool((apart.min(axis=1, initial=np.inf) <= ON_LINE_MM).all())
 
 
 def _read(kind: str, work: StudentWork, pages: Sequence[SimulatedSheet]) -> ReadWork:

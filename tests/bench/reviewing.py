@@ -4,11 +4,17 @@
 
     python -m tests.bench.reviewing --seeds 1001 1100 --kept FOLDER [--one-by-one]
 
-Sheets of simulated students, read once (`judging_scans`), are reviewed three times. *Enter* takes each
-default, and the first choice where there is none. *Truth* answers by what was drawn: of places the one where
-the node lies, else it is dragged there; of verdicts the one that a perfect reading of the same drawing gives.
-The total of that perfect reading is what is due. ``--one-by-one`` asks each open criterion in the rubric's
-order and accepts what is proposed, whatever its probability: the review as it was.
+Sheets of simulated students, read once (`judging_scans`), are reviewed twice. *Enter* takes each default, and
+the first choice where there is none. *Truth* answers by what was drawn: of places the one where the node
+lies, else it is dragged there; of verdicts the one that a perfect reading of the same drawing gives. The
+total of that perfect reading is what is due, of both reviews. ``--one-by-one`` asks each open criterion in
+the rubric's order and accepts what is proposed, whatever its probability: the review as it was.
+
+A perfect reader is sure of what it sees, and measures as well as the program does: a rubric's rule for what
+the error of reading leaves open decides alike. It sees two nodes in one point as a vector of length zero,
+where a point is due. What it does not judge, an honest person does not judge either; where that is because a
+point is due and drawn, to credit it is right, too. A vector along which other lines lie is on the sheet
+(`judging_scans`). Totals are the rubric's, with what is not judged left out, not sums of points.
 """
 
 import argparse
@@ -20,23 +26,21 @@ from pathlib import Path
 
 import numpy as np
 
-from grader.comparison.evidence import Submission
 from grader.comparison.task import Task, task_of
 from grader.documents import ReportDocument
 from grader.inputs.decisions import Decision
 from grader.inputs.measurements import StudentSubmission
-from grader.marking.mark import judge
-from grader.outcomes import Judgement
 from grader.pipeline import report_on
-from grader.records import Figure, PageRef, ReadNode, ScannedPage
+from grader.records import Figure, PageRef, ReadNode, ReadVector, ScannedPage
 from tests.bench.judging_handed_in import submission
 from tests.bench.judging_scans import SHEET_KINDS, ReadWork, read_works
+from tests.bench.judging_students import StudentWork
 from tests.bench.plain_text import Table, as_text
 
 NEAR_MM = 1.0
 """A place this near to where a node was drawn is the right one."""
 MOST_QUESTIONS = 60
-BINS = (0.0, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.01)
+BINS = (0.0, 0.5, 0.6, 0.8, 0.9, 0.95, 1.01)
 CREDITED, CHARGED = {"full", "follow_through"}, {"none", "partial"}
 
 
@@ -73,39 +77,70 @@ class Review:
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """What was drawn: verdicts and total by a perfect reading, nodes on the sheet (complex mm) by figure."""
+    """What was drawn: verdicts and total by a perfect reading, nodes on the sheet (complex mm) by figure.
+
+    `points` are the criteria of vectors that are due as a point, and drawn as one: they are not judged.
+    """
 
     verdicts: Mapping[str, str]
     total: float
     nodes: Mapping[tuple[str, str], complex]
+    points: frozenset[str]
 
 
-def truth_of(read: ReadWork, task: Task) -> Truth:
+def truth_of(read: ReadWork, task: Task, student: StudentSubmission) -> Truth:
     """What a perfect reader would have found on a student's sheets."""
-    perfect = submission(read.work, "nodes")
-    sure = tuple(
-        replace(one, figures={k: _sure(v) for k, v in one.figures.items()}) for one in perfect.readings
+    perfect = submission(replace(read.work, left_out=_left_out(read.work, task)), "nodes")
+    sure = (
+        replace(one, figures={name: _sure(drawn, _errors(read, name)) for name, drawn in one.figures.items()})
+        for one in perfect.readings
     )
-    judgement = judge(task, Submission(readings=sure, declared=read.declared))
-    return Truth(*_verdicts(task, judgement), _on_sheets(read))
-
-
-def _sure(figure: Figure) -> Figure:
-    return Figure(
-        {name: replace(one, confidence=1.0) for name, one in figure.nodes.items()},
-        {name: replace(one, confidence=1.0) for name, one in figure.vectors.items()},
+    pages = [ScannedPage(PageRef(f"{number}.jpg"), reading=one) for number, one in enumerate(sure)]
+    review = Review(task, student, pages)
+    report = review.report()
+    verdicts = {one.id: one.proposed or one.verdict for one in report.criteria}
+    points = frozenset(
+        one.id
+        for one in report.criteria
+        if one.verdict == "not_judged" and "too_short_to_judge" in one.reasons
     )
+    return Truth(verdicts, _total(review, report), _on_sheets(read), points)
 
 
-def _verdicts(task: Task, judgement: Judgement) -> tuple[Mapping[str, str], float]:
-    """The verdicts, those that wait as they are proposed, and the points that they come to."""
-    verdicts, total = dict[str, str](), 0.0
-    for one in judgement.outcomes:
-        is_open = one.verdict == "review"
-        verdicts[one.criterion] = one.proposed_verdict if is_open else one.verdict
-        share = one.proposed if is_open else (one.shares[0] if one.shares else float(one.verdict in CREDITED))
-        total += 0.0 if one.verdict == "not_judged" else share * task.rubric.points[one.criterion]
-    return verdicts, total
+def _left_out(work: StudentWork, task: Task) -> frozenset[str]:
+    """The vectors that are not drawn; not those that are due as a point, and drawn as one."""
+    scales = {name: float(one) for name, one in work.task.declared.items()}
+
+    def is_point(name: str) -> bool:
+        vector, least = work.construction.vectors[name], task.rubric.tolerance_of(name).least_mm
+        own = work.own(work.construction.figure_of(vector.head))
+        return (
+            name not in work.task.missing
+            and abs(task.drawn(name, scales)) < least
+            and abs(own[vector.head] - own[vector.tail]) < least
+        )
+
+    return frozenset(name for name in work.left_out if not is_point(name))
+
+
+def _errors(read: ReadWork, name: str) -> Figure:
+    """A figure as the program read it, whose standard errors are those of the perfect reader, too."""
+    return next((one.figures[name] for one in read.readings if name in one.figures), Figure({}, {}))
+
+
+def _sure(figure: Figure, errors: Figure) -> Figure:
+    """A figure read for certain, with another reading's standard errors where it has them."""
+    nodes = {
+        name: replace(one, confidence=1.0, cov=errors.nodes.get(name, one).cov)
+        for name, one in figure.nodes.items()
+    }
+    vectors = {name: _with_errors(one, errors.vectors.get(name, one)) for name, one in figure.vectors.items()}
+    return Figure(nodes, vectors)
+
+
+def _with_errors(drawn: ReadVector, errors: ReadVector) -> ReadVector:
+    se_deg = None if drawn.direction_deg is None else errors.se_deg or drawn.se_deg
+    return replace(drawn, confidence=1.0, se_mm=errors.se_mm, se_deg=se_deg)
 
 
 def _on_sheets(read: ReadWork) -> dict[tuple[str, str], complex]:
@@ -135,7 +170,7 @@ def _laid_onto(own: Sequence[complex], read: Sequence[ReadNode]) -> tuple[comple
     return cmath.rect(1.0, turn), complex(shift)
 
 
-# The three reviews ----------------------------------------------------------------------------------
+# The two reviews ------------------------------------------------------------------------------------
 
 
 def questions_of(review: Review, report: ReportDocument, *, one_by_one: bool) -> list:  # type: ignore[type-arg]
@@ -172,13 +207,13 @@ def walked(
                     Answered(
                         first.kind,
                         best.probability,
-                        _is_same(best, right),
+                        _is_same(best, right, truth),
                         f"{first.id} {best.key} {right}",
                     )
                 )
             review.answer(right)
         report = review.report()
-    return asked, offered, _total(report)
+    return asked, offered, _total(review, report)
 
 
 def _right(question, truth: Truth) -> list[tuple[str, str]]:  # type: ignore[no-untyped-def]
@@ -195,27 +230,29 @@ def _right(question, truth: Truth) -> list[tuple[str, str]]:  # type: ignore[no-
                 return list(choice.rows)
         return [(question.id, f"{at.real:.3f},{-at.imag:.3f}")]
     names = {name for choice in question.choices for name, _ in choice.rows}
-    return [
-        (name, truth.verdicts[name] if truth.verdicts[name] != "not_judged" else "full") for name in names
-    ]
+    return [(name, truth.verdicts[name]) for name in sorted(names)]
 
 
-def _is_same(choice, right: Sequence[tuple[str, str]]) -> bool:  # type: ignore[no-untyped-def]
+def _is_same(choice, right: Sequence[tuple[str, str]], truth: Truth) -> bool:  # type: ignore[no-untyped-def]
+    """Whether a choice says what is right: the same place, or credit where credit is due."""
     if choice.at is not None:
         return list(choice.rows) == list(right)
+    due = dict(right)
     return all(
-        (said in CREDITED) == (due in CREDITED)
-        for (_, said), (_, due) in zip(choice.rows, right, strict=True)
+        said == due.get(name)
+        or (said in CREDITED and (due.get(name) in CREDITED or name in truth.points))
+        or (said in CHARGED and due.get(name) in CHARGED)
+        for name, said in choice.rows
     )
 
 
-def _total(report: ReportDocument) -> float:
-    """The points, what still waits as it is proposed."""
-    points = 0.0
-    for one in report.criteria:
-        likely = one.max_points if one.proposed in CREDITED else 0.0
-        points += (one.points or 0.0) if one.verdict != "review" else likely
-    return points
+def _total(review: Review, report: ReportDocument) -> float:
+    """The score, with what still waits as it is proposed."""
+    waiting = [(one.id, one.proposed or "none") for one in report.criteria if one.verdict == "review"]
+    if waiting:
+        review.answer(waiting)
+        report = review.report()
+    return report.score or 0.0
 
 
 # All students ---------------------------------------------------------------------------------------
@@ -223,7 +260,7 @@ def _total(report: ReportDocument) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Walked:
-    """One student: questions by Enter and by truth, how far the totals are from what is due."""
+    """One student: questions by Enter and by truth, how far the totals of both are from what is due."""
 
     asked: int
     honest: int
@@ -241,30 +278,31 @@ def reviewed(read: ReadWork, *, one_by_one: bool) -> Walked | None:
     task = task_of(work.assignment, work.rubric, work.variant)
     student = StudentSubmission("s", work.variant, (), read.declared)
     pages = [ScannedPage(PageRef(f"{number}.jpg"), reading=one) for number, one in enumerate(drawn)]
-    truth = truth_of(read, task)
+    truth = truth_of(read, task, student)
     asked, _, total = walked(Review(task, student, pages), None, one_by_one=one_by_one)
     honest, offered, known = walked(Review(task, student, pages), truth, one_by_one=one_by_one)
-    return Walked(asked, honest, total - known, known - truth.total, tuple(offered))
+    return Walked(asked, honest, total - truth.total, known - truth.total, tuple(offered))
 
 
 def tables(students: Sequence[Walked]) -> Iterator[Table]:
     """How much was asked, how far the totals are off, and how often what was offered was right."""
-    near = [100.0 * np.mean([abs(one.off) <= 1.0 for one in students]) if students else 0.0]
-    near += [100.0 * np.mean([abs(one.honest_off) <= 1.0 for one in students]) if students else 0.0]
+    due, honest = [one.off for one in students], [one.honest_off for one in students]
+    apart = [one.off - one.honest_off for one in students]
     yield (
         "Review: questions and totals",
-        ["answers", "sheets", "questions a sheet", "total within 1 point", "mean |off|"],
         [
-            [
-                name,
-                str(len(students)),
-                f"{np.mean(counts):.2f}",
-                f"{share:.0f} %",
-                f"{np.mean(np.abs(offs)):.2f}",
-            ]
-            for name, counts, share, offs in (
-                ("Enter", [one.asked for one in students], near[0], [one.off for one in students]),
-                ("truth", [one.honest for one in students], near[1], [one.honest_off for one in students]),
+            "answers",
+            "sheets",
+            "questions a sheet",
+            "within 1 point of due",
+            "of the honest review",
+            "mean |off|",
+        ],
+        [
+            [name, str(len(students)), f"{np.mean(counts):.2f}", _near(offs), beside, f"{_mean(offs):.2f}"]
+            for name, counts, offs, beside in (
+                ("Enter", [one.asked for one in students], due, _near(apart)),
+                ("truth", [one.honest for one in students], honest, "-"),
             )
         ],
     )
@@ -282,6 +320,15 @@ def tables(students: Sequence[Walked]) -> Iterator[Table]:
             ]
         )
     yield "Review: proposals that are right, by their probability", heads, rows
+
+
+def _near(offs: Sequence[float]) -> str:
+    """The share of totals within a point."""
+    return f"{100.0 * np.mean([abs(off) <= 1.0 for off in offs]):.0f} %" if offs else "-"
+
+
+def _mean(offs: Sequence[float]) -> float:
+    return float(np.mean(np.abs(offs))) if offs else 0.0
 
 
 def _share(answers: Sequence[Answered]) -> str:
