@@ -26,6 +26,7 @@ not_drawn                                                                    no 
 value_alone                                                                  computed, and not drawn
 by_similarity         of                                                     replaced by a right image
 letters_exchanged     first, second                                          named by exchanged letters
+letters_unclear       first, second                                          letters may be exchanged
 entry_refused         reason                                                 an entry cannot be used
 doubtful              confidence                                             read without confidence
 near_limit            se, good_to, off, tolerance, what                      the error straddles a limit

@@ -133,7 +133,9 @@ def mark(limits: Sequence[Limit], remarks: tuple[Reason, ...] = ()) -> MarkRange
     )
 
 
-OPENING = frozenset({"doubtful", "near_limit", "unread", "hand_may_miss", "readings_disagree"})
+OPENING = frozenset(
+    {"doubtful", "near_limit", "unread", "hand_may_miss", "readings_disagree", "letters_unclear"}
+)
 """Reasons why a verdict is open."""
 
 

@@ -74,6 +74,7 @@ HINTS: dict[str, str] = {
     ),
     "by_similarity": N_("It need not be drawn: the point was found by similar triangles."),
     "letters_exchanged": N_("Two letters stand at each other's point: it is compared under the right ones."),
+    "letters_unclear": N_("Two letters seem to stand at each other's point: a person must look."),
     "hand_may_miss": N_(
         "Its lines meet at so small an angle that a careful hand may be off by as much: a person must look."
     ),
@@ -136,6 +137,9 @@ FULL: dict[str, str] = {
     "letters_exchanged": N_(
         "The letters %(first)s and %(second)s stand at each other's point:"
         " it is compared under the right ones."
+    ),
+    "letters_unclear": N_(
+        "The letters %(first)s and %(second)s seem to stand at each other's point: a person must look."
     ),
     "not_explained": N_("These vectors do not belong together: %(unfit)s of %(of)s fit nothing."),
     "readings_disagree": N_("The drawing gives %(first)s, the entered measurement %(second)s."),

@@ -1,4 +1,7 @@
-"""Letters exchanged in a plan: the drawing is judged under the right letters, the exchange charged once."""
+"""Letters exchanged in a plan: the drawing is judged under the right letters, the exchange charged once.
+
+Where letters were read at each other's node without certainty, a person decides the vector that would pay.
+"""
 
 import cmath
 import math
@@ -7,7 +10,7 @@ from dataclasses import replace
 
 from grader.comparison.evidence import Submission
 from grader.comparison.task import Task
-from grader.comparison.verdicts import FULL, NONE
+from grader.comparison.verdicts import FULL, NONE, OPENING, verdict_of
 from grader.marking.settling import settled
 from grader.outcomes import NamedMistake, Outcome, Reason
 from grader.records import Figure, Reading, ReadNode, ReadVector
@@ -107,28 +110,52 @@ def letters_charged(
     task: Task,
     outcomes: Sequence[Outcome],
     mistakes: Sequence[NamedMistake],
+    read: Sequence[NamedMistake],
     as_lettered: Callable[[Pair], Sequence[Outcome]],
 ) -> tuple[Outcome, ...]:
     """The outcomes, one vector charged for each certain exchange of letters, and all that it touches told.
 
     Arguments: `as_lettered` gives the outcomes under the letters as they stand; the charged one is of these.
+    `read` are the exchanges of letters that were read beside nodes named by their lines: an uncertain one
+    opens the vector that it would charge.
     """
     found = list(outcomes)
     for one in mistakes:
-        if one.code == "labels_swapped" and one.confidence >= CERTAIN:
+        is_certain = one.confidence >= CERTAIN
+        if one.code == "labels_swapped" and (is_certain or one in read):
             first, second = one.mistake.other
-            reason = Reason("letters_exchanged", {"first": first, "second": second})
+            code = "letters_exchanged" if is_certain else "letters_unclear"
+            reason = Reason(code, {"first": first, "second": second})
             touched = [place for place in _in_order(task, found) if _touches(task, found[place], one.mistake)]
             paying = [place for place in touched if found[place].verdict in CREDITED]
             lettered = as_lettered((first, second)) if paying else ()
             shown = [place for place in paying if lettered[place].verdict not in CREDITED]
-            for place in touched:
+            for place in touched if is_certain else ():
                 found[place] = replace(found[place], reasons=(reason, *found[place].reasons))
             for place in (shown or paying)[:1]:
+                if not is_certain:
+                    found[place] = _open(lettered[place], found[place], one.confidence, reason)
+                    continue
                 lost = settled(lettered[place], NONE, one.confidence)
                 reasons = tuple(other for other in lost.reasons if other.code != "right") or (reason,)
                 found[place] = replace(lost, reasons=reasons, mistake=one.code, cause=one)
     return tuple(found)
+
+
+def _open(lettered: Outcome, named: Outcome, probability: float, reason: Reason) -> Outcome:
+    """A vector that pays with this probability, shown as lettered; else it is worth what its lines say."""
+    share = named.shares[-1]
+    return replace(
+        lettered,
+        verdict="review",
+        possible=("none", verdict_of(share, followed=named.verdict == "follow_through")),
+        shares=(NONE, share),
+        proposed=NONE,
+        probability=probability,
+        reasons=(reason, *(other for other in lettered.reasons if other.code not in {"right", *OPENING})),
+        mistake=None,
+        cause=None,
+    )
 
 
 def _in_order(task: Task, outcomes: Sequence[Outcome]) -> Iterator[int]:

@@ -108,13 +108,15 @@ def _judged(task: Task, submission: Submission, comparison: Comparison, owner: O
         explanations, lost = _explanations(task, comparison, owner)
         others = _named(task, comparison, owner, explanations, lost)
         mistakes = (*letters, *(one for one in others if one.code != "labels_swapped"))
-    mistakes = (*mistakes, *_swapped_letters(task, submission, mistakes))
+    read = _swapped_letters(task, submission, mistakes)
+    mistakes = (*mistakes, *read)
     mistakes = (*mistakes, *_not_drawn(task, comparison, mistakes))
     mistakes = (*mistakes, *_slips(task, comparison, mistakes))
     outcomes = letters_charged(
         task,
         comparison.outcomes,
         mistakes,
+        read,
         lambda pair: compare(task, with_letters_exchanged(task, submission, pair, used)).outcomes,
     )
     outcomes, unfit = of_nothing(task, outcomes, not_explained(explanations))

@@ -32,8 +32,8 @@ RARE_NATS = 5.0
 """Two given letters of a plan are swapped in one plan of 150."""
 PRIOR_OF_SWAP = 1.0 / (1.0 + math.exp(RARE_NATS))
 """Probability of a swap before letters are considered: the confidences hold with it."""
-REPORTED = 0.5
-"""Probability from which a swap is reported."""
+REPORTED = 0.6
+"""Probability from which a swap is reported; whoever judges the drawing weighs it."""
 COMPONENTS = ("n_", "k_")
 """How names of ends of normal and Coriolis components begin: few write them, and they share a letter."""
 USUAL_SHARE = 0.04
@@ -97,9 +97,10 @@ def support(
 def lettered(
     reading: Reading, letters: Letters | None, construction: Construction, renamed: Mapping[str, str]
 ) -> Reading:
-    """A sheet's reading, less certain where letters of a plan seem swapped, with the likely swaps.
+    """A sheet's reading with the likely swaps of letters, less certain where letters may be swapped.
 
-    The names stay those of the construction: which of the two the student meant, a person decides.
+    The names stay those of the construction. A swap that is reported leaves the confidences as they are:
+    these tell whether the strokes were read rightly, and one doubt counts once.
     """
     poles = frozenset(construction.poles.values())
     nodes = {
@@ -116,10 +117,11 @@ def lettered(
         if figure == MECHANISM or any(name in poles or name.startswith(COMPONENTS) for name in (p, q)):
             continue
         chance = 1.0 / (1.0 + math.exp(RARE_NATS - nats))
-        left = min(1.0, (1.0 - chance) / (1.0 - PRIOR_OF_SWAP))
-        figures[figure] = _doubted(figures[figure], {p, q}, construction, left)
         if chance >= REPORTED:
             swaps.append(Swapped(figure, p, q, chance))
+        else:
+            left = min(1.0, (1.0 - chance) / (1.0 - PRIOR_OF_SWAP))
+            figures[figure] = _doubted(figures[figure], {p, q}, construction, left)
     swaps.sort(key=lambda swap: -swap.confidence)
     return replace(reading, figures=figures, swapped=tuple(swaps))
 

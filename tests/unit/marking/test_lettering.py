@@ -47,8 +47,13 @@ def test_letters_read_at_each_others_node_cost_one_vector_too():
     assert lost[0].measured != lost[0].expected
 
 
-def test_letters_that_are_doubtful_are_not_charged():
+def test_letters_that_are_doubtful_leave_one_vector_to_a_person():
     reading = sheet(PUMP)
     swapped = (Swapped("velocity_plan", "b", "c", 0.7),)
-    judgement, _ = judged(Submission(readings=(type(reading)(reading.figures, swapped=swapped),)))
-    assert judgement.score.low == judgement.score.maximum
+    judgement, found = judged(Submission(readings=(type(reading)(reading.figures, swapped=swapped),)))
+    assert judgement.score.high == judgement.score.maximum
+    (waiting,) = (one for one in found.values() if one.verdict not in {"full", "follow_through"})
+    assert (waiting.verdict, waiting.proposed_verdict, waiting.probability) == ("review", "none", 0.7)
+    assert waiting.reasons[0].code == "letters_unclear"
+    # Shown is what stands under the letters, as the proposal has it.
+    assert waiting.measured != waiting.expected

@@ -13,8 +13,8 @@ PLACES = {"o": 50 - 50j, "a": 90 - 60j, "b": 60 - 100j, "c": 100 - 110j, "d": 55
 OWN = {name: name for name in PLACES}
 SWAPPED = OWN | {"b": "c", "c": "b"}
 SURE, HEIGHT_MM, GAP_MM = 0.97, 3.0, 1.5
-CLEARLY = 0.5
-"""Of confidences."""
+HARDLY = 0.5
+"""So surely a letter is read that hardly tells of a swap."""
 
 
 def letters(written: dict[str, str], sure: float = SURE, gap_mm: float = GAP_MM) -> Letters:
@@ -64,13 +64,21 @@ def test_letters_at_their_own_nodes_bear_them_out_and_change_no_confidence(readi
     assert (found.figures, found.swapped) == (reading.figures, ())
 
 
-def test_two_letters_at_each_others_node_are_told_and_their_vectors_left_to_a_person(reading, construction):
+def test_two_letters_at_each_others_node_are_told_and_the_strokes_are_read_as_surely(reading, construction):
     found = lettered(reading, letters(SWAPPED), construction, {})
     assert pairs(found) == [{"b", "c"}]
+    assert found.figures == reading.figures
+
+
+def test_letters_that_may_be_swapped_leave_less_confidence_in_their_vectors(reading, construction):
+    found = lettered(reading, letters(SWAPPED, HARDLY), construction, {})
+    assert pairs(found) == []
     vectors = found.figures[VELOCITY_PLAN].vectors
     ends = {name: {construction.vectors[name].tail, construction.vectors[name].head} for name in vectors}
     for name, read in vectors.items():
-        assert (read.confidence < CLEARLY) == bool(ends[name] & {"b", "c"})
+        assert (read.confidence < reading.figures[VELOCITY_PLAN].vectors[name].confidence) == bool(
+            ends[name] & {"b", "c"}
+        )
 
 
 def test_one_strange_letter_alone_is_no_swap(reading, construction):
