@@ -239,15 +239,25 @@ class Charges:
         return replace(mark, best=FULL, reasons=(*mark.reasons, unread), sure=min(mark.sure, EVEN))
 
     def unknown_upstream(self, segment: TaskSegment) -> tuple[str, ...]:
-        """What a vector is made from and was not read: nodes, of figures that were, and its scale."""
+        """What a vector is made from and is not known: nodes, of figures that were read, and its scale.
+
+        Known are nodes that were read, those from which a vector was made that is right, and those at which
+        it is nearly certain what was done.
+        """
         construction, nodes = self.task.construction, self.evidence.nodes
         scale = self.settled[segment.scale].mark
         is_unseen = scale is not None and any(reason.code == "unread" for reason in scale.reasons)
         needs = [
-            need for need in construction.step(segment.head).needs if need not in {*nodes, *self.charged}
+            need
+            for need in construction.step(segment.head).needs
+            if need not in {*nodes, *self.charged, *self.cleared}
         ]
         read = {construction.figure_of(node) for node in nodes} if needs else set()
         unread = dict.fromkeys(need for need in needs if construction.figure_of(need) in read)
+        if unread:
+            right = self.cleared - self.by_length - self.charged - self.doubtful
+            sure = construction.needed_for(right) | self.following.explained()
+            unread = {need: None for need in unread if need not in sure}
         return (*((segment.scale,) if is_unseen else ()), *unread)
 
     # What is wrong --------------------------------------------------------------------------------
@@ -312,11 +322,11 @@ class Charges:
 
     def leave_open(self, name: str) -> None:
         """Record that the verdict on a vector, angular quantity or scale is open after all."""
-        self.doubtful.add(self._forgotten(name))
+        self.doubtful.add(self.forget(name))
 
     def decided(self, name: str, verdict: str) -> None:
         """Record what a person decided of an open verdict: what follows from it is in doubt no more."""
-        node = self._forgotten(name)
+        node = self.forget(name)
         if verdict in {"none", "partial"}:
             self.charged.add(node)
         elif verdict in {"full", "follow_through"}:
@@ -324,7 +334,7 @@ class Charges:
         if verdict == "follow_through":
             self.inherited.add(node)
 
-    def _forgotten(self, name: str) -> str:
+    def forget(self, name: str) -> str:
         """The node, quantity or scale of a name, of which nothing is recorded any more."""
         segment = self.task.segments.get(name)
         node = name if segment is None else segment.head

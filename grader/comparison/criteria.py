@@ -175,6 +175,11 @@ def segment(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) -> 
     is_read = drawn is charges.evidence.drawn.get(one.name)
     if is_read:
         mark = charges.opened(one, mark, follows_through=follows)
+    if is_read and criterion.optional and not mark.is_certain and drawn.confidence < EVEN:
+        # Likelier another stroke than this vector, which need not be there.
+        charges.forget(one.name)
+        reasons = (Reason("optional"), Reason("doubtful", {"confidence": drawn.confidence}))
+        return verdicts.unjudged(criterion, "not_judged", reasons, expected=Quantity())
     scale = charges.used[one.scale]
     value, wrong_value = drawn.length_mm * scale, None
     if one.name in charges.evidence.values:
@@ -433,7 +438,8 @@ def absent(charges: Charges, criterion: CriterionTable, expected: Quantity) -> O
             return verdicts.unjudged(criterion, "not_judged", (short, reason), expected=expected)
         _leave_out(charges, segment, blank)
         return verdicts.unjudged(criterion, blank, (reason,), expected=expected)
-    if is_not_drawn(charges.task, evidence, criterion.name, length or 0.0):
+    is_missing = is_not_drawn(charges.task, evidence, criterion.name, length or 0.0)
+    if is_missing or (segment is not None and charges.following.is_left_out(segment.head)):
         _leave_out(charges, segment, rubric.missing)
         return verdicts.unjudged(
             criterion, rubric.missing, (Reason("not_drawn"),), expected=expected, sure=NOT_DRAWN

@@ -131,7 +131,10 @@ def gather(task: Task, submission: Submission) -> Evidence:
         has_sketch=any(MECHANISM in reading.figures for reading in submission.readings),
         refused=_refused(submission.measured),
         blank=frozenset(
-            gap.name for reading in submission.readings for gap in reading.unread if gap.is_blank
+            gap.name
+            for reading in submission.readings
+            for gap in reading.unread
+            if gap.is_blank or (submission.verdicts.get(gap.name) == "none" and gap.name not in drawn)
         ),
     )
 

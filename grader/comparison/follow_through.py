@@ -65,11 +65,15 @@ class ReplayResult:
     explanations : of the drawing, the likeliest first; none where it may be right
     basis : the other construction by which the plans were drawn, where that is certain
     blamed : vectors in which a mistake was made, nearly certainly
+    explained : nodes at which it was made
+    left_out : those of them that are the ends of components left out
     """
 
     explanations: tuple[Replay, ...] = ()
     basis: PlanBasis | None = None
     blamed: frozenset[str] = frozenset()
+    explained: frozenset[str] = frozenset()
+    left_out: frozenset[str] = frozenset()
 
 
 Explain = Callable[[Task, Evidence, Mapping[str, Scale]], ReplayResult]
@@ -226,16 +230,27 @@ class FollowThrough:
 
     def drawn_instead(self) -> PlanBasis | None:
         """The basis of the plans: by the search for what was done, else by counting vectors; or None."""
-        self.is_blamed("")
+        self._explanation()
         return self.instead
 
     def is_blamed(self, vector: str) -> bool:
         """Whether the search for what was done finds a mistake in a vector, nearly certainly."""
+        return vector in self._explanation().blamed
+
+    def explained(self) -> frozenset[str]:
+        """The nodes at which the search for what was done finds a mistake, nearly certainly."""
+        return self._explanation().explained
+
+    def is_left_out(self, node: str) -> bool:
+        """Whether the search for what was done finds the component to a node left out, nearly certainly."""
+        return node in self._explanation().left_out
+
+    def _explanation(self) -> ReplayResult:
         if self.explanation is None:
             self.explanation = self.explain()
             scales = (self.used, self.followed)
             self.instead = self.explanation.basis or other_mechanism(self.task, self.evidence, scales)
-        return vector in self.explanation.blamed
+        return self.explanation
 
     def nodes_instead(self) -> Mapping[str, complex]:
         """The nodes by another mechanism that was certainly drawn, and whose sketch was not handed in."""

@@ -235,12 +235,31 @@ def _unseen(
 
     Arguments: `doubtful` is what shows it as read, where that contradicts it.
     """
-    unread = Reason("unread", {"reason": f"{name[1]}_{task.pin}, which tells it, was not read for certain"})
+    vector = f"{name[1]}_{task.pin}"
+    unread = Reason("unread", {"reason": f"{vector}, which tells it, was not read for certain"})
     other = None if doubtful is None else doubtful[0] / doubtful[1]
-    if other is None or _fitting(task, evidence, name, other) <= _fitting(task, evidence, name, scale.used):
-        return Scale(scale, None, MarkRange(FULL, NONE, FULL, (unread,), EVEN))
+    off = 0.0 if other is None else _is_off(task, evidence, name, scale.used, other)
+    if other is None or off < EVEN:
+        return Scale(scale, None, MarkRange(FULL, NONE, FULL, (unread,), min(1.0 - off, 1.0 - WRONG_SCALE)))
     params: dict[str, float | str] = {"declared": scale.used, "expected": other, "unit": unit_of(name)}
-    return Scale(scale, other, MarkRange(NONE, NONE, FULL, (Reason("scale_seems_off", params), unread), EVEN))
+    return Scale(scale, other, MarkRange(NONE, NONE, FULL, (Reason("scale_seems_off", params), unread), off))
+
+
+WRONG_SCALE, FITS_BY_CHANCE = 0.05, 0.1
+"""Probabilities that a declared scale is not the one drawn with, and that a vector has the right length at a
+scale that it was not drawn at."""
+
+
+def _is_off(task: Task, evidence: Evidence, name: str, declared: float, other: float) -> float:
+    """The probability that the scale shown by a doubtful crank's vector was drawn with, not the declared one.
+
+    Else that vector was misread; the other vectors of the plan fit one or the other.
+    """
+    drawn = evidence.vector(f"{name[1]}_{task.pin}")
+    confidence = 0.0 if drawn is None else drawn.confidence
+    more = _fitting(task, evidence, name, other) - _fitting(task, evidence, name, declared)
+    is_other, is_misread = WRONG_SCALE * confidence, FITS_BY_CHANCE**more * (1.0 - confidence)
+    return is_other / (is_other + is_misread) if is_other else 0.0
 
 
 def _is_unseen(task: Task, evidence: Evidence, name: str, scale: float) -> bool:

@@ -44,11 +44,16 @@ def explain(
     if owner is not None and owner.of_whole is not None:
         wrong |= {MECHANISM}
     construction = task.construction
-    # Where a sheet shows the drawn mechanism and no plan is turned, the own nodes are enough.
-    is_needed = wrong and (wrong & construction.poles.keys() or not evidence.has_sheets)
-    lines = _on_wrong_lines(sure_of(explanations, CERTAIN), construction)
+    certain = sure_of(explanations, CERTAIN)
+    # Where a sheet shows where the mistakes were made and no plan is turned, the own nodes are enough.
+    is_unseen = any(one.at not in evidence.nodes for one in certain)
+    is_needed = wrong and (wrong & construction.poles.keys() or not evidence.has_sheets or is_unseen)
+    lines = _on_wrong_lines(certain, construction)
     basis = PlanBasis("instead", drawn.construction, drawn.parameters, wrong, lines) if is_needed else None
-    return ReplayResult(explanations, basis, _blamed(sure_of(explanations, NEARLY_CERTAIN), construction))
+    nearly = sure_of(explanations, NEARLY_CERTAIN)
+    left_out = frozenset(one.at for one in nearly if one.code == "normal_missing")
+    at = frozenset(one.at for one in nearly)
+    return ReplayResult(explanations, basis, _blamed(nearly, construction), at, left_out)
 
 
 def _on_wrong_lines(mistakes: Iterable[Mistake], construction: Construction) -> frozenset[str]:

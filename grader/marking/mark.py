@@ -119,6 +119,7 @@ def _judged(task: Task, submission: Submission, comparison: Comparison, owner: O
         read,
         lambda pair: compare(task, with_letters_exchanged(task, submission, pair, used)).outcomes,
     )
+    outcomes = _left_out(task, outcomes, mistakes)
     outcomes, unfit = of_nothing(task, outcomes, not_explained(explanations))
     outcomes = at_stake(task.rubric, outcomes)
     if unfit is None or (owner is not None and owner.named is not None):
@@ -197,6 +198,19 @@ def _not_drawn(task: Task, comparison: Comparison, known: Sequence[NamedMistake]
             sure = NOT_DRAWN if evidence.has_sheets else 1.0
             found.append(NamedMistake(Mistake("vector_missing", one.name), (one.criterion,), sure))
     return found
+
+
+def _left_out(task: Task, outcomes: Sequence[Outcome], known: Sequence[NamedMistake]) -> tuple[Outcome, ...]:
+    """The outcomes; of components that were not read, as likely lost as it is that they were left out."""
+    sure = {one.at: one.confidence for one in known if one.code == "normal_missing"}
+    vectors = task.construction.vectors
+
+    def likely(one: Outcome) -> Outcome:
+        at = vectors[one.name].head if one.name in vectors else ""
+        is_unread = one.verdict == "review" and one.measured.length_mm is None
+        return replace(one, probability=max(one.probability, sure[at])) if is_unread and at in sure else one
+
+    return tuple(map(likely, outcomes))
 
 
 VALUE_OFF = frozenset({"value_too_large", "value_too_small"})

@@ -318,7 +318,7 @@ def figure_of_plan(plan: PlanReading, scale_se: float, where: InkMap) -> tuple[F
     for vector in construction.vectors_of(construction.figure_of(names[0])):
         reason = absent.get(vector.head, absent.get(vector.tail))
         if reason is not None and vector.name not in vectors:
-            unread.append(Unread(vector.name, reason))
+            unread.append(Unread(vector.name, reason, is_blank=vector.head in absent))
     return Figure(_no_surer(nodes, vectors, plan), vectors), unread
 
 

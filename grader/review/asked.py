@@ -47,7 +47,7 @@ MOST_NAMED = 3
 def asked_question(session: Session, student: Student, name: str, speaker: Tongue) -> Facts:
     """One question on a student: an open one by its id, or a criterion."""
     doubt = session.doubt(student, name)
-    if doubt is not None and (doubt.kind != "verdict" or doubt.criteria != (doubt.id,)):
+    if doubt is not None and (doubt.kind != "verdict" or doubt.id not in doubt.criteria):
         return _doubt_facts(session, student, doubt, speaker)
     return {**question_facts(session, student, name, speaker), "settles": _settles(doubt, speaker)}
 

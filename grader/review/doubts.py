@@ -97,28 +97,41 @@ def doubts_of(task: Task, report: ReportDocument, figures: Mapping[str, Figure])
     Arguments: `figures` as read on the sheets, with what else each vector may be.
     """
     waiting = [one for one in report.criteria if one.verdict == OPEN]
-    found: list[Doubt] = []
+    vectors, found = task.construction.vectors, list[Doubt]()
+    heads = [(vectors[one.drawn].head, one.verdict) for one in report.criteria if one.drawn in vectors]
+    right = {head for head, verdict in heads if verdict == "full"}
+    right -= {head for head, verdict in heads if verdict not in {"full", "not_judged"}}
+    vouched = task.construction.needed_for(right) | right
     for make in (_owners, _scales, _nodes):
         covered = {name for doubt in found for name in doubt.criteria}
         left = [one for one in waiting if one.id not in covered]
-        found.extend(make(_Asked(task, left, figures)))
+        found.extend(make(_Asked(task, left, figures, vouched)))
     covered = {name for doubt in found for name in doubt.criteria}
     found.extend(of_verdict(one) for one in waiting if one.id not in covered)
     return in_order(found)
 
 
 def in_order(doubts: Sequence[Doubt]) -> list[Doubt]:
-    """Questions in the order in which they are asked: by kind, then by what they settle."""
-    return sorted(doubts, key=lambda one: (ORDER[one.kind], -one.settles))
+    """Questions in the order in which they are asked: by kind, then by what they settle.
+
+    A verdict on which others hang is asked with the nodes.
+    """
+
+    def place(doubt: Doubt) -> tuple[int, int]:
+        kind: Kind = "node" if len(doubt.criteria) > 1 else doubt.kind
+        return min(ORDER[kind], ORDER[doubt.kind]), -doubt.settles
+
+    return sorted(doubts, key=place)
 
 
 @dataclass(frozen=True, slots=True)
 class _Asked:
-    """The criteria that wait, and what was read."""
+    """The criteria that wait, what was read, and the nodes from which vectors were made that are right."""
 
     task: Task
     waiting: Sequence[CriterionDocument]
     figures: Mapping[str, Figure] = field(default_factory=dict)
+    vouched: frozenset[str] = frozenset()
 
     @property
     def least(self) -> float:
@@ -200,6 +213,12 @@ def _nodes(asked: _Asked) -> Iterator[Doubt]:
         if figure not in asked.figures or not left:
             continue
         about = [one for one in left.values() if step.node in _in_doubt(asked, one)]
+        unread = next((one for one in left.values() if _is_unread_end(asked, one, step.node)), None)
+        if about and unread is not None:
+            # Whether the vector is there at all: what hangs on it follows from the answer.
+            yield replace(of_verdict(unread), criteria=(unread.id, *(one.id for one in about)))
+            left = {name: one for name, one in left.items() if one not in [unread, *about]}
+            continue
         make = _joint if figure == MECHANISM else _places
         choices = _credit(about) or make(asked, about, step.node, figure) if about else ()
         if choices:
@@ -221,11 +240,16 @@ def _in_doubt(asked: _Asked, criterion: CriterionDocument) -> set[str]:
     figure = asked.figures.get(asked.task.construction.figure_of(vector.head))
     if figure is None or not {"doubtful", "unread"} & codes or criterion.measured.length_mm is None:
         return set()
-    needs = asked.task.construction.step(vector.head).needs if "unread" in codes else ()
+    needs = set(asked.task.construction.step(vector.head).needs) - asked.vouched if "unread" in codes else ()
     unsure = {one for one in (vector.tail, vector.head, *needs) if _sure(asked, one) < asked.least}
     known = {end: _sure(asked, end) for end in (vector.tail, vector.head)}
     weakest = min(known, key=lambda end: known[end])
     return unsure or ({weakest} if "doubtful" in codes and known[weakest] < 1.0 else set())
+
+
+def _is_unread_end(asked: _Asked, criterion: CriterionDocument, node: str) -> bool:
+    """Whether an open vector that was not read ends at a node."""
+    return criterion.measured.length_mm is None and _vector(asked, criterion).head == node
 
 
 def _sure(asked: _Asked, node: str) -> float:
@@ -266,7 +290,8 @@ def _places(asked: _Asked, about: Sequence[CriterionDocument], node: str, figure
         )
         for key, (at, each) in zip("abc", likely, strict=False)
     )
-    missing = tuple((one.id, "none") for one in touching)
+    optional = {one.id for one in asked.task.rubric.criterion if one.optional}
+    missing = tuple((one.id, "not_judged" if one.id in optional else "none") for one in touching)
     is_stroke = read is not None and start is not None
     return (*places, Choice("neither", missing)) if len(places) > 1 or is_stroke else ()
 
@@ -286,8 +311,10 @@ def _credit(about: Sequence[CriterionDocument]) -> tuple[Choice, ...]:
 
     Wherever the node lies, the verdicts are the same: there is nothing to tell apart.
     """
-    if any(one.proposed not in CREDITED or OFF_AS_READ & set(one.reasons) for one in about):
-        return ()
+    for one in about:
+        is_off = OFF_AS_READ & set(one.reasons) and "counted_for_you" not in one.reasons
+        if one.proposed not in CREDITED or is_off:
+            return ()
     right = tuple((one.id, one.proposed or "full") for one in about)
     wrong = tuple((one.id, "none") for one in about)
     sure = min(one.probability or 0.0 for one in about)

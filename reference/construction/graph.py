@@ -13,7 +13,7 @@ its pole). It is data, a directed acyclic graph, and one evaluator has all uses:
 - only what is needed: `wanted` names the nodes asked for, ancestors alone are evaluated.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
@@ -210,6 +210,10 @@ class Construction:
     def figure_of(self, node: str) -> str:
         """The figure that a node belongs to. Raises KeyError for a node that there is not."""
         return self._by_node[node][0]
+
+    def needed_for(self, nodes: Collection[str]) -> frozenset[str]:
+        """The nodes from which any of some nodes are made directly."""
+        return frozenset(need for step in self.steps if step.node in nodes for need in step.needs)
 
     def upstream(self, node: str) -> frozenset[str]:
         """A node and everything that it is made from. Raises KeyError for a node that there is not."""

@@ -204,3 +204,33 @@ def test_a_links_direction_counts_in_the_assignments_frame(turn_deg):
     found = compare(TASK, Submission(readings=(reading,)))
     assert outcome_of(found, "CD").verdict == "none"
     assert outcome_of(found, "AB").verdict == "full"
+
+
+def doubtful_crank(confidence, length_share=1.0):
+    """A sheet on which v_A was read in doubt, and nothing else of the velocities tells the scale."""
+    reading = without(sheet(TASK, figures=("mechanism", "velocity_plan")), *VELOCITIES)
+    v_a = reading.figures["velocity_plan"].vectors["v_A"]
+    return changed(reading, "v_A", confidence=confidence, length_mm=length_share * v_a.length_mm)
+
+
+VELOCITIES = ("v_B", "v_BA", "v_C", "v_CA", "v_CB", "v_D", "v_DC")
+
+
+@pytest.mark.parametrize("confidence", [0.2, 0.89])
+def test_a_stroke_that_is_likelier_misread_than_the_scale_is_wrong_does_not_speak_against_it(confidence):
+    told = Submission(readings=(doubtful_crank(confidence, 0.8),), declared=declared())
+    outcome = outcome_of(compare(TASK, told), "kv")
+    assert (outcome.verdict, outcome.proposed_verdict) == ("review", "full")
+    assert outcome.probability > 0.5
+    assert "scale_seems_off" not in codes(outcome)
+
+
+def test_others_that_fit_the_scale_of_a_doubtful_stroke_speak_for_it():
+    own = {**RULE, "kv": 1.25 * RULE["kv"]}
+    reading = sheet(TASK, own, figures=("mechanism", "velocity_plan"))
+    for name in reading.figures["velocity_plan"].vectors:
+        reading = changed(reading, name, confidence=0.5)
+    outcome = outcome_of(compare(TASK, Submission(readings=(reading,), declared=declared())), "kv")
+    assert (outcome.verdict, outcome.proposed_verdict) == ("review", "none")
+    assert outcome.probability > 0.9
+    assert codes(outcome)[0] == "scale_seems_off"
