@@ -187,15 +187,17 @@ def _letter(key: str, words: str) -> Markup:
 def _doubt_numbers(
     student: Student, doubt: Doubt, first: CriterionDocument, speaker: Tongue
 ) -> Iterator[tuple[str, Markup]]:
-    """Of a place the vector to it, beside the one expected; of a scale what was declared and drawn with."""
+    """Of a place its vector, beside the one expected; of a scale what was declared and drawn with."""
     if doubt.kind == "node":
         for choice in doubt.choices:
-            if choice.at is not None and choice.start is not None:
-                along = complex(choice.at[0] - choice.start[0], choice.start[1] - choice.at[1])
+            along = choice.along
+            if along is not None:
                 turn = math.degrees(cmath.phase(along)) % 360.0
                 cells = quantity_cells(Quantity(length_mm=abs(along), direction_deg=turn), speaker)
                 yield choice.key.upper(), Markup.escape(" · ".join(cells))
-        expected = Quantity(length_mm=first.expected.length_mm, direction_deg=first.expected.direction_deg)
+        of_stroke = next((one.vector for one in doubt.choices if one.vector), first.vector)
+        shown = next((one for one in student.report.criteria if one.vector == of_stroke), first).expected
+        expected = Quantity(length_mm=shown.length_mm, direction_deg=shown.direction_deg)
         yield speaker.gettext("Expected"), Markup.escape(" · ".join(quantity_cells(expected, speaker)))
     elif doubt.kind == "scale":
         for name, quantity in ((N_("Declared"), first.measured), (N_("Drawn with"), first.expected)):

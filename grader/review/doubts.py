@@ -49,7 +49,9 @@ class Choice:
     rows : what it writes, verdicts or places by criterion
     probability : that it is the right answer, None where nothing is known
     at : of a place, mm on the sheet, y down
-    start : the other end of a vector to that place
+    start : the other end of a vector that starts or ends at that place
+    vector : its name
+    is_tail : whether it starts at that place
     """
 
     key: str
@@ -57,6 +59,16 @@ class Choice:
     probability: float | None = None
     at: tuple[float, float] | None = None
     start: tuple[float, float] | None = None
+    vector: str = ""
+    is_tail: bool = False
+
+    @property
+    def along(self) -> complex | None:
+        """The vector as it would be drawn, complex mm, y up; None where its other end is not known."""
+        if self.at is None or self.start is None:
+            return None
+        along = complex(self.at[0] - self.start[0], self.start[1] - self.at[1])
+        return -along if self.is_tail else along
 
 
 @dataclass(frozen=True, slots=True)
@@ -287,6 +299,8 @@ def _places(asked: _Asked, about: Sequence[CriterionDocument], node: str, figure
             each,
             on_sheet(at),
             None if start is None else on_sheet(start),
+            "" if vector is None else vector.name,
+            is_tail=vector is not None and vector.tail == node,
         )
         for key, (at, each) in zip("abc", likely, strict=False)
     )

@@ -6,6 +6,7 @@ import pytest
 
 from grader.inputs.decisions import Decision
 from grader.inputs.measurements import StudentSubmission
+from grader.marking.answers import along_of
 from grader.pipeline import report_on
 from grader.records import MECHANISM, Figure, PageRef, ScannedPage, Unread
 from grader.review.doubts import doubts_of, figures_read
@@ -98,3 +99,14 @@ def test_an_optional_vector_that_is_likelier_another_stroke_is_not_judged():
     assert verdicts(report)["a_CA_n"] == "review"
     (doubt,) = doubts
     assert dict(doubt.choices[-1].rows)["a_CA_n"] == "not_judged"
+
+
+def test_a_stroke_is_told_as_its_vector_points_whichever_end_is_in_doubt():
+    reading = unsure(sheet(PUMP), "acceleration_plan", "a'")
+    reading = changed(reading, "a_BA_n", length_mm=20.0, confidence=0.3)
+    report, doubts = reviewed(PUMP, reading)
+    (doubt,) = (one for one in doubts if one.kind == "node")
+    places = [one for one in doubt.choices if one.at is not None]
+    assert {(one.vector, one.is_tail) for one in places} == {("a_BA_n", True)}
+    expected = along_of(next(one.expected for one in report.criteria if one.id == "a_BA_n"))
+    assert min(abs(one.along - expected) for one in places) < 0.1
