@@ -158,11 +158,16 @@ def of_verdict(criterion: CriterionDocument) -> Doubt:
         Choice(
             verdict,
             ((criterion.id, verdict),),
-            criterion.probability if verdict == criterion.proposed else None,
+            known_probability(criterion) if verdict == criterion.proposed else None,
         )
         for verdict in order
     )
     return Doubt(criterion.id, "verdict", (criterion.id,), choices)
+
+
+def known_probability(criterion: CriterionDocument) -> float | None:
+    """The probability of what is proposed; None where nothing speaks for it."""
+    return None if criterion.probability == EVEN else criterion.probability
 
 
 # Whose drawing it is --------------------------------------------------------------------------------
@@ -195,7 +200,7 @@ def _scales(asked: _Asked) -> Iterator[Doubt]:
         names = (*(one.id for one in own), *(one.id for one in undecided))
         if scale in by_scale:
             likely = own[0].proposed if own else None
-            sure = own[0].probability if own else None
+            sure = known_probability(own[0]) if own else None
             choices = tuple(
                 Choice(verdict, ((by_scale[scale], verdict),), sure if verdict == likely else None)
                 for verdict in ("full", "partial", "none")
@@ -296,7 +301,7 @@ def _places(asked: _Asked, about: Sequence[CriterionDocument], node: str, figure
         Choice(
             key,
             ((f"node:{figure}:{node}", place_text(*on_sheet(at))), *known),
-            each,
+            None if read is None else each,
             on_sheet(at),
             None if start is None else on_sheet(start),
             "" if vector is None else vector.name,

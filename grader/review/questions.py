@@ -14,7 +14,7 @@ from grader.language import N_, Tongue
 from grader.overlay.closeup import look
 from grader.overlay.scene import MARKS
 from grader.records import MECHANISM, Box
-from grader.review.doubts import SURE
+from grader.review.doubts import SURE, known_probability
 from grader.review.session import OPEN, Session, Standing, Student, mark_of, page_criterion
 from grader.rubric import RubricFile
 
@@ -146,7 +146,8 @@ def question_facts(session: Session, student: Student, name: str, speaker: Tongu
     title = next(one.title for one in session.batch.rubric.criterion if one.id == name)
     row = _row(student, criterion, standing, title.in_language(speaker.lang))
     decision = standing.of(student, name)
-    proposed = criterion.proposed if criterion.verdict == OPEN else None
+    is_known = criterion.verdict == OPEN and known_probability(criterion) is not None
+    proposed = criterion.proposed if is_known else None
     what = speaker.gettext(VERDICTS[proposed]) if proposed else ""
     if proposed and criterion.probability is not None:
         what = f"{what}, {per_cent(criterion.probability)}"
@@ -208,7 +209,7 @@ def _accept(criterion: CriterionDocument, what: str, speaker: Tongue) -> Markup:
     if criterion.verdict != OPEN or is_sure(criterion):
         accept = ACCEPT if criterion.verdict == OPEN else GO_ON
         return Markup("<kbd>Enter</kbd> {}").format(speaker.gettext(accept) % {"verdict": what})
-    if criterion.proposed is None:
+    if criterion.proposed is None or known_probability(criterion) is None:
         return Markup.escape(speaker.gettext(NO_PROPOSAL))
     return Markup.escape(speaker.gettext(UNSURE) % {"least": per_cent(SURE)})
 

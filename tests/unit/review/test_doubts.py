@@ -12,7 +12,7 @@ from grader.records import MECHANISM, Figure, PageRef, ScannedPage, Unread
 from grader.review.doubts import doubts_of, figures_read
 from reference.construction.mistakes import Mistake
 from samples.simulation.wording import declared_texts
-from tests.hands import changed, rule_scales, sheet, task_for
+from tests.hands import changed, rule_scales, sheet, task_for, without
 
 PUMP, ENGINE = task_for("pump", 7), task_for("engine", 3)
 MISSING = Mistake("normal_missing", "n_BA")
@@ -110,3 +110,12 @@ def test_a_stroke_is_told_as_its_vector_points_whichever_end_is_in_doubt():
     assert {(one.vector, one.is_tail) for one in places} == {("a_BA_n", True)}
     expected = along_of(next(one.expected for one in report.criteria if one.id == "a_BA_n"))
     assert min(abs(one.along - expected) for one in places) < 0.1
+
+
+def test_what_nothing_speaks_for_is_not_proposed():
+    gap = Unread("v_D", "torn off")
+    reading = replace(without(sheet(PUMP), "v_D"), unread=(gap,))
+    report, doubts = reviewed(PUMP, reading)
+    (waiting,) = (one for one in report.criteria if one.verdict == "review")
+    assert (waiting.id, waiting.probability) == ("v_D", 0.5)
+    assert [one.probability for one in doubts[0].choices] == [None] * 4
