@@ -554,10 +554,11 @@ def test_an_error_at_the_crank_is_not_excused_by_a_wrong_mechanism():
 
 
 def test_a_loss_is_open_while_what_it_may_follow_from_is_not_known():
-    reading = sheet(PUMP, moved={"d": 6.0 + 0j})
+    reading = sheet(PUMP, moved={"d": 6.0 + 0j, "c": 9.0 + 7j})
     plan = reading.figures["velocity_plan"]
     doubtful = {**plan.nodes, "c": replace(plan.nodes["c"], confidence=0.4)}
-    figures = {**reading.figures, "velocity_plan": Figure(doubtful, plan.vectors)}
+    unsure = {name: replace(plan.vectors[name], confidence=0.4) for name in ("v_C", "v_CA", "v_CB", "v_DC")}
+    figures = {**reading.figures, "velocity_plan": Figure(doubtful, {**plan.vectors, **unsure})}
     comparison = compare(PUMP, Submission(readings=(replace(reading, figures=figures),)))
     outcome = outcome_of(comparison, "v_D")
     assert outcome.verdict == "review"
