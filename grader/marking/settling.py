@@ -141,7 +141,7 @@ def _is_in(task: Task, name: str, figures: frozenset[str]) -> bool:
 
 
 def _waiting(outcome: Outcome, worst: float, reason: Reason) -> Outcome:
-    """An outcome that a person decides, between the worst share and all points."""
+    """An outcome that a person decides, between the worst share and all points; it follows from nothing."""
     best = outcome.shares[-1] if outcome.shares else FULL
     return replace(
         outcome,
@@ -150,7 +150,7 @@ def _waiting(outcome: Outcome, worst: float, reason: Reason) -> Outcome:
         shares=(worst, max(best, FULL)),
         proposed=outcome.shares[0] if outcome.verdict != "review" and outcome.shares else outcome.proposed,
         probability=EVEN,
-        reasons=(reason, *outcome.reasons),
+        reasons=(reason, *(one for one in outcome.reasons if one.code != "follows")),
     )
 
 

@@ -38,6 +38,13 @@ def test_all_that_it_loses_goes_to_a_person():
     assert {one.verdict for one in judgement.outcomes} <= {"review", "full", "not_judged"}
 
 
+def test_nothing_is_said_to_follow_where_nothing_belongs_together():
+    for seed in range(3):
+        judgement = random_sheet(seed, closed=True, directed=False)
+        reasons = [{reason.code for reason in one.reasons} for one in judgement.outcomes]
+        assert not any(codes >= {"not_explained", "follows"} for codes in reasons)
+
+
 def test_the_report_and_the_sentence_count_the_vectors():
     judgement = random_sheet(1, closed=False, directed=True)
     (problem,) = (one for one in report_of(PUMP, judgement, "s1").problems if one.code == "not_explained")
