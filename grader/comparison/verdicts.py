@@ -198,12 +198,12 @@ def left_open(first: MarkRange, by_hand: MarkRange) -> MarkRange:
 
 
 def the_better(first: MarkRange, other: MarkRange, *reasons: Reason) -> MarkRange:
-    """The better of two marks; its reasons are `reasons`, then those of `other`."""
+    """The better of two marks; its reasons are `reasons`, then the losses of `other`."""
     return MarkRange(
         max(first.share, other.share),
         max(first.worst, other.worst),
         max(first.best, other.best),
-        (*reasons, *other.reasons),
+        (*reasons, *(one for one in other.reasons if one.code != "too_short_to_judge")),
         first.sure if first.share >= other.share else other.sure,
     )
 

@@ -7,6 +7,7 @@ from typing import Literal
 
 from markupsafe import Markup
 
+from grader.comparison.verdicts import EVEN
 from grader.documents import (
     CriterionDocument,
     MistakeDocument,
@@ -411,8 +412,8 @@ class StudentPage:
 
     @property
     def likely(self) -> list[tuple[str, int]]:
-        """How many of what waits have each likeliest verdict, where that is known."""
-        proposed = [row.proposed for row in self.group("waiting").rows]
+        """How many of what waits have each likeliest verdict, where something speaks for one."""
+        proposed = [row.proposed for row in self.group("waiting").rows if row.probability != EVEN]
         return [(verdict, proposed.count(verdict)) for verdict in words.VERDICTS if verdict in proposed]
 
 

@@ -114,8 +114,14 @@ def test_one_comment_on_several_criteria_is_told_once():
 
 def test_what_waits_is_told_with_what_it_is_likely_to_be():
     rows = [
-        criterion(name, "review", None).model_copy(update={"proposed": proposed, "probability": 0.9})
-        for name, proposed in (("v_A", "full"), ("v_B", "full"), ("v_C", "none"))
+        criterion(name, "review", None).model_copy(update={"proposed": proposed, "probability": probability})
+        for name, proposed, probability in (
+            ("v_A", "full", 0.9),
+            ("v_B", "full", 0.9),
+            ("v_C", "none", 0.9),
+            # Nothing speaks for this one.
+            ("v_D", "follow_through", 0.5),
+        )
     ]
     assert page_of(report(criteria=rows, mistakes=[])).likely == [("full", 2), ("none", 1)]
     assert (
