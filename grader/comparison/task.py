@@ -103,6 +103,9 @@ class Task:
         init=False, repr=False, compare=False, default_factory=dict
     )
 
+    def __repr__(self) -> str:
+        return f"Task({self.assignment.file.id}, {self.variant})"
+
     def tolerance_at(self, node: str) -> ToleranceTable:
         """The tolerance of a node's position: that of the vector or link asked for that ends there.
 

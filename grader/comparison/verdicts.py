@@ -495,7 +495,13 @@ def entry_refused(judged: Outcome, entry: str) -> Outcome:
 
 
 def both(first: Outcome, second: Outcome, allowed_mm: float) -> Outcome:
-    """The outcome of a vector with scan and measurement: for review where they differ in the verdict."""
+    """The outcome of a vector with scan and measurement: for review where they differ in the verdict.
+
+    Where one of them shows nothing to judge, the other is the outcome.
+    """
+    for one, other in ((first, second), (second, first)):
+        if one.verdict == "not_judged":
+            return other
     lengths = first.measured.length_mm or 0.0, second.measured.length_mm or 0.0
     params: dict[str, float | str] = {"first": lengths[0], "second": lengths[1], "unit": "mm"}
     differ = Reason("readings_disagree", params)

@@ -88,6 +88,8 @@ def _apart_from(rows: Rows, residuals: FloatArray) -> FloatArray:
     return found
 
 
+CANCELLED = 1e-13
+"""A row's precision of which no more than this share is left is lost in rounding errors."""
 OUTLYING = 16.0
 """Squared standard deviations from which on it does not matter how far a row is off."""
 
@@ -109,7 +111,7 @@ def _fitted(rows: Rows, residuals: FloatArray, turn_rad: float) -> FloatArray:
     likely = -0.5 * (pull * np.tile(residuals, (len(CARES), 1))).sum(axis=1)
     likely += np.log1p(-rows.doubt).sum() - 0.5 * np.linalg.slogdet(math.tau * covariance)[1][care]
     own = np.diagonal(start, axis1=1, axis2=2)[care]
-    kept = np.ones_like(pull, np.bool_)
+    least, kept = CANCELLED * own, np.ones_like(pull, np.bool_)
     columns = np.zeros((len(care), count, count))
     for step in range(count):
         gain = np.where(kept, 0.5 * pull**2 / own + 0.5 * np.log(math.tau / own) + outlier, -np.inf)
@@ -123,8 +125,10 @@ def _fitted(rows: Rows, residuals: FloatArray, turn_rad: float) -> FloatArray:
         column = start[care, :, worst] - (before * before[every, :, worst][:, :, None]).sum(axis=1)
         column *= (is_left / np.sqrt(own[every, worst]))[:, None]
         pull -= column * (pull[every, worst] / np.sqrt(own[every, worst]))[:, None]
-        own = np.maximum(own - column**2, ZERO)
+        own = np.maximum(own - column**2, least)
         kept[every, worst] &= ~is_left
+        kept &= own > least
+        pull[~kept] = 0.0
         columns[:, step] = column
     shares = np.log([share for _, share in CARES])
     return np.asarray(np.logaddexp.reduce(likely.reshape(len(CARES), sets) + shares[:, None]))

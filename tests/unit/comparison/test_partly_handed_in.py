@@ -9,6 +9,8 @@ import pytest
 from grader.comparison.criteria import compare
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
+from grader.comparison.verdicts import both
+from grader.documents import Quantity
 from grader.marking.mark import judge
 from grader.records import Figure, ReadVector, Unread
 from grader.rubric import CriterionTable
@@ -24,6 +26,12 @@ PUMP, SHAPER = task_for("pump", 7), task_for("shaper", 5)
 
 def outcome_of(task, submission, name):
     return next(one for one in compare(task, submission).outcomes if one.name == name)
+
+
+def test_a_measurement_counts_where_the_scan_shows_nothing_to_judge():
+    right = outcome_of(PUMP, Submission(measured=measured(PUMP)), "v_CA")
+    nothing = replace(right, verdict="not_judged", possible=("not_judged", "not_judged"), measured=Quantity())
+    assert both(nothing, right, 1.0) == both(right, nothing, 1.0) == right
 
 
 def test_a_value_with_a_slip_of_its_own_does_not_follow_the_factor_of_all():
