@@ -7,4 +7,5 @@ from pathlib import Path
 project = tomllib.loads((Path(__file__).parent.parent / "pyproject.toml").read_text())["project"]
 extras = project["optional-dependencies"]
 for requirement in [*project["dependencies"], *extras["web"], *extras["cluster"]]:
-    print(re.sub(r">=([^,]+).*", r"==\1", requirement))
+    # A constraint names no extras.
+    print(re.sub(r"(\[.*\])?>=([^,]+).*", r"==\2", requirement))
