@@ -310,12 +310,15 @@ def _swaps(case: Case, explanation: Replay) -> Iterator[Mistake]:
         images = sorted(
             v.head for v in construction.vectors_of(figure) if v.tail == pole and v.part not in {"n", "c"}
         )
+        is_off = bool(off) or explanation.care > USUAL
         for pair in combinations(images, 2):
-            is_off = off or explanation.care > USUAL
-            is_swapped = _lie_nearer_swapped(case, pole, pair, nodes) or _has_lengths_swapped(
-                case, figure, pair, nodes
-            )
-            if off >= set(pair) or (is_off and is_swapped):
+            if off >= set(pair) or (
+                is_off
+                and (
+                    _lie_nearer_swapped(case, pole, pair, nodes)
+                    or _has_lengths_swapped(case, figure, pair, nodes)
+                )
+            ):
                 yield Mistake("labels_swapped", pair[0], other=pair)
 
 
