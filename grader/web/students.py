@@ -6,7 +6,7 @@ import re
 import secrets
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -139,6 +139,16 @@ def check(call: Called, key: Key, values: Values) -> Told:
     return Told(**told, attempts_left=left)
 
 
+def body_after(asked: Callable[..., object]) -> Callable[..., Awaitable[bytes]]:
+    """What reads the body of a request once `asked` has let it be sent."""
+
+    async def body(request: Request, allowed: Annotated[object, Depends(asked)]) -> bytes:
+        _ = allowed
+        return await request.body()
+
+    return body
+
+
 def may_check_photo(call: Called, key: Key) -> Publication:
     """The publication of a photo that may be sent now, which is asked before any of it is read."""
     publication = open_for_checks(call, key)
@@ -178,17 +188,11 @@ def _check_seconds(call: Call, publication: Publication) -> None:
         raise RefusedError(429, "seconds", why)
 
 
-async def photo_of(request: Request, publication: Annotated[Publication, Depends(may_check_photo)]) -> bytes:
-    """The photo."""
-    _ = publication
-    return await request.body()
-
-
 @router.post("/publications/{key}/photos", status_code=202, openapi_extra=FILE_BODY)
 def check_photo(
     call: Called,
     publication: Annotated[Publication, Depends(may_check_photo)],
-    body: Annotated[bytes, Depends(photo_of)],
+    body: Annotated[bytes, Depends(body_after(may_check_photo))],
     n: Number = None,
     position: Number = None,
     lang: Lang = "en",
@@ -309,17 +313,11 @@ def may_hand_in(call: Called, key: Key) -> tuple[Publication, Link]:
     return publication, link
 
 
-async def sheet_of(request: Request, asked: Annotated[object, Depends(may_hand_in)]) -> bytes:
-    """The sheet."""
-    _ = asked
-    return await request.body()
-
-
 @router.post("/publications/{key}/sheets", status_code=201, openapi_extra=FILE_BODY)
 def hand_in(
     call: Called,
     asked: Annotated[tuple[Publication, Link], Depends(may_hand_in)],
-    body: Annotated[bytes, Depends(sheet_of)],
+    body: Annotated[bytes, Depends(body_after(may_hand_in))],
     name: Annotated[
         str, Query(max_length=200, pattern=WITHOUT_NUL, description="as the student calls it")
     ] = "",
