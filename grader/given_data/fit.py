@@ -14,7 +14,9 @@ TURNS = ((0.7, 0.85), (25.0, 0.15))
 """By how many degrees a drawing is turned on its sheet (standard deviation), and how often."""
 AS_IT_LIES = ((0.0, 1.0),)
 FITS_WELL = 2.0
-"""Nats a row above nobody's data from which on the own data fit as a drawing lies: it is not tried turned."""
+"""Nats a row above nobody's data from which on the own data fit as a drawing lies: it is not tried turned, if
+its own directions lie within `STRAIGHT_DEG` of theirs."""
+STRAIGHT_DEG = 1.4
 ALIKE_RAD = math.radians(0.7)
 """The same of a figure beside the others of a sheet."""
 ANY_SCALE = 2.0
@@ -41,7 +43,7 @@ def fit_of(rows: Rows, is_own: BoolArray) -> FloatArray:
     chosen = _nearest(np.where(is_there & ~is_like_own, _apart_from(rows, residuals), np.inf), is_own)
     chosen[0] = is_there[0]
     for turn_deg, share in TURNS if rows.is_angle.any() else AS_IT_LIES:
-        if found[0] > nobodys(rows) + FITS_WELL * len(rows):
+        if found[0] > nobodys(rows) + FITS_WELL * len(rows) and _lies_straight(rows, residuals[0]):
             break
         fitted = math.log(share) + _fitted(rows, residuals[chosen], math.radians(turn_deg))
         found[chosen] = np.logaddexp(found[chosen], fitted)
@@ -51,6 +53,12 @@ def fit_of(rows: Rows, is_own: BoolArray) -> FloatArray:
         back = rows.reversed[:, rows.part == part].sum(axis=1)
         found -= np.minimum(BACKWARDS * back, BACKWARDS_TOGETHER)
     return found
+
+
+def _lies_straight(rows: Rows, residuals: FloatArray) -> bool:
+    """Whether no sheet is turned, by the medians of the residuals of its directions against the own data."""
+    turned = (residuals[rows.is_angle & (rows.sheet == sheet)] for sheet in np.unique(rows.sheet))
+    return all(abs(np.median(one)) <= math.radians(STRAIGHT_DEG) for one in turned if len(one))
 
 
 def nobodys(rows: Rows) -> float:

@@ -129,8 +129,7 @@ STRANGER = JWK.generate(kty="RSA", size=2048, kid="platform-key")
     "changed",
     [
         {"nonce": "another"}, {"nonce": None}, {"aud": "another-client"}, {"iss": "https://evil.example"},
-        {"exp": int(time.time()) - 600}, {"exp": None}, {"iat": None}, {"iat": int(time.time()) + 600},
-        {"iat": int(time.time()) - 3600}, {"azp": "another-client"}, {"aud": [CLIENT, "another-client"]},
+        {"exp": None}, {"iat": None}, {"azp": "another-client"}, {"aud": [CLIENT, "another-client"]},
         {"aud": [CLIENT, "another-client"], "azp": "another-client"}, {"aud": []},
         {f"{CLAIM}deployment_id": "another"}, {f"{CLAIM}version": "1.1"},
         {f"{CLAIM}message_type": "Unknown"}, {f"{CLAIM}message_type": None}, {"sub": None},
@@ -139,6 +138,13 @@ STRANGER = JWK.generate(kty="RSA", size=2048, kid="platform-key")
 )  # fmt: skip
 def test_a_message_that_is_not_right_is_refused(platform, visitor, changed):
     answer = platform.launch(visitor, **changed)
+    assert answer.status_code in {400, 403}, answer.text
+    assert visitor.get("/api/v1/publications").status_code == 401
+
+
+@pytest.mark.parametrize(("claim", "later_s"), [("exp", -600), ("iat", 600), ("iat", -3600)])
+def test_a_message_of_another_time_is_refused(platform, visitor, claim, later_s):
+    answer = platform.launch(visitor, **{claim: int(time.time()) + later_s})
     assert answer.status_code in {400, 403}, answer.text
     assert visitor.get("/api/v1/publications").status_code == 401
 
