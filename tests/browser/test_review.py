@@ -129,19 +129,20 @@ def test_a_dragged_node_snaps_and_the_marks_follow(open_window, server):
     window = open_window(server)
     page = window.page
     page.wait_for_selector("#view[data-loaded]")
+    page.wait_for_selector("body:not([data-busy])")
     before = page.inner_text("#numbers")
     moved = []
     # The vector in question is in the middle of the view: one of the nearest nodes is its own.
     while page.inner_text("#numbers") == before and len(moved) < 4:
+        shown = page.evaluate("() => document.body.dataset.shown")
         name, (x, y) = nearest_node(page, moved)
         moved.append(name)
-        page.evaluate("() => delete document.body.dataset.nodeMs")
         page.mouse.move(x, y)
         page.mouse.down()
         page.mouse.move(x + 60, y + 45, steps=4)
         page.mouse.up()
-        page.wait_for_function("() => document.body.dataset.nodeMs")
-        page.wait_for_selector("#view[data-loaded]")
+        page.wait_for_function("shown => document.body.dataset.shown !== shown", arg=shown)
+        page.wait_for_selector("body:not([data-busy])")
         assert len([row for row in server.decisions().values() if row.kind == "node"]) == len(moved)
     assert page.inner_text("#numbers") != before
 

@@ -250,7 +250,8 @@ class Viewer {
     this.svg.setPointerCapture(event.pointerId);
     this.pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
     const node = event.target.closest(".node");
-    this.drag = node && this.pointers.size === 1 ? node : null;
+    // A node that cannot be saved now does not move.
+    this.drag = node && this.pointers.size === 1 && !state.busy ? node : null;
     this.moved = false;
   }
 
