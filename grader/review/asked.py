@@ -2,7 +2,7 @@
 
 import cmath
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from urllib.parse import urlencode
 
 from markupsafe import Markup
@@ -137,7 +137,7 @@ def _doubt_facts(session: Session, student: Student, doubt: Doubt, speaker: Tong
         "comment": "",
         "position": "",
         "seen": mark_of(standing.of(student, doubt.id)),
-        "numbers": list(_doubt_numbers(student, doubt, first, speaker)),
+        "numbers": list(_doubt_numbers(student, doubt, after, speaker)),
         "state": state_of(first, None, "", speaker),
         "brief": "",
         "accept": accept,
@@ -185,9 +185,13 @@ def _letter(key: str, words: str) -> Markup:
 
 
 def _doubt_numbers(
-    student: Student, doubt: Doubt, first: CriterionDocument, speaker: Tongue
+    student: Student, doubt: Doubt, after: Mapping[str, CriterionDocument], speaker: Tongue
 ) -> Iterator[tuple[str, Markup]]:
-    """Of a place its vector, beside the one expected; of a scale what was declared and drawn with."""
+    """Of a place its vector, beside the one expected; of a scale what was declared and drawn with.
+
+    Arguments: `after` are the criteria as judged with the likeliest answer; empty where none is offered.
+    """
+    first = student.criterion(doubt.criteria[0])
     if doubt.kind == "node":
         for choice in doubt.choices:
             along = choice.along
@@ -196,7 +200,8 @@ def _doubt_numbers(
                 cells = quantity_cells(Quantity(length_mm=abs(along), direction_deg=turn), speaker)
                 yield choice.key.upper(), Markup.escape(" · ".join(cells))
         of_stroke = next((one.vector for one in doubt.choices if one.vector), first.vector)
-        shown = next((one for one in student.report.criteria if one.vector == of_stroke), first).expected
+        rows = after.values() or student.report.criteria
+        shown = next((one for one in rows if one.vector == of_stroke), first).expected
         expected = Quantity(length_mm=shown.length_mm, direction_deg=shown.direction_deg)
         yield speaker.gettext("Expected"), Markup.escape(" · ".join(quantity_cells(expected, speaker)))
     elif doubt.kind == "scale":

@@ -62,6 +62,18 @@ def test_a_question_says_why_it_waits_and_what_the_student_will_read(page):
     assert (settled["sentence"], settled["why"]) == (question["sentence"], "")
 
 
+def test_what_is_expected_of_a_stroke_is_judged_with_the_likeliest_answer(page, session):
+    student = session.student(SCANNED)
+    offered = [one for one in session.doubts(student, counted=True) if one.kind == "node" and one.default]
+    assert offered
+    for doubt in offered:
+        question = page.get("/api/question", params={"student": SCANNED, "criterion": doubt.id}).json()
+        after = session.report_if(student, doubt.default.rows)
+        vector = next(one.vector for one in doubt.choices if one.vector)
+        expected = next(one.expected for one in after.criteria if one.vector == vector)
+        assert f"{expected.length_mm:.1f}" in dict(question["numbers"])["Expected"]
+
+
 def test_without_a_scan_there_is_nothing_to_look_at(page):
     question = page.get("/api/question", params={"student": ENTERED, "criterion": "v_B"}).json()
     assert question["look"] is None
