@@ -1,6 +1,7 @@
 """What moves between two checkouts: every report of the same submissions, field by field.
 
     python -m tests.bench.frozen CHECKOUT_BEFORE [CHECKOUT_AFTER] [--sheets DIR] [--out DIR] [--students N]
+                                 [--marks]
 
 Both checkouts (the second is this one by default) grade
 
@@ -10,7 +11,8 @@ Both checkouts (the second is this one by default) grade
   mistake, with two, and with a slip in computing; every other one without directions.
 
 Reports are compared without times and version, numbers to 1e-9 of their size. Every difference is printed
-with its path in the report; the exit status is 0 where there is none.
+with its path in the report; the exit status is 0 where there is none. With `--marks` only the verdicts that
+moved are printed, by their reason, and for simulated students whether they are nearer to what was due.
 """
 
 import argparse
@@ -21,12 +23,15 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tests.bench.judging_handed_in import measured_line
-from tests.bench.judging_students import HANDS, KINDS, StudentKey
+from tests.bench.judging_handed_in import Due, Visible, measured_line, submission
+from tests.bench.judging_students import HANDS, KINDS, Source, StudentKey, student
+from tests.bench.judging_tally import CHARGED, CREDITED
+from tests.bench.judging_truth import charged_once, verdicts_due
 
 ROOT = Path(__file__).resolve().parents[2]
 ASSIGNMENTS = ("pump", "press", "engine", "shaper", "piston", "pump-collinear", "pump-230")
@@ -138,6 +143,63 @@ def compare(before: Path, after: Path) -> tuple[int, int]:
     return same, len(names)
 
 
+# Marks that moved ---------------------------------------------------------------------------------
+
+FALSE, OPEN, ALLOWED = 0, 1, 2
+"""How good a verdict is: wrong, left to a person or not judged, as due."""
+
+
+def print_moved_marks(before: Path, after: Path) -> None:
+    """Every verdict that moved, counted by the reason it has now; those for the worse with their place."""
+    counts: Counter[tuple[str, ...]] = Counter()
+    worse = []
+    for path in sorted(after.rglob("report.json")):
+        name = path.relative_to(after)
+        if not (before / name).is_file():
+            continue
+        said = [
+            {one["id"]: one for one in json.loads((root / name).read_text(encoding="utf-8"))["criteria"]}
+            for root in (before, after)
+        ]
+        kind, due = _due(name, {one: row["verdict"] for one, row in said[1].items()})
+        for criterion in said[0].keys() & said[1].keys():
+            old, new = (rows[criterion]["verdict"] for rows in said)
+            if old == new:
+                continue
+            why = ", ".join(dict.fromkeys(str(one) for one in said[1][criterion]["reasons"]))
+            direction = ""
+            if criterion in due:
+                was, is_now = (_goodness(due[criterion], verdict) for verdict in (old, new))
+                direction = "same" if was == is_now else "better" if is_now > was else "worse"
+            counts[kind, direction, f"{old} -> {new}", why] += 1
+            if direction == "worse":
+                worse.append(f"    {name.parent} {criterion}: {old} -> {new}, due {due[criterion]} ({why})")
+    for row, count in sorted(counts.items(), key=lambda one: (one[0][:2], -one[1])):
+        print(f"{count:5d}  " + "  ".join(part for part in row if part))
+    print("for the worse:", *worse or ["none"], sep="\n")
+
+
+def _due(name: Path, said: dict[str, str]) -> tuple[str, dict[str, Due]]:
+    """The kind of a student and what is due by criterion; nothing of scans, whose truth is not here."""
+    folder, student_id = name.parts[0], name.parts[1]
+    if not folder.startswith("students-"):
+        return "scan", {}
+    hand, kind, seed = student_id.split("-")
+    work = student(StudentKey(folder.removeprefix("students-"), hand, kind, int(seed)))  # type: ignore[arg-type]
+    source: Source = "directions" if int(seed) % 2 else "lengths"
+    visible = Visible.of(submission(work, source), work.construction.links)
+    return kind, charged_once(work, verdicts_due(work, source, visible), said)
+
+
+def _goodness(due: Due, verdict: str) -> int:
+    if due not in {"right", "follows", "wrong"}:
+        return ALLOWED
+    if verdict in {"review", "not_judged"}:
+        return OPEN
+    is_false = verdict in CHARGED if due in {"right", "follows"} else due == "wrong" and verdict in CREDITED
+    return FALSE if is_false else ALLOWED
+
+
 def main() -> int:
     """Grade with both checkouts and compare; the exit status."""
     parser = argparse.ArgumentParser(description="What moves between two checkouts.")
@@ -150,6 +212,7 @@ def main() -> int:
         "--out", type=Path, help="keep the results here: a second run grades only what changed"
     )
     parser.add_argument("--students", type=int, default=STUDENTS, help="of each kind, hand and assignment")
+    parser.add_argument("--marks", action="store_true", help="the verdicts that moved, by their reason")
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
         out = (chosen.out or Path(temporary)).resolve()
@@ -158,6 +221,9 @@ def main() -> int:
             for side, checkout in (("before", chosen.before), ("after", chosen.after)):
                 grade(checkout.resolve(), folder.resolve(), assignment, out / side / name)
             print(f"{name}: graded", file=sys.stderr)
+        if chosen.marks:
+            print_moved_marks(out / "before", out / "after")
+            return 0
         same, of = compare(out / "before", out / "after")
     print(f"{same} of {of} the same")
     return 0 if same == of else 1
