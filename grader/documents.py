@@ -428,18 +428,22 @@ class OpenedDocument(Document):
     count: int
 
 
+Source = Literal["printed", "plain", "photo", "entered"]
+"""What verdicts were read from: scans of printed sheets or of plain paper, photos, entered values."""
+
+
 class ReliabilityDocument(Document):
     """Verdicts on which a person had a say, held against the probabilities that were stated for them.
 
     Attributes
     ----------
-    source : sheets that were printed by the program, plain paper, or entered values
+    source : what they were read from
     kind : settled verdicts that were audited, or proposals that were decided
     count, right : how many, and how many of them a person found right
     said : the mean of the stated probabilities
     """
 
-    source: Literal["printed", "plain", "entered"]
+    source: Source
     kind: Literal["settled", "proposed"]
     count: int
     right: int

@@ -96,6 +96,7 @@ MOVED_POINTS = N_("Points of drawings that a person put elsewhere: %(count)s.")
 SOURCES: Mapping[str, str] = {
     "printed": N_("printed sheets"),
     "plain": N_("plain paper"),
+    "photo": N_("photos"),
     "entered": N_("entered values"),
 }
 KINDS: Mapping[str, str] = {"settled": N_("settled, then checked"), "proposed": N_("proposed, then decided")}

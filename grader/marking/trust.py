@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from scipy.special import betaln, gammaln, logsumexp
@@ -27,6 +27,7 @@ from grader.documents import (
     ReliabilityDocument,
     ReportDocument,
     SaidDocument,
+    Source,
     TrustDocument,
     Verdict,
 )
@@ -36,6 +37,7 @@ from grader.marking.mark import score, share_of
 from grader.outcomes import Judgement, Outcome, Reason
 from grader.records import FloatArray
 from grader.rubric import RubricFile
+from reference.drawing.canvas import A3_MM
 
 CONFIDENCE = 0.95
 PRIOR_NONE = 0.5
@@ -53,6 +55,8 @@ NO_LONGER_SAID = FOR_THE_STUDENT | {"right"}
 """Reasons of a settled verdict that would contradict an open one."""
 OPENED = "found_wrong_elsewhere"
 """The reason of a verdict that an audit opened."""
+SLANTED = 2e-3
+"""From such a change of scale across the sheet on a camera took it."""
 Answer = Literal["right", "wrong", "unclear"]
 
 
@@ -99,7 +103,7 @@ class Checkable:
     student: str
     position: int | None
     criterion: str
-    source: Literal["printed", "plain", "entered"]
+    source: Source
     said: SaidDocument
     answer: Answer | None
     by_audit: bool
@@ -130,9 +134,7 @@ def checkable(reports: Sequence[ReportDocument]) -> list[Checkable]:
 
 
 def _of_report(report: ReportDocument) -> Iterator[Checkable]:
-    methods = {sheet.sheet.method for sheet in report.reading.sheets if sheet.sheet is not None}
-    source: Literal["printed", "plain", "entered"]
-    source = "entered" if not methods else "printed" if "markers" in methods else "plain"
+    source = _source_of(report)
     answers = {row.criterion: row.verdict for row in report.decisions if row.criterion.startswith("audit:")}
     for criterion in report.criteria:
         said = said_of(report, criterion)
@@ -148,6 +150,17 @@ def _of_report(report: ReportDocument) -> Iterator[Checkable]:
         yield Checkable(
             report.student_id, report.position, criterion.id, source, said, answer, by_audit  # type: ignore[arg-type]
         )  # fmt: skip
+
+
+def _source_of(report: ReportDocument) -> Source:
+    """What a submission was read from; a photo shows one side of the sheet nearer than the other."""
+    sheets = [one.sheet for one in report.reading.sheets if one.sheet is not None]
+    if not sheets:
+        return "entered"
+    slants = (abs(one.mm_to_px[2][0]) + abs(one.mm_to_px[2][1]) for one in sheets)
+    if max(slants) * A3_MM[0] > SLANTED:
+        return "photo"
+    return "printed" if any(one.method == "markers" for one in sheets) else "plain"
 
 
 def _answer_by(criterion: CriterionDocument, said: SaidDocument) -> Answer:
@@ -280,7 +293,7 @@ def _reliability(
 ) -> Iterator[ReliabilityDocument]:
     """What was said against what was found, by source; undecidable verdicts tell nothing."""
     for kind, verdicts in (("settled", settled), ("proposed", proposals)):
-        for source in ("printed", "plain", "entered"):
+        for source in get_args(Source):
             own = [one for one in verdicts if one.source == source and one.answer != "unclear"]
             if own:
                 said = sum(one.said.probability for one in own) / len(own)

@@ -214,3 +214,29 @@ def test_what_is_opened_waits_between_nothing_and_everything_and_keeps_what_was_
     ]
     less = like.model_copy(update={"most": first.probability - 1e-6})
     assert opened_by_audit(judgement, task.rubric, [less]) is judgement
+
+
+# Where from ---------------------------------------------------------------------------------------
+
+STRAIGHT, SLANTED = [0.0, 0.0, 1.0], [2e-4, 0.0, 1.0]
+
+
+def read_from(one, method, last_row):
+    """The report as read from a page that was registered so."""
+    sheet = {
+        "method": method, "px_per_mm": 11.8, "rotation_deg": 0.0, "residual_mm": 0.05,
+        "mm_to_px": [[11.8, 0.0, 0.0], [0.0, 11.8, 0.0], last_row],
+    }  # fmt: skip
+    page = {"source": "a.jpg", "page": 1, "student_id": None, "sheet": sheet, "figures": {}}
+    return ReportDocument.model_validate({**one.model_dump(), "reading": {"sheets": [page]}})
+
+
+def test_what_was_said_is_held_against_what_was_found_by_where_it_was_read():
+    first, second, third, fourth, *_ = answered(90)[0]
+    reports = [
+        read_from(first, "markers", STRAIGHT), read_from(second, "frame", STRAIGHT),
+        read_from(third, "markers", SLANTED), fourth,
+    ]  # fmt: skip
+    found = trust_of(reports, SETTLE).reliability
+    assert [one.source for one in found] == ["printed", "plain", "photo", "entered"]
+    assert all((one.count, one.right) == (3, 3) for one in found)
