@@ -520,6 +520,11 @@ def rate(charges: Charges, criterion: CriterionTable) -> Outcome:
     own = None
     if follows and not mark.is_full:
         own = rate_from_vector(task, charges.evidence, turned, scale, charges.following.nodes_instead())
+        drawn = charges.evidence.vector(turned.vector)
+        is_made_wrongly = segment.head in charges.charged | charges.doubtful
+        if own is not None and drawn is not None and drawn.direction_rad is None and is_made_wrongly:
+            # Which way it points is not known.
+            own = math.copysign(own, value)
     factor = common_factor(charges, segment.scale)
     if own is None and factor is not None and follows and not mark.is_full:
         own = right

@@ -405,6 +405,8 @@ SURE_TOGETHER = 0.8
 LEAST_RIVAL = 0.1
 """A rival less likely than this is not named."""
 MOST_RIVALS = 3
+ALL_THOUGHT_OF = 0.94
+"""Probability that the mistakes made are among those tried, where one mistake does not explain a drawing."""
 EVEN = 0.5
 """A plan that is likelier than this to follow no construction goes to a person."""
 MOST_SLIPS = 2
@@ -428,6 +430,7 @@ def named(explanations: Sequence[Replay], construction: Construction, lost: Lost
     if not explanations:
         return ()
     best, shares = explanations[0], _Shares(explanations)
+    known = ALL_THOUGHT_OF if len(best.made) > 1 else 1.0
     slips = sum(one.code == SLIP for one in best.made)
     explains, mistakes = _losses_explained(best, construction, lost), []
     for mistake in _in_order(best.made, construction):
@@ -437,8 +440,10 @@ def named(explanations: Sequence[Replay], construction: Construction, lost: Lost
         is_sure = share >= LEAST_CONFIDENCE or (together >= SURE_TOGETHER and rivals)
         is_shown = explains[mistake] and (mistake.code != SLIP or slips <= MOST_SLIPS)
         if is_shown and is_sure and not _is_slight(mistake, best):
-            others = tuple(_record(one, construction, (), shares.instead(key, _key(one))) for one in rivals)
-            mistakes.append(_record(mistake, construction, tuple(explains[mistake]), share, others))
+            others = tuple(
+                _record(one, construction, (), known * shares.instead(key, _key(one))) for one in rivals
+            )
+            mistakes.append(_record(mistake, construction, tuple(explains[mistake]), known * share, others))
     return tuple(mistakes)
 
 

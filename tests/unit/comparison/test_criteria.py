@@ -613,10 +613,11 @@ def test_an_angular_velocity_follows_from_no_vector_and_from_none_that_is_trivia
     assert outcome_of(comparison, "omega_3").verdict == "none"
 
 
-def test_an_angular_velocity_follows_from_a_length_alone():
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_an_angular_velocity_follows_in_either_sense_from_the_length_of_a_wrong_vector(sense):
     reading = measured(PUMP, directions=False, mistakes=(WRONG_B,))
     own = reading.figures["velocity_plan"].vectors["v_BA"].length_mm
-    value = own * rule_scales(PUMP)["kv"] / 0.4 * (1 if PUMP.rates["omega_3"] > 0 else -1)
+    value = sense * own * rule_scales(PUMP)["kv"] / 0.4
     comparison = compare(PUMP, Submission(measured=reading, values={"omega_3": value}))
     assert outcome_of(comparison, "omega_3").verdict == "follow_through"
 
