@@ -405,7 +405,7 @@ SURE_TOGETHER = 0.8
 LEAST_RIVAL = 0.1
 """A rival less likely than this is not named."""
 MOST_RIVALS = 3
-ALL_THOUGHT_OF = 0.94
+ALL_THOUGHT_OF, ALL_THOUGHT_OF_BY_LENGTHS = 0.94, 0.89
 """Probability that the mistakes made are among those tried, where one mistake does not explain a drawing."""
 EVEN = 0.5
 """A plan that is likelier than this to follow no construction goes to a person."""
@@ -425,12 +425,15 @@ class Lost:
     scales: Mapping[str, str]
 
 
-def named(explanations: Sequence[Replay], construction: Construction, lost: Lost) -> tuple[NamedMistake, ...]:
+def named(
+    explanations: Sequence[Replay], construction: Construction, lost: Lost, *, has_directions: bool
+) -> tuple[NamedMistake, ...]:
     """The mistakes of the likeliest explanation that are sure enough, in the order of construction."""
     if not explanations:
         return ()
     best, shares = explanations[0], _Shares(explanations)
-    known = ALL_THOUGHT_OF if len(best.made) > 1 else 1.0
+    all_thought_of = ALL_THOUGHT_OF if has_directions else ALL_THOUGHT_OF_BY_LENGTHS
+    known = all_thought_of if len(best.made) > 1 else 1.0
     slips = sum(one.code == SLIP for one in best.made)
     explains, mistakes = _losses_explained(best, construction, lost), []
     for mistake in _in_order(best.made, construction):

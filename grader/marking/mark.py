@@ -133,12 +133,14 @@ def _named(
 ) -> tuple[NamedMistake, ...]:
     """The mistakes named; whose data they are goes first."""
     other = None if owner is None else owner.named
+    directed = any(one.direction_rad is not None for one in comparison.evidence.drawn.values())
+    mistakes = named(explanations, task.construction, lost, has_directions=directed)
     if owner is None or other is None:
-        return named(explanations, task.construction, lost)
+        return mistakes
     losing = [one for one in comparison.outcomes if one.verdict in LOST]
     explained = tuple(one.criterion for one in losing if is_of(task, one.name, owner.part))
     other = replace(other, explains=explained)
-    return (other, *named(explanations, task.construction, lost))
+    return (other, *mistakes)
 
 
 def _explanations(task: Task, comparison: Comparison, owner: Owner | None) -> tuple[Sequence[Replay], Lost]:
