@@ -1,12 +1,14 @@
 """Write the table and the picture of the rooms into architecture.md: `python -m docs.make_architecture`.
 
+The ceilings of rooms, tests and laboratory fall to what these have now, in `tests/docs/ceilings.toml`.
 A room is a folder of modules; a module that lies directly in a package is a room of its own. What it holds is
 the first line of its docstring. Arrows are the imports in the files, those inside functions too; the picture
 leaves out an arrow that a longer way says already.
 """
 
 import ast
-from collections.abc import Iterator, Mapping
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -14,6 +16,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 PAGE, PICTURE = HERE / "architecture.md", HERE / "rooms.svg"
+CEILINGS = ROOT / "tests" / "docs" / "ceilings.toml"
 PACKAGES = ("grader", "reference")
 FIRST, LAST = "<!-- rooms: written by make_architecture.py -->\n", "<!-- rooms: end -->"
 
@@ -23,11 +26,10 @@ Arrows = Mapping[str, frozenset[str]]
 
 @dataclass(frozen=True, slots=True)
 class Room:
-    """A room: its path without the ending, what it holds, how many files, how many lines."""
+    """A room: its path without the ending, what it holds, how many lines."""
 
     name: str
     holds: str
-    files: int
     lines: int
 
 
@@ -56,10 +58,14 @@ def rooms() -> list[Room]:
     for path in modules().values():
         files.setdefault(room_of(path), []).append(path)
     return [
-        Room(name, _first_line(paths), len(paths), sum(len(_text(path).splitlines()) for path in paths))
+        Room(name, _first_line(paths), _lines(paths))
         for name, paths in sorted(files.items())
         if name not in PACKAGES
     ]
+
+
+def _lines(paths: Iterable[Path]) -> int:
+    return sum(len(_text(path).splitlines()) for path in paths)
 
 
 def _text(path: Path) -> str:
@@ -133,18 +139,12 @@ def shortened(imports: Arrows) -> Arrows:
 
 
 def table() -> str:
-    """The table of the rooms as Markdown, by package, with sums."""
-    lines = ["| room | holds | files | lines |", "| --- | --- | ---: | ---: |"]
-    every = rooms()
-    for package in PACKAGES:
-        here = [room for room in every if room.name.startswith(f"{package}/")]
-        lines += [f"| `{room.name}` | {room.holds} | {room.files} | {room.lines} |" for room in here]
-        files, size = sum(room.files for room in here), sum(room.lines for room in here)
-        lines.append(f"| **{package}** | {len(here)} rooms | **{files}** | **{size}** |")
-    return "\n".join(lines)
+    """The table of the rooms as Markdown, by package."""
+    rows = (f"| `{room.name}` | {room.holds} |" for room in rooms())
+    return "\n".join(["| room | holds |", "| --- | --- |", *rows])
 
 
-WIDE, HIGH, GAP_X, GAP_Y, MARGIN = 132, 34, 10, 44, 12
+WIDE, HIGH, GAP_X, GAP_Y, MARGIN = 132, 28, 10, 44, 12
 """Of a box and between boxes, in pixels."""
 IN_A_ROW = 8
 FILLS = {"grader": "#eef4fb", "reference": "#eef7ee"}
@@ -152,7 +152,7 @@ FILLS = {"grader": "#eef4fb", "reference": "#eef7ee"}
 
 def picture() -> str:
     """The rooms as boxes, each above what it imports from, as SVG."""
-    imports, size = arrows(), {room.name: room for room in rooms()}
+    imports = arrows()
     places = _places(levels(imports))
     low = max(y for _, y in places.values()) + HIGH + MARGIN
     wide = MARGIN + IN_A_ROW * (WIDE + GAP_X)
@@ -164,20 +164,17 @@ def picture() -> str:
     for name, others in sorted(shortened(imports).items()):
         lines += [_arrow(places[name], places[other]) for other in sorted(others)]
     for name, place in places.items():
-        lines += _box(size[name], place)
+        lines += _box(name, place)
     return "\n".join([*lines, "</svg>\n"])
 
 
-def _box(room: Room, place: tuple[int, int]) -> list[str]:
-    """A room with its size."""
-    package, _, name = room.name.partition("/")
+def _box(room: str, place: tuple[int, int]) -> list[str]:
+    package, _, name = room.partition("/")
     x, y, middle = *place, place[0] + WIDE // 2
     outline = f'width="{WIDE}" height="{HIGH}" rx="4" fill="{FILLS[package]}" stroke="#556"'
-    size = f"{room.files} file{'s' * (room.files > 1)}, {room.lines} lines"
     return [
         f'<rect x="{x}" y="{y}" {outline}/>',
-        f'<text x="{middle}" y="{y + 15}" font-size="11" text-anchor="middle">{escape(name)}</text>',
-        f'<text x="{middle}" y="{y + 28}" font-size="9" text-anchor="middle">{size}</text>',
+        f'<text x="{middle}" y="{y + 18}" font-size="11" text-anchor="middle">{escape(name)}</text>',
     ]
 
 
@@ -204,12 +201,44 @@ def _arrow(start: tuple[int, int], end: tuple[int, int]) -> str:
     return f'<line {line} stroke="{colour}" stroke-width="0.8" marker-end="url(#tip)"/>'
 
 
+# Ceilings -----------------------------------------------------------------------------------------
+
+ROUND = 50
+"""A ceiling is the next multiple of so many lines."""
+LABORATORY = ("samples/simulation", "tests/bench", "tests/synthetic", "tests/training")
+
+
+def sizes() -> dict[str, int]:
+    """The lines of each room, of the package, of the tests and of the laboratory."""
+    found = {room.name: room.lines for room in rooms()}
+    laboratory = {path for folder in LABORATORY for path in (ROOT / folder).rglob("*.py")}
+    tests = set((ROOT / "tests").rglob("*.py")) - laboratory
+    return {**found, "package": sum(found.values()), "tests": _lines(tests), "laboratory": _lines(laboratory)}
+
+
+def ceilings() -> dict[str, int]:
+    """The most lines that each may have."""
+    return dict(tomllib.loads(_text(CEILINGS))["lines"])
+
+
+def lowered() -> str:
+    """The file of ceilings with those lowered above which there is too much air; a new room has one, too."""
+    head, _, _ = _text(CEILINGS).partition("[lines]")
+    known = ceilings()
+    rows = (
+        f'"{name}" = {min(known.get(name, size + ROUND), -(-size // ROUND) * ROUND)}'
+        for name, size in sizes().items()
+    )
+    return head + "\n".join(["[lines]", *rows, ""])
+
+
 def main() -> None:
-    """Write both."""
+    """Write all three."""
     before, _, rest = PAGE.read_text(encoding="utf-8").partition(FIRST)
     _, _, after = rest.partition(LAST)
     PAGE.write_text(f"{before}{FIRST}\n{table()}\n\n{LAST}{after}", encoding="utf-8")
     PICTURE.write_text(picture(), encoding="utf-8")
+    CEILINGS.write_text(lowered(), encoding="utf-8")
 
 
 if __name__ == "__main__":

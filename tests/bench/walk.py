@@ -117,4 +117,4 @@ if __name__ == "__main__":
     if parser.parse_args().list:
         print(*sorted(seen.modules), *sorted(map(str, between | piped)), sep="\n")
     for room in rooms():
-        print(f"{room.name:28}{room.files:5} files{room.lines:7} lines")
+        print(f"{room.name:28}{room.lines:7} lines")

@@ -13,6 +13,12 @@ def test_the_picture_of_the_rooms_is_that_of_the_imports():
     assert architecture.PICTURE.read_text(encoding="utf-8") == architecture.picture()
 
 
+def test_no_room_is_above_its_ceiling():
+    sizes, ceilings = architecture.sizes(), architecture.ceilings()
+    assert sizes.keys() == ceilings.keys()
+    assert {name: size for name, size in sizes.items() if size > ceilings[name]} == {}
+
+
 def test_every_room_says_what_it_holds():
     assert not [room.name for room in architecture.rooms() if not room.holds]
 
