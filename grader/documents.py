@@ -78,7 +78,7 @@ class ProblemDocument(Document):
 
 
 class SheetDocument(Document):
-    """Where the sheet lies in its image."""
+    """The place of the sheet in its image."""
 
     method: str
     px_per_mm: float
@@ -98,7 +98,7 @@ class NodeDocument(Document):
 
 
 class OtherReadingDocument(Document):
-    """What else a vector may be; the confidence is that it is this one or one before it."""
+    """Another reading of a vector; the confidence is that it is this one or one before it."""
 
     length_mm: float
     direction_deg: float
@@ -124,7 +124,7 @@ class FigureDocument(Document):
 
 
 class UnreadDocument(Document):
-    """What was asked for and not read, and why."""
+    """A vector or length that was asked for and not read, and the reason."""
 
     name: str
     reason: str
@@ -141,7 +141,7 @@ class TimingDocument(Document):
 
 
 class ReadingDocument(Document):
-    """What was read on one page; `sheet` is null where the page could not be registered."""
+    """The reading of one page; `sheet` is null where the page could not be registered."""
 
     schema_version: Version = 1
     source: str
@@ -170,7 +170,7 @@ class Quantity(Document):
 
 
 class Tolerance(Document):
-    """What full marks allow."""
+    """The deviation that full marks allow."""
 
     length_mm: float | None = None
     direction_deg: float | None = None
@@ -202,7 +202,7 @@ class AppliedDecisionDocument(Document):
 
 
 class SaidDocument(Document):
-    """What the program itself said of a criterion on which a person or an audit then had a say."""
+    """The program's own verdict on a criterion that a person decided or an audit opened."""
 
     verdict: Verdict
     """Settled, or proposed to a person."""
@@ -336,7 +336,7 @@ class UnmatchedDocument(Document):
 
 
 class StandingDocument(Document):
-    """How a submission stands: its status and points, or between what they lie."""
+    """The standing of a submission: its status and points, or the range in which they lie."""
 
     status: Status
     score: float | None
@@ -451,7 +451,7 @@ class ReliabilityDocument(Document):
 
 
 class TrustDocument(Document):
-    """What the audit of a class shows.
+    """The result of auditing a class.
 
     Attributes
     ----------
@@ -606,7 +606,7 @@ class LintWorst(VariantDocument):
 
 
 class LintDocument(Document):
-    """What `planmark lint` found."""
+    """The findings of `planmark lint`."""
 
     schema_version: Version = 1
     assignment: str
@@ -618,7 +618,7 @@ class LintDocument(Document):
 
 
 class CalibrationPoint(Document):
-    """How far a point of the calibration page came out from its place, sheet mm, y down."""
+    """The residual of a point of the calibration page, sheet mm, y down."""
 
     kind: Literal["marker", "segment"]
     at_mm: tuple[float, float]
@@ -639,7 +639,7 @@ class CalibrationSegments(Document):
 
 
 class CalibrationDocument(Document):
-    """What `planmark calibrate` measured. Scales are seen over true lengths, along the upright sheet's axes.
+    """The measurements of `planmark calibrate`: scales over true lengths, along the upright sheet's axes.
 
     `scale_x` and `scale_y` are null without a stated resolution, they and the rest of a scanner's map
     for a photo (`camera`). `skew_deg` is by how much the sheet's right angle comes out wider.

@@ -1,4 +1,4 @@
-"""What one student's page says: one description, from the report."""
+"""Describe one student's page, from the report."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -85,7 +85,7 @@ WAITING: dict[str, str] = {
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """What is known of a submission beside its report: how its student and assignment are called."""
+    """The names of a submission's student and assignment, which its report does not hold."""
 
     title: str = ""
     student_name: str = ""
@@ -163,13 +163,13 @@ class StudentPage:
 
     @property
     def tally(self) -> list[tuple[str, int]]:
-        """How many criteria have each verdict that occurs."""
+        """Count the criteria by verdict; verdicts that do not occur are left out."""
         verdicts = [criterion.verdict for criterion in self.report.criteria]
         return [(verdict, verdicts.count(verdict)) for verdict in words.VERDICTS if verdict in verdicts]
 
     @property
     def problems(self) -> list[ProblemText]:
-        """What is wrong with files and sheets."""
+        """Tell the problems of files and sheets."""
         return [problem_sentence(problem, self.speaker) for problem in self.report.problems]
 
     def shown(self, name: str) -> str:
@@ -186,7 +186,7 @@ class StudentPage:
 
     @property
     def score_line(self) -> str:
-        """How the points of the rows become the score."""
+        """Explain how the points of the rows add up to the score."""
         return score_line(self.report, self.speaker)
 
     @property
@@ -196,7 +196,7 @@ class StudentPage:
 
     @property
     def remarks_of_people(self) -> list[tuple[str, str]]:
-        """What a person wrote: on the whole, then on criteria, each text once with the criteria's titles."""
+        """List a person's remarks: on the whole, then on criteria, each text once with its criteria's titles."""
         titles: dict[str, list[str]] = {}
         for row in self.report.criteria:
             if row.decided and row.decided.comment:
@@ -206,7 +206,7 @@ class StudentPage:
 
     @property
     def not_required(self) -> list[Markup]:
-        """What need not be handed in and was not; with the right value where it may be told."""
+        """List what is optional and was not handed in, with the right value where it may be told."""
         names = []
         for criterion in filter(_is_left_out, self.report.criteria):
             name = words.symbols(self.shown(criterion.drawn or criterion.id))
@@ -215,21 +215,21 @@ class StudentPage:
         return names
 
     def name(self, criterion: CriterionDocument) -> str:
-        """What a criterion is about, where its title does not say it."""
+        """Name what a criterion is about, where its title does not say it."""
         is_needed = criterion.drawn and criterion.drawn not in criterion.title
         return self.shown(criterion.drawn) if is_needed else ""
 
     def sentence(self, criterion: CriterionDocument) -> str:
-        """What is said of a criterion; nothing where its mark says it: just right, or checked by a person."""
+        """The sentence on a criterion; empty where its mark says all: just right, or checked by a person."""
         needless = (self.speaker.gettext(HINTS[code]) for code in ("right", "decided"))
         return "" if criterion.feedback in needless else criterion.feedback
 
     def measured(self, criterion: CriterionDocument) -> list[str]:
-        """What was handed in, as lines of a cell."""
+        """Write what was handed in as lines of a cell."""
         return quantity_cells(criterion.measured, self.speaker)
 
     def expected(self, criterion: CriterionDocument) -> list[str]:
-        """What is right, as lines of a cell; what is shorter than its tolerance has no direction."""
+        """Write what is right as lines of a cell; a vector shorter than its tolerance has no direction."""
         if not self.shows_expected:
             return []
         expected = criterion.expected
@@ -238,7 +238,7 @@ class StudentPage:
         return quantity_cells(expected, self.speaker)
 
     def tolerance(self, criterion: CriterionDocument) -> list[str]:
-        """What full marks allow, and why; one in per cent of what is expected would give that away."""
+        """Tell what full marks allow, and why. A tolerance in per cent would give the expected value away."""
         if not self.shows_expected:
             return []
         unit = criterion.expected.unit or criterion.measured.unit or ""
@@ -260,7 +260,7 @@ class StudentPage:
 
     @property
     def footer(self) -> str:
-        """How lengths and directions are to be understood."""
+        """Explain how lengths and directions are measured."""
         return self.speaker.gettext(UNITS)
 
     def declared(self, name: ScaleName) -> str:
@@ -268,7 +268,7 @@ class StudentPage:
         return scale_text(self.report.scales[name].declared, name, self.speaker)
 
     def remarks(self, scale: ScaleDocument) -> list[str]:
-        """How a scale was written, where it was found, why it was refused."""
+        """Tell how a scale was written, where it was found, and why it was refused."""
         source = self.speaker.gettext(words.SOURCES[scale.source]) if scale.source else ""
         return [remark for remark in (scale.text, source, scale.refused) if remark]
 
@@ -285,7 +285,7 @@ class StudentPage:
 
     @property
     def views(self) -> tuple[list[PageView], list[PageView]]:
-        """What is shown at once, and whole sheets that show no more than their plans, shown by themselves."""
+        """Choose the pictures to show at once, and the whole sheets to show by themselves."""
         pages = [page_views(picture, index, self.about.names) for index, picture in enumerate(self.pictures)]
         views = [view for page in pages for view in page]
         whole = [page[0] for page in pages if len(page) > 1 and page[0].kind == "sheet" and not page[0].names]
@@ -334,7 +334,7 @@ class StudentPage:
         return self.speaker.gettext({**PLACES, "sheet": SHEET, "detail": DETAIL}[view.kind])
 
     def _source(self, picture: Picture) -> str:
-        """Which page of which file it is."""
+        """Name the file and the page."""
         if not picture.scan:
             return f"{picture.source}, {self.speaker.gettext(AS_MEASURED)}"
         return f"{picture.source}, {self.speaker.gettext(PAGE)} {picture.page}"
@@ -412,7 +412,7 @@ class StudentPage:
 
     @property
     def likely(self) -> list[tuple[str, int]]:
-        """How many of what waits have each likeliest verdict, where something speaks for one."""
+        """Count what waits by its likeliest verdict, where something speaks for one."""
         proposed = [row.proposed for row in self.group("waiting").rows if row.probability != EVEN]
         return [(verdict, proposed.count(verdict)) for verdict in words.VERDICTS if verdict in proposed]
 

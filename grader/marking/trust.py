@@ -1,4 +1,4 @@
-"""What checked verdicts say of the others: an audit of a class, and what it opens again.
+"""The audit of a class: how many settled verdicts may be wrong, and which ones are opened again.
 
 The settled verdicts of a class stand in an order that depends on nothing but their names: the ones checked
 first are a random sample, whatever their probability, and a review that is started again goes on with it.
@@ -115,7 +115,7 @@ class Checkable:
 
 
 def said_of(report: ReportDocument, criterion: CriterionDocument) -> SaidDocument | None:
-    """What the program itself said of a criterion; None where it said nothing."""
+    """The program's own verdict on a criterion; None where it had none."""
     if criterion.id in report.said or criterion.decided is not None:
         return report.said.get(criterion.id)
     is_open = criterion.verdict == "review"
@@ -153,7 +153,7 @@ def _of_report(report: ReportDocument) -> Iterator[Checkable]:
 
 
 def _source_of(report: ReportDocument) -> Source:
-    """What a submission was read from; a photo shows one side of the sheet nearer than the other."""
+    """The source of a submission; a photo shows one side of the sheet nearer than the other."""
     sheets = [one.sheet for one in report.reading.sheets if one.sheet is not None]
     if not sheets:
         return "entered"
@@ -188,7 +188,7 @@ def next_to_check(verdicts: Sequence[Checkable], count: int) -> list[Checkable]:
 
 
 def trust_of(reports: Sequence[ReportDocument], settle: float) -> TrustDocument | None:
-    """What people checked says of a class; None before anybody has checked anything.
+    """The result of the checks in a class; None before anybody has checked anything.
 
     Arguments: `settle` is the rubric's.
     """
@@ -239,7 +239,7 @@ def _raised(checked: Sequence[Checkable], settle: float) -> float:
 def _opened(
     verdicts: Sequence[Checkable], checked: Sequence[Checkable], raised: float | None
 ) -> Iterator[OpenedDocument]:
-    """What is no longer trusted: verdicts like those found wrong, and those that are not sure enough."""
+    """List what is no longer trusted: verdicts like those found wrong, and those that are not sure enough."""
     likes = {
         LikeDocument(
             criterion=one.criterion, verdict=one.said.verdict, mistake=one.said.mistake,
@@ -265,7 +265,7 @@ def is_like(criterion: str, said: SaidDocument, like: LikeDocument) -> bool:
 
 
 def opened_in(report: ReportDocument, trust: TrustDocument | None) -> tuple[LikeDocument, ...]:
-    """What an audit opens of one submission."""
+    """The kinds of verdicts that an audit opens in one submission."""
     likes = () if trust is None else tuple(one.like for one in trust.opened)
     own = [one for one in _of_report(report) if one.said.settled] if likes else []
     return tuple(like for like in likes if any(is_like(one.criterion, one.said, like) for one in own))
@@ -291,7 +291,7 @@ def with_said(report: ReportDocument, own: Judgement, decided: Collection[str]) 
 def _reliability(
     settled: Sequence[Checkable], proposals: Sequence[Checkable]
 ) -> Iterator[ReliabilityDocument]:
-    """What was said against what was found, by source; undecidable verdicts tell nothing."""
+    """Compare stated probabilities with results, by source; undecidable verdicts are left out."""
     for kind, verdicts in (("settled", settled), ("proposed", proposals)):
         for source in get_args(Source):
             own = [one for one in verdicts if one.source == source and one.answer != "unclear"]
@@ -325,7 +325,7 @@ def _is_opened(outcome: Outcome, like: LikeDocument) -> bool:
 
 
 def said_by(outcome: Outcome) -> SaidDocument | None:
-    """What an outcome says, as it stands in a report; None where nothing was judged."""
+    """The verdict of an outcome as it stands in a report; None where nothing was judged."""
     is_open = outcome.verdict == "review"
     verdict = outcome.proposed_verdict if is_open else outcome.verdict
     if verdict == "not_judged":

@@ -1,4 +1,4 @@
-"""What the page is told of open questions: their list, and one question with its choices."""
+"""Open questions as the page gets them: their list, and one question with its choices."""
 
 import cmath
 import math
@@ -77,7 +77,7 @@ def asked_facts(session: Session, student: Student, speaker: Tongue, *, counted:
 
 
 def title_of(session: Session, doubt: Doubt, speaker: Tongue) -> Markup:
-    """What a question asks."""
+    """The title of a question."""
     names = {one.id: one for one in session.batch.rubric.criterion}
     if doubt.kind == "owner":
         return Markup.escape(speaker.gettext(WHOSE))
@@ -99,7 +99,7 @@ def title_of(session: Session, doubt: Doubt, speaker: Tongue) -> Markup:
 
 
 def _settles(doubt: Doubt | None, speaker: Tongue) -> str:
-    """How many further verdicts an answer settles; empty where it is the one alone."""
+    """Tell how many further verdicts an answer settles; empty where it settles one alone."""
     more = 0 if doubt is None else doubt.settles - 1
     return speaker.ngettext("settles %d more", "settles %d more", more) % more if more > 0 else ""
 
@@ -187,7 +187,7 @@ def _letter(key: str, words: str) -> Markup:
 def _doubt_numbers(
     student: Student, doubt: Doubt, after: Mapping[str, CriterionDocument], speaker: Tongue
 ) -> Iterator[tuple[str, Markup]]:
-    """Of a place its vector, beside the one expected; of a scale what was declared and drawn with.
+    """List the vector of each place beside the expected one, or the declared scale beside the drawn one.
 
     Arguments: `after` are the criteria as judged with the likeliest answer; empty where none is offered.
     """
@@ -214,7 +214,7 @@ def _doubt_numbers(
 
 
 def _doubt_look(session: Session, student: Student, doubt: Doubt, first: CriterionDocument) -> Facts | None:
-    """Where to look: both strokes of a place, the writing of a scale, else the first vector."""
+    """The part of a scan to show: both strokes of a place, the writing of a scale, else the first vector."""
     look = look_of(session, student, first)
     if look is None:
         return None

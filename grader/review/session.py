@@ -42,7 +42,7 @@ MOST_COMMENTS = 30
 
 
 class ChangedError(PlanmarkError):
-    """What a person answered is no longer what it was when the question was shown; `there` decided it."""
+    """The question was decided by somebody else (`there`) after it had been shown."""
 
     exit_status = 1
 
@@ -83,7 +83,7 @@ class Student:
 
     @property
     def key(self) -> str:
-        """What it is called between page and server; it stays when others come to the class."""
+        """The name used between page and server; it stays when others come to the class."""
         return self.job.folder
 
     def criterion(self, name: str) -> CriterionDocument:
@@ -95,7 +95,7 @@ class Student:
 
 
 class Said(BaseModel):
-    """What every post says: who decides, and in which window."""
+    """The fields of every post: who decides, and in which window."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
@@ -105,7 +105,7 @@ class Said(BaseModel):
 
 @posted(config=Said.model_config, frozen=True, slots=True)
 class Answer:
-    """What a person decided on one criterion.
+    """A person's decision on one criterion.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ class Answer:
 
 
 class Whole(Said):
-    """What a person said of a whole submission: a comment, points added, the marks of what stood there."""
+    """A person's remarks on a whole submission: a comment, points added, the marks of what stood there."""
 
     student: str
     comment: str = ""
@@ -159,13 +159,13 @@ def _stands(standing: StandingDocument | None) -> str:
 
 
 class Standing:
-    """What stands decided: rows by what they are about."""
+    """The decisions in force, by their subject."""
 
     def __init__(self, rows: Sequence[Decision]) -> None:
         self.rows = {row.key: row for row in rows}
 
     def key(self, student: Student, criterion: str) -> Key:
-        """What a row on a student's criterion is about: people may leave the position blank."""
+        """The subject of a row on a student's criterion; people may leave the position blank."""
         report = student.report
         blank = (report.student_id, None, criterion)
         return blank if blank in self.rows else (report.student_id, report.position, criterion)
@@ -261,7 +261,7 @@ class Session:
     # Decisions ------------------------------------------------------------------------------------
 
     def standing(self) -> Standing:
-        """What stands decided now. Raises InputFileError for a file that people have broken."""
+        """Read the decisions in force. Raises InputFileError for a file that people have broken."""
         return Standing(self._file.all())
 
     def decide(self, answers: Sequence[Answer], by: str, window: str) -> list[Student]:
@@ -390,7 +390,7 @@ class Session:
             self.note(by, about, _said(there.get(key)) or self._marked(key), _said(now.get(key)))
 
     def _marked(self, key: Key) -> str:
-        """What the program says of what a decision is about."""
+        """The program's own mark of a decision's subject."""
         for student in self.students:
             if key[0] == student.report.student_id and key[1] in {None, student.report.position}:
                 return next((one.verdict for one in student.report.criteria if one.id == key[2]), "")
@@ -461,7 +461,7 @@ class Session:
         return opened.model_copy(update={"criteria": criteria})
 
     def sentence_if(self, student: Student, criterion: CriterionDocument) -> str:
-        """What the student is told of a criterion, if what is proposed is accepted."""
+        """The sentence that the student reads if the proposal is accepted."""
         if criterion.verdict != OPEN or criterion.proposed is None:
             return criterion.feedback
         after = {
@@ -539,7 +539,7 @@ class Session:
         return [(refs[place], problem) for place, problem in found.items() if place in refs]
 
     def owner_of(self, ref: PageRef, row: Decision | None) -> Student | None:
-        """Whose a page is, by a decision or as it was found."""
+        """The owner of a page, by a decision or as found."""
         said = None if row is None else row.page.owner
         for student in self.students:
             report = student.report
@@ -553,7 +553,7 @@ class Session:
     # What is seen ---------------------------------------------------------------------------------
 
     def scene(self, student: Student, sheet: int) -> Scene | None:
-        """What was read on one of a student's pages; None of a refused one."""
+        """The scene of what was read on one of a student's pages; None for a refused page."""
         construction = self._construction(student)
         page = self.pages_of(student)[sheet]
         if page.sheet is None or construction is None:
@@ -600,7 +600,7 @@ class Session:
 
 
 def page_criterion(ref: PageRef) -> str:
-    """How decisions name a page."""
+    """The name of a page in decisions."""
     return f"page:{ref.file}#{ref.page}"
 
 
@@ -610,7 +610,7 @@ def mark_of(row: Decision | None) -> str:
 
 
 def _said(row: Decision | None) -> str:
-    """What a row decides, in short."""
+    """Summarise what a row decides."""
     if row is None:
         return ""
     points = "" if row.points is None else f"{row.points:g}"
