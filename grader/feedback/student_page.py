@@ -196,7 +196,7 @@ class StudentPage:
 
     @property
     def remarks_of_people(self) -> list[tuple[str, str]]:
-        """List a person's remarks: on the whole, then on criteria, each text once with its criteria's titles."""
+        """List a person's remarks: on the whole, then on criteria, each text once with their titles."""
         titles: dict[str, list[str]] = {}
         for row in self.report.criteria:
             if row.decided and row.decided.comment:
