@@ -281,12 +281,15 @@ def serve(
         str | None,
         typer.Option("--database", help="postgresql+psycopg://...; SQLite in the folder if not given."),
     ] = None,
+    mail: Annotated[
+        str | None, typer.Option("--mail", help="smtps://USER@HOST/SENDER sends links to new passwords.")
+    ] = None,
     jobs: JobsOption = None,
 ) -> None:
     """Serve students' self-check and instructors' classes as a web application."""
     from grader.cli.serving import serve as serve_folder
 
-    serve_folder(data, host=host, port=port, address=address, database=database, jobs=jobs)
+    serve_folder(data, host=host, port=port, address=address, database=database, mail=mail, jobs=jobs)
 
 
 @app.command()

@@ -65,7 +65,14 @@ class Bounded(H11Protocol):
 
 
 def serve(
-    data: Path, *, host: str, port: int, address: str | None, database: str | None, jobs: int | None
+    data: Path,
+    *,
+    host: str,
+    port: int,
+    address: str | None,
+    database: str | None,
+    mail: str | None,
+    jobs: int | None,
 ) -> None:
     """Serve the web application until it is ended.
 
@@ -86,6 +93,7 @@ def serve(
             data,
             address or f"http://{shown}:{listener.getsockname()[1]}",
             database,
+            mail,
             jobs=jobs or os.cpu_count() or 1,
         )
         app = application(settings)

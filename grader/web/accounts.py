@@ -3,6 +3,7 @@
 import hmac
 import secrets
 import time
+from collections.abc import Collection
 from typing import Annotated, Any
 
 import pyotp
@@ -13,7 +14,16 @@ from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
 from grader.language import N_
-from grader.web.guard import INVITATION, NO_TOKENS, RESET, RefusedError, hash_of, is_password, missing
+from grader.web.guard import (
+    INVITATION,
+    MAILED,
+    NO_TOKENS,
+    RESET,
+    RefusedError,
+    hash_of,
+    is_password,
+    missing,
+)
 from grader.web.service import Call, Called, Key, Route, Row
 from grader.web.store import Account, Visit, digest_of
 from grader.web.students import Strict
@@ -23,8 +33,9 @@ Name = Annotated[str, Field(min_length=1, max_length=80, pattern=r"^[^\x00-\x1f\
 Password = Annotated[str, Field(min_length=1, max_length=200)]
 Token = Annotated[str, Field(min_length=1, max_length=200)]
 Code = Annotated[str, Field(pattern=r"^([0-9]{6})?$")]
-INVITED_S = 7 * 86400.0
-"""An invitation is valid for a week."""
+Email = Annotated[str, Field(max_length=200, pattern=r"^[A-Za-z0-9.!#$%&'*+/=?^_`{|}~-]+@[A-Za-z0-9.-]+$")]
+VALID_S = {INVITATION: 7 * 86400.0, RESET: 7 * 86400.0, MAILED: 3600.0}
+"""How long what was sent is valid: a letter is read soon, and lies about for long."""
 STEP_S = 30
 """A code of a device is for so long (RFC 6238)."""
 OVER = N_("this invitation is not valid any more: ask for a new one")
@@ -55,6 +66,18 @@ class NewPassword(Strict):
     """A password in the place of another."""
 
     old: Password
+    password: Password
+
+
+class Forgotten(Strict):
+    """Where a link to a new password is to be sent."""
+
+    email: Email
+
+
+class OwnEmail(Forgotten):
+    """Where the own links are to be sent."""
+
     password: Password
 
 
@@ -104,7 +127,7 @@ def invite(call: Called, name: Annotated[Name, Query()], *, is_admin: bool = Fal
 @router.post("/accounts/join")
 def join(call: Called, who: Invited) -> dict[str, Any]:
     """Answer an invitation: the account gets its password."""
-    waiting, account = _answered(call, who.token, INVITATION)
+    waiting, account = _answered(call, who.token, {INVITATION})
     if account.password:
         raise RefusedError(403, "invitation", OVER)
     other = call.session.scalar(select(Account).where(Account.name == who.name, Account.id != account.id))
@@ -131,11 +154,30 @@ def allow_reset(call: Called, number: Row) -> dict[str, str]:
 @router.post("/accounts/reset")
 def reset(call: Called, who: Reset) -> dict[str, str]:
     """Choose a new password by a link; all visits and tokens of the account end."""
-    _, account = _answered(call, who.token, RESET)
+    _, account = _answered(call, who.token, {RESET, MAILED})
     account.password = hash_of(who.password, account.name)
     call.session.execute(delete(Visit).where(Visit.account_id == account.id))
     call.note("password reset", account.name)
     return {"state": "changed"}
+
+
+@router.post("/accounts/forgotten", status_code=202)
+def forgotten(call: Called, who: Forgotten) -> dict[str, str]:
+    """Send a link to a new password, good for an hour; whether the address is an account's is not told."""
+    if not call.service.settings.mail:
+        raise missing()
+    call.service.guard.count("forgotten", [call.visitor.address])
+    call.service.mail.put(who.email.lower(), call.lang)
+    return {"state": "asked"}
+
+
+@router.put("/account/email")
+def set_email(call: Called, new: OwnEmail) -> dict[str, str]:
+    """Say where links to a new password are to be sent."""
+    account = _proved(call, new.password)
+    account.email = new.email.lower()
+    call.note("e-mail set", account.name)
+    return {"state": "set"}
 
 
 @router.put("/account/password")
@@ -143,7 +185,8 @@ def change_password(call: Called, new: NewPassword) -> dict[str, Any]:
     """Change the own password; the account's other visits end."""
     account = _proved(call, new.old)
     account.password = hash_of(new.password, account.name)
-    call.session.execute(delete(Visit).where(Visit.account_id == account.id, Visit.title == ""))
+    ended = delete(Visit).where(Visit.account_id == account.id, Visit.title.in_(NO_TOKENS))
+    call.session.execute(ended)
     call.visitor.visit = None
     call.note("password changed", account.name)
     return _entered(call, account)
@@ -236,9 +279,7 @@ def new_token(call: Called, title: Annotated[Name, Query()]) -> dict[str, str]:
 @router.get("/tokens")
 def tokens(call: Called) -> list[dict[str, Any]]:
     """The instructor's tokens, without their secrets."""
-    own = select(Visit).where(
-        Visit.account_id == call.account.id, Visit.title.not_in(("", INVITATION, RESET))
-    )
+    own = select(Visit).where(Visit.account_id == call.account.id, Visit.title.not_in(NO_TOKENS))
     return [{"id": one.id, "title": one.title, "created": one.created} for one in call.session.scalars(own)]
 
 
@@ -264,13 +305,13 @@ def invitation(session: Session, name: str, *, is_admin: bool) -> str:
     return token
 
 
-def _answered(call: Call, token: str, kind: str) -> tuple[Visit, Account]:
+def _answered(call: Call, token: str, kinds: Collection[str]) -> tuple[Visit, Account]:
     """What a link that was sent stands for. Raises RefusedError for one that is used, too old, or none."""
     call.service.guard.count("sign_in", [call.visitor.address])
     waiting = call.session.get(Visit, digest_of(token))
-    if waiting is None or waiting.title != kind or waiting.account is None:
+    if waiting is None or waiting.title not in kinds or waiting.account is None:
         raise RefusedError(403, "invitation", OVER)
-    if time.time() - waiting.created > INVITED_S:
+    if time.time() - waiting.created > VALID_S[waiting.title]:
         raise RefusedError(403, "invitation", N_("this invitation is too old: ask for a new one"))
     return waiting, waiting.account
 

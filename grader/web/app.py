@@ -18,6 +18,7 @@ from grader import __version__
 from grader.language import tongue
 from grader.web import accounts, claims, instructors, lti, pages, students
 from grader.web.guard import Guard, RefusedError, Rim
+from grader.web.mail import Mail
 from grader.web.queue import Photo, Queue
 from grader.web.reviews import Reviews
 from grader.web.self_check import checked_photo
@@ -50,11 +51,13 @@ def application(settings: Settings, photo: Photo = checked_photo) -> FastAPI:
     Raises CallError for a data base that cannot be opened.
     """
     store = Store(settings.database)
-    service = Service(settings, store, Guard(settings, store), Queue(settings, store, photo))
+    jobs, mail = Queue(settings, store, photo), Mail(settings, store)
+    service = Service(settings, store, Guard(settings, store), jobs, mail)
 
     @asynccontextmanager
     async def running(_app: FastAPI) -> AsyncIterator[None]:
         service.queue.start()
+        service.mail.start()
         ended = asyncio.Event()
         forgetting = asyncio.create_task(_forget(store, settings.keep_days, ended))
         yield

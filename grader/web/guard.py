@@ -44,7 +44,9 @@ INVITATION = "invitation"
 """The title of a visit that stands for an invitation: it makes an account, and opens nothing else."""
 RESET = "reset"
 """The title of a visit that stands for a link to a new password."""
-NO_TOKENS = frozenset({"", INVITATION, RESET})
+MAILED = "mailed"
+"""The same of a link that was sent by e-mail."""
+NO_TOKENS = frozenset({"", INVITATION, RESET, MAILED})
 """Titles of visits that are no program's token."""
 SESSION_S = 7 * 86400.0
 """A visit in which an instructor is signed in ends after a week, however it is used."""
@@ -68,6 +70,7 @@ HEADERS = {
 RATES: dict[str, RateLimitItem] = {
     "sign_in": RateLimitItemPerMinute(10),
     "code": RateLimitItemPerHour(20),
+    "forgotten": RateLimitItemPerHour(20),
     "check": RateLimitItemPerMinute(60),
     "photo": RateLimitItemPerMinute(10),
     "key": RateLimitItemPerMinute(60),

@@ -46,7 +46,18 @@ from grader.web.store import (
     Sheet,
     digest_of,
 )
-from grader.web.students import WITHOUT_NUL, JobState, Lang, Strict, queued, state_of
+from grader.web.students import (
+    HANDING_IN,
+    WITHOUT_NUL,
+    JobState,
+    Lang,
+    Strict,
+    check_pages,
+    pages_in,
+    queued,
+    state_of,
+    trial_of,
+)
 from reference.authored.assignment import built_in
 from reference.errors import PlanmarkError
 
@@ -305,10 +316,20 @@ def put_file(call: Called, key: Key, name: FileName, body: Body, *, replace: boo
             422, "file_name", "upload the roster as the roster; decisions are made in the review"
         )
     stored = stored_name(called)
-    sent = select(Sheet.id).where(Sheet.publication_id == own.id, Sheet.file == stored)
-    if call.session.scalar(sent) is not None:
-        raise RefusedError(409, "file_exists", f"{called}: a student has handed this in; choose another name")
-    is_same = call.places(own).keep(called, body, replace=replace)
+    with trial_of(call, own, PurePath(stored).suffix, body) as trial:
+        pages = pages_in(call, own, trial)
+        with HANDING_IN:
+            known = select(Sheet).where(Sheet.publication_id == own.id, Sheet.file == stored)
+            sheet = call.session.scalar(known) or Sheet(publication_id=own.id, student_id="", file=stored)
+            if sheet.student_id:
+                why = f"{called}: a student has handed this in; choose another name"
+                raise RefusedError(409, "file_exists", why)
+            check_pages(call, own, pages, replaced=stored)
+            is_same = call.places(own).keep(called, body, replace=replace)
+            sheet.pages = pages
+            call.session.add(sheet)
+            call.session.flush()
+            trial.unlink()
     call.note("file", f"{key} {called}")
     return {"name": called, "is_same": is_same}
 

@@ -39,6 +39,7 @@ TEXTS = {
     "uploaded": N_("%(done)s of %(total)s files are there"),
     "refused": N_("These files were not taken:"),
     "sure": N_("This cannot be undone. Go on?"),
+    "mailed": N_("If this is an account's address, a link to a new password is on its way."),
     "sent": N_("Your request waits for the instructor."),
     "queued": N_("Waiting ..."),
     "opening": N_("Opening files"),
@@ -67,6 +68,7 @@ def page(call: Call, name: str, status: int = 200, /, **known: Any) -> Response:
             token=guard.form_token(call.visitor),
             account=call.visitor.account,
             path=call.request.url.path,
+            has_mail=bool(call.service.settings.mail),
             **known,
         )
     )
@@ -101,8 +103,14 @@ def join(call: Called, token: str = "") -> Response:
 
 @router.get("/reset")
 def reset(call: Called, token: str = "") -> Response:
-    """The form by which somebody chooses a new password, by an administrator's link."""
+    """The form by which somebody chooses a new password, by a link."""
     return page(call, "sign_in.html", secret=token[:200], kind="reset")
+
+
+@router.get("/forgotten")
+def forgotten(call: Called) -> Response:
+    """The form by which somebody is sent a link to a new password."""
+    return page(call, "sign_in.html", secret="", kind="forgotten")
 
 
 @router.get("/c/{key}")

@@ -12,6 +12,7 @@ from sqlalchemy.orm import Session
 
 from grader.language import LANGUAGES, N_
 from grader.web.guard import Guard, RefusedError, Visitor, forbidden, missing
+from grader.web.mail import Mail
 from grader.web.places import Places, places_of
 from grader.web.queue import Queue
 from grader.web.settings import Settings
@@ -28,6 +29,7 @@ class Service:
     store: Store
     guard: Guard
     queue: Queue
+    mail: Mail
 
 
 @dataclass(slots=True)

@@ -2,6 +2,7 @@
 
 import os
 import secrets
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -12,6 +13,7 @@ from reference.errors import CallError
 
 SECRET = "PLANMARK_SECRET"  # noqa: S105 - the name of the variable
 DATABASE = "PLANMARK_DATABASE"
+MAIL = "PLANMARK_MAIL"
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
 LEAST_SECRET = 32
 """Signs of the secret that signs links and forms: fewer could be tried out."""
@@ -32,15 +34,18 @@ class Settings:
     photos : photos that are checked at once, each in a process with these limits
     upload_mb, photo_mb : what a file of a class, and a photo, may have
     student_pages, class_pages : that a student may hand in, and all students of a class together
+    upload_pages : of all files of a class, with those that instructors upload
     photo_pages : of a file that is checked
-    student_seconds, class_seconds : of checking photos in an hour
+    sender_seconds : in an hour, of checking one person's photos and of counting the pages of their files
+    class_seconds : of those of all without a personal link together
     keep_days : how long visits, photos' results and the audit trail are kept
     link_days : how long a personal link is valid
+    mail : the server of e-mail and the sender, ``smtps://USER:PASSWORD@HOST/SENDER``; empty without one
     """
 
     data: Path
     database: str
-    secret: str
+    secret: str = field(repr=False)
     address: str = "http://127.0.0.1:8000"
     jobs: int = 1
     limits: Limits = field(default_factory=Limits)
@@ -49,11 +54,13 @@ class Settings:
     photo_mb: int = 30
     student_pages: int = 40
     class_pages: int = 4000
+    upload_pages: int = 10_000
     photo_pages: int = 10
-    student_seconds: float = 300.0
+    sender_seconds: float = 300.0
     class_seconds: float = 3600.0
     keep_days: float = 365.0
     link_days: float = 200.0
+    mail: str = field(default="", repr=False)
 
     @property
     def is_https(self) -> bool:
@@ -75,20 +82,34 @@ class Settings:
         return text.replace(f"{self.data.resolve()}{os.sep}", "").replace(f"{self.data}{os.sep}", "")
 
 
-def settings_of(data: Path, address: str, database: str | None = None, *, jobs: int = 1) -> Settings:
+def settings_of(
+    data: Path, address: str, database: str | None = None, mail: str | None = None, *, jobs: int = 1
+) -> Settings:
     """The settings of a data folder; its secret is made once, if the environment has none.
 
-    Raises CallError for an address without a scheme and for a short secret, OutputError where the folder
-    cannot be written.
+    Raises CallError for an address or a mail server that is none and for a short secret, OutputError where
+    the folder cannot be written.
     """
     parts = urlsplit(address)
     if parts.scheme not in {"http", "https"} or not parts.netloc or parts.path.strip("/"):
         raise CallError("address", f"--address {address}: write it as https://NAME or http://NAME:PORT")
     make_folder(data)
     url = database or os.environ.get(DATABASE) or f"sqlite:///{data.resolve() / 'planmark.sqlite'}"
-    return Settings(
-        data, url, _secret(data), address.rstrip("/"), jobs=jobs, photos=max(1, (os.cpu_count() or 1) - 1)
-    )
+    photos = max(1, (os.cpu_count() or 1) - 1)
+    mail = _mail(mail or os.environ.get(MAIL, ""))
+    return Settings(data, url, _secret(data), address.rstrip("/"), jobs=jobs, photos=photos, mail=mail)
+
+
+def _mail(url: str) -> str:
+    with suppress(ValueError):
+        parts = urlsplit(url)
+        is_port = parts.port != 0  # raises where it is no number
+        if not url or (
+            parts.scheme in {"smtp", "smtps"} and parts.hostname and "@" in parts.path and is_port
+        ):
+            return url
+    why = "write it as smtps://USER:PASSWORD@HOST/SENDER, or with smtp:// where the server does STARTTLS"
+    raise CallError("mail", f"--mail: {why}; SENDER is the address that letters come from")
 
 
 def _secret(data: Path) -> str:

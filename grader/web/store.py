@@ -58,6 +58,7 @@ class Account(Table):
     password : an Argon2 hash, empty until an invitation is answered
     totp : the secret of the second factor, empty without one
     totp_used : the last step of time of which a code was taken
+    email : in small letters, for a link to a new password; empty where none was given
     """
 
     __tablename__ = "accounts"
@@ -68,6 +69,7 @@ class Account(Table):
     created: Mapped[float] = mapped_column(default=time.time)
     totp: Mapped[str] = mapped_column(String(64), default="", server_default="")
     totp_used: Mapped[int] = mapped_column(default=0, server_default="0")
+    email: Mapped[str] = mapped_column(String(200), default="", server_default="", index=True)
 
 
 class Visit(Table):
@@ -141,10 +143,11 @@ class Link(Table):
 
 
 class Sheet(Table):
-    """A version that a student handed in; its row outlives the file, so that no name is given twice.
+    """A file that was handed in; a student's version, whose row outlives it, so that no name is given twice.
 
     Attributes
     ----------
+    student_id : empty for what an instructor uploaded
     file : the name under which it is stored
     shown : the person's own name of it, for people alone
     pages : that count for the budgets of the student and of the class
@@ -183,7 +186,7 @@ class Job(Table):
     publication_id: Mapped[int] = mapped_column(ForeignKey("publications.id", ondelete="CASCADE"), index=True)
     publication: Mapped[Publication] = relationship(lazy="joined")
     kind: Mapped[str] = mapped_column(String(10))
-    """``grade`` or ``photo``."""
+    """``grade``, ``photo``, or ``count`` of the pages of a file that was sent."""
     state: Mapped[str] = mapped_column(String(10), default="queued", index=True)
     """``queued``, ``running``, ``done``, ``failed`` or ``cancelled``."""
     asked: Mapped[dict[str, Any]] = mapped_column(default=dict)
@@ -195,7 +198,7 @@ class Job(Table):
     visit_id: Mapped[str] = mapped_column(String(64), default="")
     """Whose photo it is."""
     sender: Mapped[str] = mapped_column(String(100), default="", server_default="")
-    """``student:ID`` of a personal link, else ``visit:ID``: whose seconds it takes."""
+    """Whose seconds it takes: ``student:ID`` of a personal link, ``account:ID``, else ``visit:ID``."""
     created: Mapped[float] = mapped_column(default=time.time)
     started: Mapped[float | None] = mapped_column(default=None)
     ended: Mapped[float | None] = mapped_column(default=None)
@@ -372,7 +375,7 @@ class Store:
         before = moment - days * 86400.0
         with self.session() as session:
             session.execute(delete(Visit).where(Visit.used < before, Visit.title == ""))
-            session.execute(delete(Job).where(Job.created < moment - 86400.0, Job.kind == "photo"))
+            session.execute(delete(Job).where(Job.created < moment - 86400.0, Job.kind != "grade"))
             session.execute(delete(Audit).where(Audit.at < before))
 
 

@@ -19,9 +19,10 @@ from sqlalchemy.exc import IntegrityError
 
 from grader.documents import ReportDocument
 from grader.files import make_folder, result_folders, write_whole
-from grader.folder.workers import result_of
+from grader.folder.workers import guarded, result_of
 from grader.language import N_
 from grader.lms.export import read_results
+from grader.records import Problem
 from grader.review.server import page_file
 from grader.scan.decode.pages import count_pages
 from grader.web.guard import RefusedError, forbidden, missing
@@ -41,8 +42,8 @@ MOST_WAITING = 200
 """Photos in the queue: at two seconds each the last one would wait for seven minutes."""
 MOST_SHEETS = 40
 """That one student may hand in: ten times a plan of four pages."""
-_HANDING_IN = threading.Lock()
-"""Two sheets sent at once have two names."""
+HANDING_IN = threading.Lock()
+"""Two sheets sent at once have two names, and count together."""
 _PICTURES = {
     b"\xff\xd8\xff": ".jpg",
     b"\x89PNG": ".png",
@@ -162,22 +163,24 @@ def may_check_photo(call: Called, key: Key) -> Publication:
 
 
 def _sender(call: Call, publication: Publication) -> str:
-    """Whose seconds a photo takes: a cookie costs nothing, a personal link is one student's."""
+    """Whose seconds a file takes: a cookie costs nothing, a personal link is one student's."""
     link, visit = call.link(publication), call.visitor.visit
+    if call.visitor.account is not None:
+        return f"account:{call.visitor.account.id}"
     return f"student:{link.student_id}" if link is not None else f"visit:{visit.id if visit else ''}"
 
 
 def _check_seconds(call: Call, publication: Publication) -> None:
-    """Raise RefusedError where the photos of an hour have taken as long as they may.
+    """Raise RefusedError where the files of an hour have taken as long as they may.
 
     Each student by a personal link has an own budget; all without one share that of the class.
     """
     settings, sender = call.service.settings, _sender(call, publication)
     spent = select(func.sum(Job.ended - Job.started)).where(
-        Job.kind == "photo", Job.publication_id == publication.id, Job.created > time.time() - 3600.0
+        Job.kind != "grade", Job.publication_id == publication.id, Job.created > time.time() - 3600.0
     )
-    if (call.session.scalar(spent.where(Job.sender == sender)) or 0.0) > settings.student_seconds:
-        why = N_("checking your photos took very long: send the next one in an hour")
+    if (call.session.scalar(spent.where(Job.sender == sender)) or 0.0) > settings.sender_seconds:
+        why = N_("your files took very long: send the next one in an hour")
         raise RefusedError(429, "seconds", why)
     strangers = spent.where(Job.sender.startswith("visit:"))
     is_stranger = sender.startswith("visit:")
@@ -201,13 +204,9 @@ def check_photo(
     ending = ending_of(body)
     assignment = assignment_of(call.service.settings.data, publication)
     variant = variant_of(assignment, n, position)
-    left = use_attempt(call, publication, variant)
-    places = call.places(publication)
-    name = f"{secrets.token_hex(12)}{ending}"
-    write_whole(places.photos / name, body)
     most = call.service.settings.photo_pages
-    with _without(places.photos / name):
-        pages = pages_in(call, places.photos / name)
+    with trial_of(call, publication, ending, body) as path:
+        pages = pages_in(call, publication, path)
         if pages > most:
             raise RefusedError(
                 413,
@@ -216,8 +215,9 @@ def check_photo(
                 pages=pages,
                 most=most,
             )
+        left = use_attempt(call, publication, variant)
     asked = {
-        "file": name, "assignment": str(assignment.path), "n": n, "position": position, "lang": lang,
+        "file": path.name, "assignment": str(assignment.path), "n": n, "position": position, "lang": lang,
         "level": _level(publication), "attempts_left": left,
     }  # fmt: skip
     visit = call.service.guard.begin(call.session, call.visitor)
@@ -324,14 +324,11 @@ def hand_in(
 ) -> dict[str, Any]:
     """Hand in a sheet: one more version, stored by its time and content; none is ever replaced."""
     publication, link = asked
-    places = call.places(publication)
-    folder, ending = places.handed_in, ending_of(body)
-    trial = places.photos / f"{secrets.token_hex(12)}{ending}"
-    with _without(trial):
-        write_whole(trial, body)
-        pages = pages_in(call, trial)
-        with _HANDING_IN:
-            _check_pages(call, publication, link, pages)
+    folder, ending = call.places(publication).handed_in, ending_of(body)
+    with trial_of(call, publication, ending, body) as trial:
+        pages = pages_in(call, publication, trial)
+        with HANDING_IN:
+            check_pages(call, publication, pages, student=link.student_id)
             at = datetime.now(UTC)
             digest = hashlib.sha256(body).hexdigest()[:8]
             file = f"{link.student_id}_sent{at:%Y%m%dT%H%M%S%f}-{digest}{ending}"
@@ -347,19 +344,25 @@ def hand_in(
     return version_of(sheet)
 
 
-def _check_pages(call: Call, publication: Publication, link: Link, pages: int) -> None:
-    """Raise RefusedError where a student, or the class, has handed in as much as may be handed in."""
+def check_pages(
+    call: Call, publication: Publication, pages: int, *, student: str = "", replaced: str = ""
+) -> None:
+    """Raise RefusedError where a student, or the class, has handed in as much as may be handed in.
+
+    Arguments: `student` is empty for an instructor, `replaced` a file whose pages are so many from now on.
+    """
     settings = call.service.settings
-    there = {path.name for path in call.places(publication).submitted()}
-    taken = sum(name.startswith(f"{link.student_id}_sent") for name in there)
-    if taken >= MOST_SHEETS:
-        raise RefusedError(403, "sheets", N_("%(count)s sheets of yours are there already"), count=taken)
+    there = {path.name for path in call.places(publication).submitted()} - {replaced}
     sheets = call.session.scalars(select(Sheet).where(Sheet.publication_id == publication.id))
     known = [(one.student_id, one.pages) for one in sheets if one.file in there]
-    left = min(
-        settings.student_pages - sum(count for student, count in known if student == link.student_id),
-        settings.class_pages - sum(count for _, count in known),
-    )
+    own = [count for sender, count in known if sender == student]
+    left = settings.upload_pages - sum(count for _, count in known)
+    if student:
+        if len(own) >= MOST_SHEETS:
+            why = N_("%(count)s sheets of yours are there already")
+            raise RefusedError(403, "sheets", why, count=len(own))
+        of_students = sum(count for sender, count in known if sender)
+        left = min(left, settings.student_pages - sum(own), settings.class_pages - of_students)
     if pages > left:
         why = N_("this file has %(pages)s pages: %(left)s more may be handed in")
         raise RefusedError(403, "pages", why, pages=pages, left=max(0, left))
@@ -457,21 +460,40 @@ def ending_of(body: bytes) -> str:
     return ending
 
 
-def pages_in(call: Call, path: Path) -> int:
-    """Number of pages of a stored file, counted in a worker. Raises InputFileError for a damaged one."""
-    if path.suffix not in {".pdf", ".tif"}:
+def pages_in(call: Call, publication: Publication, path: Path) -> int:
+    """Number of pages of a stored file, counted in a worker in the sender's seconds.
+
+    Raises RefusedError for a damaged one, and for a sender who has none left.
+    """
+    if path.suffix.lower() not in {".pdf", ".tif", ".tiff"}:
         return 1
+    _check_seconds(call, publication)
+    sender, now = _sender(call, publication), time.time()
     try:
-        return result_of(call.service.queue.workers, count_pages, path)
-    except InputFileError as error:
-        raise RefusedError(422, error.code, error.message.replace(path.name, "the file")) from error
+        pages, seconds = result_of(call.service.queue.workers, counted, path)
+    except InputFileError as error:  # its worker was ended
+        pages, seconds = Problem(error.code, error.message), call.service.settings.limits.seconds
+    times = {"started": now - seconds, "ended": now}
+    call.session.add(Job(publication=publication, kind="count", state="done", sender=sender, **times))
+    call.session.commit()
+    if isinstance(pages, Problem):
+        raise RefusedError(422, pages.code, pages.message.replace(path.name, "the file"))
+    return pages
+
+
+def counted(path: Path) -> tuple[int | Problem, float]:
+    """Number of pages of a file, or why it has none, and how long it took; in a worker."""
+    began = time.process_time()
+    return guarded(count_pages, path), time.process_time() - began
 
 
 @contextlib.contextmanager
-def _without(path: Path) -> Iterator[None]:
-    """Delete a file again where what is done with it fails."""
+def trial_of(call: Call, publication: Publication, ending: str, body: bytes) -> Iterator[Path]:
+    """A stored file, which is deleted again where what is done with it fails."""
+    path = call.places(publication).photos / f"{secrets.token_hex(12)}{ending}"
     try:
-        yield
+        write_whole(path, body)
+        yield path
     except BaseException:
         path.unlink(missing_ok=True)
         raise

@@ -8,7 +8,7 @@ from grader.cli import serving
 from grader.web.settings import SECRET
 from reference.errors import CallError
 
-CALL = {"host": "127.0.0.1", "port": 0, "address": None, "database": None, "jobs": 1}
+CALL = {"host": "127.0.0.1", "port": 0, "address": None, "database": None, "mail": None, "jobs": 1}
 
 
 @pytest.fixture
