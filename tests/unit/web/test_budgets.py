@@ -25,7 +25,7 @@ def pdf(pages):
 
 @pytest.fixture
 def settings(settings):
-    return replace(settings, student_pages=6, class_pages=8, photo_pages=3)
+    return replace(settings, student_pages=6, class_pages=8, upload_pages=12, photo_pages=3)
 
 
 def sent(browser, key, pages):
@@ -65,6 +65,41 @@ def test_a_photo_is_no_book(graded, student, settings):
     answer = student.act("POST", path, content=pdf(4))
     assert (answer.status_code, answer.json()["code"]) == (413, "pages")
     assert not list(settings.data.rglob("photos/*"))
+
+
+def uploaded(browser, key, name, pages, how=""):
+    answer = browser.act("PUT", f"/publications/{key}/files/{name}{how}", content=pdf(pages))
+    return answer.status_code, answer.json().get("message", "")
+
+
+def test_pages_that_instructors_upload_are_counted_and_told_at_once(admin, graded, student, settings):
+    key, _ = graded  # with two files of measurements
+    assert uploaded(admin, key, "class.pdf", 6) == (200, "")
+    assert sent(student, key, 3)[0] == 201
+    status, message = uploaded(admin, key, "more.pdf", 2)
+    assert (status, "2 pages: 1 more" in message) == (403, True)
+    assert "1 more" in sent(student, key, 2)[1]
+    assert uploaded(admin, key, "class.pdf", 7, "?replace=true") == (200, "")
+    assert uploaded(admin, key, "one.pdf", 1)[0] == 403
+    assert admin.act("DELETE", f"/publications/{key}/files/class.pdf").status_code == 200
+    assert uploaded(admin, key, "one.pdf", 1) == (200, "")
+    broken = admin.act("PUT", f"/publications/{key}/files/broken.pdf", content=b"%PDF-1.4 and nothing else")
+    assert (broken.status_code, "cut off" in broken.json()["message"]) == (422, True)
+    assert not list(settings.data.rglob("photos/*"))
+    assert not list(settings.data.rglob("broken.pdf"))
+
+
+def test_seconds_of_counting_pages_are_the_senders_own(admin, colleague, graded, service):
+    key, _ = graded
+    number = next(one["id"] for one in admin.get("/api/v1/accounts").json() if one["name"] == "Ion")
+    assert admin.act("PUT", f"/publications/{key}/members/{number}").status_code == 200
+    assert uploaded(admin, key, "first.pdf", 1) == (200, "")
+    with service.store.session() as session:
+        job = session.query(Job).filter_by(kind="count").one()
+        job.started -= service.settings.sender_seconds + 1.0
+    status, message = uploaded(admin, key, "second.pdf", 1)
+    assert (status, "in an hour" in message) == (429, True)
+    assert uploaded(colleague, key, "second.pdf", 1) == (200, "")
 
 
 def checked_for(service, key, sender, seconds):
