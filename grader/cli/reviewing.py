@@ -57,10 +57,13 @@ def listener_on(host: str, port: int) -> socket.socket:
     """A socket that listens; raises CallError for a port that is taken."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
-        return socket.create_server((host, port), family=family)
+        listener = socket.create_server((host, port), family=family)
     except OSError as error:
         why = f"{error.strerror or error}; choose another with --port, 0 takes any that is free"
         raise CallError("port_taken", f"--host {host} --port {port}: {why}") from error
+    # Head and body of an answer are two packets: the second would wait until the first is confirmed.
+    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    return listener
 
 
 def _serve(listener: socket.socket, session: Session, lang: str, token: str) -> None:

@@ -5,7 +5,9 @@ import contextlib
 import logging
 import os
 import socket
+from collections import Counter
 from pathlib import Path
+from typing import ClassVar
 from urllib.parse import urlsplit
 
 import h11
@@ -24,6 +26,10 @@ HEAD_S = 10.0
 MOST_CONNECTIONS = 1000
 MOST_OF_ONE = 500
 """Connections of one address: the others always have as many."""
+REFUSED_S, MOST_REFUSED = 1.0, 1000
+"""A connection too many is closed after this time, while there are not more of them: whoever opens them over
+and over would otherwise open the next at once, which costs more than one that waits."""
+REFUSED = "refused"
 MOST_FILES = 4096
 """Open files of the process, where the system lets it: connections, the data base's and the workers'."""
 
@@ -32,25 +38,35 @@ class Bounded(H11Protocol):
     """HTTP in which the head of a request must come in time, and one address has some connections only."""
 
     _head: asyncio.TimerHandle | None = None
+    _sender = ""
+    _open: ClassVar[Counter[str]] = Counter()
+    """Connections by address; under `REFUSED` those that are closed soon."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Begin to wait for a request, unless its sender has too many."""
-        super().connection_made(transport)
-        addresses = [(getattr(one, "client", None) or ("",))[0] for one in self.connections]
-        if self.client is not None and addresses.count(self.client[0]) > MOST_OF_ONE:
-            transport.abort()
+        """Begin to wait for a request, unless its sender has too many: then nothing is heard."""
+        self._sender = (transport.get_extra_info("peername") or ("",))[0]
+        if self._open[self._sender] >= MOST_OF_ONE:
+            self._sender = REFUSED
+            self.loop.call_later(REFUSED_S if self._open[REFUSED] < MOST_REFUSED else 0.0, transport.abort)
         else:
+            super().connection_made(transport)
             self._watch()
+        self._open[self._sender] += 1
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Wait no longer."""
-        self._stop_watching()
-        super().connection_lost(exc)
+        self._open[self._sender] -= 1
+        if not self._open[self._sender]:
+            del self._open[self._sender]
+        if self._sender != REFUSED:
+            self._stop_watching()
+            super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
         """Take a part of a request in."""
-        super().data_received(data)
-        self._watch()
+        if self._sender != REFUSED:
+            super().data_received(data)
+            self._watch()
 
     def _watch(self) -> None:
         if self.conn.their_state is not h11.IDLE:

@@ -1,11 +1,12 @@
 """Load on `planmark serve`, on loopback: ``python -m tests.bench.serving``.
 
-Measures 200 students who check values at once, 20 photos at once with the memory of the server and its
-workers, and what is left of a class that is graded and of photos that wait when the server is killed.
+Measures how long a page takes while 1,200 half heads are sent, 200 students who check values at once, 20
+photos at once with the memory of the server and its workers, and what is left of a class that is graded and of photos that wait when the server is killed.
 """
 
 import argparse
 import asyncio
+import multiprocessing
 import re
 import statistics
 import subprocess
@@ -166,6 +167,54 @@ async def checks(server: Server, key: str, students: int) -> None:
         await session.close()
 
 
+HALF_HEADS = 1200
+"""Connections of the attack, each opened again as soon as it is closed."""
+ATTACKER = "127.0.0.2"
+"""Another address than that of the others, who have connections of their own."""
+
+
+def send_half_heads(port: int) -> None:
+    """Attack the server, for ever; in a process of its own."""
+
+    async def one() -> None:
+        while True:
+            try:
+                reader, writer = await asyncio.open_connection("127.0.0.1", port, local_addr=(ATTACKER, 0))
+                writer.write(b"GET / HTTP/1.1\r\nHost: x\r\n")
+                await reader.read(100)
+                writer.close()
+            except OSError:
+                await asyncio.sleep(0.01)
+
+    async def all_of_them() -> None:
+        await asyncio.gather(*(one() for _ in range(HALF_HEADS)))
+
+    asyncio.run(all_of_them())
+
+
+async def half_heads(server: Server) -> None:
+    """How long a page takes, one after the other, without and with the attack."""
+    port = int(server.address.rpartition(":")[2])
+    attack = multiprocessing.get_context("spawn").Process(target=send_half_heads, args=(port,), daemon=True)
+    async with browser() as session:
+        client = Client(session, server.address)
+        for name in ("alone", "with half heads"):
+            took = []
+            until = time.monotonic() + 6.0
+            while time.monotonic() < until:
+                began = time.perf_counter()
+                await client.open("/sign-in")
+                took.append(1e3 * (time.perf_counter() - began))
+                await asyncio.sleep(0.02)
+            cuts = statistics.quantiles(took[5:], n=20)
+            mean = statistics.mean(took[5:])
+            print(f"a page {name}: mean {mean:.0f} ms, p50 {cuts[9]:.0f} ms, p95 {cuts[18]:.0f} ms")
+            if name == "alone":
+                attack.start()
+                await asyncio.sleep(3.0)  # for the process, and all its connections
+    attack.kill()
+
+
 async def photo_ended(client: Client, job: dict[str, Any]) -> dict[str, Any]:
     """The job of a photo when it has ended."""
     until = time.monotonic() + SECONDS_FOR_ALL
@@ -234,6 +283,7 @@ async def main() -> None:
         server = Server(Path(folder) / "data")
         try:
             token, key = await prepared(server)
+            await half_heads(server)
             await checks(server, key, asked.students)
             await photos(server, key, asked.photos, picture)
             await killed(server, key, token, picture)

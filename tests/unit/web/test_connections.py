@@ -8,6 +8,7 @@ import pytest
 import uvicorn
 
 from grader.cli import serving
+from grader.cli.reviewing import listener_on
 
 ANSWER = [(b"content-length", b"2")]
 
@@ -81,6 +82,7 @@ def test_nothing_is_waited_for_once_a_head_is_there(server):
 
 def test_one_address_has_some_connections_only(server, monkeypatch):
     monkeypatch.setattr(serving, "MOST_OF_ONE", 2)
+    monkeypatch.setattr(serving, "REFUSED_S", 0.1)
     waiting = [opened(server, b"GET") for _ in range(2)]
     with opened(server, b"") as third:
         assert is_closed(third)
@@ -88,3 +90,26 @@ def test_one_address_has_some_connections_only(server, monkeypatch):
         one.sendall(b" / HTTP/1.1\r\nHost: x\r\n\r\n")
         assert one.recv(1000).startswith(b"HTTP/1.1 200")
         one.close()
+
+
+def test_a_connection_too_many_waits_for_its_end_and_the_next_one_does_not(server, monkeypatch):
+    """Whoever opens one after the other is slowed down, and the files that stay open have a bound."""
+    for name, value in (("MOST_OF_ONE", 1), ("REFUSED_S", 3600.0), ("MOST_REFUSED", 1)):
+        monkeypatch.setattr(serving, name, value)
+    with opened(server, b"GET"), opened(server, b"GET / HTTP/1.1\r\nHost: x\r\n\r\n") as second:
+        with opened(server, b"") as third:
+            assert is_closed(third)
+        second.settimeout(0.2)
+        with pytest.raises(TimeoutError):
+            second.recv(1000)
+        assert len(server.server_state.connections) == 1
+
+
+def test_an_answer_does_not_wait_for_the_browser_to_confirm_its_head():
+    with (
+        listener_on("127.0.0.1", 0) as listener,
+        socket.create_connection(listener.getsockname()),
+    ):
+        accepted, _ = listener.accept()
+        with accepted:
+            assert accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
