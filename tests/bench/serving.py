@@ -1,7 +1,8 @@
 """Load on `planmark serve`, on loopback: ``python -m tests.bench.serving``.
 
-Measures how long a page takes while 1,200 half heads are sent, 200 students who check values at once, 20
-photos at once with the memory of the server and its workers, and what is left of a class that is graded and of photos that wait when the server is killed.
+Measures how long a page takes while 1,200 half heads are sent, 200 students who check values at once, the
+memory of the server and its workers at and after 20 photos at once, three times over, and what is left of a
+class that is graded and of photos that wait when the server is killed.
 """
 
 import argparse

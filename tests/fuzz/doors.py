@@ -1,6 +1,6 @@
 """Mutated files at every door: each is taken or refused with a message, within the limits of a worker.
 
-    python -m tests.fuzz.doors --seconds 60 [--inputs N] [--corpus FOLDER] [--seed N]
+    python -m tests.fuzz.doors --seconds 60 [--inputs N] [--door DOOR ...] [--seed N]
 
 Inputs that bring about a new answer join the corpus of the run; those that fail are written to
 `tests/fuzz/corpus/DOOR`, which every run begins with and the tests replay.
@@ -17,17 +17,20 @@ import time
 import traceback
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 
+from grader.folder.changes import earlier
 from grader.folder.workers import Limits, Workers
 from grader.inputs.class_file import read_class_file
 from grader.inputs.decisions import Decision, DecisionFile
 from grader.inputs.measurements import names_of, read_measurements
 from grader.inputs.roster import read_roster
 from grader.inputs.scale_text import parse_scale
-from grader.lms.export import TARGETS
-from grader.lms.gradebooks import Gradebook
-from grader.lms.moodle import Worksheet
+from grader.lms.export import KINDS, TARGETS, draft, read_results
+from grader.lms.gradebooks import LAYOUTS
+from grader.lms.grades import Options, Person, grades_of
+from grader.lms.moodle import fill_worksheet
 from grader.records import Problem
 from grader.rubric import load_rubric
 from grader.scan.decode.pages import count_pages, is_blank, page_of
@@ -36,18 +39,24 @@ from reference.authored.assignment import load_assignment
 from reference.authored.variant_table import DataTable, read_rows
 from reference.errors import PlanmarkError
 from tests.fuzz.seeds import seeds
+from tests.fuzz.shaped import SHAPED, shaped
+from tests.unit.lms.classroom import report, results
 
 CORPUS = Path(__file__).parent / "corpus"
 DOORS = (
     "pictures", "measurements", "roster", "decisions", "authored", "variants", "settings", "scales",
-    "worksheet", "gradebook",
+    "worksheet", "gradebook", "results",
 )  # fmt: skip
 LIMITS = Limits(seconds=60.0, memory_mb=1500)
 SLOW_S = 20.0
 """One input may take this long: a third of a worker's limit, on a busy machine."""
 BATCH = {"pictures": 100, "measurements": 400, "roster": 400, "decisions": 400, "authored": 150,
-         "variants": 200, "settings": 400, "scales": 2000, "worksheet": 400, "gradebook": 400}  # fmt: skip
+         "variants": 200, "settings": 400, "scales": 2000, "worksheet": 400, "gradebook": 400,
+         "results": 200}  # fmt: skip
+WELL_FORMED = 2 / 3
+"""The share of inputs whose form is kept, where a file has one: what is broken anywhere is refused early."""
 MOST_PAGES = 3
+NOW = datetime(2026, 11, 22, tzinfo=UTC)
 _WORDS = (
     b"", b"0", b"-1", b"1e400", b"nan", b"inf", b"NaN", b"999999999999999999999", b"1_0", b"0x10",
     b"2026-01-01", b"9**9**9", b"\x00", b"\xff\xfe", b"\xd0\x90", b'"', b"{", b"[", b"[[", b"'''", b"\r",
@@ -86,7 +95,12 @@ def _name(door: str, data: bytes) -> str:
                 "input.assignment.toml"}.get(table[1] if table else b"", "input.mechanism.toml")  # fmt: skip
     if door == "measurements":
         return "input.json" if data.lstrip()[:1] in {b"{", b"["} else "input.csv"
-    names = {"pictures": "input.bin", "settings": "planmark.toml", "scales": "input.txt"}
+    names = {
+        "pictures": "input.bin",
+        "settings": "planmark.toml",
+        "scales": "input.txt",
+        "results": "results.json",
+    }
     return names.get(door, "input.csv")
 
 
@@ -157,20 +171,50 @@ def _scales(path: Path) -> str:
     return " ".join(type(parse_scale(name, text)).__name__ for name in ("kL", "kv", "ka"))
 
 
+_ANA = Person(name="Popa, Ana", email="ana@example.org", username="ana", platform_id="12", participant=101)
+_PEOPLE = {"s1": _ANA}
+_GRADES = grades_of(results(report("s1", 7.5)), Options(to="canvas"))
+
+
 def _worksheet(path: Path) -> str:
-    form = Worksheet.opened(path.read_bytes(), path.name)
-    return f"{len(form.people)} people, {len(form.columns)} columns"
+    options = Options(to="moodle", people=_PEOPLE)
+    filled = fill_worksheet(path.read_bytes(), path.name, _GRADES, options, {"s1": "<p>Right.</p>"}, NOW)
+    return f"{len(filled.written)} written, {len(filled.unplaced)} unplaced"
 
 
 def _gradebook(path: Path) -> str:
-    form = Gradebook.opened(path.read_bytes(), path.name, "Plan 1")
-    return f"{form.platform}: {len(form.people)} people"
+    """For each platform, as an instructor would try it."""
+    answers = []
+    for layout in LAYOUTS:
+        item = "Plan 1" if "item" in KINDS[layout.key, "grades"].used else ""
+        options = Options(to=layout.key, form=path, people=_PEOPLE, item=item, rescale=True)
+        try:
+            filled = draft(results(report("s1", 7.5)), options)
+        except PlanmarkError as error:
+            answers.append(error.code)
+        else:
+            answers.append(f"{len(filled.written)} written, {len(filled.unplaced)} unplaced")
+    return " ".join(answers)
+
+
+def _results(path: Path) -> str:
+    """Read by the next run, and exported to every platform."""
+    before = earlier(path, "pump")
+    read, answers = read_results(path.parent), [str(len(before or ()))]
+    for to, what in KINDS:
+        try:
+            filled = draft(read, Options(to=to, what=what, out=path.parent, people=_PEOPLE, now=NOW))
+        except PlanmarkError as error:
+            answers.append(error.code)
+        else:
+            answers.append(str(len(filled.written)))
+    return " ".join(answers)
 
 
 _ENTER = {
     "pictures": _pictures, "measurements": _measurements, "roster": _roster, "authored": _authored,
     "decisions": _decisions, "variants": _variants, "settings": _settings, "scales": _scales,
-    "worksheet": _worksheet, "gradebook": _gradebook,
+    "worksheet": _worksheet, "gradebook": _gradebook, "results": _results,
 }  # fmt: skip
 
 
@@ -218,7 +262,10 @@ def _change(data: bytearray, other: bytes, dice: random.Random) -> None:
 def _inputs(door: str, pool: Sequence[bytes], seed: str, count: int) -> Iterator[bytes]:
     dice = random.Random(f"{door} {seed}")
     for _ in range(count):
-        yield mutated(dice.choice(pool), dice.choice(pool), dice)
+        if door in SHAPED and dice.random() < WELL_FORMED:
+            yield shaped(dice.choice(pool), dice)
+        else:
+            yield mutated(dice.choice(pool), dice.choice(pool), dice)
 
 
 # A run --------------------------------------------------------------------------------------------
@@ -251,18 +298,21 @@ def corpus(door: str) -> list[bytes]:
     return [path.read_bytes() for path in sorted((CORPUS / door).glob("*")) if path.is_file()]
 
 
-def fuzz(seconds: float, inputs: int | None, seed: int, jobs: int) -> list[tuple[str, str, bytes]]:
-    """Failures (door, what, file) of a run over all doors."""
+def fuzz(
+    doors: Sequence[str], seconds: float, inputs: int | None, seed: int, jobs: int
+) -> list[tuple[str, str, bytes]]:
+    """Failures (door, what, file) of a run over doors, with so many inputs at each."""
     start, tried = time.monotonic(), collections.Counter[str]()
-    pools = {door: seeds(door) + corpus(door) for door in DOORS}
-    answers: dict[str, set[str]] = {door: set() for door in DOORS}
+    pools = {door: seeds(door) + corpus(door) for door in doors}
+    answers: dict[str, set[str]] = {door: set() for door in doors}
     failures: list[tuple[str, str, bytes]] = []
     with Workers(jobs, LIMITS, __name__) as workers:
         for turn in range(10**6):
-            if time.monotonic() - start > seconds or (inputs is not None and tried.total() >= inputs):
+            left = [door for door in doors if inputs is None or tried[door] < inputs]
+            if time.monotonic() - start > seconds or not left:
                 break
             calls = [
-                (door, pools[door], f"{seed} {turn} {k}", BATCH[door]) for door in DOORS for k in range(jobs)
+                (door, pools[door], f"{seed} {turn} {k}", BATCH[door]) for door in left for k in range(jobs)
             ]
             for index, result in workers.run(try_batch, calls):
                 door = calls[index][0]
@@ -273,7 +323,7 @@ def fuzz(seconds: float, inputs: int | None, seed: int, jobs: int) -> list[tuple
                     new = found.answers.keys() - answers[door]
                     answers[door] |= new
                     pools[door] += [found.answers[answer] for answer in sorted(new)]
-    for door in DOORS:
+    for door in doors:
         print(f"{door}: {tried[door]} inputs, {len(answers[door])} answers, "
               f"{sum(one == door for one, *_ in failures)} failures")  # fmt: skip
     return failures
@@ -296,12 +346,13 @@ def main() -> int:
     """Fuzz, write what fails into the corpus, and tell; 1 where anything failed."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("--seconds", type=float, default=60.0)
-    parser.add_argument("--inputs", type=int)
+    parser.add_argument("--inputs", type=int, help="at each door")
+    parser.add_argument("--door", nargs="+", choices=DOORS, default=DOORS)
     parser.add_argument("--seed", type=int, default=int(time.time()))
     parser.add_argument("--jobs", type=int, default=2)
     asked = parser.parse_args()
     print(f"seed {asked.seed}")
-    failures = fuzz(asked.seconds, asked.inputs, asked.seed, asked.jobs)
+    failures = fuzz(asked.door, asked.seconds, asked.inputs, asked.seed, asked.jobs)
     shown = collections.Counter[str]()
     for door, what, data in failures:
         shown[what] += 1

@@ -11,6 +11,8 @@ import tifffile
 from PIL import Image
 from reportlab.pdfgen.canvas import Canvas
 
+from tests.unit.lms.classroom import a_class, marked, results
+
 ROOT = Path(__file__).parents[2]
 SHAPE = (120, 170)
 
@@ -188,11 +190,23 @@ def _gradebook() -> list[bytes]:
             b"OrgDefinedId\tUsername\tLast Name\tFirst Name\tPlan 1 Points Grade <Numeric MaxPoints:10>\t"
             b"End-of-Line Indicator\n#s1\t#ana\tPopa\tAna\t7\t#\n"
         ),
+        (
+            '"Last Name"\t"First Name"\t"Username"\t"Student ID"\t"Plan 1 [Total Pts: 10 Score] |12"\r\n'
+            '"Popa"\t"Ana"\t"ana"\t"s1"\t"7,5"\r\n'
+        ).encode("utf-16"),
+        (
+            b'"update","usr_id","login","lastname","firstname","status","mark","notice","comment"\r\n'
+            b'"0","12","ana","Popa","Ana","notgraded","","",""\r\n'
+        ),
     ]
+
+
+def _results() -> list[bytes]:
+    return [a_class().model_dump_json().encode(), results(marked("s1", 5.0, 2.5)).model_dump_json().encode()]
 
 
 _SEEDS = {
     "pictures": _pictures, "measurements": _measurements, "roster": _roster, "authored": _authored,
     "decisions": _decisions, "variants": _variants, "settings": _settings, "scales": _scales,
-    "worksheet": _worksheet, "gradebook": _gradebook,
+    "worksheet": _worksheet, "gradebook": _gradebook, "results": _results,
 }  # fmt: skip

@@ -1,7 +1,10 @@
 """Any file at any door: it is taken, or refused with a documented code; nothing else is raised."""
 
+import json
 import random
 import re
+import tomllib
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -11,6 +14,7 @@ from hypothesis import strategies as st
 
 from tests.fuzz.doors import enter, mutated
 from tests.fuzz.seeds import seeds
+from tests.fuzz.shaped import shaped
 
 DOCUMENTED = "".join(path.read_text("utf-8") for path in (Path(__file__).parents[2] / "docs").glob("*.md"))
 KINDS = {
@@ -55,3 +59,13 @@ def test_what_only_begins_like_a_file_is_taken_or_refused(kind, data):
 def test_a_damaged_file_is_taken_or_refused(kind, seed):
     dice = random.Random(seed)
     hand_in(kind, mutated(dice.choice(healthy(kind)), dice.choice(healthy(kind)), dice))
+
+
+@pytest.mark.parametrize(("door", "read"), [("results", json.loads), ("settings", tomllib.loads)])
+def test_most_mutations_keep_the_form_and_change_what_it_holds(door, read):
+    healthy_one, whole = seeds(door)[0], 0
+    before = read(healthy_one.decode())
+    for seed in range(100):
+        with suppress(ValueError):  # another encoding, or a key of TOML that is there twice
+            whole += read(shaped(healthy_one, random.Random(seed)).decode()) != before
+    assert whole > 70
