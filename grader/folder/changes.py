@@ -132,17 +132,20 @@ def _digest(*parts: object) -> str:
 # The run before -----------------------------------------------------------------------------------
 
 
+_NO_RESULTS = (OSError, AttributeError, KeyError, TypeError, ValidationError)
+
+
 def earlier(results: Path, assignment: str) -> Mapping[Key, EarlierReport] | None:
     """The last run's reports by student and position; None where there was no run of this assignment."""
     try:
         note = StandingsNote.model_validate_json((results.parent / CACHE_FOLDER / STANDINGS).read_bytes())
-    except (OSError, KeyError, TypeError, ValidationError):
+    except _NO_RESULTS:
         note = StandingsNote(stamp=None)
     try:
         before = note.results
         if before is None or note.stamp != stamp_of(results):
             before = EarlierResults.model_validate_json(results.read_bytes())
-    except (OSError, KeyError, TypeError, ValidationError):
+    except _NO_RESULTS:
         return None
     if before.assignment != assignment:
         return None
