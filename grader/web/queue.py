@@ -8,14 +8,17 @@ one photo after the other is checked, and one that is graded for long lets those
 
 import logging
 import multiprocessing
+import os
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
-from typing import Any
+from typing import Any, TypeVar
 
 from sqlalchemy import select, update
 
@@ -33,6 +36,9 @@ _TELL_S = 0.5
 """Progress is written at this interval: a person cannot read faster."""
 TURN_S = 120.0
 """A class is graded for so long where others wait; the next time twice, then three times as long."""
+MOST_JUDGES = 4
+"""Of 110 MB each: 100 values a second and more."""
+Result = TypeVar("Result")
 Photo = Callable[..., dict[str, Any]]
 """Checks a photo: its path, the assignment, n, position, language and level."""
 
@@ -89,6 +95,31 @@ class Turns:
             self._changed.notify_all()
 
 
+class Judges:
+    """A pool for short calls without limits: requests that share one interpreter only take turns."""
+
+    def __init__(self, jobs: int) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._pool = ProcessPoolExecutor(jobs, context, initializer=_with_parent)
+        for _ in range(jobs):  # each call lets one more process start
+            self._pool.submit(int)
+
+    def run(
+        self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]], sheets: Iterable[int] = ()
+    ) -> Iterator[tuple[int, Result | Problem]]:
+        """As `grader.folder.workers.Pool.run`; where a process was killed, in this one."""
+        del sheets
+        for index, call in enumerate(calls):
+            try:
+                yield index, self._pool.submit(guarded, function, *call).result()
+            except BrokenProcessPool:
+                yield index, guarded(function, *call)
+
+    def end(self) -> None:
+        """End the processes."""
+        self._pool.shutdown(cancel_futures=True)
+
+
 @dataclass(slots=True)
 class Queue:
     """The jobs of a server.
@@ -105,10 +136,13 @@ class Queue:
     """How often each class that is graded has let others go first."""
     _threads: list[threading.Thread] = field(default_factory=list)
     _workers: Workers | None = None
+    judges: Judges = field(init=False)
+    """Processes that judge values while a request waits."""
     _running: dict[int, SpawnProcess] = field(default_factory=dict)
 
     def start(self) -> None:
         """Begin to work, first at what an earlier server left."""
+        self.judges = Judges(min(os.cpu_count() or 1, MOST_JUDGES))
         self._workers = Workers(self.settings.photos, self.settings.limits, __name__).__enter__()
         with self.store.session() as session:
             left = session.scalars(
@@ -136,6 +170,7 @@ class Queue:
             process.join()
         if workers is not None:
             workers.__exit__(None, None, None)
+            self.judges.end()
         for thread in self._threads:
             thread.join()
 
@@ -273,9 +308,7 @@ class _TurnOverError(Exception):
 
 def _graded(batch: Batch, reports: Connection) -> None:
     """Grade in a process of its own, which ends with its parent."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+    _with_parent()
 
     def tell(stage: str, done: int, total: int) -> None:
         reports.send(("progress", stage, done, total))
@@ -291,8 +324,14 @@ def _graded(batch: Batch, reports: Connection) -> None:
     reports.send(("done", {"states": counts, "unmatched": len(results.unmatched)}))
 
 
+def _with_parent() -> None:
+    """Let this process end with its parent."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+
+
 def _end_with(sentinel: int) -> None:
-    import os  # noqa: PLC0415 - only in the process that grades
     from multiprocessing.connection import wait  # noqa: PLC0415
 
     wait([sentinel])

@@ -74,6 +74,13 @@ def form_of(assignment: Assignment, lang: str) -> dict[str, Any]:
     }
 
 
+def checked_form(
+    name: str, variant: Variant, cells: Mapping[str, str], lang: str, level: Level
+) -> dict[str, Any]:
+    """As `checked_values`, by the assignment's name or the path of its file; in a process of its own."""
+    return checked_values(load_assignment(name), variant, cells, lang, level)
+
+
 def checked_values(
     assignment: Assignment, variant: Variant, cells: Mapping[str, str], lang: str, level: Level
 ) -> dict[str, Any]:

@@ -27,7 +27,7 @@ from grader.review.server import page_file
 from grader.scan.decode.pages import count_pages
 from grader.web.guard import RefusedError, forbidden, missing
 from grader.web.places import assignment_of
-from grader.web.self_check import checked_values, form_of, variant_of
+from grader.web.self_check import checked_form, form_of, variant_of
 from grader.web.service import FILE_BODY, Call, Called, Key, Route
 from grader.web.store import Attempt, Job, Link, Publication, Regrading, Sheet
 from reference.authored.assignment import Variant
@@ -136,7 +136,9 @@ def check(call: Called, key: Key, values: Values) -> Told:
     assignment = assignment_of(call.service.settings.data, publication)
     variant = variant_of(assignment, values.n, values.position)
     left = use_attempt(call, publication, variant)
-    told = checked_values(assignment, variant, values.cells, values.lang, _level(publication))
+    asked = (str(assignment.path), variant, values.cells, values.lang, _level(publication))
+    call.session.commit()
+    told = result_of(call.service.queue.judges, checked_form, *asked)
     return Told(**told, attempts_left=left)
 
 

@@ -33,6 +33,8 @@ class Workers(Inline):
     def __exit__(self, *_error):
         """Nothing to end."""
 
+    end = __exit__
+
 
 @pytest.fixture(scope="module")
 def app(tmp_path_factory):
@@ -47,6 +49,7 @@ def app(tmp_path_factory):
     settings.data.mkdir()
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(queue, "Workers", Workers)
+        patched.setattr(queue, "Judges", Workers)
         patched.setattr(queue.Queue, "_grade", lambda *_: {"states": {}, "unmatched": 0})
         patched.setattr("grader.web.guard.Guard.count", lambda *_: None)
         made = application(settings, photo=lambda *_: {"lines": [], "problems": [], "is_right": False})

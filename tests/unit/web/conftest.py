@@ -31,6 +31,8 @@ class Workers(Inline):
     def __exit__(self, *_error):
         """Nothing to end."""
 
+    end = __exit__
+
 
 class Browser(TestClient):
     """A browser with cookies of its own that sends what our script sends."""
@@ -79,6 +81,7 @@ def settings(tmp_path):
 @pytest.fixture
 def app(settings, monkeypatch):
     monkeypatch.setattr(queue, "Workers", Workers)
+    monkeypatch.setattr(queue, "Judges", Workers)
     settings.data.mkdir(exist_ok=True)
     made = application(settings)
     with TestClient(made, base_url=ADDRESS) as server:

@@ -168,6 +168,7 @@ def test_a_class_that_is_graded_for_long_lets_another_go_first(settings, store, 
         return {}
 
     monkeypatch.setattr(queue, "Workers", Workers)
+    monkeypatch.setattr(queue, "Judges", Workers)
     monkeypatch.setattr(Queue, "_grade", graded)
     jobs = Queue(settings, store, lambda *_: {})
     jobs.start()

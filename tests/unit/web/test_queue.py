@@ -1,13 +1,16 @@
 """Jobs: they survive the end of the server, are cancelled, and fail with words."""
 
+import os
+import signal
 import time
 
 import pytest
 from starlette.testclient import TestClient
 
+from grader.records import Problem
 from grader.web import queue
 from grader.web.app import application
-from grader.web.queue import Queue
+from grader.web.queue import Judges, Queue
 from grader.web.store import Job, Publication, Store
 from reference.errors import CallError, InputFileError
 from tests.unit.web.conftest import ADDRESS, Workers
@@ -45,6 +48,7 @@ def ended(store):
 @pytest.fixture(autouse=True)
 def inline(monkeypatch):
     monkeypatch.setattr(queue, "Workers", Workers)
+    monkeypatch.setattr(queue, "Judges", Workers)
 
 
 @pytest.mark.parametrize("state", ["queued", "running"])
@@ -125,3 +129,15 @@ def test_a_data_base_that_cannot_be_opened_is_told():
     for url in ("nonsense", "sqlite://", "sqlite:////nowhere/at/all.sqlite", "mysql://x/y"):
         with pytest.raises(CallError, match="--database"):
             Store(url)
+
+
+def test_values_are_judged_in_processes_and_where_one_was_killed_here():
+    judges = Judges(1)
+    try:
+        (elsewhere,) = judges.run(os.getpid, [()])
+        assert elsewhere[1] != os.getpid()
+        os.kill(elsewhere[1], signal.SIGKILL)
+        assert list(judges.run(os.getpid, [(), ()])) == [(0, os.getpid()), (1, os.getpid())]
+        assert isinstance(next(judges.run(int, [("x",)]))[1], Problem)
+    finally:
+        judges.end()
