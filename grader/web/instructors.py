@@ -328,7 +328,7 @@ def put_file(call: Called, key: Key, name: FileName, body: Body, *, replace: boo
             is_same = call.places(own).keep(called, body, replace=replace)
             sheet.pages = pages
             call.session.add(sheet)
-            call.session.flush()
+            call.session.commit()
             trial.unlink()
     call.note("file", f"{key} {called}")
     return {"name": called, "is_same": is_same}

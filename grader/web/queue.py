@@ -12,13 +12,11 @@ import os
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
-from typing import Any, TypeVar
+from typing import Any
 
 from sqlalchemy import select, update
 
@@ -26,6 +24,7 @@ from grader.folder.batch import Batch, grade
 from grader.folder.workers import Workers, guarded, result_of
 from grader.records import Problem
 from grader.review.session import moves
+from grader.web.judges import MOST_JUDGES, Judges, end_with_parent
 from grader.web.places import batch_of, places_of
 from grader.web.settings import Settings
 from grader.web.store import Job, Store
@@ -36,9 +35,6 @@ _TELL_S = 0.5
 """Progress is written at this interval: a person cannot read faster."""
 TURN_S = 120.0
 """A class is graded for so long where others wait; the next time twice, then three times as long."""
-MOST_JUDGES = 4
-"""Of 110 MB each: 100 values a second and more."""
-Result = TypeVar("Result")
 Photo = Callable[..., dict[str, Any]]
 """Checks a photo: its path, the assignment, n, position, language and level."""
 
@@ -93,31 +89,6 @@ class Turns:
         with self._changed:
             self._has_ended = True
             self._changed.notify_all()
-
-
-class Judges:
-    """A pool for short calls without limits: requests that share one interpreter only take turns."""
-
-    def __init__(self, jobs: int) -> None:
-        context = multiprocessing.get_context("spawn")
-        self._pool = ProcessPoolExecutor(jobs, context, initializer=_with_parent)
-        for _ in range(jobs):  # each call lets one more process start
-            self._pool.submit(int)
-
-    def run(
-        self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]], sheets: Iterable[int] = ()
-    ) -> Iterator[tuple[int, Result | Problem]]:
-        """As `grader.folder.workers.Pool.run`; where a process was killed, in this one."""
-        del sheets
-        for index, call in enumerate(calls):
-            try:
-                yield index, self._pool.submit(guarded, function, *call).result()
-            except BrokenProcessPool:
-                yield index, guarded(function, *call)
-
-    def end(self) -> None:
-        """End the processes."""
-        self._pool.shutdown(cancel_futures=True)
 
 
 @dataclass(slots=True)
@@ -308,7 +279,7 @@ class _TurnOverError(Exception):
 
 def _graded(batch: Batch, reports: Connection) -> None:
     """Grade in a process of its own, which ends with its parent."""
-    _with_parent()
+    end_with_parent()
 
     def tell(stage: str, done: int, total: int) -> None:
         reports.send(("progress", stage, done, total))
@@ -322,17 +293,3 @@ def _graded(batch: Batch, reports: Connection) -> None:
     states = [report.status for report in results.reports]
     counts = {state: states.count(state) for state in dict.fromkeys(states)}
     reports.send(("done", {"states": counts, "unmatched": len(results.unmatched)}))
-
-
-def _with_parent() -> None:
-    """Let this process end with its parent."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
-
-
-def _end_with(sentinel: int) -> None:
-    from multiprocessing.connection import wait  # noqa: PLC0415
-
-    wait([sentinel])
-    os._exit(1)

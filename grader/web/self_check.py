@@ -27,7 +27,6 @@ from grader.marking.self_check import Level
 from grader.overlay.closeup import page_views, scan_element, svg
 from grader.overlay.measured import measured_picture
 from grader.overlay.scene import Picture
-from grader.photo import photo_check
 from grader.rubric import rubric_of
 from grader.web.guard import RefusedError
 from reference.authored.assignment import Assignment, Variant, load_assignment
@@ -120,6 +119,8 @@ def checked_photo(path: Path, asked: Mapping[str, Any]) -> dict[str, Any]:
 
     Arguments: `asked` has the ``assignment``, ``n``, ``position``, ``lang`` and ``level``.
     """
+    from grader.photo import photo_check  # noqa: PLC0415 - processes that judge values need no reading
+
     assignment, lang = load_assignment(asked["assignment"]), asked["lang"]
     variant = variant_of(assignment, asked["n"], asked["position"])
     check = photo_check(path, assignment, rubric_of(assignment), variant, lang, asked["level"])

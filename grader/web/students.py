@@ -342,6 +342,7 @@ def hand_in(
             call.session.flush()
             make_folder(folder)
             trial.replace(folder / file)
+            call.session.commit()  # the next one counts it
     call.note("handed in", f"{publication.key} {file}")
     return version_of(sheet)
 

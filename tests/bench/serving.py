@@ -9,6 +9,7 @@ import argparse
 import asyncio
 import multiprocessing
 import re
+import resource
 import statistics
 import subprocess
 import sys
@@ -61,6 +62,11 @@ class Server:
                     continue
             self.peak_mb = max(self.peak_mb, total / 1e6)
             time.sleep(0.1)
+
+    def memory_mb(self) -> list[float]:
+        """What the server, and each of its workers, takes now."""
+        family = _family(psutil.Process(self.process.pid))
+        return [round(one.memory_info().rss / 1e6) for one in family]
 
     def kill(self) -> None:
         """As by a power cut: the server and its workers."""
@@ -176,6 +182,9 @@ ATTACKER = "127.0.0.2"
 
 def send_half_heads(port: int) -> None:
     """Attack the server, for ever; in a process of its own."""
+    resource.setrlimit(
+        resource.RLIMIT_NOFILE, (2 * HALF_HEADS, resource.getrlimit(resource.RLIMIT_NOFILE)[1])
+    )
 
     async def one() -> None:
         while True:
@@ -241,7 +250,8 @@ async def photos(server: Server, key: str, count: int, picture: bytes) -> None:
             raise RuntimeError("a photo failed")
 
     await measured("photos", count, one)
-    print(f"photos: server and workers took {server.peak_mb:.0f} MB at most")
+    await asyncio.sleep(2.0)
+    print(f"photos: server and workers took {server.peak_mb:.0f} MB at most, after them {server.memory_mb()}")
     for session in sessions:
         await session.close()
 
@@ -278,6 +288,7 @@ async def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--students", type=int, default=200)
     arguments.add_argument("--photos", type=int, default=20)
+    arguments.add_argument("--rounds", type=int, default=3, help="of photos")
     asked = arguments.parse_args()
     picture = (SAMPLES / "s01_1.jpg").read_bytes()
     with tempfile.TemporaryDirectory() as folder:
@@ -286,7 +297,9 @@ async def main() -> None:
             token, key = await prepared(server)
             await half_heads(server)
             await checks(server, key, asked.students)
-            await photos(server, key, asked.photos, picture)
+            print(f"memory before photos: {server.memory_mb()} MB")
+            for _ in range(asked.rounds):
+                await photos(server, key, asked.photos, picture)
             await killed(server, key, token, picture)
         finally:
             server.kill()

@@ -10,7 +10,8 @@ from starlette.testclient import TestClient
 from grader.records import Problem
 from grader.web import queue
 from grader.web.app import application
-from grader.web.queue import Judges, Queue
+from grader.web.judges import Judges
+from grader.web.queue import Queue
 from grader.web.store import Job, Publication, Store
 from reference.errors import CallError, InputFileError
 from tests.unit.web.conftest import ADDRESS, Workers
