@@ -1,6 +1,7 @@
 """What all tests share."""
 
 import os
+import signal
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,9 @@ settings.register_profile(
 )
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci" if os.environ.get("CI") else "dev"))
 
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    # A shell lets what it starts in the background ignore Ctrl+C, and the programs that tests start with it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 SLOW = (
     "bench", "browser", "docs/test_readme", "functional", "fuzz", "laws", "samples", "synthetic",

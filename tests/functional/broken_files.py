@@ -18,6 +18,7 @@ from typing import Any
 from typer.testing import CliRunner
 
 from grader.cli.app import app
+from tests.inline import without_workers
 
 MECHANISM = """\
 schema_version = 1
@@ -335,8 +336,7 @@ def _problems(results: dict[str, Any]) -> list[str]:
 
 def told(cases: list[Case]) -> Iterator[Told]:
     """Run the command of each case, in a folder of its own."""
-    # A worker of a graded class would write what stands in this process's buffers once more.
-    with TemporaryDirectory() as name, chdir(name):
+    with TemporaryDirectory() as name, chdir(name), without_workers():
         folder = Path(name).resolve()
         Case("", "", "", "", "").write(folder)
         CliRunner().invoke(app, GRADE.split())

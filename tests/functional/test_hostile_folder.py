@@ -9,10 +9,9 @@ from pathlib import Path
 
 import pikepdf
 import pytest
-from typer.testing import CliRunner
 
-from grader.cli.commands import app
 from tests import hostile
+from tests.inline import planmark
 
 REFUSED = {
     "s10_zero.jpg": "file_empty",
@@ -37,8 +36,7 @@ NOBODYS = "bad\udcff\udcfename.jpg"
 
 
 def graded(folder, out, *more):
-    call = ["grade", folder, "--assignment", "pump", "--out", out, "--jobs", "1", *more]
-    return CliRunner().invoke(app, [str(part) for part in call])
+    return planmark("grade", folder, "--assignment", "pump", "--out", out, *more, cwd=out.parent)
 
 
 def png_of(side):
@@ -88,7 +86,7 @@ def results(tmp_path_factory):
 
 def test_the_run_ends_with_work_for_a_person(results):
     run, out, _ = results
-    assert run.exit_code == 1
+    assert run.returncode == 1
     assert (out / "index.html").stat().st_size > 0
 
 
@@ -118,9 +116,9 @@ def test_no_name_moves_the_cursor_or_begins_a_line(tmp_path, name):
     (folder / name).write_bytes(b"junk")
     run = graded(folder, out, "--log", out / "run.log")
     shown = "s1_\\n\\x1b[2J\\u202e"
-    assert shown in run.output
+    assert shown in run.stdout
     assert shown in (out / "results.json").read_text("utf-8").replace("\\\\", "\\")
-    for text in (run.output, *(path.read_text("utf-8") for path in (out / "summary.csv", out / "run.log"))):
+    for text in (run.stdout, run.stderr, *(path.read_text("utf-8") for path in (out / "summary.csv", out / "run.log"))):
         assert not re.search("\x1b|\u202e|s1_\n", text)
 
 
@@ -129,5 +127,5 @@ def test_a_pipe_with_the_name_of_measurements_is_told_and_not_waited_for(tmp_pat
     folder.mkdir()
     os.mkfifo(folder / "class.csv")
     run = graded(folder, tmp_path / "out")
-    assert run.exit_code == 1
-    assert "class.csv: it is a folder or a pipe, not a file" in run.output
+    assert run.returncode == 1
+    assert "class.csv: it is a folder or a pipe, not a file" in run.stdout

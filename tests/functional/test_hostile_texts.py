@@ -11,13 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pypdfium2 import PdfDocument
-from typer.testing import CliRunner
 
-from grader.cli.commands import app
 from grader.files import guarded, is_formula, unguarded
 from grader.folder.draft_roster import RosterDraft, draft_csv
 from grader.inputs.roster import read_roster
 from reference.authored.assignment import library
+from tests.inline import planmark
 
 ROOT = Path(__file__).parents[2]
 MARKUP = "\"'><img src=x onerror=harm()><script>harm()</script></script><svg onload=harm()>"
@@ -59,10 +58,6 @@ class Page(HTMLParser):
         self.is_script = False
 
 
-def run(*words):
-    return CliRunner().invoke(app, [str(word) for word in words])
-
-
 def quoted(text):
     return f'"{text.replace(chr(34), chr(34) * 2)}"'
 
@@ -98,17 +93,17 @@ def written(tmp_path_factory):
     )
     options = ["--assignment", top / "pump.assignment.toml", "--roster", folder / "roster.csv"]
     log = top / "log.txt"
-    graded = run("grade", folder, *options, "--out", out, "--jobs", "1", "--log", log)
-    assert graded.exit_code == 1, graded.output
+    graded = planmark("grade", folder, *options, "--out", out, "--log", log, cwd=top)
+    assert graded.returncode == 1, graded.stderr
     draft = draft_csv(read_roster(folder / "roster.csv"), RosterDraft(()))
     (top / "draft.csv").write_text(draft, encoding="utf-8")
     for kind in ("sheet", "handout"):
         words = [kind, options[1], "--roster", options[3], "--out", top / f"{kind}.pdf"]
-        assert run(*words).exit_code in {0, 1}
+        assert planmark(*words, cwd=top).returncode in {0, 1}
     for platform in ("csv", "moodle", "canvas", "gradescope"):
         words = ["export", out, "--to", platform, "--file", top / f"{platform}.csv", "--roster", options[3]]
-        run(*words)
-    return top, graded.output, log
+        planmark(*words, cwd=top)
+    return top, graded.stdout + graded.stderr, log
 
 
 def test_a_page_runs_and_fetches_nothing_that_people_wrote(written):

@@ -1,41 +1,24 @@
 """`planmark review` as a command: what it refuses, and how it ends."""
 
 import json
-import os
 import re
 import signal
 import socket
-import subprocess
-import sys
 import urllib.error
 import urllib.request
 
 import pytest
 
-from tests.functional.conftest import ROOT
-
-
-def command(*arguments):
-    return [sys.executable, "-u", "-m", "grader", *map(str, arguments)]
-
-
-ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1", "COLUMNS": "120"}
-
-
-def run(*arguments, cwd):
-    return subprocess.run(  # noqa: S603 - our own program
-        command(*arguments), cwd=cwd, env=ENVIRONMENT, capture_output=True, text=True, encoding="utf-8",
-        timeout=300, check=False,
-    )  # fmt: skip
+from tests.functional.conftest import start
 
 
 @pytest.fixture
-def graded(tmp_path):
+def graded(planmark, tmp_path):
     folder = tmp_path / "class"
     folder.mkdir()
     entered = {"student_id": "s07", "n": 7, "segments_mm": {"v_A": 60.0}}
     (folder / "s07.json").write_text(json.dumps(entered), encoding="utf-8")
-    done = run("grade", "class", "--assignment", "pump", "--out", "out", "--jobs", "1", cwd=tmp_path)
+    done = planmark("grade", "class", "--assignment", "pump", "--out", "out", "--jobs", "1")
     assert done.returncode in {0, 1}, done.stderr
     return tmp_path
 
@@ -50,26 +33,24 @@ def graded(tmp_path):
         (["out", "--lang", "fr"], "en, ro, ru"),
     ],
 )
-def test_a_call_that_cannot_be_carried_out_says_why(tmp_path, arguments, said):
+def test_a_call_that_cannot_be_carried_out_says_why(planmark, tmp_path, arguments, said):
     (tmp_path / "out").mkdir()
-    done = run("review", *arguments, cwd=tmp_path)
+    done = planmark("review", *arguments)
     assert done.returncode == 2
     assert said in done.stderr
 
 
-def test_a_port_that_is_taken_is_told(graded):
+@pytest.mark.usefixtures("graded")
+def test_a_port_that_is_taken_is_told(planmark):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        done = run("review", "out", "--port", port, cwd=graded)
+        done = planmark("review", "out", "--port", port)
     assert done.returncode == 2
     assert "--port" in done.stderr
 
 
 def test_a_decision_is_in_the_results_when_the_review_has_ended(graded):
-    served = subprocess.Popen(  # noqa: S603 - our own program
-        command("review", "class", "--port", "0", "--jobs", "1"), cwd=graded, env=ENVIRONMENT,
-        stdout=subprocess.PIPE, text=True, encoding="utf-8",
-    )  # fmt: skip
+    served = start(graded, "review", "class", "--port", "0", "--jobs", "1")
     address = re.search(r"http://\S+", served.stdout.readline())[0]
     answer = {"student": "s07", "criterion": "v_A", "verdict": "none", "seen": ""}
     request = urllib.request.Request(  # noqa: S310 - this machine's
@@ -82,7 +63,7 @@ def test_a_decision_is_in_the_results_when_the_review_has_ended(graded):
     with pytest.raises(urllib.error.HTTPError):
         urllib.request.urlopen(f"{address}api/question")  # noqa: S310 - this machine's
     served.send_signal(signal.SIGINT)
-    said, _ = served.communicate(timeout=120)
+    said, _ = served.communicate(timeout=300)
     assert served.returncode == 0, said
     assert "1 submissions" in said
     report = json.loads((graded / "out" / "s07" / "report.json").read_text(encoding="utf-8"))
