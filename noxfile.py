@@ -19,14 +19,14 @@ def lint(session: nox.Session) -> None:
 
 @nox.session
 def quick(session: nox.Session) -> None:
-    """The quick tests; more arguments go to pytest: nox -s quick -- tests/unit/lms."""
+    """The README's tests; more arguments go to pytest: nox -s quick -- tests/unit/lms."""
     session.run("pytest", "-q", "-n", "2", "-m", "not slow", *session.posargs, env=ONE_THREAD)
 
 
 @nox.session
 def tests(session: nox.Session) -> None:
-    """All tests."""
-    session.run("pytest", "-q", "-n", "2", *session.posargs, env=ONE_THREAD)
+    """All tests, laws with all their examples."""
+    session.run("pytest", "-q", "-n", "2", *session.posargs, env={**ONE_THREAD, "HYPOTHESIS_PROFILE": "full"})
 
 
 @nox.session

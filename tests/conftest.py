@@ -1,41 +1,34 @@
 """What all tests share."""
 
-import os
 import signal
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, Phase, settings
 
-settings.register_profile("dev", max_examples=25, deadline=None)
+from tests.examples import FULL, PROFILE, examples
+
+settings.register_profile("fresh", max_examples=examples(25), deadline=None)
 settings.register_profile(
-    "ci",
-    max_examples=25,  # the same in every run: more would only hold again what held; "dev" draws new ones
-    deadline=None,
+    "same",
+    settings.get_profile("fresh"),
     derandomize=True,
     phases=[Phase.explicit, Phase.generate],  # a failure is told at once, and shrunk by whoever mends it
     suppress_health_check=[HealthCheck.too_slow],
 )
-settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci" if os.environ.get("CI") else "dev"))
+# Nobody's checkout fails by a draw that nobody else has; new ones are drawn where somebody asks for them.
+settings.load_profile("fresh" if PROFILE == "fresh" else "same")
 
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     # A shell lets what it starts in the background ignore Ctrl+C, and the programs that tests start with it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-SLOW = (
-    "bench", "browser", "docs/test_readme", "functional", "fuzz", "laws", "samples", "synthetic",
-    "unit/bench", "unit/folder/test_workers", "unit/older", "unit/reading",
-    "unit/reference/test_exact_plan", "unit/review/test_session", "unit/scan/decode/test_hostile",
-    "unit/scan/handwriting", "unit/scan/register", "unit/scan/strokes", "unit/similarity",
-)  # fmt: skip
-"""Where tests run the whole program, read scans, or try many cases; the others are the quick set."""
-
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark slow tests by where they stand; `-m "not slow"` runs the quick set in under a minute."""
-    tests = Path(__file__).parent
+    """Mark laws as slow where they are tried with all their examples: `-m slow` runs these, too."""
+    laws = Path(__file__).parent / "laws"
     for item in items:
-        if item.path.relative_to(tests).as_posix().startswith(SLOW):
+        if FULL and (item.path.is_relative_to(laws) or hasattr(getattr(item, "obj", None), "hypothesis")):
             item.add_marker(pytest.mark.slow)
 
 

@@ -337,12 +337,13 @@ def _values(
     right = {name: abs(real) * followed.get(task.scale_of(name), 1.0) for name, real in task.real.items()}
     for name, rate in task.rates.items():
         right[name] = rate * followed.get(task.scale_of(task.construction.rates[name].vector), 1.0)
-    known = {name: value for name, value in values.items() if value and right.get(name)}
+    ratios = {name: abs(value / float(right[name])) for name, value in values.items() if right.get(name)}
+    known = {name: ratio for name, ratio in ratios.items() if 0.0 < ratio < math.inf}
     for unit, (kinds, factor) in VALUE_UNITS.items():
         names = [name for name in known if name[0] in kinds]
         if len(names) < LEAST_ENTRIES:
             continue
-        logs = np.log([abs(known[name] / right[name]) for name in names])
+        logs = np.log([known[name] for name in names])
         sigmas = np.full(len(names), RELATIVE_SIGMA)
         residuals = (logs, logs - math.log(factor))
         as_asked, in_unit = (_cost(one, sigmas, VALUE_RANGE) for one in residuals)

@@ -3,6 +3,8 @@
 import pypdfium2
 import pytest
 
+pytestmark = pytest.mark.slow
+
 PHONE = {"width": 390, "height": 844}
 
 

@@ -7,6 +7,8 @@ import pytest
 
 from grader.records import Figure
 
+pytestmark = pytest.mark.slow
+
 SHEETS = 30
 
 

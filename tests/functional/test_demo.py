@@ -7,8 +7,9 @@ import pytest
 from grader.documents import ResultsDocument
 from tests.bench.contradictions import contradictions
 
+pytestmark = pytest.mark.slow
 
-@pytest.mark.slow
+
 def test_the_demos_page_leads_to_every_student_and_no_report_contradicts_itself(planmark, tmp_path):
     ran = planmark("demo", "--jobs", 2)
     assert ran.returncode == 0, ran.stderr

@@ -11,6 +11,8 @@ from pathlib import Path
 import psutil
 import pytest
 
+pytestmark = pytest.mark.slow
+
 SAMPLES = Path(__file__).resolve().parents[2] / "samples" / "pump"
 ROSTER = "student_id,name,n\ns01,A,7\ns02,B,12\ns08,C,21\ng08,D,21\n"
 

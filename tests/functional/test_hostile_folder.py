@@ -118,7 +118,8 @@ def test_no_name_moves_the_cursor_or_begins_a_line(tmp_path, name):
     shown = "s1_\\n\\x1b[2J\\u202e"
     assert shown in run.stdout
     assert shown in (out / "results.json").read_text("utf-8").replace("\\\\", "\\")
-    for text in (run.stdout, run.stderr, *(path.read_text("utf-8") for path in (out / "summary.csv", out / "run.log"))):
+    written = [(out / name).read_text("utf-8") for name in ("summary.csv", "run.log")]
+    for text in (run.stdout, run.stderr, *written):
         assert not re.search("\x1b|\u202e|s1_\n", text)
 
 

@@ -10,6 +10,7 @@ import pytest
 from grader.marking.mark import judge
 from reference.construction.mistakes import Drawing, affected, single_mistakes
 from samples.simulation import PERFECT, TYPICAL
+from tests.examples import examples
 from tests.hands import SOURCES, drawn_by, drawn_nodes, handed_in, task_for
 
 CREDITED = {"full", "follow_through"}
@@ -102,7 +103,7 @@ def test_what_follows_from_one_mistake_is_credited_and_the_mistake_costs(source)
     for case in CASES:
         task = task_for(*case)
         every = list(mistakes_of(task))
-        for mistake in (every[index] for index in lot.permutation(len(every))[:MISTAKES]):
+        for mistake in (every[index] for index in lot.permutation(len(every))[: examples(MISTAKES)]):
             for hand in (PERFECT, TYPICAL):
                 with contextlib.suppress(ValueError):
                     found.update(followed(task, (mistake,), hand, lot, source))
@@ -114,6 +115,7 @@ def test_what_follows_from_one_mistake_is_credited_and_the_mistake_costs(source)
     assert found[True] >= LEAST_SINGLE[source] * found.total(), found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", SOURCES)
 def test_what_follows_from_two_mistakes_is_credited(source):
     lot, found = np.random.default_rng(12), Counter()

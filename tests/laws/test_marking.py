@@ -13,6 +13,7 @@ from grader.marking.mark import judge
 from grader.marking.report import report_of
 from grader.records import Figure, Reading, ReadVector
 from reference.construction.mistakes import Mistake, line_of
+from tests.examples import examples
 from tests.hands import changed, measured, sheet, task_for
 
 TASKS = (task_for("pump", 7), task_for("press", position=0), task_for("pump-collinear", 16))
@@ -78,7 +79,7 @@ def test_marks_do_not_depend_on_the_sheets_turn_and_the_scale_drawn_at(turn_deg,
     assert judgement.score.total == judgement.score.maximum
 
 
-@settings(max_examples=8)
+@settings(max_examples=examples(8))
 @given(st.sampled_from(["v_A", "v_B", "v_D", "a_B", "a_D"]), st.floats(2.2, 20.0))
 def test_a_larger_error_never_gives_a_better_mark(name, off_mm):
     task = TASKS[0]

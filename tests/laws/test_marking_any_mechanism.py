@@ -17,6 +17,7 @@ from reference.authored.toml_file import validate
 from reference.construction.mistakes import Drawing, Mistake, single_mistakes
 from reference.kinematics.motion import move
 from reference.mechanism import Mechanism
+from tests.examples import examples
 from tests.hands import drawn_nodes, measured, sheet
 from tests.laws.mechanisms import authored
 
@@ -70,7 +71,7 @@ def lost(judgement) -> list[tuple[str, str]]:
 
 
 @given(mechanism=...)
-@settings(max_examples=FEW, deadline=None)
+@settings(max_examples=examples(FEW))
 def test_a_perfect_hand_has_full_marks_on_any_mechanism(mechanism: Mechanism):
     task = task_for(mechanism)
     values = {**{name: abs(real) for name, real in task.real.items()}, **task.rates}
@@ -85,7 +86,7 @@ def test_a_perfect_hand_has_full_marks_on_any_mechanism(mechanism: Mechanism):
 
 
 @given(mechanism=..., lot=st.randoms())
-@settings(max_examples=FEW, deadline=None)
+@settings(max_examples=examples(FEW))
 def test_any_mistake_on_any_mechanism_is_marked_and_told(mechanism: Mechanism, lot):
     task = task_for(mechanism)
     drawing = Drawing(task.construction, task.parameters)

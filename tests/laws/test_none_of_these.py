@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from grader.comparison.evidence import Submission
 from grader.marking.mark import judge
 from reference.mechanism import Mechanism
+from tests.examples import examples
 from tests.hands import nonsense
 from tests.laws.test_marking_any_mechanism import task_for
 
@@ -17,7 +18,7 @@ SURE = 0.9
 
 
 @given(mechanism=..., seed=st.integers(0, 10_000), closed=st.booleans(), directed=st.booleans())
-@settings(max_examples=FEW, deadline=None)
+@settings(max_examples=examples(FEW))
 def test_random_vectors_carry_no_name_on_any_mechanism(
     mechanism: Mechanism, seed: int, closed: bool, directed: bool
 ):

@@ -12,6 +12,7 @@ from grader.marking.mark import CHARGED, judge
 from grader.rubric import HandTable, rubric_of
 from reference.authored.assignment import built_in, load_assignment
 from reference.construction.mistakes import Drawing, single_mistakes
+from tests.examples import examples, sample
 from tests.hands import changed, drawn_nodes, measured, sheet, task_for
 
 WITHIN, BEYOND = 0.9, 1.1
@@ -73,7 +74,7 @@ def test_a_tolerance_is_where_the_rubric_has_it(name):
     rubric = rubric_of(assignment).model_copy(update={"hand": NO_HAND})
     lot = random.Random(name)
     variants = assignment.variants()
-    for _ in range(SAMPLE):
+    for _ in range(examples(SAMPLE)):
         task = task_of(assignment, rubric, lot.choice(variants))
         for share in (WITHIN, BEYOND):
             criterion, reading = lot.choice(list(perturbations(task, share)))
@@ -86,7 +87,7 @@ def test_every_criterion_has_its_tolerance_to_itself(name, n, position):
     task = task_for(name, n, position)
     task = replace(task, rubric=task.rubric.model_copy(update={"hand": NO_HAND}))
     for share in (WITHIN, BEYOND):
-        for criterion, reading in perturbations(task, share):
+        for criterion, reading in sample(perturbations(task, share)):
             judgement = judge(task, Submission(measured=reading))
             assert lost(judgement) == ([] if share < 1.0 else [criterion])
 
@@ -100,7 +101,8 @@ def test_one_mistake_of_a_perfect_hand_costs_the_vectors_of_one_node(name, n, po
     """Whatever it is: what is drawn from there follows, and is not charged a second time."""
     task = task_for(name, n, position)
     drawing = Drawing(task.construction, task.parameters)
-    for mistake in (one for plan in task.construction.figures for one in single_mistakes(drawing, plan)):
+    every = (one for plan in task.construction.figures for one in single_mistakes(drawing, plan))
+    for mistake in sample(every):
         if not all(map(cmath.isfinite, drawn_nodes(task, mistakes=(mistake,)).values())):
             continue
         if source == "sheet":

@@ -9,6 +9,7 @@ from grader.marking.mark import judge
 from reference.construction.elements import View
 from reference.construction.mistakes import Drawing, changed_step, single_mistakes
 from reference.mechanism import Mechanism
+from tests.examples import examples
 from tests.hands import drawn_nodes, measured, sheet, without
 from tests.laws.test_marking_any_mechanism import task_for
 from tests.unit.comparison.rubrics import with_rubric
@@ -96,7 +97,7 @@ def two_of(task, lot):
 
 
 @given(mechanism=..., lot=st.randoms())
-@settings(max_examples=FEW, deadline=None)
+@settings(max_examples=examples(FEW))
 def test_the_second_of_two_mistakes_costs_at_least_half_of_what_it_costs_alone(mechanism: Mechanism, lot):
     task = task_for(mechanism)
     first, second = two_of(task, lot)
@@ -106,7 +107,7 @@ def test_the_second_of_two_mistakes_costs_at_least_half_of_what_it_costs_alone(m
 
 
 @given(mechanism=..., lot=st.randoms())
-@settings(max_examples=FEW, deadline=None)
+@settings(max_examples=examples(FEW))
 def test_a_single_mistake_costs_one_criterion(mechanism: Mechanism, lot):
     task = task_for(mechanism)
     every = list(clear_mistakes(task))
@@ -115,7 +116,7 @@ def test_a_single_mistake_costs_one_criterion(mechanism: Mechanism, lot):
 
 
 @given(mechanism=..., lot=st.randoms())
-@settings(max_examples=FEW // 2, deadline=None)
+@settings(max_examples=examples(FEW // 2))
 def test_a_price_does_not_depend_on_the_order_of_the_rubric(mechanism: Mechanism, lot):
     task = task_for(mechanism)
     every = list(clear_mistakes(task))
@@ -127,7 +128,7 @@ def test_a_price_does_not_depend_on_the_order_of_the_rubric(mechanism: Mechanism
 
 
 @given(mechanism=..., lot=st.randoms())
-@settings(max_examples=FEW // 2, deadline=None)
+@settings(max_examples=examples(FEW // 2))
 def test_a_component_left_blank_costs_as_much_as_a_zero(mechanism: Mechanism, lot):
     task = task_for(mechanism)
     every = [one for one in clear_mistakes(task) if one.code == "normal_missing"]

@@ -13,6 +13,7 @@ from grader.rubric import rubric_of
 from reference.authored.assignment import built_in, load_assignment
 from reference.mechanism import Mechanism
 from samples.simulation import CAREFUL, TYPICAL
+from tests.examples import examples
 from tests.hands import SOURCES, drawn_by, handed_in
 from tests.laws.test_marking_any_mechanism import task_for
 
@@ -40,7 +41,7 @@ def test_right_drawings_of_careful_hands_lose_nothing_and_of_typical_ones_next_t
     rubric, variants = rubric_of(assignment), assignment.variants()
     lot = np.random.default_rng(5)
     typical: Counter[str] = Counter()
-    for index in range(DRAWINGS):
+    for index in range(examples(DRAWINGS)):
         task = task_of(assignment, rubric, variants[index % len(variants)])
         careful = {one.name: one.verdict for one in verdicts_of(task, CAREFUL, lot) if one.verdict in CHARGED}
         assert not careful, (task.variant, careful)
@@ -51,7 +52,7 @@ def test_right_drawings_of_careful_hands_lose_nothing_and_of_typical_ones_next_t
 
 
 @given(mechanism=..., seed=st.integers(0, 10_000))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=examples(15))
 def test_a_careful_hands_right_drawing_of_any_mechanism_loses_nothing(mechanism: Mechanism, seed):
     task = task_for(mechanism)
     charged = [

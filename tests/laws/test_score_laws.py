@@ -15,6 +15,7 @@ from grader.outcomes import Outcome
 from grader.records import Figure, Reading, ReadNode
 from grader.rubric import RubricFile, WeightsTable
 from reference.construction.mistakes import Mistake
+from tests.examples import examples
 from tests.hands import sheet, task_for
 from tests.unit.comparison.rubrics import with_rubric
 
@@ -32,7 +33,7 @@ def total(task, reading):
 
 
 @given(nodes, angles, st.lists(st.floats(0.1, 12.0), min_size=3, max_size=3))
-@settings(max_examples=FEW, deadline=None)
+@settings(max_examples=examples(FEW))
 def test_without_following_through_a_score_never_rises_when_a_node_gets_worse(node, angle, distances):
     task = with_rubric(PUMP, follow_through=False)
     away = [distance * cmath.exp(1j * angle) for distance in sorted(distances)]
@@ -42,7 +43,7 @@ def test_without_following_through_a_score_never_rises_when_a_node_gets_worse(no
 
 
 @given(st.dictionaries(nodes, st.complex_numbers(max_magnitude=30.0), max_size=4))
-@settings(max_examples=FEW, deadline=None)
+@settings(max_examples=examples(FEW))
 def test_with_following_through_a_score_is_never_lower_than_without_nor_above_full_marks(moved):
     reading = sheet(PUMP, moved=moved)
     (low, high), (strict_low, strict_high) = (
@@ -75,14 +76,14 @@ places = st.complex_numbers(max_magnitude=200.0)
 @given(
     st.fixed_dictionaries(dict.fromkeys(("mechanism", "velocity_plan", "acceleration_plan"), places)), nodes
 )
-@settings(max_examples=FEW, deadline=None)
+@settings(max_examples=examples(FEW))
 def test_the_same_drawing_elsewhere_on_the_paper_with_other_poles_has_the_same_mark(by, node):
     reading = sheet(PUMP, moved={node: 5.0 + 3.0j}, mistakes=(Mistake("normal_missing", "n_B"),))
     assert total(PUMP, shifted(reading, by)) == pytest.approx(total(PUMP, reading))
 
 
 @given(st.randoms(use_true_random=False), nodes)
-@settings(max_examples=FEW, deadline=None)
+@settings(max_examples=examples(FEW))
 def test_the_order_of_criteria_does_not_matter(lot, node):
     reading = sheet(PUMP, moved={node: 4.0 - 4.0j})
     criteria = list(PUMP.rubric.criterion)

@@ -15,6 +15,7 @@ from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, Figure, Reading
 from samples.simulation import CAREFUL, TYPICAL
 from samples.simulation.wording import declared_texts
 from tests.bench.judging_students import ASSIGNMENTS, assignment_named
+from tests.examples import examples
 from tests.hands import drawn_by, drawn_nodes, handed_in, measured, sheet
 
 FEW = 20
@@ -65,7 +66,7 @@ def scaled(reading, by):
     return replace(reading, figures=figures)
 
 
-@settings(max_examples=FEW)
+@settings(max_examples=examples(FEW))
 @given(copies(), st.floats(0.5, 2.0), st.floats(0.5, 2.0))
 def test_no_declared_scale_hides_whose_data_a_drawing_follows(copy, kv, ka):
     task, other = copy.tasks
@@ -78,7 +79,7 @@ def test_no_declared_scale_hides_whose_data_a_drawing_follows(copy, kv, ka):
     assert beside.not_own > 0.5
 
 
-@settings(max_examples=FEW)
+@settings(max_examples=examples(FEW))
 @given(copies(), st.floats(0.7, 1.4), st.floats(0.7, 1.4))
 def test_the_scales_drawn_with_do_not_change_whose_data_they_are(copy, kv, ka):
     task, other = copy.tasks
@@ -90,7 +91,7 @@ def test_the_scales_drawn_with_do_not_change_whose_data_they_are(copy, kv, ka):
             assert (first is None) == (second is None)
 
 
-@settings(max_examples=FEW)
+@settings(max_examples=examples(FEW))
 @given(copies(), st.floats(-20.0, 20.0))
 @example(Copy("shaper", 1, 6), -8.46)
 def test_a_sheet_turned_on_the_scanner_has_the_same_owner(copy, turn_deg):
@@ -102,7 +103,7 @@ def test_a_sheet_turned_on_the_scanner_has_the_same_owner(copy, turn_deg):
         assert (upright is None) == (turned is None)
 
 
-@settings(max_examples=FEW)
+@settings(max_examples=examples(FEW))
 @given(copies(), st.sampled_from(["sheet", "directions"]), st.integers(0, 10_000))
 def test_what_is_copied_wholly_is_never_marked_without_a_person(copy, source, seed):
     task, other = copy.tasks
@@ -111,7 +112,7 @@ def test_what_is_copied_wholly_is_never_marked_without_a_person(copy, source, se
     assert judge(task, copied).score.total is None
 
 
-@settings(max_examples=FEW)
+@settings(max_examples=examples(FEW))
 @given(copies(), st.sampled_from(["sheet", "directions", "lengths"]), st.integers(0, 10_000))
 def test_own_data_are_nobody_elses(copy, source, seed):
     task, _ = copy.tasks
@@ -119,7 +120,7 @@ def test_own_data_are_nobody_elses(copy, source, seed):
     assert owner(task, drawn) is None
 
 
-@settings(max_examples=FEW)
+@settings(max_examples=examples(FEW))
 @given(copies(), st.sampled_from(PLANS))
 def test_half_a_copy_waits_for_a_person_whichever_half_it_is(copy, plan):
     task, other = copy.tasks

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.examples import examples
 from tests.fuzz.doors import enter, mutated
 from tests.fuzz.seeds import seeds
 from tests.fuzz.shaped import shaped
@@ -47,14 +48,14 @@ def hand_in(kind: str, data: bytes) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@settings(max_examples=EXAMPLES)
+@settings(max_examples=examples(EXAMPLES))
 @given(data=st.binary(max_size=200))
 def test_what_only_begins_like_a_file_is_taken_or_refused(kind, data):
     hand_in(kind, KINDS[kind][1] + data)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@settings(max_examples=EXAMPLES)
+@settings(max_examples=examples(EXAMPLES))
 @given(seed=st.integers(0, 2**64 - 1))
 def test_a_damaged_file_is_taken_or_refused(kind, seed):
     dice = random.Random(seed)

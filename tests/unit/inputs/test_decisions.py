@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from grader.inputs.decision_texts import PageDecision, page_decision, place, place_text
 from grader.inputs.decisions import COLUMNS, VERDICTS, ClashError, Decision, DecisionFile, read_table
 from reference.errors import CallError, InputFileError, PlanmarkError, lines_of
+from tests.examples import examples
 
 HEADER = ",".join(COLUMNS)
 ROW = Decision(
@@ -297,7 +298,7 @@ decisions = st.builds(
 )
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=examples(60))
 @given(rows=st.lists(decisions, max_size=6, unique_by=lambda row: row.key), mark=st.sampled_from(",;"))
 def test_any_decision_reads_back_as_it_was_written(tmp_path, rows, mark):
     path = written(tmp_path / "any.csv", HEADER.replace(",", mark))

@@ -18,6 +18,7 @@ from grader.lms.marks import numbered
 from grader.lms.moodle import fill_worksheet
 from grader.lms.table import with_ids
 from reference.errors import PlanmarkError
+from tests.examples import examples
 from tests.unit.lms import importers
 from tests.unit.lms.classroom import marked, report, results
 
@@ -30,7 +31,7 @@ texts = st.text(alphabet=st.sampled_from("ăȘИя<>&;,\"'\n\r =+-@0"), max_size
 scores = st.integers(0, 1_000_000).map(lambda one: one / 100_000)
 classes = st.lists(st.tuples(texts, texts, scores), min_size=1, max_size=6)
 styles = st.sampled_from([("\n", csv.QUOTE_ALL), ("\r\n", csv.QUOTE_ALL), ("\r\n", csv.QUOTE_MINIMAL)])
-quick = settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+quick = settings(max_examples=examples(100), suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def written(rows, style, mark):
