@@ -26,6 +26,8 @@ class Inline:
     def __exit__(self, *_error):
         """Nothing to end."""
 
+    end = __exit__
+
     def run(self, function, calls, sheets=()):
         del sheets
         for index, call in enumerate(calls):

@@ -21,21 +21,6 @@ EXAMPLES = 10
 """For each operation: the whole document is tried in a minute."""
 
 
-class Workers(Inline):
-    """The pool in the test itself."""
-
-    def __init__(self, *_arguments):
-        """Nothing is limited."""
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_error):
-        """Nothing to end."""
-
-    end = __exit__
-
-
 @pytest.fixture(scope="module")
 def app(tmp_path_factory):
     top = tmp_path_factory.mktemp("served")
@@ -48,8 +33,8 @@ def app(tmp_path_factory):
     )
     settings.data.mkdir()
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(queue, "Workers", Workers)
-        patched.setattr(queue, "Judges", Workers)
+        patched.setattr(queue, "Workers", Inline)
+        patched.setattr(queue, "Judges", Inline)
         patched.setattr(queue.Queue, "_grade", lambda *_: {"states": {}, "unmatched": 0})
         patched.setattr("grader.web.guard.Guard.count", lambda *_: None)
         made = application(settings, photo=lambda *_: {"lines": [], "problems": [], "is_right": False})

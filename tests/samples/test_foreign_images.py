@@ -20,6 +20,7 @@ def test_a_foreign_image_is_refused_with_a_reason(path):
     assert seen.problems
 
 
+@pytest.mark.slow
 def test_a_page_of_text_is_read_as_nothing(tmp_path):
     path = reading_scenes._page(reading_scenes._text, seed=700).save(tmp_path / "text")
     page = open_page(PageRef(path.name, path=path))

@@ -76,6 +76,7 @@ def nodes_of(reading):
     return {(name, node): read for name, one in reading.figures.items() for node, read in one.nodes.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_sheet_is_read_to_its_floor_and_alike_in_all_four_turns(kind, tmp_path):
     upright = None

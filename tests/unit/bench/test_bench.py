@@ -41,6 +41,7 @@ def test_the_speed_of_ours_stands_beside_scipys_with_the_errors_of_each():
     assert errors["closed form"] < errors["scipy fsolve"] < 1e-6
 
 
+@pytest.mark.slow
 def test_the_bench_of_the_solver_measures_as_many_rows_as_it_says(monkeypatch):
     few = KINDS[:1]
     monkeypatch.setattr(solver, "KINDS", few)

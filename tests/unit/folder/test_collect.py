@@ -22,7 +22,6 @@ from reference.plan import construction_for
 from tests.bench.collected import points_of
 from tests.inline import Inline
 
-pytestmark = pytest.mark.slow
 PUMP = load_assignment("pump")
 RUBRIC = rubric_of(PUMP)
 NAME = "Ion-Popescu"

@@ -326,7 +326,14 @@ def sources(tmp_path_factory):
         shutil.copytree(TOP / package, top / package, ignore=shutil.ignore_patterns("__pycache__", "samples"))
     (top / "tests").mkdir()
     (top / "tests" / "bench.py").write_text("")
-    return top
+    return top, digests(top)
+
+
+def digests(top):
+    """Of each stage of the work, by the sources in a folder."""
+    stage_digest.cache_clear()
+    found = {stage: stage_digest(modules, top=top) for stage, modules in STAGES.items()}
+    return found | {"cells": stage_digest(CELL_STAGE, CELLS_OF, top)}
 
 
 @pytest.mark.parametrize(
@@ -347,18 +354,13 @@ def sources(tmp_path_factory):
     ],
 )
 def test_what_a_change_makes_stale(sources, file, stale):
-    def digests():
-        stage_digest.cache_clear()
-        digests = {stage: stage_digest(modules, top=sources) for stage, modules in STAGES.items()}
-        return digests | {"cells": stage_digest(CELL_STAGE, CELLS_OF, sources)}
-
-    before, path = digests(), sources / file
+    top, before = sources
+    path = top / file
     content = path.read_bytes()
     path.write_bytes(content + b"\n# changed\n")
-    after = digests()
+    after = digests(top)
     path.write_bytes(content)
     assert {stage for stage in before if after[stage] != before[stage]} == stale
-    assert digests() == before
 
 
 def test_every_module_that_the_order_of_work_calls_is_in_a_stage():

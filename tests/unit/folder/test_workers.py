@@ -34,7 +34,7 @@ def codes(jobs, work):
     ]
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("jobs", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_what_breaks_a_process_or_a_limit_costs_that_call_alone(jobs):
     broken = {
         "crashes": "crashed",
@@ -78,6 +78,7 @@ def test_a_call_that_gives_none_has_ended():
         assert dict(workers.run(print, [(), ()])) == {0: None, 1: None}
 
 
+@pytest.mark.slow
 def test_processes_killed_at_any_moment_lose_no_call():
     """Also between two calls, and while one is handed over."""
     dice, stop = random.Random(7), threading.Event()
@@ -108,7 +109,9 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(
+    "sent", [pytest.param(signal.SIGKILL, marks=pytest.mark.slow), signal.SIGTERM, signal.SIGINT]
+)
 def test_the_processes_end_with_their_parent(tmp_path, sent):
     script = tmp_path / "parent.py"
     script.write_text(PARENT)

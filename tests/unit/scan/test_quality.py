@@ -145,7 +145,7 @@ def test_a_picture_without_a_sheet_is_told_and_a_turned_sheet_is_none() -> None:
     assert not flaws_of(replace(page, grey=np.ascontiguousarray(np.rot90(page.grey)), turn_deg=270))
 
 
-@pytest.mark.parametrize("seed", range(40, 44))
+@pytest.mark.parametrize("seed", [40, *(pytest.param(one, marks=pytest.mark.slow) for one in (41, 42, 43))])
 def test_good_photos_have_no_flaw(seed: int) -> None:
     for scene in (PRINTED, PLAIN):
         assert not flaws_of(photo(scene, seed)[0])

@@ -1,37 +1,27 @@
 import json
 import re
+import shutil
 import time
 
 import pytest
+from argon2 import PasswordHasher
 from starlette.testclient import TestClient
 
 from grader.files import samples_folder
 from grader.folder.batch import grade
 from grader.folder.workers import Limits
-from grader.web import queue
+from grader.web import guard, queue
 from grader.web.app import application, first_invitation
 from grader.web.places import batch_of
 from grader.web.settings import Settings
+from grader.web.store import Store
 from tests.inline import Inline
 
 ADDRESS = "http://127.0.0.1:8000"
 PASSWORD = "four words make one"  # noqa: S105 - of a test
 SAMPLES = samples_folder() / "pump"
-
-
-class Workers(Inline):
-    """The pool in the test itself."""
-
-    def __init__(self, *_arguments):
-        """Nothing is limited."""
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_error):
-        """Nothing to end."""
-
-    end = __exit__
+QUICK = PasswordHasher(time_cost=1, memory_cost=8, parallelism=1)
+"""Hashes take memory and time on purpose, which tests of other things need not pay."""
 
 
 class Browser(TestClient):
@@ -70,8 +60,17 @@ class Browser(TestClient):
         raise AssertionError("it does not end")
 
 
+@pytest.fixture(scope="session")
+def empty(tmp_path_factory):
+    """A data base without rows."""
+    path = tmp_path_factory.mktemp("empty") / "test.sqlite"
+    Store(f"sqlite:///{path}").close()
+    return path
+
+
 @pytest.fixture
-def settings(tmp_path):
+def settings(empty, tmp_path):
+    shutil.copy(empty, tmp_path)
     return Settings(
         tmp_path / "data", f"sqlite:///{tmp_path / 'test.sqlite'}", "s" * 40, ADDRESS,
         limits=Limits(60.0, 3000), upload_mb=2, photo_mb=1,
@@ -80,8 +79,9 @@ def settings(tmp_path):
 
 @pytest.fixture
 def app(settings, monkeypatch):
-    monkeypatch.setattr(queue, "Workers", Workers)
-    monkeypatch.setattr(queue, "Judges", Workers)
+    monkeypatch.setattr(queue, "Workers", Inline)
+    monkeypatch.setattr(queue, "Judges", Inline)
+    monkeypatch.setattr(guard, "_HASHER", QUICK)
     settings.data.mkdir(exist_ok=True)
     made = application(settings)
     with TestClient(made, base_url=ADDRESS) as server:

@@ -16,6 +16,7 @@ SCOPES = [
     "https://purl.imsglobal.org/spec/lti-ags/scope/lineitem",
     "https://purl.imsglobal.org/spec/lti-ags/scope/score",
 ]
+KEY = JWK.generate(kty="RSA", size=2048, kid="platform-key")
 CLIENT, DEPLOYMENT = "client-1", "deployment-1"
 
 
@@ -23,7 +24,7 @@ class Platform:
     """The platform's server; `scores` are what it was sent, `broken` a status that it answers instead."""
 
     def __init__(self):
-        self.key = JWK.generate(kty="RSA", size=2048, kid="platform-key")
+        self.key = KEY
         self.tool_keys, self.scores, self.items, self.broken, self.tokens = "", [], [], None, []
         outer = self
 

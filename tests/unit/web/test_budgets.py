@@ -11,7 +11,8 @@ from reportlab.pdfgen.canvas import Canvas
 from grader.web import queue
 from grader.web.queue import Queue, Turns, _TurnOverError
 from grader.web.store import Job, Publication, Store
-from tests.unit.web.conftest import Browser, Workers
+from tests.inline import Inline
+from tests.unit.web.conftest import Browser
 
 
 def pdf(pages):
@@ -167,8 +168,8 @@ def test_a_class_that_is_graded_for_long_lets_another_go_first(settings, store, 
             raise _TurnOverError
         return {}
 
-    monkeypatch.setattr(queue, "Workers", Workers)
-    monkeypatch.setattr(queue, "Judges", Workers)
+    monkeypatch.setattr(queue, "Workers", Inline)
+    monkeypatch.setattr(queue, "Judges", Inline)
     monkeypatch.setattr(Queue, "_grade", graded)
     jobs = Queue(settings, store, lambda *_: {})
     jobs.start()

@@ -14,7 +14,8 @@ from grader.web.judges import Judges
 from grader.web.queue import Queue
 from grader.web.store import Job, Publication, Store
 from reference.errors import CallError, InputFileError
-from tests.unit.web.conftest import ADDRESS, Workers
+from tests.inline import Inline
+from tests.unit.web.conftest import ADDRESS
 
 
 @pytest.fixture
@@ -48,8 +49,8 @@ def ended(store):
 
 @pytest.fixture(autouse=True)
 def inline(monkeypatch):
-    monkeypatch.setattr(queue, "Workers", Workers)
-    monkeypatch.setattr(queue, "Judges", Workers)
+    monkeypatch.setattr(queue, "Workers", Inline)
+    monkeypatch.setattr(queue, "Judges", Inline)
 
 
 @pytest.mark.parametrize("state", ["queued", "running"])

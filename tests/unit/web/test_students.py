@@ -139,11 +139,11 @@ def _looked_at(path, asked):
     return {"is_there": path.is_file(), **asked}
 
 
-@pytest.mark.parametrize("body", [b"", b"<svg/>", b"MZ\x90", b"<html>", b"%!PS", b"PK\x03\x04"])
-def test_only_pictures_are_taken_as_photos(admin, visitor, body, settings):
+def test_only_pictures_are_taken_as_photos(admin, visitor, settings):
     key = admin.publish()
-    answer = visitor.act("POST", f"/publications/{key}/photos?n=12", content=body)
-    assert (answer.status_code, answer.json()["code"]) == (415, "file_type")
+    for body in (b"", b"<svg/>", b"MZ\x90", b"<html>", b"%!PS", b"PK\x03\x04"):
+        answer = visitor.act("POST", f"/publications/{key}/photos?n=12", content=body)
+        assert (answer.status_code, answer.json()["code"]) == (415, "file_type"), body
     assert not list(settings.data.rglob("photos/*"))
 
 
@@ -293,10 +293,10 @@ def test_all_of_a_student_is_deleted_and_nothing_of_the_others(graded, admin, st
     assert admin.act("DELETE", f"/publications/{key}/students/..%2F..").status_code in {404, 422}
 
 
-@pytest.mark.parametrize("platform", ["csv", "canvas", "gradescope", "lti"])
-def test_platform_files_are_downloaded(graded, admin, platform):
+def test_platform_files_are_downloaded(graded, admin):
     key, _ = graded
-    answer = admin.get(f"/api/v1/publications/{key}/exports/{platform}")
-    assert answer.status_code == 200, answer.text
-    assert answer.headers["content-disposition"].startswith('attachment; filename="export-')
+    for platform in ("csv", "canvas", "gradescope", "lti"):
+        answer = admin.get(f"/api/v1/publications/{key}/exports/{platform}")
+        assert answer.status_code == 200, answer.text
+        assert answer.headers["content-disposition"].startswith('attachment; filename="export-')
     assert admin.get(f"/api/v1/publications/{key}/exports/nothing").status_code == 404

@@ -91,6 +91,7 @@ print(page_of({path!r}, 1).grey.shape)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["png16", "tiff_rgb"])
 def test_large_accepted_pictures_decode_within_a_workers_memory(tmp_path, kind):
     path = tmp_path / "large"

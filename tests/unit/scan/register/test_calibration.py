@@ -8,12 +8,11 @@ import numpy as np
 import pypdfium2
 import pytest
 from PIL import Image
-from typer.testing import CliRunner
 
-from grader.cli.app import app
 from grader.printed.answer_sheet import make_calibration
 from grader.records import Unread
 from grader.scan.register.calibration import calibrate, residual_map
+from tests.inline import planmark
 
 DPI = 200
 SCALE = 0.0002
@@ -88,9 +87,9 @@ def test_another_page_says_nothing(tmp_path):
 
 def test_the_command_tells_and_writes_what_was_measured(tmp_path):
     scan, svg = saved(tmp_path / "scan.jpg", distorted((1.003, 1.0))), tmp_path / "map.svg"
-    told = CliRunner().invoke(app, ["calibrate", str(scan), "--json", "--svg", str(svg)])
-    assert told.exit_code == 1
+    told = planmark("calibrate", scan, "--json", "--svg", svg, cwd=tmp_path)
+    assert told.returncode == 1
     (document,) = json.loads(told.stdout)
     assert document["unequal"] == pytest.approx(0.003, abs=2 * SCALE)
     assert svg.read_text().startswith("<svg")
-    assert "unequal scale +0.3" in CliRunner().invoke(app, ["calibrate", str(scan)]).stdout
+    assert "unequal scale +0.3" in planmark("calibrate", scan, cwd=tmp_path).stdout
