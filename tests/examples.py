@@ -1,8 +1,11 @@
-"""How many examples a law is tried with: few in the README's command, all of them in `.ci/run`."""
+"""What is tried: a part of the examples in the README's command, all of them in `.ci/run`."""
 
 import os
 from collections.abc import Iterable
 from typing import TypeVar
+
+import pytest
+from _pytest.mark.structures import ParameterSet
 
 Case = TypeVar("Case")
 
@@ -16,6 +19,13 @@ SHARE = 5
 def examples(number: int) -> int:
     """The examples of this run, of so many."""
     return number if FULL else max(number // SHARE, 2)
+
+
+def slow(*cases: object) -> list[ParameterSet]:
+    """Cases that `.ci/run` alone tries, beside those of every run."""
+    return [
+        pytest.param(*(one if isinstance(one, tuple) else (one,)), marks=pytest.mark.slow) for one in cases
+    ]
 
 
 def sample(cases: Iterable[Case]) -> list[Case]:

@@ -167,10 +167,10 @@ def test_a_worker_with_another_program_is_refused(address, handed_in, tmp_path, 
 
 
 def test_a_folder_that_workers_do_not_see_is_refused(address, tmp_path):
-    fsspec.filesystem("memory").pipe("/class/s01.json", b"{}")
-    image = cluster.image_of("memory://class", tmp_path)
-    with pytest.raises(CallError, match=r"worker .* cannot read memory://class .* all workers see"):
-        cluster.Cluster(address, image, tmp_path, PATIENT, "memory://class").__enter__()
+    fsspec.filesystem("memory").pipe("/unseen/s01.json", b"{}")
+    image = cluster.image_of("memory://unseen", tmp_path)
+    with pytest.raises(CallError, match=r"worker .* cannot read memory://unseen .* all workers see"):
+        cluster.Cluster(address, image, tmp_path, PATIENT, "memory://unseen").__enter__()
 
 
 def test_no_scheduler(handed_in, tmp_path, planmark):

@@ -71,8 +71,8 @@ def results_of(folder: Path) -> dict:
 
 
 @pytest.mark.parametrize("name", built_in())
-def test_a_perfect_hand_scores_full_marks_in_every_variant(planmark, tmp_path, name):
-    rows = perfect_rows(name)
+def test_a_table_of_a_perfect_hand_has_full_marks(planmark, tmp_path, name):
+    rows = perfect_rows(name)[:3]
     write_table(tmp_path / "in" / "measured.csv", rows)
     write_roster(tmp_path / "roster.csv", rows)
     ran = planmark("grade", "in", "--assignment", name, "--roster", "roster.csv", "--out", "out", "--jobs", 1)

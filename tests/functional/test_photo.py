@@ -7,7 +7,6 @@ import cv2
 import numpy as np
 import pytest
 
-from grader.folder.workers import Limits, Workers, result_of
 from grader.photo import PhotoCheck, photo_check
 from tests.bench.reading_scenes import ReadingScene, SceneWork, work
 from tests.functional.conftest import Run
@@ -23,10 +22,7 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> tuple[SceneWork, Path]:
 
 
 def checked(student: SceneWork, path: Path, lang: str = "en", level: str = "hint") -> PhotoCheck:
-    with Workers(1, Limits()) as workers:
-        return result_of(
-            workers, photo_check, path, student.assignment, student.rubric, student.variant, lang, level
-        )
+    return photo_check(path, student.assignment, student.rubric, student.variant, lang, level)
 
 
 def test_what_is_drawn_rightly_is_right_and_nothing_expected_is_shown(drawn: tuple[SceneWork, Path]) -> None:

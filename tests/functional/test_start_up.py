@@ -1,13 +1,13 @@
 """What a command imports: no heavy library for work that is not asked for. mpmath refines dead points."""
 
 import json
-import os
 import subprocess
 import sys
+from functools import cache
 
 import pytest
 
-from tests.functional.conftest import ROOT
+from tests.functional.conftest import ENVIRONMENT
 
 HEAVY = frozenset(
     "scipy cv2 skimage reportlab pikepdf pypdfium2 PIL tifffile imagecodecs simplejpeg zxingcpp jinja2 rich"
@@ -31,11 +31,11 @@ main()
 """
 
 
-def imported(folder, *arguments):
+@cache
+def imported(folder, command):
     """The modules that a command has imported when it ends."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1", "COLUMNS": "120"}
     run = subprocess.run(  # noqa: S603 - our own program
-        [sys.executable, "-c", PROGRAM, *arguments], cwd=folder, env=environment, capture_output=True,
+        [sys.executable, "-c", PROGRAM, *command.split()], cwd=folder, env=ENVIRONMENT, capture_output=True,
         text=True, encoding="utf-8", timeout=300, check=False,
     )  # fmt: skip
     assert run.returncode in {0, 1}, run.stderr
@@ -44,9 +44,10 @@ def imported(folder, *arguments):
     return set(modules)
 
 
-@pytest.fixture
-def folder(tmp_path):
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
     """A folder with one student's measurements to check, and a class's to grade."""
+    tmp_path = tmp_path_factory.mktemp("desk")
     (tmp_path / "class").mkdir()
     measured = {"student_id": "s07", "n": 7, "segments_mm": {"v_A": 60.0}}
     for path in (tmp_path / "measured.json", tmp_path / "class" / "s07.json"):
@@ -73,7 +74,7 @@ def folder(tmp_path):
     ],
 )
 def test_a_command_imports_no_heavy_library_that_it_does_not_use(folder, command, allowed):
-    assert HEAVY & imported(folder, *command.split()) <= allowed
+    assert HEAVY & imported(folder, command) <= allowed
 
 
 @pytest.mark.parametrize(
@@ -85,14 +86,12 @@ def test_a_command_imports_no_heavy_library_that_it_does_not_use(folder, command
     ],
 )
 def test_a_command_imports_no_room_of_the_program_that_it_does_not_use(folder, command, needed):
-    modules = (module.split(".") for module in imported(folder, *command.split()))
+    modules = (module.split(".") for module in imported(folder, command))
     assert {names[1] for names in modules if names[0] == "grader" and len(names) > 1} <= set(needed.split())
 
 
 def test_grading_imports_no_heavy_library_beyond_those_of_scans_pages_and_processes(folder):
     allowed = {*SCANS, *PAGES, "rich", "pebble", "psutil", "filelock"}
-    modules = imported(
-        folder, "grade", "class", "--assignment", "pump", "--roster", "class/roster.csv", "--out", "out",
-        "--jobs", "1",
-    )  # fmt: skip
+    call = "grade class --assignment pump --roster class/roster.csv --out out --jobs 1"
+    modules = imported(folder, call)
     assert HEAVY & modules <= allowed

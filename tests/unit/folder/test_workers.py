@@ -5,7 +5,7 @@ import random
 import signal
 import subprocess
 import sys
-import threading
+import time
 from multiprocessing import active_children
 from pathlib import Path
 
@@ -17,10 +17,13 @@ from grader.folder import workers as workers_module
 from grader.folder.workers import Limits, Workers, result_of
 from grader.records import Problem
 from reference.errors import InputFileError
+from tests.examples import slow
 from tests.unit.folder import calls
 
 LIMITS = Limits(seconds=2.0, memory_mb=400)
 ROOT = Path(__file__).parents[3]
+KILLED = 0.05
+"""Share of the results after which a process is killed."""
 
 
 def codes(jobs, work):
@@ -34,7 +37,7 @@ def codes(jobs, work):
     ]
 
 
-@pytest.mark.parametrize("jobs", [pytest.param(1, marks=pytest.mark.slow), 2])
+@pytest.mark.parametrize("jobs", [2, *slow(1)])
 def test_what_breaks_a_process_or_a_limit_costs_that_call_alone(jobs):
     broken = {
         "crashes": "crashed",
@@ -80,21 +83,15 @@ def test_a_call_that_gives_none_has_ended():
 
 @pytest.mark.slow
 def test_processes_killed_at_any_moment_lose_no_call():
-    """Also between two calls, and while one is handed over."""
-    dice, stop = random.Random(7), threading.Event()
-
-    def kill():
-        while not stop.wait(dice.uniform(0.2, 2.5)):
-            children = [child for child in active_children() if child.name == WORKERS_NAME]
-            if children:
-                dice.choice(children).kill()
-
-    killer = threading.Thread(target=kill)
+    """Also between two calls, and while one is handed over; some results come between two kills."""
+    dice, results = random.Random(7), {}
     with Workers(2, LIMITS, calls.__name__) as workers:
-        killer.start()
-        results = dict(workers.run(calls.sleeps, [(0.02,)] * 200))
-        stop.set()
-        killer.join()
+        for index, result in workers.run(calls.sleeps, [(0.02,)] * 200):
+            results[index] = result
+            children = [child for child in active_children() if child.name == WORKERS_NAME]
+            if children and dice.random() < KILLED:
+                time.sleep(dice.uniform(0.0, 0.03))
+                dice.choice(children).kill()
     assert sorted(results) == list(range(200))
     assert set(results.values()) == {0.02}
 

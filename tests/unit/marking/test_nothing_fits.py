@@ -24,9 +24,8 @@ def random_sheet(seed, *, closed, directed, plans=None):
 
 @pytest.mark.parametrize("directed", [True, False])
 @pytest.mark.parametrize("closed", [True, False])
-@pytest.mark.parametrize("seed", range(3))
-def test_random_vectors_fit_nothing_and_no_mistake_is_named(closed, directed, seed):
-    judgement = random_sheet(seed, closed=closed, directed=directed)
+def test_random_vectors_fit_nothing_and_no_mistake_is_named(closed, directed):
+    judgement = random_sheet(0, closed=closed, directed=directed)
     assert judgement.unfit is not None
     assert judgement.unfit.vectors >= judgement.unfit.of / 2
     assert not [one for one in judgement.mistakes if one.confidence >= SURE]

@@ -13,6 +13,7 @@ from grader.scan.decode.pages import page_of
 from grader.scan.quality import LEAST_DPI, MOST_BLUR_MM, flaws
 from grader.scan.register.registration import register
 from tests.bench.reading_scenes import ReadingScene, work
+from tests.examples import slow
 
 REAL = Path(__file__).parents[4] / "shared" / "real"
 PRINTED = ReadingScene("photo", "", device="phone", dpi=None, printed=True, hardship=0.0)
@@ -145,7 +146,7 @@ def test_a_picture_without_a_sheet_is_told_and_a_turned_sheet_is_none() -> None:
     assert not flaws_of(replace(page, grey=np.ascontiguousarray(np.rot90(page.grey)), turn_deg=270))
 
 
-@pytest.mark.parametrize("seed", [40, *(pytest.param(one, marks=pytest.mark.slow) for one in (41, 42, 43))])
+@pytest.mark.parametrize("seed", [40, *slow(41, 42, 43)])
 def test_good_photos_have_no_flaw(seed: int) -> None:
     for scene in (PRINTED, PLAIN):
         assert not flaws_of(photo(scene, seed)[0])

@@ -365,24 +365,24 @@ def test_a_login_of_a_platform_that_is_not_registered_is_refused(visitor):
     assert visitor.post("/lti/launch", data={"error": "login_required"}).status_code == 400
 
 
-@pytest.mark.parametrize(
-    "address",
-    [
-        "http://platform.example/token", "https://10.0.0.5/token", "https://169.254.169.254/latest",
-        "https://localhost/token", "https://localhost./token", "https://[::1]/token", "file:///etc/passwd",
-        "https://a:b@platform.example/", "https://printer.local/", "gopher://platform.example", "https://0/",
-        "https://2130706433/", "https://0x7f.1/", "https://127.1/", "https://[::ffff:127.0.0.1]/",
-        "https://[64:ff9b::7f00:1]/", "https://[2002:7f00:1::]/", "https://224.0.0.1/", "https://x:99999/",
-        "https://" + "a" * 300 + ".example/",
-    ],
-)  # fmt: skip
-def test_the_server_is_not_sent_into_its_own_network(admin, address):
-    registration = {
-        "issuer": "https://platform.example", "client_id": "1", "deployments": ["1"],
-        "auth_login_url": "https://platform.example/a", "key_set_url": "https://platform.example/k",
-        "auth_token_url": address,
-    }  # fmt: skip
-    assert admin.act("POST", "/lti/platforms", json=registration).status_code == 422
+NOT_PUBLIC = [
+    "http://platform.example/token", "https://10.0.0.5/token", "https://169.254.169.254/latest",
+    "https://localhost/token", "https://localhost./token", "https://[::1]/token", "file:///etc/passwd",
+    "https://a:b@platform.example/", "https://printer.local/", "gopher://platform.example", "https://0/",
+    "https://2130706433/", "https://0x7f.1/", "https://127.1/", "https://[::ffff:127.0.0.1]/",
+    "https://[64:ff9b::7f00:1]/", "https://[2002:7f00:1::]/", "https://224.0.0.1/", "https://x:99999/",
+    "https://" + "a" * 300 + ".example/",
+]  # fmt: skip
+
+
+def test_the_server_is_not_sent_into_its_own_network(admin):
+    for address in NOT_PUBLIC:
+        registration = {
+            "issuer": "https://platform.example", "client_id": "1", "deployments": ["1"],
+            "auth_login_url": "https://platform.example/a", "key_set_url": "https://platform.example/k",
+            "auth_token_url": address,
+        }  # fmt: skip
+        assert admin.act("POST", "/lti/platforms", json=registration).status_code == 422, address
 
 
 def test_only_administrators_register_platforms(colleague, visitor, platform):

@@ -8,7 +8,6 @@ import pytest
 from starlette.testclient import TestClient
 
 from grader.records import Problem
-from grader.web import queue
 from grader.web.app import application
 from grader.web.judges import Judges
 from grader.web.queue import Queue
@@ -49,8 +48,8 @@ def ended(store):
 
 @pytest.fixture(autouse=True)
 def inline(monkeypatch):
-    monkeypatch.setattr(queue, "Workers", Inline)
-    monkeypatch.setattr(queue, "Judges", Inline)
+    for name in ("web.queue.Workers", "web.queue.Judges", "folder.batch.Workers"):
+        monkeypatch.setattr(f"grader.{name}", Inline)
 
 
 @pytest.mark.parametrize("state", ["queued", "running"])

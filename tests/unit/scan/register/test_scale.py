@@ -10,6 +10,7 @@ from grader.scan.decode.pages import page_of
 from grader.scan.register.registration import rectify
 from reference.authored.assignment import load_assignment
 from samples.simulation import any_settings, simulate
+from tests.examples import slow
 
 PUMP = load_assignment("pump")
 STANDARD_ERRORS = 4.0
@@ -29,7 +30,7 @@ def log_scale(mm_to_px) -> float:
 
 @pytest.mark.parametrize(
     ("seed", "dpi"),
-    [(0, 150.0), (36, 300.0), *(pytest.param(*one, marks=pytest.mark.slow) for one in OTHERS)],
+    [(0, 150.0), (36, 300.0), *slow(*OTHERS)],
 )
 def test_a_wrong_resolution_never_gives_a_wrong_scale_with_confidence(seed, dpi, tmp_path):
     settings = any_settings(seed, device="flatbed", dpi=dpi, mistakes=0.0)
