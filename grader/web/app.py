@@ -5,6 +5,7 @@ import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, closing, suppress
 from http import HTTPStatus
+from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
@@ -69,7 +70,7 @@ def application(settings: Settings, photo: Photo = checked_photo) -> FastAPI:
     app = FastAPI(
         title="planmark", version=__version__, description=DESCRIPTION, lifespan=running,
         docs_url=None, redoc_url=None, openapi_url="/api/v1/openapi.json",
-        responses={code: {"description": HTTPStatus(code).phrase, "model": Fault} for code in REFUSALS},
+        responses={code: {"description": HTTPStatus(code).phrase, **_refusal(code)} for code in REFUSALS},
     )  # fmt: skip
     app.state.service = service
     for router in (
@@ -88,6 +89,13 @@ def application(settings: Settings, photo: Photo = checked_photo) -> FastAPI:
     app.add_exception_handler(Exception, _fault)
     app.add_middleware(Rim, settings=settings, hosts=LOOPBACK if settings.is_local else frozenset())
     return app
+
+
+def _refusal(code: int) -> dict[str, Any]:
+    """What a status answers: the model once, which FastAPI makes anew for each route, then by its name."""
+    if code == HTTPStatus.UNPROCESSABLE_ENTITY:
+        return {"model": Fault}
+    return {"content": {"application/json": {"schema": {"$ref": "#/components/schemas/Fault"}}}}
 
 
 async def _forget(store: Store, days: float, ended: asyncio.Event) -> None:
