@@ -12,6 +12,7 @@ from grader.folder.decisions import basis_of
 from grader.inputs.decisions import Decision, DecisionFile
 from grader.review.server import application
 from grader.review.session import mark_of
+from tests.examples import slow
 from tests.unit.review.conftest import PUMP, Page, silent
 
 SCANNED, ENTERED = "s02", "s09"
@@ -86,33 +87,31 @@ def test_a_part_of_a_scan_is_cut_as_large_as_asked(page):
     assert Image.open(io.BytesIO(answer.content)).size == (200, 100)
 
 
-@pytest.mark.parametrize(
-    ("path", "asked"),
-    [
-        ("/scan", {"student": "s02", "sheet": 7, "x": 0, "y": 0, "w": 9, "h": 9, "scale": 1}),
-        ("/scan", {"student": "s70", "sheet": 0, "x": 0, "y": 0, "w": 9, "h": 9, "scale": 1}),
-        ("/scan", {"student": "s02", "sheet": 0, "x": 0, "y": 0, "w": 0, "h": 9, "scale": 1}),
-        ("/scan", {"student": "s02", "sheet": 0, "x": 0, "y": 0, "w": 9e5, "h": 9e5, "scale": 99}),
-        ("/scan", {"student": "s02", "sheet": 0, "x": "nan", "y": 0, "w": 9, "h": 9, "scale": 1}),
-        ("/scan", {"student": "s02", "sheet": 0}),
-        ("/page", {"file": "../roster.csv", "page": 1}),
-        ("/page", {"file": "/etc/passwd", "page": 1}),
-        ("/api/question", {"student": "s02", "criterion": "nothing"}),
-        ("/api/question", {"student": "x", "criterion": "v_B"}),
-        ("/api/question", {}),
-    ],
-)
-def test_what_is_not_there_is_refused_in_words(page, path, asked):
-    answer = page.get(path, params=asked)
-    assert answer.status_code == 400
-    assert answer.json()["message"]
+NOT_THERE = [
+    ("/scan", {"student": "s02", "sheet": 7, "x": 0, "y": 0, "w": 9, "h": 9, "scale": 1}),
+    ("/scan", {"student": "s70", "sheet": 0, "x": 0, "y": 0, "w": 9, "h": 9, "scale": 1}),
+    ("/scan", {"student": "s02", "sheet": 0, "x": 0, "y": 0, "w": 0, "h": 9, "scale": 1}),
+    ("/scan", {"student": "s02", "sheet": 0, "x": 0, "y": 0, "w": 9e5, "h": 9e5, "scale": 99}),
+    ("/scan", {"student": "s02", "sheet": 0, "x": "nan", "y": 0, "w": 9, "h": 9, "scale": 1}),
+    ("/scan", {"student": "s02", "sheet": 0}),
+    ("/page", {"file": "../roster.csv", "page": 1}),
+    ("/page", {"file": "/etc/passwd", "page": 1}),
+    ("/api/question", {"student": "s02", "criterion": "nothing"}),
+    ("/api/question", {"student": "x", "criterion": "v_B"}),
+    ("/api/question", {}),
+]
 
 
-@pytest.mark.parametrize(
-    "path", ["results.json", ".planmark/run.json", "../in/roster.csv", "%2e%2e/in/roster.csv", "s02"]
-)
-def test_only_pages_and_tables_of_the_results_are_served(page, path):
-    assert page.get(f"/out/{path}").status_code == 404
+def test_what_is_not_there_is_refused_in_words(page):
+    for path, asked in NOT_THERE:
+        answer = page.get(path, params=asked)
+        assert answer.status_code == 400, asked
+        assert answer.json()["message"], asked
+
+
+def test_only_pages_and_tables_of_the_results_are_served(page):
+    for path in ("results.json", ".planmark/run.json", "../in/roster.csv", "%2e%2e/in/roster.csv", "s02"):
+        assert page.get(f"/out/{path}").status_code == 404, path
 
 
 def test_the_pages_of_the_results_are_served(page):
@@ -122,7 +121,7 @@ def test_the_pages_of_the_results_are_served(page):
 # Decisions ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("verdict", ["full", "partial", "none", "follow_through", "not_judged"])
+@pytest.mark.parametrize("verdict", ["partial", *slow("full", "none", "follow_through", "not_judged")])
 def test_a_verdict_is_written_and_counts_at_once(page, session, verdict):
     answer = page.answer(SCANNED, "v_D", verdict, comment="seen")
     assert answer.status_code == 200
@@ -190,6 +189,7 @@ def test_answers_together_are_written_all_or_none(page, session):
     assert {row.verdict for row in decided(session).values()} == {"none"}
 
 
+@pytest.mark.slow
 def test_many_at_once_lose_nothing(page, session):
     rows = page.rows()
     names = [name for student, name in rows if student == SCANNED][:12]
@@ -215,30 +215,30 @@ def test_many_at_once_lose_nothing(page, session):
     assert {criterion for _, criterion in decided(session)} == set(names)
 
 
-@pytest.mark.parametrize(
-    "answer",
-    [
-        {"student": "s02", "criterion": "v_D", "verdict": "perfect", "seen": ""},
-        {"student": "s02", "criterion": "nothing", "verdict": "full", "seen": ""},
-        {"student": "s90", "criterion": "v_D", "verdict": "full", "seen": ""},
-        {"student": 0, "criterion": "v_D", "verdict": "full", "seen": ""},
-        {"student": 0.5, "criterion": "v_D", "verdict": "full", "seen": ""},
-        {"student": "s02", "criterion": ["v_D"], "verdict": "full", "seen": ""},
-        {"student": "s02", "criterion": "v_D", "verdict": "full", "comment": 7, "seen": ""},
-        {"student": "s02", "criterion": "v_D", "verdict": "full", "comment": "c" * 5000, "seen": ""},
-        {"student": "s02", "criterion": "total", "verdict": "full", "seen": ""},
-    ],
-)
-def test_an_answer_that_cannot_be_used_is_refused_and_nothing_written(page, session, answer):
-    refused = page.said("/api/decide", answers=[answer])
-    assert refused.status_code == 400
+NO_ANSWERS = [
+    {"student": "s02", "criterion": "v_D", "verdict": "perfect", "seen": ""},
+    {"student": "s02", "criterion": "nothing", "verdict": "full", "seen": ""},
+    {"student": "s90", "criterion": "v_D", "verdict": "full", "seen": ""},
+    {"student": 0, "criterion": "v_D", "verdict": "full", "seen": ""},
+    {"student": 0.5, "criterion": "v_D", "verdict": "full", "seen": ""},
+    {"student": "s02", "criterion": ["v_D"], "verdict": "full", "seen": ""},
+    {"student": "s02", "criterion": "v_D", "verdict": "full", "comment": 7, "seen": ""},
+    {"student": "s02", "criterion": "v_D", "verdict": "full", "comment": "c" * 5000, "seen": ""},
+    {"student": "s02", "criterion": "total", "verdict": "full", "seen": ""},
+]
+
+
+def test_an_answer_that_cannot_be_used_is_refused_and_nothing_written(page, session):
+    for answer in NO_ANSWERS:
+        refused = page.said("/api/decide", answers=[answer])
+        assert refused.status_code == 400, answer
     assert refused.json()["message"]
     assert not decided(session)
 
 
-@pytest.mark.parametrize("said", [{}, {"answers": []}, {"answers": {}}, {"answers": [7]}])
-def test_no_answer_is_refused(page, said):
-    assert page.said("/api/decide", **said).status_code == 400
+def test_no_answer_is_refused(page):
+    for said in ({}, {"answers": []}, {"answers": {}}, {"answers": [7]}):
+        assert page.said("/api/decide", **said).status_code == 400, said
 
 
 def test_a_comment_is_offered_again_the_commonest_first(page):
@@ -369,21 +369,21 @@ def test_decisions_that_were_not_applied_are_told(session):
     assert "has changed since" in said["state"]
 
 
-@pytest.mark.parametrize(
-    "said",
-    [
-        {"file": "stranger.jpg", "page": 1},
-        {"file": "nothing.jpg", "page": 1, "turn": 90},
-        {"file": "stranger.jpg", "page": 2, "turn": 90},
-        {"file": "stranger.jpg", "page": 1, "turn": 45},
-        {"file": "stranger.jpg", "page": 1, "owner": "s90"},
-        {"file": "stranger.jpg", "page": 1, "corners": [[0, 0], [1]]},
-        {"file": "stranger.jpg", "page": 1, "corners": 7},
-        {"file": "stranger.jpg", "page": 1, "corners": [[0, 0], [1, 1], [2, 2], [3, 3]]},
-    ],
-)
-def test_a_page_decision_that_cannot_be_used_is_refused(page, session, said):
-    assert page.said("/api/page", **said).status_code == 400
+NO_PAGES = [
+    {"file": "stranger.jpg", "page": 1},
+    {"file": "nothing.jpg", "page": 1, "turn": 90},
+    {"file": "stranger.jpg", "page": 2, "turn": 90},
+    {"file": "stranger.jpg", "page": 1, "turn": 45},
+    {"file": "stranger.jpg", "page": 1, "owner": "s90"},
+    {"file": "stranger.jpg", "page": 1, "corners": [[0, 0], [1]]},
+    {"file": "stranger.jpg", "page": 1, "corners": 7},
+    {"file": "stranger.jpg", "page": 1, "corners": [[0, 0], [1, 1], [2, 2], [3, 3]]},
+]
+
+
+def test_a_page_decision_that_cannot_be_used_is_refused(page, session):
+    for said in NO_PAGES:
+        assert page.said("/api/page", **said).status_code == 400, said
     assert not decided(session)
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -20,6 +21,7 @@ PRINTED = ReadingScene("photo", "", device="phone", dpi=None, printed=True, hard
 PLAIN = ReadingScene("photo", "", device="phone", dpi=None, hardship=0.0)
 
 
+@cache
 def photo(scene: ReadingScene, seed: int) -> tuple[Page, float]:
     """A photo, as the camera stored it, and its pixels per mm."""
     sheet = work(scene, seed).sheets[0]
@@ -146,7 +148,7 @@ def test_a_picture_without_a_sheet_is_told_and_a_turned_sheet_is_none() -> None:
     assert not flaws_of(replace(page, grey=np.ascontiguousarray(np.rot90(page.grey)), turn_deg=270))
 
 
-@pytest.mark.parametrize("seed", [40, *slow(41, 42, 43)])
+@pytest.mark.parametrize("seed", [1, *slow(40, 41, 42, 43)])
 def test_good_photos_have_no_flaw(seed: int) -> None:
     for scene in (PRINTED, PLAIN):
         assert not flaws_of(photo(scene, seed)[0])
