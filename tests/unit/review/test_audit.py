@@ -1,5 +1,7 @@
 """Settled verdicts are checked one by one; a wrong one opens those like it at once, and can be corrected."""
 
+import pytest
+
 from grader.review.audit import SHORT
 
 
@@ -64,6 +66,7 @@ def test_a_wrong_verdict_waits_at_once_until_it_is_corrected(page, session):
     assert student.criterion(question["criterion"]).verdict == "none"
 
 
+@pytest.mark.slow
 def test_taking_a_wrong_answer_back_settles_what_it_had_opened(page):
     before = {key: row["verdict"] for key, row in page.rows().items()}
     checked(page, page.get("/api/audit").json()["question"], "wrong")
