@@ -5,11 +5,13 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import psutil
 import pytest
+
+from tests.functional.conftest import ENVIRONMENT
 
 pytestmark = pytest.mark.slow
 
@@ -57,26 +59,46 @@ def results_of(out):
     return results
 
 
-def wait_for(process, seen):
-    """Wait until something is seen, while the process lives."""
-    while process.poll() is None and not seen():
-        time.sleep(0.02)
-    assert process.poll() is None, "the run ended before it could be disturbed"
+RUN = """
+import sys
+from pathlib import Path
+
+from grader.folder.batch import Batch, grade
+from grader.rubric import rubric_of
+from reference.authored.assignment import load_assignment
 
 
-def keys(out):
-    """The submissions that are done."""
-    return list((out / ".planmark").glob("*.key"))
+def pause(what, done, total):
+    if (what, done) == (sys.argv[3], 1):
+        print("one is done", flush=True)
+        sys.stdin.read()
+
+
+if __name__ == "__main__":
+    pump = load_assignment("pump")
+    grade(Batch(pump, rubric_of(pump), Path(sys.argv[1]), Path(sys.argv[2]), jobs=2), pause)
+"""
+
+
+@contextmanager
+def paused(folder, out, what):
+    """A run that waits where one of several is opened or marked, until its input ends."""
+    script = out.with_name("run.py")
+    script.write_text(RUN, encoding="utf-8")
+    command = [sys.executable, script, folder, out, what]
+    with subprocess.Popen(  # noqa: S603 - our own program
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=ENVIRONMENT, text=True
+    ) as process:
+        assert process.stdout.readline() == "one is done\n"
+        yield process
 
 
 def test_a_run_killed_on_the_way_is_finished_by_the_next(handed_in, tmp_path):
     undisturbed = graded(handed_in, tmp_path / "undisturbed")
     out = tmp_path / "out"
-    with subprocess.Popen(  # noqa: S603 - our own program
-        call(handed_in, out), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    ) as process:
-        wait_for(process, lambda: keys(out))
+    with paused(handed_in, out, "marking") as process:
         process.send_signal(signal.SIGKILL)
+    assert list((out / ".planmark").glob("*.key"))
     assert not (out / "results.json").exists()
     assert graded(handed_in, out) == undisturbed
 
@@ -84,17 +106,15 @@ def test_a_run_killed_on_the_way_is_finished_by_the_next(handed_in, tmp_path):
 def test_a_killed_worker_costs_nothing(handed_in, tmp_path):
     undisturbed = graded(handed_in, tmp_path / "undisturbed")
     out = tmp_path / "out"
-    with subprocess.Popen(  # noqa: S603 - our own program
-        call(handed_in, out), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    ) as process:
-        wait_for(process, (out / ".planmark" / "pages").is_dir)
+    with paused(handed_in, out, "opening") as process:
         workers = [
             child
             for child in psutil.Process(process.pid).children()
             if "spawn_main" in " ".join(child.cmdline())
         ]
         workers[0].kill()
-        assert process.wait(600) in {0, 1}
+        process.stdin.close()
+        assert process.wait(600) == 0
     assert results_of(out) == undisturbed
 
 
