@@ -53,18 +53,37 @@ class Flaw:
 
 
 @dataclass(frozen=True, slots=True)
+class Ruling:
+    """The printed squares of a page.
+
+    Attributes
+    ----------
+    lines_per_px : (2, 2) level and upright lines crossed by a step to the right and down, at the page's middle
+    """
+
+    lines_per_px: FloatArray
+
+    def pitches_mm(self, mm_to_px: FloatArray, middle_px: FloatArray) -> FloatArray:
+        """(2,) distances of level and of upright lines on a sheet, whose homography is given."""
+        (x, y, w), to_px = np.linalg.solve(mm_to_px, [*middle_px, 1.0]), mm_to_px
+        steps = (to_px[:2, :2] - middle_px[:, None] * to_px[2:, :2]) * w
+        return np.asarray(1.0 / np.hypot(*(self.lines_per_px @ steps).T))
+
+
+@dataclass(frozen=True, slots=True)
 class Page:
     """One page as stored in its file, before any rotation.
 
     Attributes
     ----------
     source, page : file name as the user gave it, and page number from 1
-    grey : (h, w) uint8, 255 = paper
+    grey : (h, w) uint8, 255 = paper, printed squares taken out
     dpi : horizontal and vertical resolution that the file states, or None
     turn_deg : counter-clockwise turn that the file asks viewers to apply (EXIF, PDF), 0/90/180/270
     paper_mm : width and height of the stored image on paper where the file states it (PDF), or None
     damage : which rows are not as they were stored, where the file shows it; empty for a whole page
     turn_is_sure : a person said the turn: the page is read no other way up
+    ruling : the printed squares of its paper, None where there are none
     """
 
     source: str
@@ -75,6 +94,7 @@ class Page:
     paper_mm: tuple[float, float] | None = None
     damage: str = ""
     turn_is_sure: bool = False
+    ruling: Ruling | None = None
 
 
 @dataclass(frozen=True, slots=True)

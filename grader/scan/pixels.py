@@ -18,10 +18,6 @@ BoolArray = NDArray[np.bool_]
 
 TITLE_BLOCK_MM = (215.0, 80.0)
 """Width and height of the corner of a sheet in which a title block may lie."""
-_ON_LATTICE = 0.12
-"""Of the pitch: a place farther off is none of the lattice."""
-_FOLLOWS = 0.3
-"""How fast the local pitch follows the distances met, which a photo's perspective changes."""
 _PAPER_LONG_SIDE_PX = 640
 """Resolution of the paper's brightness: about 1.5 px/mm on A3."""
 _CLOSE_PX = 17
@@ -125,38 +121,6 @@ def reached(low: FloatArray, high: FloatArray, start: tuple[float, float], gap: 
     group = np.empty(len(order), dtype=np.intp)
     group[order[0]], group[order[1:]] = 0, (lows[order[1:]] > far[:-1] + gap).cumsum()
     return np.asarray(group[:-1] == group[-1])
-
-
-def lattice(at: FloatArray) -> FloatArray:
-    """(n,) number of each place on the lattice that most of them make, -1 for those beside it."""
-    best = np.full(len(at), -1.0)
-    gaps = np.diff(at)
-    gaps = gaps[gaps > 2.0]
-    if len(gaps) == 0:
-        return best
-    pitch = _commonest(gaps)
-    start = len(at) // 2
-    for first in range(max(0, start - 3), min(len(at), start + 4)):
-        index = np.full(len(at), np.nan)
-        index[first] = 0.0
-        for step in (1, -1):
-            last, here = first, pitch
-            for k in range(first + step, len(at) if step > 0 else -1, step):
-                ratio = abs(at[k] - at[last]) / here
-                whole = round(ratio)
-                if whole >= 1 and abs(ratio - whole) < _ON_LATTICE:
-                    index[k] = index[last] + step * whole
-                    here += _FOLLOWS * (abs(at[k] - at[last]) / whole - here)
-                    last = k
-        if np.count_nonzero(np.isfinite(index)) > np.count_nonzero(best >= 0):
-            best = np.where(np.isfinite(index), index - np.nanmin(index), -1.0)
-    return best
-
-
-def _commonest(gaps: FloatArray) -> float:
-    """The gap that most gaps are near to."""
-    near = np.abs(gaps[:, None] / gaps[None, :] - 1.0) < _ON_LATTICE
-    return float(np.median(gaps[near[:, near.sum(axis=0).argmax()]]))
 
 
 def lengths_and_directions(ends: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -1,7 +1,7 @@
 """A sheet of A3: frame, title block, where the figures go, captions and working."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from samples.simulation.figures import extent
 from samples.simulation.hand import DrawingTask, DrawnFigure
 from samples.simulation.settings import Box
 from samples.simulation.sketch import SQUARES_LAYER, SheetSketch
-from samples.simulation.strokes import PenWidth, Rng, straight
+from samples.simulation.strokes import ComplexArray, PenWidth, Rng, straight
 
 PAPER_MM = (420.0, 297.0)
 FRAMES_MM: Mapping[str, Box] = {
@@ -33,19 +33,36 @@ class Frame:
 
 
 def print_squares(sketch: SheetSketch) -> None:
-    """The fine lines of squared paper, printed a little askew to its edges."""
-    pitch = sketch.page.squared_mm
+    """The fine lines of squared paper, printed a little askew to its edges, and bent where the page says so."""
+    style = sketch.page
+    pitch = style.squared_mm
     if pitch <= 0.0:
         return
-    turn = complex(np.exp(1j * sketch.rng.normal(0.0, 0.003)))
+    turn = complex(np.exp(1j * (sketch.rng.normal(0.0, 0.003) + np.radians(style.squares_turn_deg))))
     start = sketch.rng.uniform(0.0, pitch, 2)
     w, h = PAPER_MM
-    lines = [(complex(x, 4.0), complex(x, -h - 4.0)) for x in np.arange(start[0], w, pitch)]
-    level = [(complex(-4.0, -y), complex(w + 4.0, -y)) for y in np.arange(start[1], h, pitch)]
+    # Turned paper is larger than the sheet.
+    beyond = 4.0 + abs(turn.imag) * w
+    low = -pitch * np.ceil((beyond - 4.0) / pitch)
+    lines = [
+        (complex(x, beyond), complex(x, -h - beyond)) for x in np.arange(low + start[0], w + beyond - 4.0, pitch)
+    ]
+    level = [
+        (complex(-beyond, -y), complex(w + beyond, -y)) for y in np.arange(low + start[1], h + beyond - 4.0, pitch)
+    ]
     for number, (p, q) in [*enumerate(lines), *enumerate(level)]:
         strong = pitch > 2.0 or number % 5 == 0
-        pen = PenWidth(SQUARES_LAYER, 0.12, 0.6 if strong else 0.35, 0.0, 0.0)
-        sketch.strokes.append(straight(sketch.rng, pen, p * turn, q * turn))
+        pen = PenWidth(
+            SQUARES_LAYER, style.squares_width_mm, style.squares_dark * (1.0 if strong else 7.0 / 12.0), 0.0, 0.0
+        )
+        line = straight(sketch.rng, pen, p * turn, q * turn)
+        sketch.strokes.append(replace(line, points=line.points + _bend(line.points, style.squares_bent_mm)))
+
+
+def _bend(points: ComplexArray, by_mm: float) -> ComplexArray:
+    """How far paper that a copier drew in unevenly, or a lens bent, has moved its points."""
+    x, y = points.real / PAPER_MM[0], points.imag / PAPER_MM[1]
+    return np.asarray(by_mm * (np.sin(4.1 * y + 0.7 * x) + 1j * np.sin(3.7 * x - 1.1 * y + 0.5)))
 
 
 def draw_frame(sketch: SheetSketch) -> Frame:

@@ -74,6 +74,7 @@ class DrawnPaper:
     pens: PenStyle
     background: Background | None = None
     squares: Colour = (150, 190, 225)
+    squares_broken: float = 0.0
 
 
 def digitise(paper: DrawnPaper, scan: Scan, view: PaperView, rng: Rng) -> NDArray[np.uint8]:
@@ -126,8 +127,9 @@ def _inks(paper: DrawnPaper, view: PaperView, rng: Rng) -> list[tuple[Float32Arr
         own = [stroke for stroke in paper.strokes if stroke.layer == layer]
         if own:
             cover = render(own, view.to_px, view.size).astype(np.float32) / np.float32(255.0)
-            if layer in {MAIN_LAYER, PLAN_LAYER} and pens.grain > 0:
-                _grain(cover, pens.grain, view.px_per_mm, rng)
+            grain = {PRINT_LAYER: 0.0, SQUARES_LAYER: paper.squares_broken}.get(layer, pens.grain)
+            if grain > 0:
+                _grain(cover, grain, view.px_per_mm, rng)
             if layer in {MAIN_LAYER, PLAN_LAYER} and pens.smear > 0:
                 _smear(cover, pens.smear, view.px_per_mm, rng)
             inks.append((cover, colour))

@@ -196,7 +196,8 @@ def _scanned(desk: Desk, sheet: DrawnSheet, number: tuple[int, int]) -> Simulate
     rng = np.random.default_rng([desk.seed, 3, number[0]])
     view = view_of(settings.scan, rng)
     background = None if desk.printed is None else desk.printed[sheet.kind].background
-    paper = DrawnPaper(sketch.strokes, settings.pen, background, settings.page.squares)
+    page = settings.page
+    paper = DrawnPaper(sketch.strokes, settings.pen, background, page.squares, page.squares_broken)
     image = digitise(paper, settings.scan, view, rng)
     about = {"student_id": desk.student_id, "seed": desk.seed, "page": number[0]}
     return SimulatedSheet(image, {**told, **truth.scan_truth(view, frame, settings), **about}, settings)

@@ -12,6 +12,7 @@ import numpy as np
 from grader.records import Page, PageRef
 from grader.scan.decode import pdf, pictures, tiff
 from grader.scan.decode.limits import Door, InputFile, changed, kind_of, load
+from grader.scan.decode.ruling import without_ruling
 from grader.scan.pixels import connected, is_dotted, shrink
 from reference.errors import InputFileError
 
@@ -56,7 +57,8 @@ def page_of(source: InputFile | Path | str, number: int) -> Page:
         raise InputFileError(
             "page_missing", f"{file.name}: there is no page {number}; it has {count_pages(file)}"
         )
-    return page
+    grey, ruling = without_ruling(page.grey)
+    return page if ruling is None else replace(page, grey=grey, ruling=ruling)
 
 
 def decode(ref: PageRef) -> Page:

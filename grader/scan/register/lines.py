@@ -1,6 +1,5 @@
 """Long straight lines of a page to sub-pixel: frame, borders, grid."""
 
-from collections import Counter
 from dataclasses import dataclass, replace
 
 import cv2
@@ -12,7 +11,6 @@ from grader.scan.pixels import (
     Flat,
     at_full_size,
     cut_across,
-    lattice,
     lengths_and_directions,
     reached,
     robust_lines,
@@ -69,15 +67,6 @@ _OVER = 4
 """Samples between which the change of brightness is taken: two pixels."""
 _STRONG = 0.4
 """Share of a line's usual change below which a place shows no edge."""
-
-_LEAST_LINES = 8
-"""Fewer lines at equal distances are a title block's."""
-_MOSTLY = 0.6
-"""Share of the lines of one direction that a grid has at least."""
-_DARKER = 1.35
-"""A drawn line on a grid line is so much darker than the grid is."""
-_STRAYS, _FINE_PX = 4.0, 0.3
-"""A line beside the lattice by more than four times the usual is a drawn one near it."""
 
 RIDGE = "ridge"
 STEP = "step"
@@ -347,44 +336,3 @@ def edge_offsets(flat: Flat, line: LongLine, cuts: int, reach_px: float) -> Floa
     weight = np.clip(rise - 0.5 * strong[:, None], 0.0, None) * near
     offset = (weight * places).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-9)
     return np.where(strong > _STRONG * np.median(strong), offset, np.nan)
-
-
-# Printed squares ----------------------------------------------------------------------------------
-
-
-def without_grid(lines: list[LongLine], shape: tuple[int, int]) -> list[LongLine]:
-    """The lines that are not those of graph paper; a frame ruled upon one of these is known by its darkness.
-
-    Arguments: `shape` is the picture's (height, width).
-    """
-    level, upright = (_equally_spaced(lines, shape, across=across) for across in (True, False))
-    if level is None or upright is None:
-        return lines
-    own = level | upright
-    usual = float(np.median([line.dark for line, mine in zip(lines, own, strict=True) if mine]))
-    return [line for line, mine in zip(lines, own, strict=True) if not mine or line.dark > _DARKER * usual]
-
-
-def _equally_spaced(
-    lines: list[LongLine], shape: tuple[int, int], *, across: bool
-) -> NDArray[np.bool_] | None:
-    """(n,) which lines are a grid's level (`across`) or upright ones; None without such a grid."""
-    # Of a faint line often one border alone is seen; borders of one kind are at equal distances too.
-    looks = Counter((line.kind, line.bright) for line in lines if line.across == across)
-    if not looks:
-        return None
-    usual, _ = looks.most_common(1)[0]
-    which = np.flatnonzero([line.across == across and (line.kind, line.bright) == usual for line in lines])
-    if len(which) < _LEAST_LINES:
-        return None
-    at = np.array([lines[k].at(shape[1 if across else 0] / 2.0) for k in which])
-    which, at = which[np.argsort(at)], np.sort(at)
-    index = lattice(at)
-    on = index >= 0
-    if np.count_nonzero(on) < max(_LEAST_LINES, _MOSTLY * len(at)):
-        return None
-    off = np.abs(at - np.polyval(np.polyfit(index[on], at[on], 1), index))
-    on &= off <= _STRAYS * np.median(off[on]) + _FINE_PX
-    member = np.zeros(len(lines), dtype=bool)
-    member[which[on]] = True
-    return member

@@ -28,7 +28,7 @@ from grader.scan.register.homography import (
     title_block_mm,
 )
 from grader.scan.register.hypotheses import Hypothesis, Resolution, hypotheses, match_sides, on_sides
-from grader.scan.register.lines import LongLine, long_lines, without_grid
+from grader.scan.register.lines import LongLine, long_lines
 from grader.scan.register.markers import identify
 from reference.drawing.canvas import MM_PER_INCH
 
@@ -145,8 +145,7 @@ def register_plain(page: Page) -> Sheet | Unread:
         return Unread("sheet", f"{long_px} pixels along the long side are too few for an A3 drawing")
     flat = flatten(page.grey)
     shape = (page.grey.shape[0], page.grey.shape[1])
-    every = long_lines(flat)
-    lines = without_grid(every, shape)
+    lines = long_lines(flat)
     problems: list[Problem] = []
     resolution = _resolution(page, problems)
     dpi = resolution.dpi if resolution is not None and resolution.is_sure else None
@@ -171,7 +170,7 @@ def register_plain(page: Page) -> Sheet | Unread:
             return _from_resolution(page, resolution, lines, problems, doubt)
         if isinstance(sheet, Sheet) and rival is not None:
             sheet = _with_rival(sheet, rival)
-        if isinstance(sheet, Sheet) and len(lines) < len(every):
+        if isinstance(sheet, Sheet) and page.ruling is not None:
             sheet = replace(sheet, scale_se=float(np.hypot(sheet.scale_se, _SQUARES_SE)))
         if isinstance(sheet, Unread) or not best.perspective:
             return sheet
@@ -465,7 +464,7 @@ def register_by_corners(page: Page, corners_px: Sequence[tuple[float, float]]) -
     pointed = _sheet(Fit(matrix, 0.0, 0, 0.0, _CLICKED_SE, np.zeros(0)), None, _CLICKED_SE, [])
     pointed = replace(pointed, method="corners")
     flat = flatten(page.grey)
-    lines = without_grid(long_lines(flat), (page.grey.shape[0], page.grey.shape[1]))
+    lines = long_lines(flat)
     sides, frame = match_sides(matrix, lines)
     if any(len({side.value for side in sides if side.axis == axis}) < 2 for axis in (0, 1)):
         return pointed

@@ -40,10 +40,7 @@ from grader.scan.strokes.regions import (
 from grader.scan.strokes.seeds import (
     PX_PER_MM,
     Seeds,
-    Squares,
     find_seeds,
-    find_squares,
-    without_squares,
     working_scale,
 )
 from grader.scan.strokes.symbols import arcs, find_circles, led_to
@@ -76,15 +73,14 @@ def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> In
     flat = flatten(joined_dots(page.grey, sheet.px_per_mm))
     scale = working_scale(sheet.px_per_mm)
     reduced = flat.reduced(scale)
-    squares = find_squares(reduced)
-    if squares is not None and not _is_usual(pitch := squares.pitch_px / scale / sheet.px_per_mm):
+    pitch = _ruled_mm(page, sheet)
+    if pitch is not None and not _is_usual(pitch):
         return Unread(
             "sheet",
             f"by the scale that was found its printed squares would be {pitch:.1f} mm, and no paper has such"
             " ones; scan it again with the stated resolution kept",
         )
-    contrast = without_squares(reduced, squares)
-    seeds = find_seeds(contrast)
+    seeds = find_seeds(reduced)
     components = find_components(seeds)
     field = field_of(seeds, sheet, scale, boxes)
     strokes = find_strokes(flat, seeds, components, field)
@@ -97,8 +93,8 @@ def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> In
     marks = np.concatenate([mark_boxes(components, field), boxes_around(strokes, hatched)])
     strokes = take(strokes, ~hatched)
     tips = find_tips(flat, strokes, sheet.mm_to_px)
-    problems = _left_out(squares, field, page.source)
-    return Ink(strokes, circles, marks, _ink_map(contrast, scale, sheet), tips=tips, problems=problems)
+    problems = _left_out(pitch, field, page.source)
+    return Ink(strokes, circles, marks, _ink_map(reduced, scale, sheet), tips=tips, problems=problems)
 
 
 def _is_usual(pitch_mm: float) -> bool:
@@ -106,18 +102,25 @@ def _is_usual(pitch_mm: float) -> bool:
     return any(abs(pitch_mm / usual - 1.0) < _PITCH_WITHIN for usual in _PITCHES_MM)
 
 
-def _left_out(squares: Squares | None, field: Field, file: str) -> tuple[Problem, ...]:
+def _ruled_mm(page: Page, sheet: Sheet) -> float | None:
+    """The pitch of the paper's printed squares, None where there are none."""
+    if page.ruling is None:
+        return None
+    middle = (np.array(page.grey.shape[::-1]) - 1.0) / 2.0
+    return float(np.exp(np.log(page.ruling.pitches_mm(sheet.mm_to_px, middle)).mean()))
+
+
+def _left_out(pitch: float | None, field: Field, file: str) -> tuple[Problem, ...]:
     """What a person must know: that faint strokes went with printed squares, or that an area was left out."""
     problems = []
-    if squares is not None:
-        pitch = squares.pitch_px / field.scale / field.sheet.px_per_mm
+    if pitch is not None:
         message = (
             f"the paper has printed squares of {pitch:.1f} mm: what is no darker than they are was left out"
         )
         problems.append(Problem("squared_paper", message, file))
     if field.block is not None:
         wide, high = field.block[2:]
-        if squares is not None or wide > _USUAL_BLOCK_MM[0] or high > _USUAL_BLOCK_MM[1]:
+        if pitch is not None or wide > _USUAL_BLOCK_MM[0] or high > _USUAL_BLOCK_MM[1]:
             message = (
                 f"{wide:.0f} x {high:.0f} mm at the lower right were taken for the title block and left out"
             )

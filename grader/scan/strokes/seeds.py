@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grader.records import FloatArray, GreyImage
-from grader.scan.pixels import Float32Array, lattice, lengths_and_directions, parts
+from grader.scan.pixels import lengths_and_directions, parts
 
 PX_PER_MM = 6.0
 """Resolution at which ink is looked for; strokes of 0.3 mm are two pixels wide."""
@@ -33,21 +33,6 @@ _PEN_PX = 2.0
 """A pen of 0.35 mm, where a sheet has no long stroke to tell."""
 _BUNDLE = 1.6
 """An ink band this many pens wide is more than one stroke."""
-_STRIP_MM, _STRIPS, _EVERY = 4.0, 5, 2
-"""Strips narrow enough that a line 2 degrees askew stays within its own width over half of one."""
-_LEAST_PEAK = 6.0
-"""Of 255: fainter squares do not disturb."""
-_LEAST_LINES = 12
-"""A table has fewer lines; 10 mm of a strip have as many squares."""
-_FILLED = 0.75
-"""Share of a lattice's places that have a line: what is drawn hides some, and adds others between."""
-_SPANNED = 0.6
-"""Of a strip's length, from the first to the last line of the lattice."""
-_DARKER = 1.35
-"""Drawn lines are so much darker than printed squares."""
-_DARKEST = 0.9
-"""Quantile of a strip's lines: every fifth or tenth is printed darker."""
-
 
 @dataclass(frozen=True, slots=True)
 class Seeds:
@@ -184,83 +169,3 @@ def _usual(width: FloatArray, weight: FloatArray) -> float:
     order = np.argsort(width)
     cumulated = np.cumsum(weight[order])
     return float(width[order][np.searchsorted(cumulated, 0.35 * cumulated[-1])])
-
-
-# Graph paper --------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class Squares:
-    """The printed squares of graph paper.
-
-    Attributes
-    ----------
-    dark : 0..255, the contrast of their darker lines
-    pitch_px : distance of two lines, the smaller of both directions
-    """
-
-    dark: float
-    pitch_px: float
-
-
-def find_squares(contrast: GreyImage) -> Squares | None:
-    """Printed squares, None where there are none.
-
-    Arguments: `contrast` is 0 (paper) to 255 (black), at about 6 px/mm.
-
-    Lines that fill most of a strip, at equal distances, in most strips of both directions. Slanted
-    strokes never fill a strip, and a table's lines are too few.
-    """
-    level, upright = _of_strips(contrast), _of_strips(np.ascontiguousarray(contrast.T))
-    if level is None or upright is None:
-        return None
-    return Squares(min(level.dark, upright.dark), min(level.pitch_px, upright.pitch_px))
-
-
-def without_squares(contrast: GreyImage, squares: Squares | None) -> GreyImage:
-    """Contrast with all that is no darker than printed squares left out; as given where there are none."""
-    if squares is None:
-        return contrast
-    _, drawn = cv2.threshold(contrast, _DARKER * squares.dark, 0, cv2.THRESH_TOZERO)
-    return np.asarray(drawn, dtype=np.uint8)
-
-
-def _of_strips(contrast: GreyImage) -> Squares | None:
-    """Lines at equal distances in most strips across the picture."""
-    high = contrast.shape[0]
-    deep = round(_STRIP_MM * PX_PER_MM)
-    strips = []
-    for top in np.linspace(0.08 * high, 0.92 * high - deep, _STRIPS).astype(int):
-        strip = contrast[top : top + deep : _EVERY]
-        strips.append(_regular_peaks(np.median(strip, axis=0).astype(np.float32)))
-    squared = [squares for squares in strips if squares is not None]
-    if 2 * len(squared) <= len(strips):
-        return None
-    middle = np.median([(squares.dark, squares.pitch_px) for squares in squared], axis=0)
-    return Squares(float(middle[0]), float(middle[1]))
-
-
-def _regular_peaks(profile: Float32Array) -> Squares | None:
-    """The peaks of a profile that are at equal distances, where they are many and few are missing."""
-    above = profile - _floor(profile)
-    inner = above[1:-1]
-    at = 1 + np.flatnonzero((inner >= _LEAST_PEAK) & (inner >= above[:-2]) & (inner > above[2:]))
-    if len(at) < _LEAST_LINES:
-        return None
-    before, after = above[at - 1], above[at + 1]
-    place = at + (after - before) / (before + above[at] + after)
-    index = lattice(place)
-    on = index >= 0.0
-    found, places = np.count_nonzero(on), index.max() + 1.0
-    if found < max(_LEAST_LINES, _FILLED * places):
-        return None
-    first, last = place[on][[0, -1]]
-    if last - first < _SPANNED * len(profile):
-        return None
-    return Squares(float(np.quantile(profile[at[on]], _DARKEST)), float(last - first) / (places - 1.0))
-
-
-def _floor(profile: Float32Array) -> FloatArray:
-    wide = round(2.0 * PX_PER_MM) | 1
-    row = profile[None, :]
-    return np.asarray(cv2.erode(row, np.ones((1, wide), np.uint8))[0], dtype=np.float64)
