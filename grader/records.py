@@ -58,16 +58,11 @@ class Ruling:
 
     Attributes
     ----------
-    lines_per_px : (2, 2) level and upright lines crossed by a step to the right and down, at the page's middle
+    lines_per_px : (2, 2) level and upright lines that a step to the right and down crosses in the middle
     """
 
     lines_per_px: FloatArray
 
-    def pitches_mm(self, mm_to_px: FloatArray, middle_px: FloatArray) -> FloatArray:
-        """(2,) distances of level and of upright lines on a sheet, whose homography is given."""
-        (x, y, w), to_px = np.linalg.solve(mm_to_px, [*middle_px, 1.0]), mm_to_px
-        steps = (to_px[:2, :2] - middle_px[:, None] * to_px[2:, :2]) * w
-        return np.asarray(1.0 / np.hypot(*(self.lines_per_px @ steps).T))
 
 
 @dataclass(frozen=True, slots=True)

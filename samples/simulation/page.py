@@ -33,7 +33,7 @@ class Frame:
 
 
 def print_squares(sketch: SheetSketch) -> None:
-    """The fine lines of squared paper, printed a little askew to its edges, and bent where the page says so."""
+    """The fine lines of squared paper, a little askew to its edges, turned and bent as the page says."""
     style = sketch.page
     pitch = style.squared_mm
     if pitch <= 0.0:
@@ -42,19 +42,13 @@ def print_squares(sketch: SheetSketch) -> None:
     start = sketch.rng.uniform(0.0, pitch, 2)
     w, h = PAPER_MM
     # Turned paper is larger than the sheet.
-    beyond = 4.0 + abs(turn.imag) * w
-    low = -pitch * np.ceil((beyond - 4.0) / pitch)
-    lines = [
-        (complex(x, beyond), complex(x, -h - beyond)) for x in np.arange(low + start[0], w + beyond - 4.0, pitch)
-    ]
-    level = [
-        (complex(-beyond, -y), complex(w + beyond, -y)) for y in np.arange(low + start[1], h + beyond - 4.0, pitch)
-    ]
+    more = abs(turn.imag) * w
+    low, beyond = start - pitch * np.ceil(more / pitch), more + 4.0
+    lines = [(complex(x, beyond), complex(x, -h - beyond)) for x in np.arange(low[0], w + more, pitch)]
+    level = [(complex(-beyond, -y), complex(w + beyond, -y)) for y in np.arange(low[1], h + more, pitch)]
     for number, (p, q) in [*enumerate(lines), *enumerate(level)]:
-        strong = pitch > 2.0 or number % 5 == 0
-        pen = PenWidth(
-            SQUARES_LAYER, style.squares_width_mm, style.squares_dark * (1.0 if strong else 7.0 / 12.0), 0.0, 0.0
-        )
+        dark = style.squares_dark * (1.0 if pitch > 2.0 or number % 5 == 0 else 7.0 / 12.0)
+        pen = PenWidth(SQUARES_LAYER, style.squares_width_mm, dark, 0.0, 0.0)
         line = straight(sketch.rng, pen, p * turn, q * turn)
         sketch.strokes.append(replace(line, points=line.points + _bend(line.points, style.squares_bent_mm)))
 

@@ -137,10 +137,10 @@ class PageStyle:
     """The page: frame, title block, language, what is written.
 
     `squared_mm` is the pitch of paper with printed squares, 0 for plain paper, every fifth line of
-    millimetre paper stronger, in the colour `squares`, of which its lines of `squares_width_mm` take the share
-    `squares_dark`; `squares_turn_deg` and `squares_bent_mm` say how far they are turned and bent against the sheet,
-    `squares_broken` how unevenly they are printed; `letters_touch` the share of letters set down without a look at
-    what is there, on lines and other letters.
+    millimetre paper stronger, in the colour `squares`, of which its lines of `squares_width_mm` take the
+    share `squares_dark`; `squares_turn_deg` and `squares_bent_mm` say how far they are turned and bent
+    against the sheet, `squares_broken` how unevenly they are printed; `letters_touch` the share of letters
+    set down without a look at what is there, on lines and other letters.
     """
 
     frame: Literal["iso", "gost", "none"] = "iso"

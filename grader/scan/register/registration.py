@@ -53,7 +53,7 @@ def register(
     identity = (None if printed is None else printed.identity) or identify(page)
     if corners_px:
         return printed or register_by_corners(page, corners_px), identity
-    sheet = printed or register_plain(page)
+    sheet = printed or _by_squares(page, register_plain(page))
     if isinstance(sheet, Unread):
         hint = f"; the page is as large as A4, and {HALVES_ADVICE}" if looks_a4(page) else ""
         return Unread(sheet.name, f"{sheet.reason}{hint}"), identity
@@ -76,6 +76,30 @@ def _share_in_picture(page: Page, sheet: Sheet) -> float:
     at = mapped(sheet.mm_to_px, mm)
     beside = _BESIDE_MM * sheet.px_per_mm
     return float(np.mean(np.all((at > -beside) & (at < page.grey.shape[::-1] + np.array(beside)), axis=-1)))
+
+
+def _by_squares(page: Page, sheet: Sheet | Unread) -> Sheet | Unread:
+    """A plain sheet, its printed squares a second witness of the scale; Unread where no paper has such."""
+    if isinstance(sheet, Unread) or page.ruling is None:
+        return sheet
+    middle = (np.array([page.grey.shape[::-1]]) - 1.0) / 2.0
+    right, down = local_axes(sheet.mm_to_px, mapped(inverted(sheet.mm_to_px), middle))
+    lines_per_mm = page.ruling.lines_per_px @ np.vstack([right, down]).T
+    pitch = float(np.exp(-np.log(np.hypot(*lines_per_mm.T)).mean()))
+    usual = _PITCHES_MM[np.abs(np.log(pitch / _PITCHES_MM)).argmin()]
+    off = float(np.log(pitch / usual))
+    if abs(off) > _PITCH_WITHIN:
+        return Unread(
+            "sheet",
+            f"by the scale that was found its printed squares would be {pitch:.1f} mm, and no paper has such"
+            " ones; scan it again with the stated resolution kept",
+        )
+    told = Problem("squared_paper", f"printed squares of {usual:g} mm were taken out", page.source)
+    sheet = replace(sheet, problems=(*sheet.problems, told))
+    if abs(off) > _PITCH_AGREES * np.hypot(sheet.scale_se, _PITCH_SE):
+        return sheet
+    gain = sheet.scale_se**2 / (sheet.scale_se**2 + _PITCH_SE**2)
+    return sheet.longer(float(np.exp(-gain * off)), float(sheet.scale_se * np.sqrt(1.0 - gain)))
 
 
 # Plain sheets -------------------------------------------------------------------------------------
@@ -113,8 +137,14 @@ _MOST_SIDES, _SOME_SIDES = 3, 2
 _ALL_SIDES = 4
 _COPY_SE = 0.02
 """Copiers enlarge or reduce by a per cent or two by default, to make a page fit by up to four."""
-_SQUARES_SE = 0.003
-"""On squared paper a printed line may pass for a side of the frame: it lies within a millimetre of one."""
+_PITCHES_MM = np.array([1.0, 2.0, 2.5, 4.0, 5.0, 6.35, 7.0, 8.0, 10.0])
+"""Of printed squares: pads, millimetre paper, quarter inches, French and double squares."""
+_PITCH_WITHIN = 0.03
+"""Printers and copiers change sizes by a per cent or two."""
+_PITCH_SE = 0.004
+"""Of three real pads the squares were 0.1 to 0.4 per cent off."""
+_PITCH_AGREES = 3.0
+"""Standard errors; where scale and squares are farther apart, the pad is none of these, or a copy."""
 _UNKNOWN_SE = 0.03
 """A page is about as large as this says, if it is an A3 sheet at all: to be borne out by its drawing."""
 _CUT_OFF_MM = 60.0
@@ -170,8 +200,6 @@ def register_plain(page: Page) -> Sheet | Unread:
             return _from_resolution(page, resolution, lines, problems, doubt)
         if isinstance(sheet, Sheet) and rival is not None:
             sheet = _with_rival(sheet, rival)
-        if isinstance(sheet, Sheet) and page.ruling is not None:
-            sheet = replace(sheet, scale_se=float(np.hypot(sheet.scale_se, _SQUARES_SE)))
         if isinstance(sheet, Unread) or not best.perspective:
             return sheet
         return _with_lens(flat, sheet, best)

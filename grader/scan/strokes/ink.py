@@ -47,10 +47,6 @@ from grader.scan.strokes.symbols import arcs, find_circles, led_to
 
 _DARK = 64.0
 """Of 255, a quarter of white: paper in photos is brighter than 130, a negative's darker than 20."""
-_PITCHES_MM = (1.0, 2.0, 2.5, 4.0, 5.0, 6.35, 7.0, 8.0, 10.0)
-"""Of printed squares: pads, millimetre paper, quarter inches, French and double squares."""
-_PITCH_WITHIN = 0.03
-"""Printers and copiers change sizes by a per cent or two."""
 _USUAL_BLOCK_MM = (200.0, 72.0)
 """From the paper's edges: the largest title blocks, of ISO 7200 and GOST 2.104, are 180 and 185 x 55 mm, in a
 frame up to 10 mm from the edge."""
@@ -73,16 +69,9 @@ def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> In
     flat = flatten(joined_dots(page.grey, sheet.px_per_mm))
     scale = working_scale(sheet.px_per_mm)
     reduced = flat.reduced(scale)
-    pitch = _ruled_mm(page, sheet)
-    if pitch is not None and not _is_usual(pitch):
-        return Unread(
-            "sheet",
-            f"by the scale that was found its printed squares would be {pitch:.1f} mm, and no paper has such"
-            " ones; scan it again with the stated resolution kept",
-        )
     seeds = find_seeds(reduced)
     components = find_components(seeds)
-    field = field_of(seeds, sheet, scale, boxes)
+    field = field_of(seeds, components, sheet, scale, boxes)
     strokes = find_strokes(flat, seeds, components, field)
     if isinstance(strokes, Unread):
         return strokes
@@ -93,39 +82,17 @@ def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> In
     marks = np.concatenate([mark_boxes(components, field), boxes_around(strokes, hatched)])
     strokes = take(strokes, ~hatched)
     tips = find_tips(flat, strokes, sheet.mm_to_px)
-    problems = _left_out(pitch, field, page.source)
+    problems = _left_out(field, page.source)
     return Ink(strokes, circles, marks, _ink_map(reduced, scale, sheet), tips=tips, problems=problems)
 
 
-def _is_usual(pitch_mm: float) -> bool:
-    """Whether paper is printed with squares of this size."""
-    return any(abs(pitch_mm / usual - 1.0) < _PITCH_WITHIN for usual in _PITCHES_MM)
-
-
-def _ruled_mm(page: Page, sheet: Sheet) -> float | None:
-    """The pitch of the paper's printed squares, None where there are none."""
-    if page.ruling is None:
-        return None
-    middle = (np.array(page.grey.shape[::-1]) - 1.0) / 2.0
-    return float(np.exp(np.log(page.ruling.pitches_mm(sheet.mm_to_px, middle)).mean()))
-
-
-def _left_out(pitch: float | None, field: Field, file: str) -> tuple[Problem, ...]:
-    """What a person must know: that faint strokes went with printed squares, or that an area was left out."""
-    problems = []
-    if pitch is not None:
-        message = (
-            f"the paper has printed squares of {pitch:.1f} mm: what is no darker than they are was left out"
-        )
-        problems.append(Problem("squared_paper", message, file))
-    if field.block is not None:
-        wide, high = field.block[2:]
-        if pitch is not None or wide > _USUAL_BLOCK_MM[0] or high > _USUAL_BLOCK_MM[1]:
-            message = (
-                f"{wide:.0f} x {high:.0f} mm at the lower right were taken for the title block and left out"
-            )
-            problems.append(Problem("title_block_unsure", message, file))
-    return tuple(problems)
+def _left_out(field: Field, file: str) -> tuple[Problem, ...]:
+    """What a person must know: that an area larger than usual title blocks was left out."""
+    if field.block is None or not np.any(np.array(field.block[2:]) > _USUAL_BLOCK_MM):
+        return ()
+    wide, high = field.block[2:]
+    message = f"{wide:.0f} x {high:.0f} mm at the lower right were taken for the title block and left out"
+    return (Problem("title_block_unsure", message, file),)
 
 
 def _ink_map(contrast: GreyImage, scale: float, sheet: Sheet) -> InkMap:

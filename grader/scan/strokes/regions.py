@@ -213,6 +213,8 @@ _EDGE_MM = 2.5
 """Lines nearer to the sheet's right and lower edge are the paper's shadow."""
 _LEAST_LINES = 4
 """Top, left and at least two rows."""
+_LEAST_LETTERS = 5
+"""A title block holds a name at least."""
 _SAMPLES = 64
 """Places along each side of a box: 4096 tell a median to a few per cent."""
 
@@ -276,12 +278,18 @@ def _inner(sheet: Sheet) -> Box:
     return (x + _FRAME_MM, y + _FRAME_MM, w - 2.0 * _FRAME_MM, h - 2.0 * _FRAME_MM)
 
 
-def field_of(seeds: Seeds, sheet: Sheet, scale: float, boxes: Sequence[Box] | None) -> Field:
+def field_of(
+    seeds: Seeds, components: "Components", sheet: Sheet, scale: float, boxes: Sequence[Box] | None
+) -> Field:
     """The frame's inside, or the boxes asked for, without the title block."""
     field = Field(sheet, (_inner(sheet),) if boxes is None else tuple(boxes), None, scale)
     if sheet.zones:
         return field
-    return replace(field, block=title_block(field.to_mm(at_full_size(seeds.ends, scale)), sheet))
+    block = title_block(field.to_mm(at_full_size(seeds.ends, scale)), sheet)
+    # A table, and the corner of a drawing, have no text: what stands there is not left out.
+    marks = mark_boxes(components, field)
+    is_written = block is not None and _in_box(marks[:, :2], block).sum() >= _LEAST_LETTERS
+    return replace(field, block=block if is_written else None)
 
 
 def title_block(ends: FloatArray, sheet: Sheet) -> Box | None:
