@@ -39,12 +39,15 @@ def without_ruling(grey: GreyImage) -> tuple[GreyImage, Ruling | None]:
         _family(flat, picture, pitch, scale, upright=upright)
         for upright, (picture, pitch) in zip((False, True), pitches, strict=True)
     ]
+    slopes = np.array([_slope(family, grey.shape) for family in families])
+    if np.any(np.abs([slopes[0, 0], slopes[1, 1]]) > _MOST_ASKEW * np.abs([slopes[0, 1], slopes[1, 0]])):
+        return grey, None
     clean = _lightened(flat, families)
     for family in families:
         clean = _led_through(clean, grey, family)
     if is_black_and_white(grey):
         clean = np.asarray(cv2.threshold(clean, 127, 255, cv2.THRESH_BINARY)[1], dtype=np.uint8)
-    return clean, Ruling(np.array([_slope(family, grey.shape) for family in families]))
+    return clean, Ruling(slopes)
 
 
 # Whether there are squares --------------------------------------------------------------------------
@@ -73,6 +76,8 @@ _WITHIN = 0.04
 """Relative change of the pitch over a page in perspective."""
 _LEAST_SCORE = 3.5
 """Squares have 5 to 19, drawings, tables, text and photos up to 1.7."""
+_MOST_ASKEW = 0.13
+"""Tangent of 7 degrees: hatching all over a page has another direction."""
 _ORDERS, _LOWEST = 12, 0.3
 """Multiples of a pitch have its harmonics, too, but lack the lowest: this share of the strongest's power."""
 
@@ -321,8 +326,8 @@ _COARSE_PX = 32
 """Between the places at which the numbers are computed."""
 _BAND_PX = 64
 """Rows of a page whose pictures fit the processor's cache together."""
-_LEANS = (-2.5, -1.2, -0.5, 0.0, 0.5, 1.2, 2.5)
-"""Of strokes that cross a line, against its normal: up to 68 degrees."""
+_LEANS = (-9.0, -5.0, -2.5, -1.2, -0.5, 0.0, 0.5, 1.2, 2.5, 5.0, 9.0)
+"""Of strokes that cross a line, against its normal: up to 84 degrees."""
 _SEEN = 0.03
 """Contrast at a line's border."""
 

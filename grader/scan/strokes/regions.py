@@ -213,8 +213,8 @@ _EDGE_MM = 2.5
 """Lines nearer to the sheet's right and lower edge are the paper's shadow."""
 _LEAST_LINES = 4
 """Top, left and at least two rows."""
-_LEAST_LETTERS = 5
-"""A title block holds a name at least."""
+_LEAST_LETTERS = 3
+"""A title block holds a number at least."""
 _SAMPLES = 64
 """Places along each side of a box: 4096 tell a median to a few per cent."""
 

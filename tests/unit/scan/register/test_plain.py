@@ -7,9 +7,8 @@ import cv2
 import numpy as np
 import pytest
 
-from grader.records import Page
+from grader.records import Page, Ruling
 from grader.scan.decode.pages import page_of
-from grader.scan.register import registration
 from grader.scan.register.distortion import straight, straighten, straightened
 from grader.scan.register.registration import rectify
 
@@ -244,15 +243,25 @@ def test_squared_paper_has_no_title_block():
     assert unknown_because(rectify(Page("a.png", 1, grey, None)))
 
 
-def test_a_frame_on_squared_paper_is_less_sure_since_a_square_may_pass_for_a_side(monkeypatch):
-    page = Page("a.png", 1, painted(*scanner(), bed=248), None)
-    plain, every = rectify(page), registration.long_lines
-    monkeypatch.setattr(registration, "long_lines", lambda flat: [*every(flat), "a square's line"])
-    monkeypatch.setattr(registration, "without_grid", lambda lines, _: lines[:-1])
-    sheet = rectify(page)
-    assert np.array_equal(sheet.mm_to_px, plain.mm_to_px)
-    assert plain.scale_se < 0.002
-    assert 0.003 <= sheet.scale_se < 0.004
+def on_squares(pitch_mm, dpi=None):
+    """A sheet without frame on squares that were taken out; by its edges alone, or a stated resolution."""
+    matrix, shape = scanner(bed_mm=12.0)
+    per_px = 1.0 / (pitch_mm * PX_PER_MM)
+    ruling = Ruling(np.array([[0.0, per_px], [per_px, 0.0]]))
+    return rectify(Page("a.png", 1, painted(matrix, shape, frame=None, bed=120), dpi, ruling=ruling))
+
+
+def test_squares_are_a_second_witness_of_the_scale():
+    sheet, off = on_squares(5.0), on_squares(5.02)
+    assert [problem.code for problem in sheet.problems if problem.code == "squared_paper"] == ["squared_paper"]
+    assert "5 mm" in sheet.problems[-1].message
+    assert 0.0025 < sheet.scale_se < 0.003
+    # Half-way between edges, known to 0.4 per cent, and squares, which are known as well as they.
+    assert 0.4 * 0.004 < off.px_per_mm / sheet.px_per_mm - 1.0 < 0.6 * 0.004
+
+
+def test_squares_of_a_size_that_no_paper_has_say_that_the_scale_is_wrong():
+    assert "squares would be 5.8 mm" in on_squares(5.85).reason
 
 
 @pytest.mark.parametrize(

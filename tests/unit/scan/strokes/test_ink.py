@@ -10,6 +10,7 @@ import pytest
 
 from grader.records import HEAD_AHEAD, HEAD_BACK, Page, Sheet, Unread
 from grader.scan.decode.pages import page_of
+from grader.scan.decode.ruling import without_ruling
 from grader.scan.register.registration import rectify
 from grader.scan.strokes.ink import find_ink
 
@@ -486,29 +487,32 @@ def test_strokes_are_counted_before_any_is_fitted(monkeypatch):
 
 
 @pytest.mark.parametrize("pitch", [5, 1])
-def test_squared_paper_is_told_and_its_squares_are_no_strokes(pitch):
+def test_squares_that_were_taken_out_are_no_strokes(pitch):
     paper = Paper()
-    grey = paper.grey
     for step in range(0, 420, pitch):
         paper.line((step, 0), (step, 297), pen=0.12, dark=190)
     for step in range(0, 297, pitch):
         paper.line((0, step), (420, step), pen=0.12, dark=190)
     for start, end in SEGMENTS:
         paper.line(start, end)
-    ink = paper.ink()
-    assert [problem.code for problem in ink.problems] == ["squared_paper"]
-    assert f"{pitch}.0 mm" in ink.problems[0].message
-    assert len(ink.strokes) == len(SEGMENTS)
-    paper.grey = grey
-    assert paper.ink().problems == ()
+    paper.grey, ruling = without_ruling(paper.grey)
+    assert ruling is not None
+    strokes = paper.ink().strokes
+    assert len(strokes) == len(SEGMENTS)
+    for start, end in SEGMENTS:
+        only_stroke(strokes, start, end)
 
 
-def test_squares_of_a_size_that_no_paper_has_say_that_the_scale_is_wrong():
+TABLE = [((266, 240), (410, 240)), ((266, 240), (266, 287)), ((266, 255), (410, 255)), ((266, 270), (410, 270))]
+
+
+@pytest.mark.parametrize("words", ["Nr. 7", ""])
+def test_a_table_without_text_is_no_title_block(words):
     paper = Paper()
-    for step in np.arange(0.0, 420.0, 5.85):
-        paper.line((step, 0), (step, 297), pen=0.12, dark=190)
-        paper.line((0, step), (420, step), pen=0.12, dark=190)
-    assert "squares would be 5.8 mm" in refusal(paper)
+    for start, end in TABLE:
+        paper.line(start, end)
+    paper.text(words, (272, 250))
+    assert len(paper.ink().strokes) == (0 if words else len(TABLE))
 
 
 def test_an_area_larger_than_a_title_block_is_told_where_it_is_left_out():
@@ -520,4 +524,5 @@ def test_an_area_larger_than_a_title_block_is_told_where_it_is_left_out():
         ((206, 260), (415, 260)),
     ]:
         paper.line(start, end)
+    paper.text("Nume", (212, 230))
     assert [problem.code for problem in paper.ink().problems] == ["title_block_unsure"]
