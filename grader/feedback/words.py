@@ -145,7 +145,7 @@ PROBLEMS: dict[str, str] = {
         "The page is no drawing: it has far too many lines, or its tones are inverted. Scan it in greyscale."
     ),
     "squared_paper": N_(
-        "The paper is squared: what is drawn no darker than its printed lines was left out. Use plain paper."
+        "The paper is squared: its printed lines were taken out. Strokes along one may be lost if no darker."
     ),
     "title_block_unsure": N_("A large area at the lower right was taken for the title block and left out."),
     "calibration_page": N_("This is the calibration page, not a drawing."),

@@ -104,11 +104,25 @@ def _seen(**scan: Any) -> Callable[[Settings], Settings]:
     return lambda own: replace(own, scan=replace(own.scan, **scan))
 
 
-def _on(pitch_mm: float, colour: Colour, mode: Literal["grey", "colour"]) -> Callable[[Settings], Settings]:
-    """Somebody who draws on squared paper."""
-    return lambda own: replace(
-        own, page=replace(own.page, squared_mm=pitch_mm, squares=colour), scan=replace(own.scan, mode=mode)
+def _on(
+    pitch_mm: float, colour: Colour, mode: Literal["grey", "colour"], **squares: float
+) -> Callable[[Settings], Settings]:
+    """Somebody who draws on squared paper, its lines further described as in `PageStyle`."""
+
+    def changed(own: Settings) -> Settings:
+        told = {f"squares_{name}": value for name, value in squares.items()}
+        page = replace(own.page, squared_mm=pitch_mm, squares=colour, **told)
+        return replace(own, page=page, scan=replace(own.scan, mode=mode))
+
+    return changed
+
+
+def _in_pencil(on: Callable[[Settings], Settings]) -> Callable[[Settings], Settings]:
+    """The same with a pencil that is no darker than many squares."""
+    pencil = _drawn(
+        line_mm=0.35, thin_mm=0.22, dark=0.55, thin_dark=0.38, grain=0.4, colour=_LEAD, plan_colour=None
     )
+    return lambda own: on(pencil(own))
 
 
 def _faint(own: Settings) -> Settings:
@@ -126,6 +140,7 @@ _LEAD: Colour = (78, 78, 82)
 _YELLOW: Colour = (236, 200, 40)
 _ORANGE: Colour = (240, 170, 110)
 _GREEN: Colour = (150, 205, 160)
+_BROWN: Colour = (170, 130, 100)
 PAPER_SCENES = tuple(
     replace(scene, hardship=0.0)
     for scene in (
@@ -141,6 +156,12 @@ PAPER_SCENES = tuple(
             _seen(mode="colour")(own))),
         ReadingScene("orange-1", "orange 1 mm paper, colour", changed=_on(1.0, _ORANGE, "colour")),
         ReadingScene("green-1-grey", "green 1 mm paper, grey scan", changed=_on(1.0, _GREEN, "grey")),
+        ReadingScene("pencil-5", "pencil, dark broken 5 mm squares", changed=_in_pencil(
+            _on(5.0, _LEAD, "grey", width_mm=0.25, dark=0.75, broken=0.5))),
+        ReadingScene("pencil-1", "pencil, brown bent 1 mm paper", changed=_in_pencil(
+            _on(1.0, _BROWN, "grey", dark=0.9, bent_mm=0.4))),
+        ReadingScene("pencil-7", "pencil, 7 mm squares turned", changed=_in_pencil(
+            _on(7.0, _LEAD, "grey", width_mm=0.2, dark=0.75, turn_deg=-2.5, bent_mm=0.5))),
         ReadingScene("worn", "folds, holes, coffee", changed=_worn),
         ReadingScene("sharpened", "unsharp mask, coarse JPEG",
                      changed=_seen(sharpen=1.2, jpeg_tables="web_low", container="jpg")),

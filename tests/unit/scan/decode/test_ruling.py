@@ -28,7 +28,8 @@ def lined(grey, lines, dark, width_mm):
     for points in lines:
         at = np.rint(((np.asarray(points) * PX_PER_MM) * 4 - 0.5) * 2**SUBPIXEL).astype(np.int32)
         wide = max(1, round(4 * width_mm * PX_PER_MM))
-        cv2.polylines(large, [at], isClosed=False, color=0, thickness=wide, lineType=cv2.LINE_AA, shift=SUBPIXEL)
+        pen = {"thickness": wide, "lineType": cv2.LINE_AA, "shift": SUBPIXEL}
+        cv2.polylines(large, [at], isClosed=False, color=0, **pen)
     cover = 1.0 - cv2.resize(large, grey.shape[::-1], interpolation=cv2.INTER_AREA).astype(np.float32) / 255
     return grey * (1.0 - cover * (1.0 - dark / PAPER))
 
@@ -48,7 +49,8 @@ def squared(pitch, dark=150, *, turn_deg=0.4, bend_mm=0.0, broken=0.0, heavy=1, 
         grey = lined(grey, lines, dark if which == 0 else (PAPER + dark) / 2, width_mm)
     if broken:
         grain = cv2.GaussianBlur(np.random.default_rng(3).normal(size=SHAPE), (0, 0), 0.8)
-        grey = PAPER - (PAPER - grey) * np.clip(1.0 + broken * grain / grain.std(), 0.0, 1.6).astype(np.float32)
+        grain = np.clip(1.0 + broken * grain / grain.std(), 0.0, 1.6).astype(np.float32)
+        grey = PAPER - (PAPER - grey) * grain
     return grey
 
 

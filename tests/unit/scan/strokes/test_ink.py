@@ -503,7 +503,7 @@ def test_squares_that_were_taken_out_are_no_strokes(pitch):
         only_stroke(strokes, start, end)
 
 
-TABLE = [((266, 240), (410, 240)), ((266, 240), (266, 287)), ((266, 255), (410, 255)), ((266, 270), (410, 270))]
+TABLE = [((266, y), (410, y)) for y in (240, 255, 270)] + [((266, 240), (266, 287))]
 
 
 @pytest.mark.parametrize("words", ["Nr. 7", ""])
