@@ -110,7 +110,7 @@ def _on(
     """Somebody who draws on squared paper, its lines further described as in `PageStyle`."""
 
     def changed(own: Settings) -> Settings:
-        told = {f"squares_{name}": value for name, value in squares.items()}
+        told: dict[str, Any] = {f"squares_{name}": value for name, value in squares.items()}
         page = replace(own.page, squared_mm=pitch_mm, squares=colour, **told)
         return replace(own, page=page, scan=replace(own.scan, mode=mode))
 
