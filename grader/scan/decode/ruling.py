@@ -295,16 +295,21 @@ def _cut(flat: Flat, terms: FloatArray, reach: float, *, upright: bool) -> _Cuts
     return _Cuts(lines, x, at, across, dark.reshape(*at.shape, -1))
 
 
-def _by_middles(cuts: _Cuts, shape: tuple[int, ...]) -> FloatArray:
-    """Coefficients through the middles of the lines' darkness."""
+def _middles(cuts: _Cuts) -> tuple[FloatArray, FloatArray]:
+    """(n, segments) how far beside the lines their darkness has its middle, px, and how dark it is."""
     shown = cuts.dark.reshape(len(cuts.lines), _SEGMENTS, -1, len(cuts.across)).mean(axis=2)
     shown = (shown - shown.min(axis=2, keepdims=True)) ** 2
     weight = shown.sum(axis=2)
-    off = shown @ cuts.across / np.maximum(weight, 1e-9)
+    return shown @ cuts.across / np.maximum(weight, 1e-9), np.sqrt(weight)
+
+
+def _by_middles(cuts: _Cuts, shape: tuple[int, ...]) -> FloatArray:
+    """Coefficients through the middles of the lines' darkness."""
+    off, weight = _middles(cuts)
     at = cuts.at.reshape(len(cuts.lines), _SEGMENTS, -1).mean(axis=2) + off
     line, segment = np.nonzero(np.isfinite(at))
     x = cuts.x.reshape(_SEGMENTS, -1).mean(axis=1)[segment]
-    y, dark = at[line, segment], np.sqrt(weight[line, segment])
+    y, dark = at[line, segment], weight[line, segment]
     number = cuts.lines[line].astype(np.float64)
     # A dark stroke along a line counts no more than the line.
     return _fitted(_unit(x, shape[1]), _unit(y, shape[0]), number, np.minimum(dark, np.median(dark)))
@@ -318,8 +323,10 @@ _LEAST, _MARGIN = 0.012, 1.1
 """Contrast that is paper, and what is taken off for each of darkness: no specks are left."""
 _REPEATS, _REPEATED = (1, 2, 4, 5, 10), 6
 """Every second, fourth, fifth or tenth line may be heavier, if there are so many of them."""
-_OWN = (0.8, 1.15)
+_OWN = (0.8, 1.4)
 """How far the darkness of a line may be from that of its likes: more is a stroke along it."""
+_OWN_PX = 1.5
+"""How far beside its place a line may be printed."""
 _BINS = 256
 """From one line to the next."""
 _COARSE_PX = 32
@@ -341,7 +348,10 @@ def _profiles(cuts: _Cuts, pitch: float) -> tuple[NDArray[np.uint8], int]:
     ])  # fmt: skip
     whole = inside.mean(axis=1) > 0.5
     repeat = _repeat(cuts.lines[whole], level[whole])
-    phase = (np.arange(_BINS) + 0.5) / _BINS - 0.5
+    beside = ((np.arange(_BINS) + 0.5) / _BINS - 0.5) * pitch
+    off, _ = _middles(cuts)
+    off[~np.isfinite(off).any(axis=1)] = 0.0
+    off = np.clip(np.nanmedian(off, axis=1), -_OWN_PX, _OWN_PX)
     taken, half = np.zeros((len(cuts.lines), _BINS)), _STEP_PX
     for group in range(repeat):
         own = cuts.lines % repeat == group
@@ -355,7 +365,8 @@ def _profiles(cuts: _Cuts, pitch: float) -> tuple[NDArray[np.uint8], int]:
         profile *= np.quantile(dark[:, peak], _QUANTILE) / max(float(profile[peak]), _LEAST)
         profile = np.maximum(profile - _LEAST, 0.0)
         share = np.clip(level[own] / max(float(np.median(level[own])), _LEAST), *_OWN)
-        taken[own] = share[:, None] * np.interp(phase * pitch, cuts.across, profile, left=0.0, right=0.0)
+        places = beside - off[own, None]
+        taken[own] = share[:, None] * np.interp(places, cuts.across, profile, left=0.0, right=0.0)
         half = max(half, float(np.abs(cuts.across[profile > _SEEN]).max(initial=0.0)))
     return np.rint(255.0 * np.clip(_MARGIN * taken, 0.0, 1.0)).astype(np.uint8), int(np.ceil(half))
 
