@@ -14,8 +14,8 @@ SHAPE, PX_PER_MM = (1000, 1400), 6.0
 PAPER, PENCIL, SUBPIXEL = 244, 110, 8
 LEFT = 0.06
 """Contrast of what is left of squares at most: the faintest strokes have 0.1."""
-STROKES = [((30, 30), (110, 71)), ((150, 40), (141, 130)), ((40, 120), (120, 111))]
-"""Slanted, steep and nearly level, mm."""
+STROKES = [((30, 30), (110, 71)), ((150, 40), (110, 130)), ((40, 130), (120, 94))]
+"""Up to 24 degrees from the lines, mm."""
 
 
 def fixed(points):
@@ -100,7 +100,7 @@ def test_squares_go_and_strokes_that_cross_them_stay_whole(name):
     for start, end in STROKES:
         contrast = contrast_along(clean, start, end)
         assert np.median(contrast) > 0.35
-        assert contrast.min() > 0.2
+        assert contrast.min() > 0.15
 
 
 @pytest.mark.parametrize("dark", [PENCIL, 190])
@@ -109,7 +109,7 @@ def test_a_stroke_along_a_line_is_kept_by_what_it_has_more(dark):
     y = 0.37 * 5.0 + 14 * 5.0
     stroke = ((40.0, y), (120.0, y))
     clean, _ = without_ruling(scanned(grey, [*STROKES, stroke], width_mm=0.45))
-    beyond = contrast_along(clean, (130.0, y), (220.0, y))
+    beyond = contrast_along(clean, (150.0, y), (220.0, y))
     assert np.median(contrast_along(clean, *stroke)) > 0.15
     assert beyond.max() < LEFT + 0.03
 
