@@ -64,7 +64,6 @@ class Ruling:
     lines_per_px: FloatArray
 
 
-
 @dataclass(frozen=True, slots=True)
 class Page:
     """One page as stored in its file, before any rotation.

@@ -34,6 +34,7 @@ _PEN_PX = 2.0
 _BUNDLE = 1.6
 """An ink band this many pens wide is more than one stroke."""
 
+
 @dataclass(frozen=True, slots=True)
 class Seeds:
     """Guesses of strokes at the working resolution, a row each.
