@@ -16,6 +16,8 @@ from dataclasses import replace
 from functools import partial
 from hashlib import blake2b
 
+import numpy as np
+
 from grader.comparison.evidence import Submission
 from grader.comparison.scales import Declarations, Source, declarations
 from grader.comparison.task import Task, task_of
@@ -97,7 +99,7 @@ def open_page(
         return ScannedPage(replace(ref, problem=problem), problems=(problem,), timing_ms=timing)
     if ref.turn_deg is not None:
         image = replace(image, turn_deg=ref.turn_deg, turn_is_sure=True)
-    ref = replace(ref, content=blake2b(image.grey.tobytes(), digest_size=8).hexdigest())
+    ref = replace(ref, content=blake2b(np.ascontiguousarray(image.grey), digest_size=8).hexdigest())
     page = ScannedPage(ref, image, timing_ms=timing)
     # Rows that a decoder has filled with white are not blank.
     if not image.damage and is_blank(image):

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -140,7 +140,7 @@ class PlanProblem:
         return expected if known else None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class PlanReading:
     """A plan as read under one hypothesis.
 
@@ -163,6 +163,7 @@ class PlanReading:
     rivals: tuple["PlanReading", ...] = ()
     named: float = 1.0
 
+    @cached_property
     def fit(self) -> NodeFit:
         """The nodes by the strokes alone."""
         return fit_nodes(self.assignment, self.lines)
@@ -300,7 +301,7 @@ def _with_mistakes(
 
 def _suspects(plan: PlanReading) -> frozenset[str]:
     """The nodes at which a mistake could explain edges without a stroke, and large residuals."""
-    fit, expected = plan.fit(), plan.assignment.expected
+    fit, expected = plan.fit, plan.assignment.expected
     odd: set[str] = set()
     for index, edge in enumerate(expected.edges):
         size = abs(fit.at[edge.head] - fit.at[edge.tail])

@@ -241,7 +241,7 @@ def _set_apart(pages: Sequence[_PageReading], plan: PlanReading | None) -> None:
 
 def _nodes(plan: PlanReading) -> Nodes:
     names = plan.assignment.expected.names
-    return {name: np.asarray(at) for name, at in zip(names, plan.fit().at, strict=True)}
+    return {name: np.asarray(at) for name, at in zip(names, plan.fit.at, strict=True)}
 
 
 # Readings of the sheets ----------------------------------------------------------------------------
@@ -303,7 +303,7 @@ def figure_of_plan(plan: PlanReading, scale_se: float, where: InkMap) -> tuple[F
 
     Arguments: `scale_se` is the sheet's relative standard error of lengths, `where` its ink.
     """
-    fit, names = plan.fit(), plan.assignment.expected.names
+    fit, names = plan.fit, plan.assignment.expected.names
     explanations = _explanations(plan, fit)
     absent = dict(plan.hypothesis.absent)
     nodes = {
@@ -503,7 +503,7 @@ def _explanations(plan: PlanReading, fit: NodeFit) -> _Explanations:
         if rival.score <= plan.score - RIVAL_NATS:
             continue
         if rival.strokes not in nodes_by_strokes:
-            nodes_by_strokes[rival.strokes] = rival.fit().at
+            nodes_by_strokes[rival.strokes] = rival.fit.at
         at = dict(zip(rival.assignment.expected.names, nodes_by_strokes[rival.strokes], strict=True))
         weight.append(math.exp(min(0.0, rival.score - plan.score) / TEMPERATURE))
         places.append(np.array([at.get(name, np.nan) for name in names]))

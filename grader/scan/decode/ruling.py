@@ -127,7 +127,8 @@ def find_pitch(dark: GreyImage) -> tuple[float, float]:
         power = np.abs(np.fft.rfft((piece - piece.mean(axis=0)) * window, axis=0)) ** 2
         part = power.reshape(-1, count, _STRIPS).mean(axis=2).T
         beside = np.pad(part, ((0, 0), (side, side)), mode="reflect")
-        floor = np.median(np.lib.stride_tricks.sliding_window_view(beside, _FLOOR_BINS, axis=1), axis=2)
+        around = np.lib.stride_tricks.sliding_window_view(beside, _FLOOR_BINS, axis=1)
+        floor = np.partition(around, side, axis=2)[:, :, side]
         scores.append(
             np.clip(np.log(np.maximum(part, 1e-6) / np.maximum(floor, 1e-3)), 0.0, _LOG_CAP) @ weights.T
         )

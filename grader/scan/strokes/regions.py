@@ -287,9 +287,9 @@ def field_of(
         return field
     block = title_block(field.to_mm(at_full_size(seeds.ends, scale)), sheet)
     # A table, and the corner of a drawing, have no text: what stands there is not left out.
-    marks = mark_boxes(components, field)
-    is_written = block is not None and _in_box(marks[:, :2], block).sum() >= _LEAST_LETTERS
-    return replace(field, block=block if is_written else None)
+    if block is None or _in_box(mark_boxes(components, field)[:, :2], block).sum() < _LEAST_LETTERS:
+        return field
+    return replace(field, block=block)
 
 
 def title_block(ends: FloatArray, sheet: Sheet) -> Box | None:
