@@ -168,16 +168,19 @@ def _find_plan(
     Arguments: `at_scales`, the drawing at likely scales; `known`, nodes of the plan before.
     """
     laid: list[_LaidPlan] = []
-    for page in pages:
+    # A printed sheet has a place for the plan: there it is looked for first.
+    for page in sorted(pages, key=lambda page: figure not in page.sheet.zones):
         joints, guide_turn = _sketched(page, pages)
         links = page.sketch.members if page.sketch is not None else np.zeros(0, np.int64)
         problem = PlanProblem(page.lines, figure, {**joints, **known}, page.ink.letters, renamed, links)
         for drawing in at_scales:
             turned = Drawing(drawing.construction, {**drawing.parameters, "turn": np.asarray(guide_turn)})
             laid.append(_LaidPlan(page, problem, turned, regular_plans(problem, turned)))
+        if figure in page.sheet.zones and any(one.is_explained for one in laid):
+            break
     laid.sort(key=lambda one: -one.score)
     # Where no sheet shows the plan as it should be, a mistaken one may be on either.
-    if laid and laid[0].plans and laid[0].plans[0].pose.score > EXPLAINED:
+    if laid and laid[0].is_explained:
         laid = laid[:1]
     elif figure == VELOCITY_PLAN:
         laid = [_without_accelerations(one) for one in laid]
@@ -205,6 +208,11 @@ class _LaidPlan:
     def score(self) -> float:
         """Of the best one."""
         return self.plans[0].score if self.plans else -math.inf
+
+    @property
+    def is_explained(self) -> bool:
+        """Whether the best one is what was drawn."""
+        return bool(self.plans) and self.plans[0].pose.score > EXPLAINED
 
 
 def _without_accelerations(laid: _LaidPlan) -> _LaidPlan:

@@ -352,8 +352,8 @@ _INK = 38
 """Contrast of 255: paper's texture and show-through stay below."""
 _TILE_PX = 24
 """Of that picture: 8 mm of the sheet."""
-_TILES = 48
-"""With most ink: some thousand edges in every direction."""
+_TILES, _EVERY = 48, 4
+"""Those with most ink, and how many of them stand for one: some hundred edges in every direction."""
 _ACROSS_MM = 1.2
 """To either side of an edge: past the stroke's middle, and to the paper beside it."""
 _LEAST_STEP = 0.15
@@ -414,7 +414,7 @@ def _inked_tiles(flat: Flat, mm_to_px: FloatArray, reach: int) -> Iterator[tuple
     )
     # Filled areas have few edges.
     held[held > 0.5] = 0.0
-    for place in held.reshape(-1).argsort()[::-1][:_TILES]:
+    for place in held.reshape(-1).argsort()[::-1][:_TILES:_EVERY]:
         row, column = divmod(int(place), columns)
         if held[row, column] <= 0.0:
             return

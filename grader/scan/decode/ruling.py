@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grader.records import FloatArray, GreyImage, Ruling
-from grader.scan.pixels import Flat, Float32Array, flatten, is_black_and_white, shrink
+from grader.scan.pixels import Flat, Float32Array, averaged, flatten, is_black_and_white
 
 _LONG_SIDE_PX = 2480
 """Resolution at which lines are looked for: 6 px/mm on A3, so that a line in each millimetre is seen."""
@@ -24,7 +24,8 @@ _LONG_SIDE_PX = 2480
 def without_ruling(grey: GreyImage) -> tuple[GreyImage, Ruling | None]:
     """The page without its printed squares, and these; the page itself, and None, where there are none."""
     scale = min(1.0, _LONG_SIDE_PX / max(grey.shape))
-    small = shrink(grey, scale)
+    size = round(grey.shape[1] * scale), round(grey.shape[0] * scale)
+    small = np.asarray(cv2.resize(averaged(grey, int(1.0 / scale)), size), dtype=np.uint8)
     if min(small.shape) < _WINDOW_PX:
         return grey, None
     dark = _darkness(small)
