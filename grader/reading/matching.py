@@ -548,10 +548,10 @@ def _after(states: _States, edge: int, choices: _Choices, beam: int, problem: _A
     choices, figure = choices.take(order), figure[order]
     stroke, shared = states.stroke[choices.state], states.shared[choices.state]
     stroke[:, edge], shared[:, edge] = choices.row, choices.shared
-    first: dict[bytes, int] = {}
-    for row, strokes_of_figure in enumerate(np.column_stack([figure, stroke])):
-        first.setdefault(strokes_of_figure.tobytes(), row)
-    rows = np.array(list(first.values()), dtype=np.intp)
+    each = np.column_stack([figure, stroke])
+    # Rows as single values: `unique` along an axis takes four times as long.
+    _, rows = np.unique(each.view(np.dtype((np.void, each.strides[0]))).ravel(), return_index=True)
+    rows = np.sort(rows)
     rows = rows[_first_of_each(figure[rows], beam)]
     choices = choices.take(rows)
     beliefs = states.beliefs.take(choices.state)

@@ -380,10 +380,9 @@ def _borders(
     middle = off.argmin(axis=1)
     inked_there = np.isfinite(off[rows, middle])
     # The run reaches from the last paper before its middle to the first paper after it.
-    column = np.arange(count, dtype=np.int16)
-    before = np.maximum.accumulate(np.where(inked, np.int16(-1), column), axis=1)[rows, middle]
-    after = np.minimum.accumulate(np.where(inked, np.int16(count), column)[:, ::-1], axis=1)
-    behind = after[rows, count - 1 - middle]
+    column, at = np.arange(count, dtype=np.int16), middle.astype(np.int16)[:, None]
+    before = np.where(inked | (column > at), np.int16(-1), column).max(axis=1)
+    behind = np.where(inked | (column < at), np.int16(count), column).min(axis=1)
     left = np.where(inked_there, _crossing(contrast, across, before, 1, level32), np.nan)
     right = np.where(inked_there, _crossing(contrast, across, behind, -1, level32), np.nan)
     dark = np.where(inked_there, contrast[rows, middle], 0.0).astype(np.float64)

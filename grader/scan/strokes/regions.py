@@ -138,7 +138,7 @@ def join(ends: FloatArray, width: FloatArray, off_px: float, gap_px: float) -> P
             for _ in range(_ROUNDS if has_others else 0):
                 grown = _on_line(points, middle, free, line, (off_px, gap_px))
                 grown = grown if first in grown else np.sort(np.append(grown, first))
-                if np.array_equal(grown, members):
+                if len(grown) == len(members) and (grown == members).all():
                     break
                 members, line = grown, _fitted(points[:, :, grown], length[grown])
             free[members] = False
