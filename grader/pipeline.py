@@ -16,8 +16,6 @@ from dataclasses import replace
 from functools import partial
 from hashlib import blake2b
 
-import numpy as np
-
 from grader.comparison.evidence import Submission
 from grader.comparison.scales import Declarations, Source, declarations
 from grader.comparison.task import Task, task_of
@@ -36,8 +34,8 @@ from grader.outcomes import Judgement
 from grader.overlay.measured import measured_picture
 from grader.overlay.picture import backdrop, overlay
 from grader.overlay.scene import Picture
+from grader.reading import page_scale
 from grader.reading.corrected import corrected
-from grader.reading.page_scale import at_drawn_scales, is_drawn_otherwise, is_upside_down
 from grader.reading.read import read_figures
 from grader.reading.sketch import drawings
 from grader.records import PageRef, Problem, Reading, ScannedPage, Sheet, Unread
@@ -53,7 +51,7 @@ from grader.scan.handwriting.captions import (
     written_number,
 )
 from grader.scan.handwriting.fields import writing, written_lengths, written_scales
-from grader.scan.handwriting.letters import find_letters
+from grader.scan.handwriting.letters import STAND_UPRIGHT, find_letters, upright_nats
 from grader.scan.quality import flaws
 from grader.scan.register.distortion import straighten
 from grader.scan.register.registration import register
@@ -99,7 +97,7 @@ def open_page(
         return ScannedPage(replace(ref, problem=problem), problems=(problem,), timing_ms=timing)
     if ref.turn_deg is not None:
         image = replace(image, turn_deg=ref.turn_deg, turn_is_sure=True)
-    ref = replace(ref, content=blake2b(np.ascontiguousarray(image.grey), digest_size=8).hexdigest())
+    ref = replace(ref, content=blake2b(image.grey.tobytes(), digest_size=8).hexdigest())
     page = ScannedPage(ref, image, timing_ms=timing)
     # Rows that a decoder has filled with white are not blank.
     if not image.damage and is_blank(image):
@@ -131,7 +129,17 @@ def open_page(
             problems += tuple(replace(problem, file=ref.file) for problem in ink.problems)
             page = replace(page, ink=replace(ink, letters=find_letters(ink, boxes)), problems=problems)
         reading = Reading({}, written=written_scales(image, sheet, units))
-    return replace(page, reading=reading, narrowed=boxes is not None)
+    page = replace(page, reading=reading, narrowed=boxes is not None)
+    return page if sheet.zones or image.turn_is_sure else _as_letters_stand(page)
+
+
+def _as_letters_stand(page: ScannedPage) -> ScannedPage:
+    """A plain page the way up that its letters stand; as it is where they do not tell."""
+    if (nats := upright_nats(page.ink)) is None:
+        return page
+    other = page if nats > STAND_UPRIGHT else _turned(page)
+    is_told = other is page or (upright_nats(other.ink) or nats) > nats + STAND_UPRIGHT
+    return page_scale.surely_upright(other) if is_told else page
 
 
 def _refused(page: ScannedPage, code: str, message: str) -> ScannedPage:
@@ -160,7 +168,7 @@ def _with_number_compared(page: ScannedPage, variant: Variant | None, assignment
     """A plain page; told where the drawing is not the variant's and another number stands on it."""
     if variant is None or page.ink is None or page.sheet is None or page.sheet.zones:
         return page
-    if not is_drawn_otherwise(page.reading, drawings(assignment, [variant], None)[0]):
+    if not page_scale.is_drawn_otherwise(page.reading, drawings(assignment, [variant], None)[0]):
         return page
     for which, words in (("n", NUMBER_WORDS), ("position", POSITION_WORDS)):
         numbers = {getattr(other, which) for other in assignment.variants()} - {None}
@@ -231,14 +239,14 @@ def read_pages(
         readings = _readings(pages, assignment, variant, scales, wanted)
         right = None if variant is None else drawings(assignment, [variant], scales)[0]
         sure: Collection[str] = () if variant is None else understood_scales(assignment, variant, known)
-        for at_drawing in (_upright, partial(at_drawn_scales, declared=sure)):
-            placed = at_drawing(pages, readings, right)
-            if placed is not None:
+        for at_drawing in (_upright, partial(page_scale.at_drawn_scales, declared=sure)):
+            if (placed := at_drawing(pages, readings, right)) is not None:
                 pages, readings = placed, _readings(placed, assignment, variant, scales, wanted)
     drawn = sum(page.ink is not None for page in pages)
     read = []
     for page, reading in zip(pages, readings, strict=True):
         told = replace(reading, written=page.reading.written, lengths=page.reading.lengths)
+        told = page_scale.no_surer_than_turn(told, page)
         spent = timing["reading"] / drawn if page.ink is not None else 0.0
         read.append(replace(page, reading=told, timing_ms={**page.timing_ms, "reading": spent}))
     return read
@@ -247,29 +255,25 @@ def read_pages(
 def _upright(
     pages: Sequence[ScannedPage], readings: Sequence[Reading], right: Drawing | None
 ) -> list[ScannedPage] | None:
-    """The pages, the other way up where nothing but a drawing says so; None where none is.
-
-    Letters are read upright only, so that such a page is opened again.
-    """
+    """The pages, the other way up where nothing but a drawing says so; None where none is."""
     turned = [
-        _turned(page) if right is not None and is_upside_down(reading, right) else page
+        _turned(page) if page_scale.turn_doubts(page) and page_scale.is_upside_down(reading, right) else page
         for page, reading in zip(pages, readings, strict=True)
     ]
     return turned if any(one is not page for one, page in zip(turned, pages, strict=True)) else None
 
 
 def _turned(page: ScannedPage) -> ScannedPage:
-    """A page whose way up was not sure, opened the other way up."""
-    unsure = [problem for problem in page.problems if problem.code == "upright_unsure"]
-    if not unsure or page.sheet is None:
+    """A page opened the other way up, as letters are read upright only; itself where nothing is found so."""
+    if page.sheet is None:
         return page
     turn_deg = (90 * round(page.sheet.rotation_deg / 90.0) + 180) % 360
     turned = open_page(replace(page.ref, turn_deg=turn_deg))
     if turned.image is None or turned.sheet is None:
         return page
     behind = backdrop(turned.image, turned.sheet) if page.backdrop is not None else None
-    image = turned.image if page.image is not None else None
-    return replace(turned, image=image, backdrop=behind, problems=(*turned.problems, *unsure))
+    problems = (*turned.problems, *page_scale.turn_doubts(page))
+    return replace(turned, image=page.image and turned.image, backdrop=behind, problems=problems)
 
 
 def _readings(

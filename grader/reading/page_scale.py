@@ -46,17 +46,23 @@ TELLING = 1.4
 """The scale's standard error counts as another from this factor on."""
 
 
+UPRIGHT_UNSURE = "upright_unsure"
+"""A problem of registration: neither title block nor letters tell which way up the page is."""
 UPSIDE_DOWN_RAD = math.radians(135.0)
 """Figures turned by more lie the other way up: nobody turns a drawing so far on its sheet."""
+BY_PLANS = 0.85
+"""Most confidence in what is read on a page whose plans alone tell which way up it is: a person looks."""
 
 
-def is_upside_down(reading: Reading, drawing: Drawing) -> bool:
+def is_upside_down(reading: Reading, drawing: Drawing | None) -> bool:
     """Whether two figures of a page lie as on a sheet turned by half.
 
     One alone may have been drawn so: a sense is easily reversed.
 
-    Arguments: `drawing` is what the student was to draw.
+    Arguments: `drawing` is what the student was to draw; without it nothing tells.
     """
+    if drawing is None:
+        return False
     vectors = drawing.construction.vectors
     turned = []
     for name, figure in reading.figures.items():
@@ -65,6 +71,30 @@ def is_upside_down(reading: Reading, drawing: Drawing) -> bool:
         }  # fmt: skip
         turned.append(abs(cmath.phase(sum(_turns(figure, ends, drawing)))) > UPSIDE_DOWN_RAD)
     return sum(turned) > 1
+
+
+def turn_doubts(page: ScannedPage) -> tuple[Problem, ...]:
+    """What registration says of not knowing which way up a page is."""
+    return tuple(problem for problem in page.problems if problem.code == UPRIGHT_UNSURE)
+
+
+def surely_upright(page: ScannedPage) -> ScannedPage:
+    """The page without such a doubt."""
+    return replace(page, problems=tuple(one for one in page.problems if one.code != UPRIGHT_UNSURE))
+
+
+def no_surer_than_turn(reading: Reading, page: ScannedPage) -> Reading:
+    """A page's reading, with nothing asserted where its plans alone told which way up the page is."""
+    if page.ref.turn_deg is None or not turn_doubts(page):
+        return reading
+    figures = {}
+    for name, figure in reading.figures.items():
+        nodes, vectors = figure.nodes, figure.vectors
+        figures[name] = Figure(
+            {key: replace(one, confidence=min(one.confidence, BY_PLANS)) for key, one in nodes.items()},
+            {key: replace(one, confidence=min(one.confidence, BY_PLANS)) for key, one in vectors.items()},
+        )
+    return replace(reading, figures=figures)
 
 
 OTHER_RAD = math.radians(4.0)

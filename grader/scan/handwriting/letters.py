@@ -54,6 +54,10 @@ _ABOUT_MM = 9.0
 """Letters of nodes are no farther from a long stroke."""
 _GAP, _LEVEL = 0.9, 0.4
 """Signs of one line of writing: so many heights apart, so much of the lower one's height at one level."""
+_FEW, _ENOUGH = 8, 32
+"""Fewer signs do not tell which way up they stand; of more, those are asked that are likeliest signs."""
+_NATS, STAND_UPRIGHT = 3.0, 6.0
+"""One sign alone tells no more: a p on its head is a d; and from where on all together tell."""
 _WORDS = 7
 """More signs in a line are words or a calculation, no letter of a node."""
 
@@ -82,6 +86,26 @@ def find_letters(ink: Ink, boxes: Sequence[Box] | None = None) -> Letters:
     # The centre of the map's pixel q is at q / unit mm.
     box[:, :2] += [left, top]
     return Letters(box / unit, probability, ~np.array(touched, dtype=bool), COLUMN)
+
+
+def upright_nats(ink: Ink | None) -> float | None:
+    """How much better the likeliest signs are read as they stand than on their heads; None of few signs.
+
+    Of 23 sheets 8 to 25 where they stood upright, at most 1 where they did not.
+    """
+    if ink is None or ink.letters is None or len(ink.letters) < _FEW:
+        return None
+    no_sign = ink.letters.probability[:, COLUMN[JUNK]]
+    chosen = np.argsort(no_sign, kind="stable")[:_ENOUGH]
+    chosen = chosen[no_sign[chosen] < 0.5]
+    if len(chosen) < _FEW:
+        return None
+    pictures = crops(ink.where.ink, ink.letters.box_mm[chosen] * ink.where.px_per_mm)
+    best = []
+    for turned in (pictures, np.ascontiguousarray(pictures[:, ::-1, ::-1])):
+        scores = answers("signs", turned).astype(np.float64)
+        best.append(scores[:, :-1].max(axis=1) - np.logaddexp.reduce(scores, axis=1))
+    return float(np.clip(best[0] - best[1], -_NATS, _NATS).sum())
 
 
 def _part(top: int, low: int, left: int, right: int) -> tuple[slice, slice]:

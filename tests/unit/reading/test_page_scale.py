@@ -5,7 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from grader.reading.page_scale import at_drawn_scales, is_drawn_otherwise, is_upside_down
+from grader.reading.page_scale import (
+    BY_PLANS,
+    UPRIGHT_UNSURE,
+    at_drawn_scales,
+    is_drawn_otherwise,
+    is_upside_down,
+    no_surer_than_turn,
+)
 from grader.reading.sketch import drawings
 from grader.records import (
     ACCELERATION_PLAN,
@@ -137,6 +144,15 @@ def test_two_figures_turned_by_half_say_that_the_page_lies_upside_down():
     alone = drawn()
     turned = {**alone.figures, VELOCITY_PLAN: drawn(turn=-1.0).figures[VELOCITY_PLAN]}
     assert not is_upside_down(replace(alone, figures=turned), RIGHT)
+
+
+def test_what_is_read_on_a_page_that_its_plans_alone_turned_is_not_asserted():
+    unsure = page(0.001, Problem(UPRIGHT_UNSURE, "no title block"))
+    turned = replace(unsure, ref=replace(unsure.ref, turn_deg=180))
+    for sure in (unsure, replace(turned, problems=())):
+        assert no_surer_than_turn(reading := drawn(), sure) is reading
+    for figure in no_surer_than_turn(drawn(), turned).figures.values():
+        assert {one.confidence for one in (*figure.nodes.values(), *figure.vectors.values())} == {BY_PLANS}
 
 
 def test_only_a_sketch_with_a_link_in_another_direction_looks_like_another_variants():

@@ -5,8 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from grader.records import Page, Sheet
-from grader.scan.handwriting.letters import CROP_PX, _in_words, _tiles, crops, find_letters
+from grader.pipeline import open_page
+from grader.reading.page_scale import UPRIGHT_UNSURE
+from grader.records import Page, PageRef, Sheet
+from grader.scan.handwriting.letters import (
+    CROP_PX,
+    STAND_UPRIGHT,
+    _in_words,
+    _tiles,
+    crops,
+    find_letters,
+    upright_nats,
+)
 from grader.scan.handwriting.model import COLUMN, JUNK, SIGNS, TWINS, normalised, recognise
 from grader.scan.register.registration import rectify
 from grader.scan.strokes.ink import find_ink
@@ -54,6 +64,20 @@ def test_most_letters_of_a_careful_drawing_are_read(drawn):
 def test_letters_on_lines_are_read():
     drawings = [sheet_of(PageStyle(language="en", letters_touch=1.0), seed) for seed in (5, 6)]
     assert np.mean([share_read(*drawing) for drawing in drawings]) >= TOUCHING_SHARE
+
+
+def test_letters_tell_a_sheet_without_a_title_block_that_was_scanned_upside_down(tmp_path):
+    assignment = load_assignment("pump")
+    scan = replace(
+        CLEAN_SCAN, dpi=150.0, dpi_tag=150.0, quarter_turns=2, container="png", paper=(255, 255, 255)
+    )
+    settings = Settings(hand=CAREFUL, scan=scan, page=PageStyle(language="en", title_block="none"))
+    sheet = simulate(assignment, assignment.variant(7), 5, settings)[0]
+    page = open_page(PageRef("scan.png", path=sheet.save(tmp_path / "scan")))
+    assert page.sheet is not None
+    assert page.sheet.rotation_deg == pytest.approx(180.0, abs=1.0)
+    assert UPRIGHT_UNSURE not in {problem.code for problem in page.problems}
+    assert upright_nats(page.ink) > STAND_UPRIGHT
 
 
 def test_blank_paper_has_no_letters(drawn):
