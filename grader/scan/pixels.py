@@ -34,6 +34,10 @@ _SAMPLED_ROWS = 37
 """Every such row tells whether a page has tones."""
 _RIM = 0.06
 """Of the long side: paper's edges on a copier's glass are broad and black."""
+_INKED = 200
+"""Of 255: lines that an office scanner thinned have so much of grey left."""
+_BLEACHED = 253, 0.9
+"""Brightness of paper that a scanner made white, and its share of a page: only then faint ink is in dots."""
 _LONELY = 3
 """Of the nine pixels around a dot: so many are ink at most. A line that is drawn through has more."""
 _DOTTED = 0.12
@@ -231,12 +235,13 @@ def is_black_and_white(grey: GreyImage) -> bool:
 
 
 def is_dotted(grey: GreyImage) -> bool:
-    """Whether a page is black and white, and much of its ink single dots."""
-    if not is_black_and_white(grey):
+    """Whether a page's paper was made white, by one bit or stretched contrast, and much of its ink dots."""
+    level, share = _BLEACHED
+    if not is_black_and_white(grey) and np.mean(grey[::_SAMPLED_ROWS] >= level) < share:
         return False
     # A strip narrower than two rims has no more than its middle.
     rim = min(round(_RIM * max(grey.shape)), (min(grey.shape) - 1) // 2)
-    ink = np.ascontiguousarray(grey[rim:-rim, rim:-rim] == 0) if rim else grey == 0
+    ink = np.ascontiguousarray((grey[rim:-rim, rim:-rim] if rim else grey) < _INKED)
     around = cv2.boxFilter(ink.view(np.uint8), cv2.CV_8U, (3, 3), normalize=False)
     lonely = np.count_nonzero(ink & (np.asarray(around) <= _LONELY))
     return bool(lonely > _DOTTED * np.count_nonzero(ink))

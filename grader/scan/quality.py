@@ -303,8 +303,9 @@ def _light(flat: Flat, mm_to_px: FloatArray, sheet: Sheet | None) -> Iterator[Fl
     shaded = light < _SHADE * level
     if shaded.mean() > _LEAST_SHADE:
         yield Flaw("shadow", float(np.quantile(light, 0.02) / level), _SHADE, _areas(shaded))
-    if is_black_and_white(flat.grey):
-        return  # its brightness was settled by the copier
+    is_scanned = sheet is not None and not sheet.mm_to_px[2, :2].any()
+    if is_scanned or is_black_and_white(flat.grey):
+        return  # its brightness was settled by the scanner, which may have made the paper white
     white = light >= _WHITE
     if white.mean() > _MOST_WHITE:
         boxes = [inner] if sheet is None or not sheet.zones else list(sheet.zones.values())

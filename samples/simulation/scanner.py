@@ -297,6 +297,8 @@ def _sensed(plane: Float32Array, scan: Scan, rng: Rng, specks: Sequence[_Speck])
     spread = float(np.hypot(scan.noise, scan.tint_grain))
     if spread > 0:
         plane = plane + _noise(plane.shape, spread, rng)
+    black, white = scan.levels
+    plane = (plane - np.float32(black)) * np.float32(255.0 / (white - black))
     return np.asarray(np.clip(plane + np.float32(0.5), 0.0, 255.0).astype(np.uint8))
 
 

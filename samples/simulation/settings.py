@@ -185,6 +185,8 @@ class Scan:
     sharpen : a scanner's unsharp mask, the share of an edge that is added to it
     dithered : one bit by error diffusion, not by a threshold
     curl_mm : how far a photographed sheet's bow moves its middle against a flat one
+    levels : brightness that an office scanner makes black, and that it makes white: faint ink is paper then
+    cropped_mm : how much its automatic cropping takes off each edge, on average
     """
 
     device: Literal["flatbed", "copier", "phone"] = "flatbed"
@@ -217,6 +219,8 @@ class Scan:
     lens_k1: float = 0.0
     tilt_deg: float = 0.0
     curl_mm: float = 0.0
+    levels: tuple[float, float] = (0.0, 255.0)
+    cropped_mm: float = 0.0
     shadow: float = 0.0
 
 

@@ -113,7 +113,7 @@ class SimulatedSheet:
     @property
     def suffix(self) -> str:
         """The file name's ending."""
-        return {"jpg": ".jpg", "png": ".png", "tif": ".tif"}[self.settings.scan.container]
+        return f".{self.settings.scan.container}"
 
     def save(self, path: Path) -> Path:
         """Write the file (its ending set by the scan's container); the truth then names it.
@@ -121,7 +121,11 @@ class SimulatedSheet:
         A phone's picture says by EXIF how it is to be turned.
         """
         target = path.with_name(path.name + self.suffix)
-        target.write_bytes(encoded(self.image, self.settings.scan, exif=self.settings.scan.device == "phone"))
+        scan = self.settings.scan
+        if scan.container == "pdf":
+            write_pdf(target, [(self.image, scan.dpi, 0)], scan.jpeg_quality)
+        else:
+            target.write_bytes(encoded(self.image, scan, exif=scan.device == "phone"))
         self.truth.update({"file": target.name, "page": 1})
         return target
 

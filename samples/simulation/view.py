@@ -119,6 +119,10 @@ def _glass(scan: Scan, rng: Rng) -> tuple[FloatArray, tuple[int, int]]:
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     linear = np.diag(pitch * stretch) @ turn * scan.copy_scale
     offset = (np.array([w, h]) / 2 + shift) * pitch - 0.5 - linear @ middle
+    if scan.cropped_mm > 0:
+        left, top, right, bottom = rng.uniform(0.0, 2.0 * scan.cropped_mm, 4) * pitch
+        size = (round(PAPER_MM[1] * pitch - top - bottom), round(PAPER_MM[0] * pitch - left - right))
+        offset = np.array([-left, -top]) - 0.5
     return np.array([[*linear[0], offset[0]], [*linear[1], offset[1]], [0.0, 0.0, 1.0]]), size
 
 

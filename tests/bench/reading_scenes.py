@@ -136,6 +136,13 @@ def _worn(own: Settings) -> Settings:
     return replace(own, scan=replace(own.scan, fold=True, crease=3.0, punched=True, stains=2))
 
 
+def _office(**scan: Any) -> Callable[[Settings], Settings]:
+    """Somebody at an office scanner: paper made white, faint lines thin and dotted, 200 dpi, coarse JPEG."""
+    usual: dict[str, Any] = {"mode": "grey", "container": "jpg", "jpeg_quality": 75}
+    usual |= {"dpi_tag": 200.0, "levels": (50.0, 215.0)}
+    return _seen(**(usual | scan))
+
+
 _LEAD: Colour = (78, 78, 82)
 _YELLOW: Colour = (236, 200, 40)
 _ORANGE: Colour = (240, 170, 110)
@@ -167,6 +174,13 @@ PAPER_SCENES = tuple(
                      changed=_seen(sharpen=1.2, jpeg_tables="web_low", container="jpg")),
         ReadingScene("faint", "faint 1-bit copies", device="copier", changed=_faint),
         ReadingScene("dithered", "1 bit, dithered", device="copier", changed=_seen(dithered=True)),
+        ReadingScene("office", "office scanner, 200 dpi", dpi=200.0, changed=_office()),
+        ReadingScene("office-hard", "office scanner, lines dotted", dpi=200.0, changed=_office(
+            levels=(90.0, 190.0), container="pdf")),
+        ReadingScene("cropped", "office scanner, cropped and deskewed", dpi=200.0, changed=_office(
+            skew_deg=0.03, cropped_mm=4.0)),
+        ReadingScene("office-printed", "office scanner, answer sheet", dpi=200.0, printed=True,
+                     changed=_office(skew_deg=0.03, cropped_mm=4.0)),
         ReadingScene("curled", "photos of a curled answer sheet", device="phone", dpi=None, printed=True,
                      changed=_seen(curl_mm=2.5)),
     )

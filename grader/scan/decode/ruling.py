@@ -24,13 +24,12 @@ _LONG_SIDE_PX = 2480
 def without_ruling(grey: GreyImage) -> tuple[GreyImage, Ruling | None]:
     """The page without its printed squares, and these; the page itself, and None, where there are none."""
     scale = min(1.0, _LONG_SIDE_PX / max(grey.shape))
-    size = round(grey.shape[1] * scale), round(grey.shape[0] * scale)
-    small = np.asarray(cv2.resize(averaged(grey, int(1.0 / scale)), size), dtype=np.uint8)
-    if min(small.shape) < _WINDOW_PX:
+    size = [round(side * scale) for side in grey.shape[::-1]]
+    dark = _darkness(np.asarray(cv2.resize(averaged(grey, int(1.0 / scale)), size), dtype=np.uint8))
+    if min(dark.shape) < _WINDOW_PX:
         return grey, None
-    dark = _darkness(small)
     pitches = []
-    for picture in (dark, np.asarray(cv2.transpose(dark), dtype=np.uint8)):
+    for picture in (dark, np.ascontiguousarray(dark.T)):
         pitch, score = find_pitch(picture)
         if score < _LEAST_SCORE:
             return grey, None
@@ -128,8 +127,7 @@ def find_pitch(dark: GreyImage) -> tuple[float, float]:
         power = np.abs(np.fft.rfft((piece - piece.mean(axis=0)) * window, axis=0)) ** 2
         part = power.reshape(-1, count, _STRIPS).mean(axis=2).T
         beside = np.pad(part, ((0, 0), (side, side)), mode="reflect")
-        around = np.lib.stride_tricks.sliding_window_view(beside, _FLOOR_BINS, axis=1)
-        floor = np.partition(around, side, axis=2)[:, :, side]
+        floor = np.median(np.lib.stride_tricks.sliding_window_view(beside, _FLOOR_BINS, axis=1), axis=2)
         scores.append(
             np.clip(np.log(np.maximum(part, 1e-6) / np.maximum(floor, 1e-3)), 0.0, _LOG_CAP) @ weights.T
         )

@@ -66,11 +66,11 @@ def straightened(grey: GreyImage, bend: float) -> GreyImage:
     across = np.arange(grey.shape[1], dtype=np.float32) - np.float32(cx)
     result = np.empty_like(grey)
     for top in range(0, len(grey), _BAND_ROWS):
-        rows = slice(top, min(top + _BAND_ROWS, len(grey)))
-        down = (np.arange(rows.start, rows.stop, dtype=np.float32) - np.float32(cy))[:, None]
+        band = result[top : top + _BAND_ROWS]
+        down = (np.arange(len(band), dtype=np.float32) + np.float32(top - cy))[:, None]
         share = np.float32(1.0) + np.float32(bend / radius**2) * (across**2 + down**2)
         x, y = across * share + np.float32(cx), down * share + np.float32(cy)
-        cv2.remap(grey, x, y, cv2.INTER_LINEAR, dst=result[rows], borderMode=cv2.BORDER_REPLICATE)
+        cv2.remap(grey, x, y, cv2.INTER_LINEAR, dst=band, borderMode=cv2.BORDER_REPLICATE)
     return result
 
 
@@ -97,10 +97,7 @@ def _middle(shape: tuple[int, ...]) -> tuple[FloatArray, float]:
 
 
 def find_bend(marked: MarkedPoints, plain: Projection, shape: tuple[int, int]) -> tuple[float, Projection]:
-    """The bend that best explains marked points, and the map of the straightened picture.
-
-    Arguments: `plain` is the map without a bend, given back with 0 where a bend explains little.
-    """
+    """The bend that best explains marked points, and its map; 0 and the `plain` one where that is little."""
     if plain.rms_mm < _WORTH_MM or len(marked) < _LEAST_POINTS:
         return 0.0, plain
 

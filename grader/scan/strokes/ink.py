@@ -344,7 +344,7 @@ def boxes_around(strokes: Strokes, which: BoolArray) -> FloatArray:
     return np.column_stack([low, high - low]).reshape(-1, 4)
 
 
-# Black and white scans whose lines are rows of dots (faint copies, dithered tones) --------------------
+# Scans whose lines are rows of dots (faint copies, dithered tones, stretched contrast) ----------------
 
 _SOFT_MM = 0.13
 """Dots of a line are this near to each other."""

@@ -118,6 +118,18 @@ def test_blur_is_measured_in_the_direction_in_which_it_is_worst(
     assert MOST_BLUR_MM < flaw.measured < 3.0
 
 
+def test_a_scan_whose_paper_was_made_white_is_not_overexposed() -> None:
+    grey = np.full((1754, 2480), 255, np.uint8)
+    for row in range(300, 1500, 200):
+        cv2.line(grey, (300, row), (2100, row + 60), 190, 2)
+    scanned = np.diag([5.906, 5.906, 1.0])
+    sheet = Sheet(scanned, (420.0, 297.0), "combined", 5.906, 0.0, 0.1, 0.001, (10, 10, 400, 277))
+    page = Page("scan.jpg", 1, grey, (150.0, 150.0))
+    assert flaws(page, sheet) == ()
+    tilted = scanned + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [1e-5, 0.0, 0.0]])
+    assert "overexposed" in {flaw.code for flaw in flaws(page, replace(sheet, mm_to_px=tilted))}
+
+
 def test_faded_lines_of_an_overexposed_photo_are_told_on_plain_and_printed_sheets(
     good: tuple[Page, float],
 ) -> None:

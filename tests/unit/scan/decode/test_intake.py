@@ -15,6 +15,7 @@ from PIL import Image
 from grader.scan.decode import limits
 from grader.scan.decode.pages import count_pages, is_blank, pages_of
 from reference.errors import InputFileError
+from tests.jbig2 import write_jbig2_pdf
 
 SHAPE = (300, 420)
 JPEG_ERROR_LEVELS = 3
@@ -475,3 +476,16 @@ def test_annotations_that_draw_nothing_do_not_matter(tmp_path, annotations):
     page.Annots = pdf.make_indirect(annotations)
     pdf.save(path)
     assert not is_blank(only_page(path))
+
+
+def test_a_pdf_of_a_jbig2_page_is_the_page(tmp_path):
+    one_bit = np.where(drawing((1240, 1754)) < 128, 0, 255).astype(np.uint8)
+    write_jbig2_pdf(tmp_path / "copy.pdf", one_bit, 300.0)
+    page = only_page(tmp_path / "copy.pdf")
+    assert page.dpi == pytest.approx((300.0, 300.0), rel=1e-3)
+    dark = page.grey[:1240, :1754] < 128
+    # Rendering may move it by a fraction of a pixel.
+    near = cv2.dilate((one_bit == 0).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    core = cv2.erode((one_bit == 0).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    assert dark[core].all()
+    assert not dark[~near].any()

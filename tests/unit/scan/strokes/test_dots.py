@@ -49,6 +49,14 @@ def test_a_row_of_dots_becomes_a_line(left):
     assert pieces(joined).max() > 2.0 * pieces(page).max(initial=0.5)
 
 
+def test_dots_of_stretched_contrast_are_joined_and_those_on_grey_paper_are_not():
+    tones = np.random.default_rng(7).integers(-40, 1, (780, 1180))
+    page = np.where(line_page(0.35) == 0, 140 + tones, 255).astype(np.uint8)
+    assert is_dotted(page)
+    assert pieces(joined_dots(page, PX_PER_MM)).max() > 2.0 * pieces(page).max(initial=0.5)
+    assert not is_dotted(np.minimum(page, 245))
+
+
 def test_a_line_of_dots_ends_where_its_dots_end():
     joined = joined_dots(line_page(0.5), PX_PER_MM)
     along = (np.array(ENDS[1]) - ENDS[0]) / np.hypot(*np.subtract(ENDS[1], ENDS[0]))
