@@ -44,8 +44,6 @@ NEGLIGIBLE = 0.001
 """Scales that differ by less are one: 0.1 mm in 100 mm."""
 TELLING = 1.4
 """The scale's standard error counts as another from this factor on."""
-
-
 UPRIGHT_UNSURE = "upright_unsure"
 """A problem of registration: neither title block nor letters tell which way up the page is."""
 UPSIDE_DOWN_RAD = math.radians(135.0)
@@ -89,11 +87,13 @@ def no_surer_than_turn(reading: Reading, page: ScannedPage) -> Reading:
         return reading
     figures = {}
     for name, figure in reading.figures.items():
-        nodes, vectors = figure.nodes, figure.vectors
-        figures[name] = Figure(
-            {key: replace(one, confidence=min(one.confidence, BY_PLANS)) for key, one in nodes.items()},
-            {key: replace(one, confidence=min(one.confidence, BY_PLANS)) for key, one in vectors.items()},
-        )
+        nodes = {
+            key: replace(one, confidence=min(one.confidence, BY_PLANS)) for key, one in figure.nodes.items()
+        }
+        vectors = {
+            key: replace(one, confidence=min(one.confidence, BY_PLANS)) for key, one in figure.vectors.items()
+        }
+        figures[name] = Figure(nodes, vectors)
     return replace(reading, figures=figures)
 
 

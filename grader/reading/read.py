@@ -376,7 +376,9 @@ def _vectors(
         if row >= 0:
             off_mm = float(np.abs(fit.residual_mm[index]).max())
             signs = replace(signs, off_mm=off_mm, marked=_marked(plan, fit, edge, row))
-        read = vector_of(span, cov, signs.confidence())
+        # No sign on the sheet makes a long vector surer than the sheet's scale.
+        most = math.erf(NEAR_MM / max(math.sqrt(2.0) * scale_se * abs(span), 1e-9))
+        read = vector_of(span, cov, min(signs.confidence(), most))
         rivals = (
             OtherReading(abs(other), _degrees(other), replace(signs, named=together).confidence())
             for other, together in others

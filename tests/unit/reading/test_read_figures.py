@@ -207,6 +207,16 @@ def test_a_sheet_of_unsure_scale_gives_no_confidence_in_long_vectors():
     assert vectors_read(read(vague, assignment, variant))["v_A"][1] < SURE
 
 
+def test_a_vector_is_no_surer_than_the_scale_allows_half_a_millimetre_of_its_length():
+    assignment, variant, drawing = task()
+    drawn, scale_se = draw(drawing), 0.005
+    vague = Drawn(drawn.ink, replace(drawn.sheet, scale_se=scale_se), drawn.nodes, drawn.vectors)
+    found = read(vague, assignment, variant).figures[VELOCITY_PLAN].vectors.values()
+    allowed = [math.erf(NEAR_MM / (scale_se * one.length_mm * math.sqrt(2.0))) for one in found]
+    assert min(allowed) < SURE
+    assert all(one.confidence <= most for one, most in zip(found, allowed, strict=True))
+
+
 def test_where_a_node_was_drawn_twice_the_other_place_is_told_with_what_it_adds():
     assignment, variant, drawing = task()
     once = draw(drawing)
