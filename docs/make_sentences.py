@@ -46,11 +46,12 @@ EXAMPLES: Mapping[str, str] = {
     "crank_deg": "212", "part": "the velocity plan",
     "p": "a", "p_radius": "@60.0 mm", "points": "0.5", "position": "3", "q": "b", "q_radius": "@40.0 mm",
     "radius": "@60.0 mm", "rate": "omega_3", "ratio": "0.4", "real_x": "@0.3 m", "real_y": "@0.1 m",
-    "reason": "%(nodes)s, on which it hangs, was not read for certain", "result": "32.31", "scale": "kv",
+    "result": "32.31", "scale": "kv",
     "se": "@0.25 mm", "second": "bc", "second_direction": "parallel to the guide of %(joint)s",
     "second_length": "@40.0 mm", "segment": "ab", "settled": "310", "slide": "v_BD", "start": "o'",
     "sum": "30", "tail": "A", "terms": "9 × 2 + 10 × 1", "text": "1:5?", "third": "C", "through": "a",
-    "tolerance": "@1.0 mm", "used": "@0.036 (m/s)/mm", "vector": "a_BA_n", "why": "no unit", "wrong": "0.4",
+    "tolerance": "@1.0 mm", "used": "@0.036 (m/s)/mm", "vector": "a_BA_n",
+    "why": "“%(said)s” has no unit, and a unit is never guessed", "wrong": "0.4",
     "written": "@45.0 mm", "x": "@60.0 mm", "x_direction": "@0°", "y": "@20.0 mm", "y_direction": "@90°",
     "cause": "normal component reversed", "done": "12", "minutes": "4", "open": "38", "total": "30",
     "verdict": "right", "who": "A. B.", "beyond": "@0.2 mm", "good_to": "@0.3 mm", "whose": "7",
@@ -63,6 +64,17 @@ EXAMPLES: Mapping[str, str] = {
     "students": "30", "right": "24", "audited": "24", "unclear": "1", "student": "s07",
     "criterion": "Acceleration of B", "allowed": "3\u00a0%", "raised": "98.2\u00a0%",
     "times": "10", "vectors": "v_BA, v_CA", "letter": "A",
+    "advice": "scan it again", "assignment": "pump", "assumed": "@300 dpi", "by": "AB, v_A", "claim": "s07",
+    "claims": "the QR code: %(claim)s", "copy": "2\u00a0%", "each": "2", "entries": "v_A: '6O'",
+    "examples": "1:5, 5 cm/cm", "exit": "-11", "figure": "the velocity plan", "fits": "80\u00a0%",
+    "form": "velocity", "given": "2", "graded": "n = 7", "grey": "40", "kind": "PNG", "lengths": "40",
+    "letters": "王", "long_side": "600", "longer": "1.5\u00a0%", "looks": "n = 9", "markers": "2",
+    "measurements": "1:4", "millions": "400", "more": "12", "near": "s08", "numbers": "7, 9", "page": "3",
+    "pitch": "@5.0 mm", "places": "a.csv, b.csv", "positions": "1, 2", "printed": "9", "read": "1:5",
+    "readings": "1:5, 1:4", "rival": "2\u00a0%", "roster": "1:5", "rows": "30", "said": "0.036",
+    "scan": "class.pdf#3", "scans": "400", "sign": "$", "size": "97\u00a0%", "strokes": "9000",
+    "suffix": ".png", "unpacked": "1600", "values": "60 (a.csv), 65 (b.csv)", "wanted": "9",
+    "wide": "@90 mm", "zone_high": "@120 mm", "zone_wide": "@180 mm",
 }  # fmt: skip
 """Parameters by name: after ``@`` a number with its unit; other texts of the catalogues are translated."""
 OTHERWISE: Mapping[str, Mapping[str, str]] = {
@@ -80,6 +92,9 @@ OTHERWISE: Mapping[str, Mapping[str, str]] = {
     "It is zero": {"measured": "@5.1 mm"},
     "%(at)s is not drawn": {"at": "v_BA"},
     "It is too short for": {"length": "@2.4 mm"},
+    "It could not be read": {"why": "%(nodes)s, on which it hangs, was not read for certain"},
+    "It was read with": {"why": "%(nodes)s, on which it hangs, was not read for certain"},
+    "The sheet could not be placed": {"why": "only %(share)s of the sheet is in the picture"},
     "From %(start)s": {"direction": "parallel to %(link)s, from %(tail)s towards %(head)s"},
 }
 """Parameters of texts that begin so."""

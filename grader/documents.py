@@ -22,6 +22,8 @@ Cause = Literal["assignment", "rubric", "submission", "roster", "decision", "pro
 Sign = Literal["hand_errors", "same_place", "same_numbers", "same_picture", "other_number"]
 """Why sheets look alike."""
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
+Parameters = dict[str, int | float | str | list[str]]
+"""What a reason or problem names: numbers (the name ends in the unit), names of vectors, texts as written."""
 
 
 _GIVEN: dict[tuple[type, frozenset[str]], set[str]] = {}
@@ -69,11 +71,17 @@ class MeasurementsDocument(Document):
 # Reading: what was read on one sheet --------------------------------------------------------------
 
 
-class ProblemDocument(Document):
-    """Something a person should know."""
+class ReasonDocument(Document):
+    """A reason: its code, a sentence in English, and what that names."""
 
     code: str
     message: str
+    parameters: Parameters = {}
+
+
+class ProblemDocument(ReasonDocument):
+    """Something a person should know."""
+
     file: str | None = None
 
 
@@ -124,10 +132,12 @@ class FigureDocument(Document):
 
 
 class UnreadDocument(Document):
-    """A vector or length that was asked for and not read, and the reason."""
+    """A vector or length that was asked for and not read, and the reason in English."""
 
     name: str
     reason: str
+    code: str = ""
+    parameters: Parameters = {}
 
 
 class TimingDocument(Document):
@@ -237,6 +247,8 @@ class CriterionDocument(Document):
     feedback: str = ""
     reasons: list[str] = []
     """Codes of what the verdict rests on, most important first."""
+    why: list[ReasonDocument] = []
+    """The same with their parameters."""
     link: str | None = None
     """The link of the mechanism judged."""
     section: str | None = None
@@ -255,6 +267,7 @@ class RivalDocument(Document):
     at: str
     confidence: Share
     detail: str = ""
+    parameters: Parameters = {}
     feedback: str = ""
 
 
@@ -270,6 +283,8 @@ class MistakeDocument(Document):
     explains: list[str]
     confidence: Share
     detail: str = ""
+    parameters: Parameters = {}
+    """What `detail` says, by name."""
     rivals: list[RivalDocument] = []
     feedback: str = ""
     redo: list[str] = []
@@ -333,6 +348,7 @@ class UnmatchedDocument(Document):
     page: int | None = None
     code: str
     message: str
+    parameters: Parameters = {}
 
 
 class StandingDocument(Document):
@@ -404,7 +420,9 @@ class StaleDecisionDocument(Document):
     by: str = ""
     at: str = ""
     comment: str = ""
+    code: str = ""
     reason: str
+    """In English."""
 
 
 class LikeDocument(Document):

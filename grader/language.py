@@ -24,7 +24,7 @@ def N_(text: str) -> str:  # noqa: N802 - gettext's own name for it
 
 UNITS = (
     N_("mm"), N_("m"), N_("m/s"), N_("m/s²"), N_("rad/s"), N_("rad/s²"),
-    N_("m/mm"), N_("(m/s)/mm"), N_("(m/s²)/mm"),
+    N_("s"), N_("m/mm"), N_("(m/s)/mm"), N_("(m/s²)/mm"),
 )  # fmt: skip
 """Units as people read them; each has its letters in every language."""
 

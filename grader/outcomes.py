@@ -59,17 +59,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from grader.documents import Quantity, Tolerance, Verdict
+from grader.records import Reason
 from reference.construction.mistakes import Mistake
-
-Param = float | str
-
-
-@dataclass(frozen=True, slots=True)
-class Reason:
-    """Why a verdict is what it is: a stable code and its parameters (table above)."""
-
-    code: str
-    params: Mapping[str, Param] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,15 +139,15 @@ class NamedMistake:
         return self.mistake.at
 
     @property
-    def detail(self) -> dict[str, Param]:
+    def detail(self) -> dict[str, float | str]:
         """What is known of it beside code and place, by the names that reports and sentences use."""
         return {**_detail(self.mistake), **self.line}
 
 
-def _detail(mistake: Mistake) -> dict[str, Param]:
+def _detail(mistake: Mistake) -> dict[str, float | str]:
     match mistake:
         case Mistake(code="units", other=(slip, *more), factor=factor):
-            found: dict[str, Param] = {"slip": slip}
+            found: dict[str, float | str] = {"slip": slip}
             found |= {"axis" if slip == "axis" else "unit": one for one in more}
             return found if abs(factor) == 1.0 else {**found, "factor": factor}
         case Mistake(code="scale_wrong" | "rpm_not_converted" | "arithmetic", factor=factor):
@@ -187,14 +178,14 @@ class UsedScale:
     declared : parsed, None where not declared or refused
     used : what the marking used
     assumed : whether `used` is the assignment's rule or the drawn crank instead of the declared
-    refused : why a declared text was not accepted (English, for a person), or None
+    refused : why a declared text was not accepted, or None
     """
 
     text: str | None
     declared: float | None
     used: float
     assumed: bool
-    refused: str | None = None
+    refused: Reason | None = None
 
 
 @dataclass(frozen=True, slots=True)

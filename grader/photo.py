@@ -4,22 +4,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from grader.documents import ProblemDocument
 from grader.feedback.advice import CheckedLine, checked_lines
-from grader.feedback.photos import PLANS_UNSEEN, flaw_sentence
-from grader.feedback.sentences import Level
-from grader.feedback.words import problem_sentence
 from grader.files import shown_text
 from grader.inputs.measurements import NOTHING_MEASURED, StudentSubmission
-from grader.language import Tongue, tongue
+from grader.language import N_, Tongue, tongue
 from grader.marking.self_check import is_all_right
 from grader.outcomes import Judgement
 from grader.overlay.picture import overlay
 from grader.overlay.scene import Picture
 from grader.pipeline import judged, pictures_of, read_submission, scan
-from grader.records import PageRef, Problem, ScannedPage
+from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, PageRef, Reason, ScannedPage
 from grader.rubric import RubricFile, asked_of
 from grader.scan.decode.pages import count_pages
+from grader.texts.reasons import Level
+from grader.texts.spoken import sentence, message
 from reference.authored.assignment import Assignment, Variant
 from reference.errors import InputFileError
 
@@ -74,11 +72,11 @@ def photo_check(
     asked = asked_of(assignment, rubric)
     pages = read_submission(submission, [scan(ref, asked) for ref in refs], assignment, asked)
     pages = [page.asked_only(rubric.vectors) for page in pages]
-    spoilt = {flaw.code: flaw_sentence(flaw, speaker) for page in pages for flaw in page.flaws}
+    spoilt = {flaw.code: sentence(flaw, speaker) for page in pages for flaw in page.flaws}
     readings = [page.reading for page in pages]
     problems = [problem for page in pages for problem in (*page.problems, *_other_number(page, variant))]
     answer = judged(submission, assignment, rubric, readings)
-    if isinstance(answer, Problem):
+    if isinstance(answer, Reason):
         known = [*problems, answer]
         pictures = tuple(overlay(page.backdrop, page.reading, {}, {}) for page in pages if page.backdrop)
         return PhotoCheck(spoilt, _said(known, speaker), pictures=pictures)
@@ -98,27 +96,30 @@ def photo_check(
     return PhotoCheck(spoilt, tuple(told), tuple(lines), judgement, pictures)
 
 
+PLANS_UNSEEN = {
+    VELOCITY_PLAN: N_("No velocity plan was found: if it is on another sheet, check that one, too."),
+    ACCELERATION_PLAN: N_("No acceleration plan was found: if it is on another sheet, check that one, too."),
+}
+"""Of a photo on which the plan of this name was not found."""
 _OF_NO_USE = frozenset(
     {"resolution_wrong", "resolution_assumed", "paper_assumed", "upright_unsure", "title_block_unsure"}
 )
 """Problems about which somebody with a phone can do nothing."""
 
 
-def _said(problems: Sequence[Problem], speaker: Tongue) -> tuple[str, ...]:
+def _said(problems: Sequence[Reason], speaker: Tongue) -> tuple[str, ...]:
     """What a student is told of problems, each once."""
-    documents = [
-        ProblemDocument(code=one.code, message=one.message, file=one.file)
-        for one in problems
-        if one.code not in _OF_NO_USE
+    told = [
+        sentence(one, speaker, brief=True) or message(one) for one in problems if one.code not in _OF_NO_USE
     ]
-    return tuple(dict.fromkeys(problem_sentence(one, speaker, brief=True).text for one in documents))
+    return tuple(dict.fromkeys(told))
 
 
-def _other_number(page: ScannedPage, variant: Variant) -> Iterator[Problem]:
+def _other_number(page: ScannedPage, variant: Variant) -> Iterator[Reason]:
     """Where the code of a printed sheet says another number or position than the student does."""
     code = page.ref.identity
     for what in ("n", "position"):
         printed = None if code is None else getattr(code, what)
         if printed is not None and printed != getattr(variant, what):
-            message = f"the sheet was printed for {what} = {printed}, not {variant}"
-            yield Problem(f"{what}_disagrees", message, page.ref.file)
+            known = {"printed": printed, "given": str(variant)}
+            yield Reason(f"{what}_disagrees", known, page.ref.file)

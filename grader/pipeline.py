@@ -20,9 +20,8 @@ from grader.comparison.evidence import Submission
 from grader.comparison.scales import Declarations, Source, declarations
 from grader.comparison.task import Task, task_of
 from grader.documents import ReportDocument
-from grader.feedback.photos import flaw_problems
 from grader.feedback.redo_steps import with_mistakes_explained
-from grader.feedback.sentences import Level, criterion_feedback
+from grader.feedback.sentences import criterion_feedback
 from grader.inputs.measurements import NOTHING_MEASURED, Measurements, StudentSubmission
 from grader.inputs.scale_text import SURE, declared_scales, sure_texts, understood_scales
 from grader.marking.answers import NONE_DECIDED, answers_of
@@ -38,7 +37,7 @@ from grader.reading import page_scale
 from grader.reading.corrected import corrected
 from grader.reading.read import read_figures
 from grader.reading.sketch import drawings
-from grader.records import PageRef, Problem, Reading, ScannedPage, Sheet, Unread
+from grader.records import PageRef, Reading, Reason, ScannedPage, Sheet, Unread, Value
 from grader.rubric import Asked, RubricFile
 from grader.scan.decode.pages import decode, is_blank
 from grader.scan.handwriting.captions import (
@@ -56,6 +55,8 @@ from grader.scan.quality import flaws
 from grader.scan.register.distortion import straighten
 from grader.scan.register.registration import register
 from grader.scan.strokes.ink import find_ink
+from grader.texts.reasons import Level
+from grader.texts.spoken import of_error
 from reference.authored.assignment import SCALE_NAMES, Assignment, Scales, Variant
 from reference.construction.graph import Construction
 from reference.construction.mistakes import Drawing
@@ -93,8 +94,8 @@ def open_page(
         with _timed(timing, "decode"):
             image = decode(ref)
     except InputFileError as error:
-        problem = Problem(error.code, error.message, ref.file)
-        return ScannedPage(replace(ref, problem=problem), problems=(problem,), timing_ms=timing)
+        page = _refused(ScannedPage(ref, timing_ms=timing), of_error(error))
+        return replace(page, ref=replace(ref, problem=page.problems[0]))
     if ref.turn_deg is not None:
         image = replace(image, turn_deg=ref.turn_deg, turn_is_sure=True)
     ref = replace(ref, content=blake2b(image.grey.tobytes(), digest_size=8).hexdigest())
@@ -102,7 +103,7 @@ def open_page(
     # Rows that a decoder has filled with white are not blank.
     if not image.damage and is_blank(image):
         page = replace(page, ref=replace(ref, blank=True))
-        return _refused(page, "page_blank", f"{ref.file}: page {ref.page} is blank")
+        return _refused(page, Reason("page_blank"))
     with _timed(timing, "sheet"):
         sheet, identity = register(image, ref.corners_px)
         page = replace(page, ref=replace(ref, identity=identity))
@@ -110,11 +111,10 @@ def open_page(
             image, sheet = straighten(image, sheet)
         page = replace(page, flaws=flaws(image, sheet if isinstance(sheet, Sheet) else None))
     if image.damage:
-        damage = f"{image.damage} are damaged in the file, so that lengths read there would be wrong"
-        why = f"{ref.file}: page {ref.page}: {damage}: scan the sheet again, or grade it by hand"
-        return _refused(page, "image_damaged_rows", why)
+        first, last = image.damage
+        return _refused(page, Reason("image_damaged_rows", {"first": first, "last": last}))
     if not isinstance(sheet, Sheet):
-        return _refused(page, "sheet_refused", f"{ref.file}: page {ref.page}: {sheet.reason}")
+        return _refused(page, sheet.reason)
     problems = tuple(replace(problem, file=ref.file) for problem in sheet.problems)
     boxes = sheet.boxes_of(figures)
     page = replace(page, image=image, sheet=sheet, problems=problems)
@@ -122,10 +122,7 @@ def open_page(
         if boxes is None or boxes:
             ink = find_ink(image, sheet, boxes)
             if isinstance(ink, Unread):
-                if ink.name == "sheet":
-                    return _refused(page, "sheet_refused", f"{ref.file}: page {ref.page}: {ink.reason}")
-                why = f"{ref.file}: page {ref.page} is no drawing: {ink.reason}"
-                return _refused(page, "page_not_a_drawing", why)
+                return _refused(page, ink.reason)
             problems += tuple(replace(problem, file=ref.file) for problem in ink.problems)
             page = replace(page, ink=replace(ink, letters=find_letters(ink, boxes)), problems=problems)
         reading = Reading({}, written=written_scales(image, sheet, units))
@@ -142,8 +139,9 @@ def _as_letters_stand(page: ScannedPage) -> ScannedPage:
     return page_scale.surely_upright(other) if is_told else page
 
 
-def _refused(page: ScannedPage, code: str, message: str) -> ScannedPage:
-    return replace(page, problems=(Problem(code, message, page.ref.file),))
+def _refused(page: ScannedPage, why: Reason) -> ScannedPage:
+    where = {"page": page.ref.page} if page.ref.pages > 1 else {}
+    return replace(page, problems=(Reason(why.code, {**where, **why.parameters}, page.ref.file),))
 
 
 # One student's pages: strokes to named vectors ------------------------------------------------------
@@ -177,11 +175,9 @@ def _with_number_compared(page: ScannedPage, variant: Variant | None, assignment
             if read is None or read.confidence < SURE:
                 continue
             if read.text != str(getattr(variant, which)):
-                said = f"the sheet reads {which} = {read.text} ({100 * read.confidence:.0f} %)"
-                message = f"{said}, graded is {variant}, from which the drawing differs: look"
-                page = replace(
-                    page, problems=(*page.problems, Problem("number_differs", message, page.ref.file))
-                )
+                seen: dict[str, Value] = {"what": which, "read": read.text, "confidence": read.confidence}
+                differs = Reason("number_differs", {**seen, "graded": str(variant)}, page.ref.file)
+                page = replace(page, problems=(*page.problems, differs))
             break
     return page
 
@@ -337,10 +333,13 @@ def _marked(
     sheets = [reading_document(page, submission.student_id) for page in pages]
     problems = (*submission.problems, *(problem for page in pages for problem in page.problems), *astray)
     problems += tuple(
-        flaw for page in pages if _is_doubtful(page.reading) for flaw in flaw_problems(page, submission.lang)
+        replace(flaw, file=page.ref.file)
+        for page in pages
+        if _is_doubtful(page.reading)
+        for flaw in page.flaws
     )
     answer = judged(submission, assignment, rubric, [page.reading for page in pages])
-    if isinstance(answer, Problem):
+    if isinstance(answer, Reason):
         is_there = submission.pages or submission.measured or submission.has_unusable
         report = unjudged_report(
             assignment, rubric, submission.variant or Variant(), submission.student_id,
@@ -356,7 +355,7 @@ def _marked(
         pages = corrected(pages, learnt.places, task.construction)[0]
         sheets = [reading_document(page, submission.student_id) for page in pages]
         again = judged(submission, assignment, rubric, [page.reading for page in pages], learnt.verdicts)
-        judgement = own if isinstance(again, Problem) else again[1]
+        judgement = own if isinstance(again, Reason) else again[1]
     judgement = decide(opened_by_audit(judgement, rubric, submission.opened), rubric, submission.decided)
     names, lang, measured = assignment.file.names, submission.lang, submission.measured or NOTHING_MEASURED
     report = report_of(
@@ -387,7 +386,7 @@ def judged(
     rubric: RubricFile,
     readings: Sequence[Reading],
     verdicts: Mapping[str, str] = NONE_DECIDED,
-) -> tuple[Task, Judgement, Declarations] | Problem:
+) -> tuple[Task, Judgement, Declarations] | Reason:
     """The judgement and the scales that counted as declared, or why there is none.
 
     Arguments: `verdicts` are what people decided of what waited, by vector, angular quantity or scale.
@@ -395,19 +394,17 @@ def judged(
     drawn = tuple(reading for reading in readings if reading.figures)
     is_empty = not drawn and submission.measured is None
     if submission.variant is None:
-        return Problem(
-            "variant_unknown", "nothing says this student's number or position: add it to the roster"
-        )
+        return Reason("variant_unknown")
     if is_empty and not any(row.kind == "verdict" for row in submission.decided):
         if submission.has_unusable:
-            return Problem("nothing_usable", "nothing that was handed in can be used")
+            return Reason("nothing_usable")
         if not submission.pages:
-            return Problem("nothing_handed_in", "nothing was handed in")
-        return Problem("nothing_read", "no figure of this assignment could be read on the pages handed in")
+            return Reason("nothing_handed_in")
+        return Reason("nothing_read")
     try:
         task = task_of(assignment, rubric, submission.variant)
     except MechanismError as error:
-        return Problem(error.code, error.message)
+        return of_error(error)
     measured = submission.measured or NOTHING_MEASURED
     entered: dict[Source, Mapping[str, str]]
     entered = {"roster": submission.declared, "measurements": measured.scales}

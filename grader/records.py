@@ -26,30 +26,25 @@ VELOCITY_PLAN = "velocity_plan"
 ACCELERATION_PLAN = "acceleration_plan"
 
 
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """Something a person should know: a stable code, a sentence, the file it concerns."""
-
-    code: str
-    message: str
-    file: str | None = None
+Value = float | str | tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Flaw:
-    """What spoils the reading of a picture, as measured.
+class Reason:
+    """A reason, problem or flaw as data: `grader.texts` makes a sentence of it in the reader's language.
 
     Attributes
     ----------
-    code : as in `grader.scan.quality`
-    measured, limit : in the unit of the code
-    places : which corners, or where on the sheet: `upper_left`, `middle`, `lower_middle`, ...
+    code : stable, as in `docs/errors.md` or `grader.outcomes`
+    parameters : what the sentence names: numbers (`_mm`, `_deg`, `_px`, `_s`, `_percent` end the names of
+        those with a unit), names of vectors and nodes, texts as written; `why` and `advice` are codes of
+        clauses of their own
+    file : the file that it concerns
     """
 
     code: str
-    measured: float
-    limit: float
-    places: tuple[str, ...] = ()
+    parameters: Mapping[str, Value] = field(default_factory=dict)
+    file: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +70,7 @@ class Page:
     dpi : horizontal and vertical resolution that the file states, or None
     turn_deg : counter-clockwise turn that the file asks viewers to apply (EXIF, PDF), 0/90/180/270
     paper_mm : width and height of the stored image on paper where the file states it (PDF), or None
-    damage : which rows are not as they were stored, where the file shows it; empty for a whole page
+    damage : first and last damaged row, where the file shows it; empty for a whole page
     turn_is_sure : a person said the turn: the page is read no other way up
     ruling : the printed squares of its paper, None where there are none
     """
@@ -86,7 +81,7 @@ class Page:
     dpi: tuple[float, float] | None = None
     turn_deg: int = 0
     paper_mm: tuple[float, float] | None = None
-    damage: str = ""
+    damage: tuple[int, ...] = ()
     turn_is_sure: bool = False
     ruling: Ruling | None = None
 
@@ -127,7 +122,7 @@ class PageRef:
     blank: bool = False
     identity: Identity | None = None
     digest: str = ""
-    problem: Problem | None = None
+    problem: Reason | None = None
     path: Path = Path()
     content: str = ""
     turn_deg: int | None = None
@@ -188,7 +183,7 @@ class Sheet:
     drawable_mm: Box
     zones: Mapping[str, Box] = field(default_factory=dict)
     identity: Identity | None = None
-    problems: tuple[Problem, ...] = ()
+    problems: tuple[Reason, ...] = ()
     lens: Lens | None = None
 
     def longer(self, factor: float, scale_se: float) -> "Sheet":
@@ -360,7 +355,7 @@ class Ink:
     where: InkMap
     letters: Letters | None = None
     tips: Tips = NO_TIPS
-    problems: tuple[Problem, ...] = ()
+    problems: tuple[Reason, ...] = ()
 
     def longer(self, factor: float) -> "Ink":
         """The same ink where every length is so many times what it was taken for."""
@@ -464,7 +459,7 @@ class Unread:
     """
 
     name: str
-    reason: str
+    reason: Reason
     is_blank: bool = False
 
     def __bool__(self) -> bool:
@@ -498,7 +493,7 @@ class Reading:
 
     figures: Mapping[str, Figure]
     unread: tuple[Unread, ...] = ()
-    problems: tuple[Problem, ...] = ()
+    problems: tuple[Reason, ...] = ()
     written: Mapping[str, Written] = field(default_factory=dict)
     lengths: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     swapped: tuple[Swapped, ...] = ()
@@ -542,11 +537,11 @@ class ScannedPage:
     sheet: Sheet | None = None
     ink: Ink | None = None
     reading: Reading = field(default_factory=lambda: Reading({}))
-    problems: tuple[Problem, ...] = ()
+    problems: tuple[Reason, ...] = ()
     timing_ms: Mapping[str, float] = field(default_factory=dict)
     narrowed: bool = False
     backdrop: Backdrop | None = None
-    flaws: tuple[Flaw, ...] = ()
+    flaws: tuple[Reason, ...] = ()
 
     def longer(self, factor: float, scale_se: float) -> "ScannedPage":
         """The same page where every length is so many times what it was taken for; before it is read."""

@@ -24,15 +24,20 @@ _LONGEST_NAME = 64
 
 
 class PlanmarkError(Exception):
-    """What is wrong, where, and what to do. `code` is stable; the message is for people."""
+    """What is wrong, where, and what to do. `code` is stable; the message is for people.
+
+    Attributes
+    ----------
+    parameters : what the message names, from which it can be told in another language; empty where it cannot
+    """
 
     exit_status = 2
 
-    def __init__(self, code: str, message: str) -> None:
+    def __init__(self, code: str, message: str, **parameters: float | str) -> None:
         # A file's name may hold bytes that are no text; told as they are, no report could be written.
         self.message = message.encode("utf-8", "backslashreplace").decode()
         super().__init__(self.message)
-        self.code = code
+        self.code, self.parameters = code, parameters
 
     def __reduce__(self) -> tuple[object, ...]:
         # Errors come back from worker processes as they were, whatever their classes are made from.
@@ -45,10 +50,18 @@ class CallError(PlanmarkError):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One fault of an authored file: where (a path such as ``$.criteria[3].points``), what is right."""
+    """One fault of an authored file: where (a path such as ``$.criteria[3].points``), what is right.
+
+    Attributes
+    ----------
+    code : where other code must know the fault
+    line : of a table's file, from 1; 0 where the fault is of no single line
+    """
 
     path: str
     message: str
+    code: str = ""
+    line: int = 0
 
     def __str__(self) -> str:
         return f"{self.path}: {self.message}"

@@ -12,7 +12,7 @@ from grader.cli import terminal
 from grader.cli.app import check_language
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
-from grader.documents import ProblemDocument, Quantity
+from grader.documents import Quantity
 from grader.feedback.advice import RESULTS, CheckedLine, checked_lines
 from grader.feedback.sentences import mistake_feedback
 from grader.files import shown_text, write_whole
@@ -21,6 +21,7 @@ from grader.language import N_, Tongue, tongue
 from grader.marking.mark import judge
 from grader.marking.self_check import LEVELS, Level, is_all_right, likely_mistakes
 from grader.rubric import RubricFile, rubric_of
+from grader.texts.spoken import message, of_error, problem_documents, sentence
 from reference.authored.assignment import Assignment, Variant, built_in, load_assignment
 from reference.errors import CallError, MechanismError
 
@@ -41,10 +42,6 @@ NO_ASSIGNMENT = N_(
 NEEDED = N_("--%(what)s is needed: this assignment has %(what)s from %(first)s to %(last)s")
 RANGE = N_("%(what)s = %(value)s: this assignment has %(what)s from %(first)s to %(last)s")
 DISAGREES = N_("--%(what)s %(called)s, but %(file)s says %(what)s %(filed)s: which is right?")
-ASSEMBLY = {
-    "does_not_assemble": N_("The mechanism does not assemble with these data."),
-    "singular": N_("The velocities are not determined in this position of the mechanism."),
-}
 HOW_TO_FILL_IN = N_(
     "# Drawn lengths in mm; _deg: directions counter-clockwise from the horizontal to the right; _value:"
     " computed values, counter-clockwise positive; scales with their units. What is blank is not checked;"
@@ -95,7 +92,7 @@ def check_measured(
         try:
             judgement = judge(task_of(assignment, rubric, variant), submission)
         except MechanismError as error:
-            known = speaker.gettext(ASSEMBLY[error.code]) if error.code in ASSEMBLY else error.message
+            known = sentence(of_error(error), speaker) or error.message
             raise CallError(error.code, f"{variant}: {known}") from error
         lines = checked_lines(judgement, wanted, speaker, names, driven)
         _tell(lines, wanted, speaker)
@@ -192,7 +189,7 @@ def _write_page(
     submission = StudentSubmission(entered.student_id or "", variant, measured=entered, lang=lang)
     report, pictures = mark(submission, (), assignment, rubric, level)
     problems = [*entered.problems, *entered.reading.problems]
-    told = [ProblemDocument(code=one.code, message=one.message, file=one.file) for one in problems]
+    told = [*problem_documents(problems)]
     about = About(assignment.file.title.in_language(lang), "", assignment.file.names)
     report = report.model_copy(update={"problems": told})
     write_whole(page, check_page(report, pictures, lines, mistakes, lang, about))
@@ -225,7 +222,7 @@ def _tell_head(entered: Measurements, variant: Variant, speaker: Tongue) -> None
     if parts:
         typer.secho(", ".join(parts), bold=True)
     for problem in (*entered.problems, *entered.reading.problems):
-        _print(problem.message, "  ", "yellow")
+        _print(message(problem, speaker), "  ", "yellow")
 
 
 def _tell(lines: list[CheckedLine], level: Level, speaker: Tongue) -> None:

@@ -21,7 +21,6 @@ from grader.cli.terminal import note, tell_next
 from grader.documents import AlikeDocument, MovedDocument, ReadingDocument, ResultsDocument
 from grader.feedback.class_page import CAUSES, SIGNS, trust_sentences, write_demo_page
 from grader.feedback.class_statistics import waiting
-from grader.feedback.photos import flaw_problems
 from grader.files import make_folder, samples_folder, shown_text
 from grader.folder.batch import Batch, grade
 from grader.folder.changes import standing_text
@@ -196,7 +195,7 @@ def _read(refs: Sequence[PageRef], assignment: Assignment, variant: Variant | No
     units = Asked(assignment=assignment).units
     pages = [open_page(ref, units=units) for ref in refs]
     read = [
-        replace(page, problems=(*page.problems, *flaw_problems(page, ROOT_LANGUAGE)))
+        replace(page, problems=(*page.problems, *(replace(flaw, file=page.ref.file) for flaw in page.flaws)))
         for page in read_pages(pages, assignment, variant, {}, rubric_of(assignment).vectors)
     ]
     return [reading_document(page, _student_of(page)) for page in read]

@@ -21,10 +21,11 @@ from grader.inputs.measurements import names_of
 from grader.inputs.roster import RosterRow, read_roster
 from grader.printed.answer_sheet import make_calibration, make_sheets
 from grader.printed.handout import make_handout
-from grader.records import FloatArray, PageRef, Problem, Unread
+from grader.records import FloatArray, PageRef, Reason, Unread
 from grader.rubric import rubric_of
 from grader.scan.decode.pages import count_pages
 from grader.scan.register.calibration import ALL_IS_WELL, calibrate, residual_map
+from grader.texts.spoken import message
 from reference.authored.assignment import Variant, load_assignment
 from reference.errors import CallError, InputFileError
 
@@ -41,7 +42,7 @@ def calibrate_scans(scans: Sequence[Path], svg: Path | None, *, as_json: bool) -
             document = result_of(workers, calibrate, path, page)
             if isinstance(document, Unread):
                 unread = True
-                terminal.say(f"{path.name}, page {page}: {document.reason}", err=True)
+                terminal.say(f"{path.name}, page {page}: {message(document.reason)}", err=True)
                 continue
             documents.append(document)
             if not as_json:
@@ -103,7 +104,7 @@ def print_sheets(
         write_whole(layout, sheets.layout.model_dump_json(indent=2))
         note(f"{layout}: where markers, zones and boxes are")
     for problem in sheets.problems:
-        terminal.say(f"note: {problem.message}", err=True)
+        terminal.say(f"note: {message(problem)}", err=True)
     if not calibration and roster is not None:
         _suggest_scales(name, roster)
 
@@ -184,7 +185,7 @@ def draft_matches(
         for done, (index, ends) in enumerate(
             workers.run(_strokes, [(cache, page) for page in loose]), start=1
         ):
-            if not isinstance(ends, Problem | None):
+            if not isinstance(ends, Reason | None):
                 strokes[loose[index]] = ends
             tell("reading", done, len(loose))
         draft = suggest(
@@ -195,8 +196,8 @@ def draft_matches(
     entries = []
     for index, suggestion in enumerate(draft.suggestions):
         picture = thumbnails[index]
-        if isinstance(picture, Problem):
-            terminal.say(f"{suggestion.source}: {picture.message}", err=True)
+        if isinstance(picture, Reason):
+            terminal.say(f"{suggestion.source}: {message(picture)}", err=True)
         else:
             entries.append((suggestion, picture))
     sheet = out.with_suffix(".html")
@@ -219,5 +220,5 @@ def _strokes(cache: PageCache, ref: PageRef) -> FloatArray | None:
 def _thumbnail(cache: PageCache, ref: PageRef) -> bytes:
     page = cache.page(ref)
     if page.backdrop is None:
-        raise InputFileError(page.problems[0].code, page.problems[0].message)
+        raise InputFileError(page.problems[0].code, message(page.problems[0]))
     return thumbnail(page.backdrop.scan)

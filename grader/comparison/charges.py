@@ -21,7 +21,7 @@ from grader.comparison.verdicts import (
     tolerances,
     widened,
 )
-from grader.outcomes import Reason
+from grader.records import Reason
 from reference.construction.mistakes import line_of
 from reference.construction.steps import Given
 from reference.construction.uncertainty import EndSpread
@@ -234,8 +234,7 @@ class Charges:
             return mark
         self.charged.discard(segment.head)
         self.doubtful.add(segment.head)
-        why = f"{', '.join(unknown)}, on which it hangs, was not read for certain"
-        unread = Reason("unread", {"reason": why})
+        unread = Reason("unread", {"why": "upstream_unsure", "nodes": unknown})
         return replace(mark, best=FULL, reasons=(*mark.reasons, unread), sure=min(mark.sure, EVEN))
 
     def unknown_upstream(self, segment: TaskSegment) -> tuple[str, ...]:

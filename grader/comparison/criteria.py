@@ -42,7 +42,8 @@ from grader.comparison.verdicts import (
     widened,
 )
 from grader.documents import Quantity, Tolerance, Verdict
-from grader.outcomes import Outcome, Reason, UsedScale
+from grader.outcomes import Outcome, UsedScale
+from grader.records import Reason
 from grader.rubric import CriterionTable
 from reference.construction.elements import Normal
 from reference.construction.graph import AngularRate
@@ -119,7 +120,7 @@ def _outcome(charges: Charges, criterion: CriterionTable) -> Outcome:
     return verdicts.entry_refused(outcome, entry)
 
 
-def _refused_below(charges: Charges, name: str) -> str | None:
+def _refused_below(charges: Charges, name: str) -> tuple[str, ...] | None:
     """The entry for the scale, or for a node from which a vector is made, that cannot be used."""
     task, evidence = charges.task, charges.evidence
     turned = task.construction.rates.get(name)
@@ -420,7 +421,11 @@ def absent(charges: Charges, criterion: CriterionTable, expected: Quantity) -> O
     """The outcome of a criterion for which nothing was handed in or read."""
     rubric, evidence = charges.task.rubric, charges.evidence
     unread = _why_unread(charges, criterion)
-    reason = Reason("not_measured") if unread is None else Reason("unread", {"reason": unread})
+    reason = (
+        Reason("not_measured")
+        if unread is None
+        else Reason("unread", {"why": unread.code, **unread.parameters})
+    )
     if criterion.optional:
         return verdicts.unjudged(criterion, "not_judged", (Reason("optional"), reason), expected=expected)
     if criterion.link is not None and not evidence.has_sketch:
@@ -478,7 +483,7 @@ def is_not_drawn(task: Task, evidence: Evidence, name: str, length_mm: float) ->
     return {vector.tail, vector.head} <= {*evidence.nodes, *task.construction.poles.values()}
 
 
-def _why_unread(charges: Charges, criterion: CriterionTable) -> str | None:
+def _why_unread(charges: Charges, criterion: CriterionTable) -> Reason | None:
     """Why a vector or link was not read, None where no sheet could show it."""
     segment, evidence = charges.task.segments.get(criterion.name), charges.evidence
     if segment is None or not evidence.has_sheets:
@@ -486,7 +491,7 @@ def _why_unread(charges: Charges, criterion: CriterionTable) -> str | None:
     for name in (segment.name, segment.head, segment.tail):
         if name in evidence.unread:
             return evidence.unread[name]
-    return f"{segment.name} was not found on the sheets"
+    return Reason("not_found", {"name": segment.name})
 
 
 # Angular quantities --------------------------------------------------------------------------------

@@ -4,12 +4,12 @@ import cmath
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import cast
 
 import numpy as np
 
 from grader.comparison.task import Task
-from grader.outcomes import Reason
-from grader.records import MECHANISM, Figure, OtherReading, Reading, ReadNode
+from grader.records import MECHANISM, Figure, OtherReading, Reading, ReadNode, Reason
 from grader.rubric import ToleranceTable
 
 
@@ -87,14 +87,14 @@ class Evidence:
     measured: Mapping[str, DrawnVector]
     nodes: Mapping[str, complex]
     yardstick_mm: tuple[float, float] | None
-    unread: Mapping[str, str]
+    unread: Mapping[str, Reason]
     has_sheets: bool
     values: Mapping[str, float]
     written: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     se_mm: Mapping[str, float] = field(default_factory=dict)
     sketches: Mapping[str, Mapping[str, complex]] = field(default_factory=dict)
     has_sketch: bool = False
-    refused: Mapping[str, str] = field(default_factory=dict)
+    refused: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     blank: frozenset[str] = frozenset()
     verdicts: Mapping[str, str] = field(default_factory=dict)
 
@@ -292,11 +292,12 @@ def _measured(reading: Reading | None) -> dict[str, DrawnVector]:
     return found
 
 
-def _refused(reading: Reading | None) -> dict[str, str]:
-    entries: dict[str, list[str]] = {}
+def _refused(reading: Reading | None) -> dict[str, tuple[str, ...]]:
+    entries: dict[str, tuple[str, ...]] = {}
     for gap in reading.unread if reading else ():
-        entries.setdefault(gap.name, []).append(gap.reason)
-    return {name: ", ".join(texts) for name, texts in entries.items()}
+        given = cast("tuple[str, ...]", gap.reason.parameters["entries"])
+        entries[gap.name] = (*entries.get(gap.name, ()), *given)
+    return entries
 
 
 def _nodes_from(task: Task, measured: Mapping[str, DrawnVector]) -> dict[str, complex]:

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 from grader.comparison.task import Task
 from grader.comparison.verdicts import FULL
-from grader.outcomes import Outcome, Reason
+from grader.outcomes import Outcome
+from grader.records import Reason
 from reference.construction.elements import Line
 from reference.construction.graph import Construction
 from reference.construction.steps import Divide, Given, Similar, TwoLines

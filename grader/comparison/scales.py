@@ -18,8 +18,8 @@ from grader.inputs.scale_text import (
     Refused,
     parse_scale,
 )
-from grader.outcomes import Reason, UsedScale
-from grader.records import Problem, Reading, Unread, Written
+from grader.outcomes import UsedScale
+from grader.records import Reading, Reason, Unread, Value, Written
 from grader.rubric import ToleranceTable
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.uncertainty import spread
@@ -85,7 +85,8 @@ def _settled_scale(
         return Scale(used, _contradiction(task, evidence, name, rule), None, (_assumed(name, rule),))
     if isinstance(parsed, Refused):
         used = UsedScale(text, None, rule, assumed=True, refused=parsed.why)
-        reason = Reason("scale_refused", {"text": text or "", "why": parsed.why})
+        why = parsed.why
+        reason = Reason("scale_refused", {"text": text or "", "why": why.code, **why.parameters})
         open_mark = MarkRange(NONE, NONE, FULL, (reason,), EVEN)
         return Scale(used, _contradiction(task, evidence, name, rule), open_mark)
     if isinstance(parsed, ByRule):
@@ -100,8 +101,7 @@ def _parsed(task: Task, name: str, text: str | None) -> ParsedScale | None:
         return None
     parsed = _parsed_text(task, name, text)
     if isinstance(parsed, ByRule) and "omega" in parsed.powers and task.omega is None:
-        with_unit, _, _ = EXAMPLES[name].partition(" or ")
-        return Refused(f"a slider drives this mechanism, there is no crank's omega; write {with_unit}")
+        return Refused(Reason("no_omega", {"examples": EXAMPLES[name][:1]}))
     return parsed
 
 
@@ -236,7 +236,7 @@ def _unseen(
     Arguments: `doubtful` is what shows it as read, where that contradicts it.
     """
     vector = f"{name[1]}_{task.pin}"
-    unread = Reason("unread", {"reason": f"{vector}, which tells it, was not read for certain"})
+    unread = Reason("unread", {"why": "scale_vector_unsure", "vector": vector})
     other = None if doubtful is None else doubtful[0] / doubtful[1]
     off = 0.0 if other is None else _is_off(task, evidence, name, scale.used, other)
     if other is None or off < EVEN:
@@ -330,12 +330,6 @@ SAME = 0.005
 BORNE_OUT = 0.02
 """Relative: as near as that the drawing or the rule bears a scale out."""
 Source = Literal["roster", "measurements", "box"]
-SOURCES: Mapping[Source, str] = {
-    "roster": "the roster",
-    "measurements": "the measurements",
-    "box": "the sheet",
-}
-"""What messages call them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -352,7 +346,7 @@ class Declarations:
 
     texts: Mapping[str, str]
     sources: Mapping[str, Source]
-    problems: tuple[Problem, ...] = ()
+    problems: tuple[Reason, ...] = ()
     unread: tuple[Unread, ...] = ()
 
 
@@ -369,7 +363,7 @@ def declarations(
     evidence = gather(task, Submission(readings=tuple(readings)))
     texts: dict[str, str] = {}
     sources: dict[str, Source] = {}
-    problems: list[Problem] = []
+    problems: list[Reason] = []
     unread: list[Unread] = []
     known: dict[str, float] = {}
     for name in SCALE_NAMES:
@@ -378,7 +372,8 @@ def declarations(
         given = [(text, source) for text, source in given if text]
         if any(not _is_certainly_same(task, name, text, given[0][0], known) for text, _ in given):
             problems.append(_differ(name, given))
-            unread.append(Unread(name, " / ".join(dict.fromkeys(f"'{text}'" for text, _ in given))))
+            texts_given = " / ".join(dict.fromkeys(f"'{text}'" for text, _ in given))
+            unread.append(Unread(name, Reason("entry", {"entries": (texts_given,)})))
             continue
         if given:
             texts[name], sources[name] = given[-1]
@@ -397,17 +392,14 @@ def declarations(
 
 def _believed(
     task: Task, evidence: Evidence, name: str, boxes: Sequence[Written], known: Mapping[str, float]
-) -> tuple[Written | None, list[Problem]]:
+) -> tuple[Written | None, list[Reason]]:
     """The box that counts, or why none does."""
     if not boxes:
         return None, []
     best = max(boxes, key=lambda box: box.confidence)
     if not best.text:
-        message = (
-            f"{name} on the sheet could not be read; enter {name} in the roster or with the measurements"
-        )
-        return None, [Problem("scale_box_unread", message)]
-    message = f"{name} on the sheet seems to read '{best.text}' ({100 * best.confidence:.0f} %)"
+        return None, [Reason("scale_box_unread", {"scale": name})]
+    seems: dict[str, Value] = {"scale": name, "read": best.text, "confidence": best.confidence}
     if best.confidence < SURE:
         likely = (
             Written(*read) for read in ((best.text, best.confidence), *best.others) if read[1] >= LIKELY
@@ -415,31 +407,29 @@ def _believed(
         very = (one for one in likely if _is_borne_out(task, evidence, name, one.text, known, SAME))
         chosen = next(very, None)
         if chosen is None:
-            why = "too unsure to be used"
-            return None, [Problem("scale_box_doubtful", f"{message}, {why}; look, and enter {name}")]
+            return None, [Reason("scale_box_doubtful", {**seems, "why": "too_unsure"})]
         best = chosen
     sure = [box for box in boxes if box.confidence >= SURE]
     if any(not _is_same(task, name, box.text, best.text, known) for box in sure):
-        each = " and ".join(f"'{box.text}'" for box in sure)
-        return None, [
-            Problem("scale_box_disagrees", f"{name} reads {each} on the sheets: none is used; look")
-        ]
+        readings = tuple(f"'{box.text}'" for box in sure)
+        return None, [Reason("scale_box_disagrees", {"scale": name, "readings": readings})]
     if _is_borne_out(task, evidence, name, best.text, known):
         return best, []
     if best.confidence < BEYOND_DOUBT:
-        why = "which neither the drawing nor the assignment's rule bears out"
-        return None, [Problem("scale_box_doubtful", f"{message}, {why}; look, and enter {name}")]
+        return None, [Reason("scale_box_doubtful", {**seems, "why": "not_borne_out"})]
     return best, []
 
 
-def _contradicts(name: str, box: Written, text: str, source: Source) -> Problem:
-    message = f"{name} on the sheet reads '{box.text}' ({100 * box.confidence:.0f} %)"
-    return Problem("scale_box_disagrees", f"{message}, {SOURCES[source]} '{text}', which is used")
+def _contradicts(name: str, box: Written, text: str, source: Source) -> Reason:
+    seen: dict[str, Value] = {"scale": name, "read": box.text, "confidence": box.confidence}
+    return Reason("scale_box_disagrees", {**seen, source: text})
 
 
-def _differ(name: str, given: Sequence[tuple[str, Source]]) -> Problem:
-    texts = ", ".join(dict.fromkeys(f"'{text}' in {SOURCES[source]}" for text, source in given))
-    return Problem("scale_disagrees", f"{name} is {texts}: none is used; correct one of them")
+def _differ(name: str, given: Sequence[tuple[str, Source]]) -> Reason:
+    said: dict[str, tuple[str, ...]] = {}
+    for text, source in given:
+        said[source] = tuple(dict.fromkeys([*said.get(source, ()), f"'{text}'"]))
+    return Reason("scale_disagrees", {"scale": name, **said})
 
 
 def _parsed_text(task: Task, name: str, text: str) -> ParsedScale:

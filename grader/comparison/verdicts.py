@@ -4,11 +4,13 @@ import cmath
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 from grader.comparison.evidence import DrawnVector
 from grader.comparison.task import unit_of
 from grader.documents import Quantity, Tolerance, Verdict
-from grader.outcomes import Outcome, Reason
+from grader.outcomes import Outcome
+from grader.records import Reason
 from grader.rubric import CriterionTable, ToleranceTable
 from reference.construction.uncertainty import EndSpread
 
@@ -172,22 +174,22 @@ def by_rule(first: MarkRange, rule: str) -> MarkRange:
     others = tuple(reason for reason in first.reasons if reason.code != "near_limit")
     if share == first.share:
         return MarkRange(share, share, share, others, first.sure)
-    decided = tuple(_decided(reason, rule) for reason in near if _is_decisive(reason, rule))
+    decided = tuple(
+        _decided(reason, rule) for reason in near if (_beyond(reason) > 0.0) == (rule == "student")
+    )
     losses = others if share != FULL else tuple(one for one in others if one.code == "too_short_to_judge")
     return MarkRange(share, share, share, (*decided, *losses), first.sure)
 
 
-def _is_decisive(near: Reason, rule: str) -> bool:
-    """Whether a residual near its limit is on the side that the rule changes."""
-    is_beyond = float(near.params["off"]) > float(near.params["tolerance"])
-    return is_beyond == (rule == "student")
+def _beyond(near: Reason) -> float:
+    """By how much a residual is beyond its limit; negative within."""
+    off, tolerance = (cast("float", near.parameters[key]) for key in ("off", "tolerance"))
+    return off - tolerance
 
 
 def _decided(near: Reason, rule: str) -> Reason:
-    beyond = abs(float(near.params["off"]) - float(near.params["tolerance"]))
-    return Reason(
-        COUNTED[rule], {"what": near.params["what"], "beyond": beyond, "good_to": near.params["good_to"]}
-    )
+    known = {key: near.parameters[key] for key in ("what", "good_to")}
+    return Reason(COUNTED[rule], {**known, "beyond": abs(_beyond(near))})
 
 
 def left_open(first: MarkRange, by_hand: MarkRange) -> MarkRange:
@@ -476,8 +478,8 @@ def without_drawing(judged: Outcome) -> Outcome:
     )
 
 
-def entry_refused(judged: Outcome, entry: str) -> Outcome:
-    """The outcome left to a person, because the `entry` for it cannot be used."""
+def entry_refused(judged: Outcome, entries: tuple[str, ...]) -> Outcome:
+    """The outcome left to a person, because the `entries` for it cannot be used."""
     reasons = [reason for reason in judged.reasons if reason.code != "right"]
     if judged.measured == Quantity():
         # The refused entry is the reason why nothing was judged.
@@ -489,7 +491,7 @@ def entry_refused(judged: Outcome, entry: str) -> Outcome:
         shares=(NONE, FULL),
         confidence=0.0,
         probability=EVEN,
-        reasons=(Reason("entry_refused", {"reason": entry}), *reasons),
+        reasons=(Reason("entry_refused", {"entries": entries}), *reasons),
         mistake=None,
     )
 

@@ -7,10 +7,12 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from grader.feedback.mistakes import ALONG_GUIDE, CORIOLIS_END, DRIVEN_ACROSS, DRIVEN_ALONG
-from grader.feedback.sentences import line_of, reason_sentence
+from grader.feedback.sentences import line_of
 from grader.language import N_, Tongue
 from grader.marking.self_check import Checked, Level, Result, certain_mistakes, checked_values
-from grader.outcomes import Judgement, NamedMistake, Reason
+from grader.outcomes import Judgement, NamedMistake
+from grader.records import Reason
+from grader.texts.reasons import reason_sentence
 from reference.authored.assignment import SCALE_NAMES
 
 RESULTS: Mapping[Result, tuple[str, str]] = {

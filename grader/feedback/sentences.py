@@ -6,29 +6,21 @@ Names of vectors stand in sentences as `v_BA`, `a_BA_n`; pages set them with ind
 """
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Literal
 
-from grader.documents import Quantity
+from grader.documents import CriterionDocument, Parameters, Quantity
 from grader.feedback.mistakes import GIVING_AWAY, MISTAKES, NORMAL_END, precise, question_of, words_of
 from grader.language import N_, Tongue, tongue
-from grader.outcomes import NamedMistake, Outcome, Param, Reason
-
-Level = Literal["symbol", "hint", "full"]
+from grader.outcomes import NamedMistake, Outcome
+from grader.records import Reason, Value
+from grader.texts.reasons import MISREAD, UNCHECKED, UNDECIDED, UNSURE, Level, reason_sentence
+from grader.texts.spoken import place
 
 _NO_NAMES: Mapping[str, str] = {}
 
 # Criteria -----------------------------------------------------------------------------------------
 
-UNDECIDED = "scale_undecided"
-"""Stands for `scale_assumed` and `follows` together, under review: neither alone says what is in doubt."""
-UNSURE = "read_unsurely"
-"""Stands for `unread` where something was read, though not surely, and for `doubtful` beside it."""
-UNCHECKED = "unchecked"
-"""Stands where nothing was judged and no reason is given."""
-MISREAD = "misread"
-"""Stands for what is off as read, where it is proposed as right: most probably it was misread."""
 OPEN_ONLY = frozenset({"near_limit", "hand_may_miss", "doubtful", UNSURE})
 """Said of what waits alone: no doubt is left where there is a verdict."""
 RESIDUALS = frozenset(
@@ -41,128 +33,6 @@ RESIDUALS = frozenset(
 """Said of what is off as it was read: not of what is proposed as right."""
 IN_FAVOUR = frozenset({"counted_for_you", "at_stake", "right"})
 """Said of what counts: not of what is proposed as wrong."""
-
-HINTS: dict[str, str] = {
-    "right": N_("Right."),
-    "too_long": N_("It is too long."),
-    "too_short": N_("It is too short."),
-    "turned_left": N_("Its direction is off: it is turned too far counter-clockwise."),
-    "turned_right": N_("Its direction is off: it is turned too far clockwise."),
-    "reversed": N_("It points the opposite way."),
-    "should_be_zero": N_("Look at this position of the mechanism again: how large can it be here?"),
-    "too_short_to_judge": N_("It is too short for its direction to be judged; only its length counts."),
-    "value_too_large": N_("The value is too large."),
-    "value_too_small": N_("The value is too small."),
-    "value_reversed": N_("The sign is wrong: counter-clockwise is positive."),
-    "not_measured": N_("Nothing was handed in for it."),
-    "optional": N_("It was not handed in, and is not required."),
-    "unread": N_("It could not be read on the sheet."),
-    "entry_refused": N_("An entry that it rests on cannot be used: a person must look."),
-    "doubtful": N_("It was read with too little certainty."),
-    "found_wrong_elsewhere": N_("A verdict like this one was found wrong in this class: a person must look."),
-    "near_limit": N_("It lies so near the limit of the tolerance that the scan cannot decide."),
-    "counted_for_you": N_("It is beyond the limit by no more than the scan can tell: counted for you."),
-    "not_certainly_within": N_("It is not certainly within the limit, as far as the scan can tell."),
-    "at_stake": N_("What is open here is worth very little: counted for you."),
-    "other_variant": N_("The drawing follows another student's data."),
-    "not_explained": N_("The vectors of this plan do not belong together: a person must look."),
-    "data_misread": N_("The drawing follows another crank angle than the one given."),
-    "data_unclear": N_("It is not clear whether the drawing follows your own data: a person must look."),
-    "not_drawn": N_("It is not drawn."),
-    "value_alone": N_(
-        "A value alone earns no points here: the vector must be drawn, and its length handed in."
-    ),
-    "by_similarity": N_("It need not be drawn: the point was found by similar triangles."),
-    "letters_exchanged": N_("Two letters stand at each other's point: it is compared under the right ones."),
-    "letters_unclear": N_("Two letters seem to stand at each other's point: a person must look."),
-    "hand_may_miss": N_(
-        "Its lines meet at so small an angle that a careful hand may be off by as much: a person must look."
-    ),
-    "readings_disagree": N_("The drawing and the entered measurement differ."),
-    "written_disagrees": N_("The drawing and the length written on the sheet differ: a person must look."),
-    "follows": N_(
-        "It follows rightly from your own earlier work; the earlier mistake is charged once, there."
-    ),
-    "decided": N_("A person has decided this."),
-    "scale_refused": N_("The declared scale could not be understood."),
-    "scale_off": N_("The declared scale does not fit the drawing and the data."),
-    "scale_assumed": N_("The scale was not declared; the assignment's own rule was assumed."),
-    UNDECIDED: N_(
-        "No scale was declared: it is off at the assignment's own, and right at the one"
-        " that the drawing follows."
-    ),
-    UNSURE: N_("It was read with too little certainty."),
-    MISREAD: N_("It was probably misread; a person will look."),
-    "scale_seems_off": N_("The declared scale seems not to be the one that the drawing was made with."),
-    UNCHECKED: N_("Nothing was drawn that it could be held against."),
-}
-"""What is said at level `hint`, by code of the reason."""
-
-FULL: dict[str, str] = {
-    "too_long": N_("It is too long by %(off)s (tolerance ±%(tolerance)s)."),
-    "too_short": N_("It is too short by %(off)s (tolerance ±%(tolerance)s)."),
-    "turned_left": N_("It is turned %(off)s too far counter-clockwise (tolerance ±%(tolerance)s)."),
-    "turned_right": N_("It is turned %(off)s too far clockwise (tolerance ±%(tolerance)s)."),
-    "should_be_zero": N_("It is zero in this position of the mechanism; %(measured)s were drawn."),
-    "too_short_to_judge": N_(
-        "It is too short for its direction to be judged (%(length)s, at least %(least)s are needed);"
-        " only its length counts."
-    ),
-    "value_too_large": N_("The value is too large: %(measured)s instead of %(expected)s."),
-    "value_too_small": N_("The value is too small: %(measured)s instead of %(expected)s."),
-    "value_reversed": N_(
-        "The sign is wrong: %(measured)s instead of %(expected)s; counter-clockwise is positive."
-    ),
-    "unread": N_("It could not be read on the sheet (%(reason)s)."),
-    "entry_refused": N_("An entry that it rests on cannot be used (%(reason)s): a person must look."),
-    "doubtful": N_("It was read with too little certainty (%(confidence)s)."),
-    UNSURE: N_("It was read with too little certainty (%(reason)s)."),
-    MISREAD: N_("It was probably misread; the dotted stroke may be the one meant."),
-    "scale_seems_off": N_("%(declared)s is declared, %(expected)s was probably drawn with: %(factor)s."),
-    "near_limit": N_(
-        "It lies so near the limit of the tolerance that the scan cannot decide (standard error %(se)s)."
-    ),
-    "counted_for_you": N_(
-        "It is %(beyond)s beyond the limit; the scan is good to %(good_to)s: counted for you."
-    ),
-    "not_certainly_within": N_(
-        "It is %(beyond)s within the limit; the scan is good to %(good_to)s:"
-        " only what is certainly within counts."
-    ),
-    "other_variant": N_("The drawing follows another student's data (%(whose)s)."),
-    "data_unclear": N_(
-        "It may follow other data than the student's own (%(whose)s; probability %(confidence)s):"
-        " a person must look."
-    ),
-    "letters_exchanged": N_(
-        "The letters %(first)s and %(second)s stand at each other's point:"
-        " it is compared under the right ones."
-    ),
-    "letters_unclear": N_(
-        "The letters %(first)s and %(second)s seem to stand at each other's point: a person must look."
-    ),
-    "not_explained": N_("These vectors do not belong together: %(unfit)s of %(of)s fit nothing."),
-    "readings_disagree": N_("The drawing gives %(first)s, the entered measurement %(second)s."),
-    "written_disagrees": N_("Drawn are %(drawn)s, written on the sheet %(written)s: a person must look."),
-    "scale_refused": N_("The declared scale “%(text)s” could not be understood: %(why)s."),
-    "scale_off": N_("%(declared)s is declared, %(expected)s was drawn with: %(factor)s."),
-    "scale_assumed": N_("The scale was not declared; %(used)s was assumed."),
-}
-"""What is said at level `full` where that differs."""
-
-FOLLOWS: dict[str, str] = {
-    "nodes": N_(
-        "It follows rightly from your own earlier points; the earlier mistake is charged once, there."
-    ),
-    "small_errors": N_(
-        "It follows rightly from your own earlier points: their small errors, each within its tolerance,"
-        " add up here."
-    ),
-    "scale": N_("It is right at the scale that you used; the scale is charged once, there."),
-    "vector": N_("It follows rightly from your own %(of)s; that mistake is charged once, there."),
-    "value": N_("It follows rightly from your own %(of)s; that mistake is charged once, there."),
-}
-"""Reason `follows`, by what it follows from."""
 
 NEARLY = N_("Held against your own earlier work it is nearly right; held against the data:")
 MAY_FOLLOW = N_("It may follow rightly from your own earlier work; held against the data:")
@@ -204,12 +74,30 @@ def criterion_feedback(
     return " ".join(part for part in parts if part)
 
 
+def feedback_again(
+    criterion: CriterionDocument, lang: str, level: Level = "full", names: Mapping[str, str] = _NO_NAMES
+) -> str:
+    """What is to be said to a criterion of a report that is open, in another language than the report's."""
+    outcome = Outcome(
+        criterion.id, criterion.drawn, criterion.verdict, criterion.measured, criterion.expected,
+        criterion.tolerance, criterion.confidence,
+        reasons=tuple(Reason(one.code, _as_before(one.parameters)) for one in criterion.why),
+        possible=(criterion.verdict, criterion.verdict),
+        proposed=1.0 if criterion.proposed in {"full", "follow_through"} else 0.0,
+    )  # fmt: skip
+    return criterion_feedback(outcome, lang, level, names)
+
+
+def _as_before(parameters: Parameters) -> dict[str, Value]:
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in parameters.items()}
+
+
 def _worth_telling(outcome: Outcome, level: Level = "full") -> list[Reason]:
     """The reasons without those that say nothing beside the others, or too much."""
     if outcome.verdict == "not_judged" and not outcome.reasons:
         return [Reason(UNCHECKED)]
     codes = {reason.code for reason in outcome.reasons}
-    by_scale = any(one.code == "follows" and one.params.get("what") == "scale" for one in outcome.reasons)
+    by_scale = any(one.code == "follows" and one.parameters.get("what") == "scale" for one in outcome.reasons)
     if outcome.verdict == "review" and "scale_assumed" in codes and by_scale:
         return [Reason(UNDECIDED)]
     if outcome.verdict == "follow_through" and "follows" in codes:
@@ -342,135 +230,3 @@ _IMAGE, ACCELERATED = re.compile("[a-z][0-9]?'?"), "'"
 def line_of(mistake: NamedMistake) -> str:
     """Which kind of line or slip of units it is, as `words_of` takes it; empty where the code is enough."""
     return str(mistake.detail.get("line", mistake.detail.get("slip", "")))
-
-
-PLACES = {
-    "mechanism": N_("the mechanism"),
-    "velocity_plan": N_("the velocity plan"),
-    "acceleration_plan": N_("the acceleration plan"),
-    "directions": N_("the directions"),
-    "lengths": N_("the lengths"),
-    "scales": N_("the scales"),
-    "values": N_("the values"),
-}
-
-
-def place(at: str, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES) -> str:
-    """A node, vector, scale or figure as a sentence names it."""
-    return speaker.gettext(PLACES[at]) if at in PLACES else names.get(at, at)
-
-
-# Reasons ------------------------------------------------------------------------------------------
-
-
-def reason_sentence(
-    reason: Reason, speaker: Tongue, level: Level, names: Mapping[str, str] = _NO_NAMES
-) -> str:
-    """One reason; a code without a sentence is told by its name, so that nothing is lost."""
-    said = _speak(reason.params, speaker, names)
-    if reason.code == "follows":
-        text = FOLLOWS.get(str(reason.params.get("what")), HINTS["follows"])
-        return _fill(speaker.gettext(text), said, speaker.gettext(HINTS["follows"]))
-    hint = speaker.gettext(HINTS[reason.code]) if reason.code in HINTS else reason.code
-    if level == "full" and reason.code in FULL:
-        return _fill(speaker.gettext(FULL[reason.code]), said, hint)
-    return hint
-
-
-def _fill(text: str, said: Mapping[str, str], otherwise: str) -> str:
-    """The text with its numbers, or what needs none where one of them is not known."""
-    try:
-        return text % said
-    except KeyError:
-        return otherwise
-
-
-def _speak(params: Mapping[str, Param], speaker: Tongue, names: Mapping[str, str]) -> dict[str, str]:
-    """Parameters in words: `off_mm` becomes `off`, with its unit."""
-    # `near_limit` says what it speaks of instead of a unit.
-    unit_of_limit = {"length": "mm", "scale": "mm", "direction": "°"}.get(str(params.get("what", "")), "")
-    unit = str(params.get("unit", unit_of_limit))
-    said: dict[str, str] = {}
-    for key, value in params.items():
-        stem, _, suffix = key.rpartition("_")
-        if key == "reason":
-            said[key] = reader_reason(str(value), speaker)
-        elif isinstance(value, str):
-            said[key] = place(value, speaker, names)
-        elif suffix in {"mm", "deg"} and stem:
-            said[stem] = _UNIT_WRITERS[suffix](speaker, value)
-        elif key == "confidence":
-            said[key] = f"{speaker.number(100.0 * value, 0)}\N{NO-BREAK SPACE}%"
-        else:
-            said[key] = _real(speaker, value, unit)
-    if {"declared", "expected"} <= params.keys():
-        said["factor"] = _how_far_off(float(params["declared"]), float(params["expected"]), speaker)
-    return said
-
-
-TOO_LARGE, TOO_SMALL = N_("%(times)s times too large"), N_("%(times)s times too small")
-SHARE_TOO_LARGE, SHARE_TOO_SMALL = N_("%(share)s too large"), N_("%(share)s too small")
-SEVERAL_TIMES = 1.5
-"""From this factor on a scale is said to be so many times too large, below it by so many per cent."""
-
-
-def _how_far_off(declared: float, right: float, speaker: Tongue) -> str:
-    """How far a declared scale is from the right one: "10 times too small", "5 % too large"."""
-    factor = declared / right if right else 1.0
-    ratio = max(factor, 1.0 / factor) if factor > 0.0 else 1.0
-    if ratio >= SEVERAL_TIMES:
-        text = TOO_LARGE if factor > 1.0 else TOO_SMALL
-        return speaker.gettext(text) % {"times": speaker.trimmed(ratio, 1 if ratio < 20.0 else 0)}
-    share = f"{speaker.number(100.0 * abs(factor - 1.0), 1)}\N{NO-BREAK SPACE}%"
-    return speaker.gettext(SHARE_TOO_LARGE if factor > 1.0 else SHARE_TOO_SMALL) % {"share": share}
-
-
-def _real(speaker: Tongue, value: float, unit: str) -> str:
-    if unit == "mm":
-        return speaker.quantity(value, 2, unit)
-    if unit == "°":
-        return f"{speaker.number(value, 2)}°"
-    return speaker.value(value, unit)
-
-
-_UNIT_WRITERS: dict[str, Callable[[Tongue, float], str]] = {
-    "mm": lambda speaker, value: speaker.quantity(value, 1, "mm"),
-    "deg": lambda speaker, value: f"{speaker.number(value, 1)}°",
-}
-
-
-# Reasons of the reader ----------------------------------------------------------------------------
-
-REASONS: tuple[tuple[re.Pattern[str], str], ...] = tuple(
-    (re.compile(pattern), text)
-    for pattern, text in (
-        (
-            r"no stroke between (?P<start>\S+) and (?P<end>\S+) could be told apart",
-            N_("no stroke between %(start)s and %(end)s could be told apart"),
-        ),
-        (
-            r"(?P<nodes>.+), on which it hangs, was not read for certain",
-            N_("%(nodes)s, on which it hangs, was not read for certain"),
-        ),
-        (
-            r"nothing is drawn between (?P<start>\S+) and (?P<end>\S+)",
-            N_("nothing is drawn between %(start)s and %(end)s"),
-        ),
-        (r"(?P<name>\S+) was not found on the sheets", N_("%(name)s was not found on the sheets")),
-        (r"no mechanism sketch was found on the sheets", N_("no mechanism sketch was found on the sheets")),
-        (r"no velocity plan was found on the sheets", N_("no velocity plan was found on the sheets")),
-        (r"no acceleration plan was found on the sheets", N_("no acceleration plan was found on the sheets")),
-        (r"not drawn: (?P<node>\S+) found by similarity", N_("not drawn: %(node)s found by similarity")),
-        (r"not drawn: .*normal component.* left out", N_("not drawn: normal component left out")),
-        (r"not drawn: .*Coriolis component.* left out", N_("not drawn: Coriolis component left out")),
-    )
-)
-
-
-def reader_reason(reason: str, speaker: Tongue) -> str:
-    """A reason of the reader, in a language."""
-    for pattern, text in REASONS:
-        match = pattern.fullmatch(reason)
-        if match is not None:
-            return speaker.gettext(text) % match.groupdict()
-    return reason

@@ -27,12 +27,13 @@ from grader.feedback.numbers import (
     score_text,
     tolerance_cells,
 )
-from grader.feedback.sentences import HINTS, PLACES, Level, place
 from grader.feedback.words import ProblemText, environment, problem_sentence
 from grader.files import write_whole
 from grader.language import N_, Tongue, tongue
 from grader.overlay.closeup import PageView, detail, page_views, scan_element, svg
 from grader.overlay.scene import Picture
+from grader.texts.reasons import Level
+from grader.texts.spoken import PLACES, place
 
 NUMBER, POSITION, PAGE = N_("number"), N_("position"), N_("page")
 WIDENED = N_("widened")
@@ -221,8 +222,8 @@ class StudentPage:
 
     def sentence(self, criterion: CriterionDocument) -> str:
         """The sentence on a criterion; empty where its mark says all: just right, or checked by a person."""
-        needless = (self.speaker.gettext(HINTS[code]) for code in ("right", "decided"))
-        return "" if criterion.feedback in needless else criterion.feedback
+        is_said = criterion.reasons in (["right"], ["decided"]) and criterion.mistake is None
+        return "" if is_said else criterion.feedback
 
     def measured(self, criterion: CriterionDocument) -> list[str]:
         """Write what was handed in as lines of a cell."""
@@ -423,8 +424,7 @@ def _is_left_out(criterion: CriterionDocument) -> bool:
 
 
 def _title(cause: MistakeDocument | RivalDocument, speaker: Tongue) -> str:
-    known = dict(part.split(" = ", 1) for part in cause.detail.split(", ") if " = " in part)
-    return speaker.gettext(words_of(cause.code, cause.at, known.get("line", "")).title)
+    return speaker.gettext(words_of(cause.code, cause.at, str(cause.parameters.get("line", ""))).title)
 
 
 # Files --------------------------------------------------------------------------------------------

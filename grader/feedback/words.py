@@ -11,6 +11,7 @@ from grader.documents import ProblemDocument, UnmatchedDocument
 from grader.feedback.sentences import BETWEEN_RIVALS, RIVALS
 from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
 from grader.overlay.scene import COLOURS, MARKS
+from grader.texts.spoken import Coded, sentence
 
 VERDICTS = {
     "full": N_("right"),
@@ -121,98 +122,6 @@ def environment(lang: str) -> Environment:
 
 # Problems -----------------------------------------------------------------------------------------
 
-PROBLEMS: dict[str, str] = {
-    "file_missing": N_("The file could not be opened."),
-    "link_leads_out": N_("This is a link to a file elsewhere; hand in the file itself."),
-    "file_empty": N_("The file is empty; hand it in again."),
-    "file_type_unsupported": N_("The file is of a type that is not read: use JPEG, PNG, TIFF or PDF."),
-    "image_too_large": N_("The image is too large; scan at 600 dpi or less."),
-    "file_too_large": N_("The file is too large; split it, or scan at 300 dpi."),
-    "file_changed": N_("The file changed while the folder was read; grade again."),
-    "storage_unreadable": N_("The file could not be read from where it is stored; grade again."),
-    "image_too_small": N_("The image is too small or too narrow for a drawing; scan the whole sheet."),
-    "image_damaged_rows": N_("Rows of the image are damaged; scan it again, or grade it by hand."),
-    "image_damaged": N_("The image is damaged; scan or export it again."),
-    "image_truncated": N_("The image is cut off before its end; upload it again."),
-    "pdf_encrypted": N_("The PDF asks for a password; save it without one."),
-    "pdf_damaged": N_("The PDF is damaged; export it again."),
-    "pdf_too_heavy": N_("The page has too many drawing commands; export it as an image."),
-    "page_missing": N_("The file has no such page."),
-    "pages_none": N_("The document has no pages."),
-    "pages_too_many": N_("The document has too many pages; split it."),
-    "page_blank": N_("The page is blank and was passed over."),
-    "page_not_a_drawing": N_(
-        "The page is no drawing: it has far too many lines, or its tones are inverted. Scan it in greyscale."
-    ),
-    "squared_paper": N_(
-        "The paper is squared: its printed lines were taken out. Strokes along one may be lost if no darker."
-    ),
-    "title_block_unsure": N_("A large area at the lower right was taken for the title block and left out."),
-    "calibration_page": N_("This is the calibration page, not a drawing."),
-    "print_scaled": N_("The sheet was printed or copied at another scale than 1:1."),
-    "resolution_wrong": N_("The resolution that the file states is wrong."),
-    "resolution_assumed": N_("The file states no resolution; a usual one was assumed."),
-    "registration_disagrees": N_("Frame, paper and resolution disagree about the sheet's size."),
-    "paper_assumed": N_("Only the paper's edges give the scale; the paper was taken for A3."),
-    "frame_missing": N_("No drawing frame was found; positions on the sheet are rough."),
-    "scale_by_drawing": N_("The page's scale was corrected by lengths that are known: links, v_A and a_A."),
-    "scale_doubtful": N_("Lengths that are known contradict the page's scale: lengths may be off."),
-    "scale_unknown": N_("Only the drawing can tell the page's scale, with kL, kv and ka declared."),
-    "upright_unsure": N_("No title block shows which way up the sheet is."),
-    "sheet_refused": N_("The sheet could not be placed: no frame, paper edge or marker settles it."),
-    "nothing_handed_in": N_("Nothing was handed in."),
-    "nothing_usable": N_("Nothing that was handed in can be used."),
-    "nothing_read": N_("No figure of this assignment could be read on the pages handed in."),
-    "variant_unknown": N_("Nothing says this student's number or position; add it to the roster."),
-    "n_disagrees": N_("Sources disagree about the student's number."),
-    "position_disagrees": N_("Sources disagree about the student's position."),
-    "n_range": N_("The assignment has no such number."),
-    "position_range": N_("The assignment has no such position."),
-    "number_read": N_("The number was read on the sheet; check it."),
-    "number_differs": N_(
-        "The sheet has another number than the roster, and the drawing differs from the roster's."
-    ),
-    "number_contradicted": N_("The number on the sheet is not the one that the drawing follows."),
-    "number_doubtful": N_("The number on the sheet could not be read surely; add it to the roster."),
-    "n_needed": N_("Nothing says this student's number or position; add it to the roster."),
-    "position_needed": N_("Nothing says this student's number or position; add it to the roster."),
-    "does_not_assemble": N_("The mechanism does not assemble with these data."),
-    "singular": N_("The velocities are not determined in this position of the mechanism."),
-    "sheet_boxes": N_("The answer sheet's boxes are too small for this assignment."),
-    "sheet_zone_small": N_("The answer sheet's zones are too small for this assignment."),
-    "sheet_not_flat": N_("The sheet was not flat when it was photographed or scanned."),
-    "measurements": N_("The file of measurements has faults."),
-    "measurements_encoding": N_("The file of measurements is not UTF-8 text."),
-    "measurements_unreadable": N_("The file of measurements could not be read."),
-    "measurement_fault": N_("A measured value could not be used."),
-    "measurement_columns": N_("Columns of the measurements that are not known were passed over."),
-    "measurement_not_used": N_("A measured value is not asked for in this assignment."),
-    "roster_columns": N_("Columns of the roster without meaning here were passed over."),
-    "scale_refused": N_("A declared scale could not be understood."),
-    "scale_box_unread": N_("A scale written on the sheet could not be read."),
-    "scale_box_doubtful": N_("A scale written on the sheet could not be read surely; it was not used."),
-    "scale_box_disagrees": N_("A scale written on the sheet contradicts another declaration of it."),
-    "scale_disagrees": N_("Sources disagree about a scale; none of them is used."),
-    "measurements_twice": N_("There are several sets of measurements; they were taken together."),
-    "measurements_disagree": N_("Sets of measurements disagree; what they disagree about is not used."),
-    "measurements_unmatched": N_("Nothing says whose measurements these are."),
-    "not_explained": N_("The vectors do not belong together: no explanation fits them. A person must look."),
-    "owner_unknown": N_("Nothing says whose page this is."),
-    "owner_disagree": N_("Sources disagree about whose page this is."),
-    "owner_not_listed": N_("The page names a student who is not on the roster."),
-    "owner_ambiguous": N_("The student has several positions, and nothing says which one this is."),
-    "owner_other_assignment": N_("The page belongs to another assignment."),
-    "order_refused": N_("The roster's order cannot be used for these pages."),
-    "scan_missing": N_("A scan that the roster names is not there."),
-    "decision_fault": N_("A line of the decisions cannot be used."),
-    "decision_not_applied": N_("A person's decision could not be applied."),
-    "crashed": N_("The file ended the program that read it; scan or export it again."),
-    "too_slow": N_("Reading the file took too long; scan or export it again."),
-    "too_much_memory": N_("Reading the file took too much memory; scan or export it again."),
-    "internal_error": N_("This could not be processed because of an error in the program."),
-}
-"""By code; a code that is not here is told by its own message, in English."""
-
 
 @dataclass(frozen=True, slots=True)
 class ProblemText:
@@ -224,10 +133,8 @@ class ProblemText:
 
 
 def problem_sentence(problem: ProblemDocument, speaker: Tongue, *, brief: bool = False) -> ProblemText:
-    """A problem of a submission; `brief` leaves the program's own words out where a sentence says it."""
-    if brief and problem.code in PROBLEMS:
-        return ProblemText(speaker.gettext(PROBLEMS[problem.code]), "", problem.file or "")
-    return _text_of(problem.code, problem.message, problem.file or "", speaker)
+    """A problem of a submission; `brief` leaves out its numbers, and an error's own words."""
+    return _text_of(problem, problem.message, problem.file or "", speaker, brief=brief)
 
 
 def unmatched_sentence(unmatched: UnmatchedDocument, speaker: Tongue) -> ProblemText:
@@ -235,12 +142,15 @@ def unmatched_sentence(unmatched: UnmatchedDocument, speaker: Tongue) -> Problem
     place = unmatched.file
     if unmatched.page is not None:
         place = f"{place}, {speaker.gettext('page')} {unmatched.page}"
-    return _text_of(unmatched.code, unmatched.message, place, speaker)
+    return _text_of(unmatched, unmatched.message, place, speaker)
 
 
-def _text_of(code: str, message: str, file: str, speaker: Tongue) -> ProblemText:
-    known = PROBLEMS.get(code)
-    # The English message is the more precise one: no summary is needed before it.
-    if known is None or (speaker.lang == ROOT_LANGUAGE and message):
-        return ProblemText(message or code, "", file)
-    return ProblemText(speaker.gettext(known), message, file)
+def _text_of(problem: Coded, message: str, file: str, speaker: Tongue, *, brief: bool = False) -> ProblemText:
+    told = sentence(problem, speaker, brief=brief)
+    if brief or not told:
+        return ProblemText(told or message or problem.code, "", file)
+    # The message is in English, and an error's own words are more precise than a summary.
+    if speaker.lang == ROOT_LANGUAGE and message:
+        return ProblemText(message, "", file)
+    is_all_said = problem.parameters.keys() - {"detail", "page", "line"}
+    return ProblemText(told, "" if is_all_said else str(problem.parameters.get("detail", "")), file)

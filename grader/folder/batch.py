@@ -19,7 +19,6 @@ from grader.documents import (
     UnmatchedDocument,
 )
 from grader.feedback.class_page import write_index
-from grader.feedback.sentences import Level
 from grader.feedback.student_page import About, write_feedback
 from grader.files import remove_parts, result_folders, write_parts, write_whole
 from grader.folder.cache import (
@@ -60,10 +59,12 @@ from grader.lms.table import write_summary
 from grader.marking.report import unjudged_report
 from grader.marking.trust import opened_in, trust_of
 from grader.pipeline import mark, missing_scales, read_submission
-from grader.records import PageRef, Problem, ScannedPage
+from grader.records import PageRef, Reason, ScannedPage
 from grader.rubric import RubricFile, asked_of, rubric_of
 from grader.similarity.groups import by_chance, compared_together, find_similar
 from grader.similarity.submission import compared_submission
+from grader.texts.reasons import Level
+from grader.texts.spoken import unmatched_document
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, PlanmarkError
 
@@ -304,26 +305,28 @@ def _submissions(
     written = written_owners(owners.unmatched, roster, cache, workers)
     owners = assigned(written=written) if written else owners
     refused = [(content.refused, content.students) for content in contents if content.refused is not None]
-    unusable = [Unusable((Problem(file.code, file.message, file.file),), who) for file, who in refused]
+    unusable = [Unusable((problem,), who) for problem, who in refused]
     students, strangers = submissions_of(
         batch.assignment, roster, owners, measured, batch.lang, refused=unusable
     )
     unmatched = [_unmatched(page) for page in owners.unmatched]
-    missing = [
-        UnmatchedDocument(file=problem.file or "", code=problem.code, message=problem.message)
-        for problem in owners.problems
-    ]
+    missing = map(unmatched_document, owners.problems)
     students = with_written_numbers(students, roster, batch.assignment, cache, workers)
     students = decisions.give(students, batch.assignment, batch.rubric)
-    return students, [*(file for file, _ in refused), *unmatched, *strangers, *missing]
+    return students, [
+        *(unmatched_document(problem) for problem, _ in refused),
+        *unmatched,
+        *strangers,
+        *missing,
+    ]
 
 
 def _unmatched(page: Unmatched) -> UnmatchedDocument:
     broken = page.source.problem
-    message = page.problem.message if broken is None else f"{page.problem.message}; {broken.message}"
-    return UnmatchedDocument(
-        file=page.source.file, page=page.source.page, code=page.problem.code, message=message
-    )
+    problem = page.problem
+    if broken is not None:
+        problem = replace(problem, parameters={**problem.parameters, "also": broken.code})
+    return unmatched_document(replace(problem, file=page.source.file), page.source.page)
 
 
 # Jobs ---------------------------------------------------------------------------------------------
@@ -490,11 +493,11 @@ def _marked_anew(
 
     A job that ended its worker is marked without the pages that do so alone.
     """
-    ended: list[tuple[int, Job, Problem]] = []
+    ended: list[tuple[int, Job, Reason]] = []
     sheets = [len(job.submission.pages) for _, job in jobs]
     for number, result in workers.run(_mark_one, [(batch, cache, job) for _, job in jobs], sheets):
         index, job = jobs[number]
-        if not isinstance(result, Problem):
+        if not isinstance(result, Reason):
             yield index, result
         elif result.code in ENDED and job.submission.pages:
             ended.append((index, job, result))
@@ -503,16 +506,16 @@ def _marked_anew(
     again = [(batch, cache, _without(job, problem, batch, cache, workers)) for _, job, problem in ended]
     for number, result in workers.run(_mark_one, again):
         index, job, problem = ended[number]
-        yield index, _failed(batch, job, problem) if isinstance(result, Problem) else result
+        yield index, _failed(batch, job, problem) if isinstance(result, Reason) else result
 
 
-def _without(job: Job, problem: Problem, batch: Batch, cache: PageCache, workers: Pool) -> Job:
+def _without(job: Job, problem: Reason, batch: Batch, cache: PageCache, workers: Pool) -> Job:
     """The job with the problem at those of its pages that end a worker alone."""
     pages = job.submission.pages
     calls = [(batch, cache, replace(job.submission, pages=(page,), measured=None)) for page in pages]
     alone = dict(workers.run(_read_only, calls)) if len(pages) > 1 else {0: problem}
     marked = tuple(
-        replace(page, problem=replace(result, file=page.file)) if isinstance(result, Problem) else page
+        replace(page, problem=replace(result, file=page.file)) if isinstance(result, Reason) else page
         for page, result in ((page, alone[index]) for index, page in enumerate(pages))
     )
     return _job(replace(job.submission, pages=marked), job.folder, (job.reading_key, job.key))
@@ -560,7 +563,7 @@ def _about(batch: Batch, submission: StudentSubmission) -> About:
     return About(title, submission.name, batch.assignment.file.names)
 
 
-def _failed(batch: Batch, job: Job, problem: Problem) -> ReportDocument:
+def _failed(batch: Batch, job: Job, problem: Reason) -> ReportDocument:
     submission, where = job.submission, batch.out / job.folder
     report = unjudged_report(
         batch.assignment, batch.rubric, submission.variant or Variant(), submission.student_id, "unreadable",

@@ -44,8 +44,9 @@ from grader.folder.cache import MARK_STAGE, PageCache, digest_of, stage_digest
 from grader.folder.changes import CACHE_FOLDER
 from grader.folder.workers import Limits, Workers
 from grader.inputs.decisions import FILE_NAME as DECISIONS
-from grader.records import PageRef, Problem
+from grader.records import PageRef, Reason
 from grader.scan.decode.limits import MAX_FILE_BYTES
+from grader.texts.spoken import message
 from reference.errors import CallError, PlanmarkError
 
 Result = TypeVar("Result")
@@ -357,13 +358,13 @@ def probe(run: Run, name: str | None) -> tuple[dict[str, str], str]:
     return program(), "" if is_there else "there is no such folder or file"
 
 
-def work(run: Run, task: Task, versions: Mapping[str, str]) -> tuple[bytes, dict[str, bytes]] | Problem:
+def work(run: Run, task: Task, versions: Mapping[str, str]) -> tuple[bytes, dict[str, bytes]] | Reason:
     """The results of a task's calls, pickled, and the files that these wrote, by their paths.
 
-    The Problem is for a worker whose program is another than the client's.
+    The Reason is for a worker whose program is another than the client's.
     """
     if versions != program():
-        return Problem("cluster_versions", _difference(versions, program()))
+        return Reason("cluster_versions", {"detail": _difference(versions, program())})
     with _HANDS.lock, tempfile.TemporaryDirectory(prefix="planmark-") as out:
         store = _store(run)
         folders = {"sheets": store.folder, "out": Path(out)}
@@ -476,7 +477,7 @@ class Cluster:
 
     def run(
         self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]], sheets: Iterable[int] = ()
-    ) -> Iterator[tuple[int, Result | Problem]]:
+    ) -> Iterator[tuple[int, Result | Reason]]:
         """As `grader.folder.workers.Pool.run`; raises CallError where the cluster is lost on the way."""
         counts = [*sheets, *[1] * len(calls)]
         left = iter(range(len(calls)))
@@ -503,12 +504,12 @@ class Cluster:
                     for future in self._ended(pending):
                         indices = pending.pop(future)
                         results = self._results(future)
-                        if isinstance(results, Problem) and len(indices) > 1:
+                        if isinstance(results, Reason) and len(indices) > 1:
                             # One of them did it: each alone.
                             for index in indices:
                                 submit([index])
                             continue
-                        for number, result in [(0, results)] if isinstance(results, Problem) else results:
+                        for number, result in [(0, results)] if isinstance(results, Reason) else results:
                             done += 1
                             yield indices[number], result
         finally:
@@ -533,22 +534,20 @@ class Cluster:
                 files[path.relative_to(self._folders["out"]).as_posix()] = path.read_bytes()
         return Task(data, tuple(counts), files)
 
-    def _results(self, future: _Future) -> list[tuple[int, Any]] | Problem:
-        """A task's results, with the files that it wrote in their places; the Problem that it ended with."""
+    def _results(self, future: _Future) -> list[tuple[int, Any]] | Reason:
+        """A task's results, with the files that it wrote in their places; the Reason that it ended with."""
         try:
             answer = future.result()
         except distributed.KilledWorker:
-            return Problem("crashed", "every worker that worked on it was lost; grade again")
+            return Reason("crashed", {"why": "workers_lost"})
         except _LOST:
             raise
         except Exception as error:  # noqa: BLE001 - a storage raises whatever its library does
-            return Problem(
-                "storage_unreadable", f"cannot be read ({type(error).__name__}: {error}); grade again"
-            )
+            return Reason("storage_unreadable", {"error": f"{type(error).__name__}: {error}"})
         finally:
             future.release()
-        if isinstance(answer, Problem):
-            raise self._other_program("that has come", answer.message)
+        if isinstance(answer, Reason):
+            raise self._other_program("that has come", message(answer))
         data, files = answer
         # A key stands for all of a submission's files: it comes last.
         for name in sorted(files, key=lambda name: (name.endswith(".key"), name)):

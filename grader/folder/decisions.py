@@ -17,11 +17,11 @@ from grader.folder.cache import digest_of
 from grader.inputs.decisions import FILE_NAME, Decision, read_table
 from grader.inputs.measurements import StudentSubmission
 from grader.inputs.roster import Roster, RosterRow
-from grader.language import N_
 from grader.marking.decided import NOT_APPLIED, why_not
 from grader.printed.layout import PAGE_MM
-from grader.records import PageRef
+from grader.records import PageRef, Reason
 from grader.rubric import RubricFile
+from grader.texts.spoken import ENGLISH, clause, unmatched_document
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.construction.derive import construction_of
 from reference.construction.graph import Construction
@@ -92,12 +92,8 @@ def _task(assignment: Assignment, variant: Variant | None) -> object:
     return assignment.id, mechanism, assignment.file.plate_images, told
 
 
-_CHANGED = (
-    N_("what was handed in has changed since"),
-    N_("the student's number or position, the scales or the assignment's data have changed since"),
-    N_("the criterion asks for something else since, or the page was placed anew"),
-)
-"""What is said of a stale decision, by the part of its basis that differs."""
+_CHANGED = ("handed_in_changed", "data_changed", "asked_changed")
+"""Why a decision is stale, by the part of its basis that differs."""
 
 
 def _why_stale(then: str, now: str) -> str | None:
@@ -123,13 +119,13 @@ class ClassDecisions:
     ----------
     file : its name
     rows : those that can be read
-    faults : lines that cannot be read or applied, by their number
+    faults : lines that cannot be read or applied
     stale : decisions whose basis has changed
     """
 
     file: str
     rows: Sequence[Decision] = ()
-    faults: list[tuple[int, Finding]] = field(default_factory=list)
+    faults: list[Finding] = field(default_factory=list)
     stale: list[StaleDecisionDocument] = field(default_factory=list)
     pages: dict[PageKey, Decision] = field(default_factory=dict)
     """What was decided of each page, as far as it applies."""
@@ -137,8 +133,8 @@ class ClassDecisions:
     def problems(self) -> list[UnmatchedDocument]:
         """The faults, by their lines."""
         return [
-            UnmatchedDocument(file=self.file, code="decision_fault", message=str(fault))
-            for _, fault in sorted(self.faults, key=lambda fault: fault[0])
+            unmatched_document(Reason("decision_fault", {"line": one.line, "detail": str(one)}, self.file))
+            for one in sorted(self.faults, key=lambda fault: fault.line)
         ]
 
     # Pages -----------------------------------------------------------------------------------
@@ -150,7 +146,7 @@ class ClassDecisions:
         for key, row in rows.items():
             page = there.get(key)
             if page is None and row.basis:
-                self._out_of_date(row, N_("the page is not in the folder any more"))
+                self._out_of_date(row, "page_gone")
             elif page is None:
                 self._fault(row, "criterion", f"there is no page {key[1]} of {key[0]} in the folder")
             elif row.scan.page is None and page.pages > 1:
@@ -254,25 +250,28 @@ class ClassDecisions:
         lines = {(row.student_id, row.position, row.criterion): row for row in self.rows}
         for report in reports:
             for problem in report.problems:
-                criterion = problem.message.partition(" ")[0]
+                if problem.code != NOT_APPLIED:
+                    continue
+                criterion = str(problem.parameters["criterion"])
                 keys = [(report.student_id, position, criterion) for position in (report.position, None)]
                 row = next((lines[key] for key in keys if key in lines), None)
-                if problem.code == NOT_APPLIED and row is not None:
+                if row is not None:
                     self._fault(row, "criterion", problem.message)
 
     # Both ------------------------------------------------------------------------------------
 
     def _fault(self, row: Decision, column: str, why: str) -> None:
-        self.faults.append((row.line, Finding(f"line {row.line}, {column}", why)))
+        self.faults.append(Finding(f"line {row.line}, {column}", why, line=row.line))
 
-    def _out_of_date(self, row: Decision, reason: str) -> None:
+    def _out_of_date(self, row: Decision, code: str) -> None:
         """Note a decision to be made again; an answer of an audit is no decision, and just stops counting."""
         if row.kind == "audit":
             return
         self.stale.append(
             StaleDecisionDocument(
                 line=row.line, student_id=row.student_id, position=row.position, criterion=row.criterion,
-                verdict=row.verdict, by=row.by, at=row.at, comment=row.comment, reason=reason,
+                verdict=row.verdict, by=row.by, at=row.at, comment=row.comment, code=code,
+                reason=clause(Reason(code), ENGLISH),
             )
         )  # fmt: skip
 
@@ -289,8 +288,7 @@ def decided(
 def class_decisions(path: Path) -> ClassDecisions:
     """The decisions in a file, none where there is none. Raises InputFileError for a fault of all of it."""
     table = read_table(path)
-    faults = [(int(fault.path.split()[1].rstrip(",")), fault) for fault in table.faults]
-    return ClassDecisions(path.name, table.rows, faults)
+    return ClassDecisions(path.name, table.rows, list(table.faults))
 
 
 def _positions(rows: Iterable[RosterRow | StudentSubmission]) -> str:

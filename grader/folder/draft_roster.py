@@ -25,8 +25,9 @@ from grader.files import guarded
 from grader.folder.owners import How, Owned, assign_pages
 from grader.inputs.roster import COLUMNS, DRAFT_COLUMNS, Roster, RosterRow
 from grader.language import N_, Tongue, tongue
-from grader.records import FloatArray, GreyImage, PageRef, Problem
+from grader.records import FloatArray, GreyImage, PageRef, Reason
 from grader.scan.pixels import shrink
+from grader.texts.spoken import unmatched_document
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.construction.graph import Construction, bars, evaluate, parameters_of
 from reference.errors import CallError
@@ -68,7 +69,7 @@ class RosterDraft:
     """Suggestions for every page that is not blank, and what a person should know."""
 
     suggestions: tuple[Suggestion, ...]
-    problems: tuple[Problem, ...] = field(default=())
+    problems: tuple[Reason, ...] = field(default=())
 
 
 def suggest(
@@ -101,7 +102,7 @@ def suggest(
         if (first is None or not first.sure) and not contested and strokes_of is not None and variants:
             first = _by_similarity(page, strokes_of(page), assignment, variants, first) or first
         if first is None:
-            why = reasons[page].message.removeprefix(f"{page}: ")
+            why = unmatched_document(reasons[page], page.page).message
             first = Suggestion(page, None, why, sure=False)
         suggestions.append(first)
     return RosterDraft(tuple(_in_order(suggestions, roster)), known.problems)

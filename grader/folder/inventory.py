@@ -14,15 +14,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 from types import MappingProxyType
 
-from grader.documents import UnmatchedDocument
 from grader.files import Stamp, shown_text, stamp_of, write_whole
 from grader.folder.cache import PageCache, packed, unpacked
 from grader.folder.workers import ENDED, Pool
 from grader.inputs.measurements import Measurements, Names, read_measurements, students_in
-from grader.records import PageRef, Problem
+from grader.records import PageRef, Reason
 from grader.scan.decode.limits import load
 from grader.scan.decode.pages import count_pages, decode
 from grader.scan.register.registration import register
+from grader.texts.spoken import of_error
 from reference.errors import InputFileError
 
 # The files handed in ------------------------------------------------------------------------------
@@ -147,7 +147,7 @@ class FileContent:
 
     pages: tuple[PageRef, ...] = ()
     measurements: tuple[Measurements, ...] = ()
-    refused: UnmatchedDocument | None = None
+    refused: Reason | None = None
     students: tuple[str, ...] = ()
 
 
@@ -177,8 +177,7 @@ def take_inventory(  # noqa: PLR0913, PLR0917 - what a folder is read with
     for index, (name, stamp) in enumerate(zip(shown, stamps, strict=True)):
         known = noted.get(name)
         if leads_out(files[index], folder):
-            why = f"{name}: a link to a place outside the folder; put the file itself there"
-            contents[index] = _failed(name, Problem("link_leads_out", why))
+            contents[index] = _failed(name, Reason("link_leads_out"))
         elif known is not None and stamp is not None and known.stamp == stamp:
             contents[index] = FileContent(tuple(replace(page, path=files[index]) for page in known.pages))
         else:
@@ -187,7 +186,7 @@ def take_inventory(  # noqa: PLR0913, PLR0917 - what a folder is read with
     opened = workers.run(open_file, [(files[index], shown[index], names) for index in anew])
     for done, (number, result) in enumerate(opened, start=len(files) - len(anew) + 1):
         index = anew[number]
-        contents[index] = _failed(shown[index], result) if isinstance(result, Problem) else result
+        contents[index] = _failed(shown[index], result) if isinstance(result, Reason) else result
         progress("opening", done, len(files))
     waiting = [(index, page) for index in anew for page in contents[index].pages if not page.problem]
     pages = {index: list(content.pages) for index, content in enumerate(contents)}
@@ -200,7 +199,7 @@ def take_inventory(  # noqa: PLR0913, PLR0917 - what a folder is read with
     scans = workers.run(identify_page, [(cache, page) for _, page in waiting])
     for done, (number, page) in enumerate(scans, start=total - len(waiting) + 1):
         index, ref = waiting[number]
-        pages[index].append(_with_problem(ref, page, workers) if isinstance(page, Problem) else page)
+        pages[index].append(_with_problem(ref, page, workers) if isinstance(page, Reason) else page)
         progress("looking", done, total)
     ordered = [sorted(pages[index], key=lambda page: page.page) for index in range(len(contents))]
     scanned = [page for several in ordered for page in several]
@@ -263,8 +262,7 @@ def open_file(path: Path, name: str, names: Names) -> FileContent:
         try:
             return FileContent(measurements=read_measurements(path, names, name))
         except InputFileError as error:
-            refused = UnmatchedDocument(file=name, code=error.code, message=error.message)
-            return FileContent(refused=refused, students=students_in(path))
+            return FileContent(refused=of_error(error, name), students=students_in(path))
     file = load(path, name)
     count = count_pages(file)
     return FileContent(
@@ -282,16 +280,16 @@ def code_of(page: PageRef) -> PageRef:
     return replace(page, identity=register(decode(page))[1])
 
 
-def _with_problem(page: PageRef, problem: Problem, workers: Pool) -> PageRef:
+def _with_problem(page: PageRef, problem: Reason, workers: Pool) -> PageRef:
     """A page that could not be scanned, with its problem, and its code where that can still be read."""
     if problem.code in ENDED:
         ((_, known),) = workers.run(code_of, [(page,)])
-        page = page if isinstance(known, Problem) else known
+        page = page if isinstance(known, Reason) else known
     return replace(page, problem=replace(problem, file=page.file))
 
 
-def _failed(name: str, problem: Problem) -> FileContent:
+def _failed(name: str, problem: Reason) -> FileContent:
     """What is known of a file that could not be opened: it is there, and why."""
     if PurePath(name).suffix.lower() in MEASUREMENT_TYPES:
-        return FileContent(refused=UnmatchedDocument(file=name, code=problem.code, message=problem.message))
+        return FileContent(refused=replace(problem, file=name))
     return FileContent((PageRef(name, problem=replace(problem, file=name)),))

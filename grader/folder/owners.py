@@ -26,7 +26,7 @@ from types import MappingProxyType
 from typing import TypeVar
 
 from grader.inputs.roster import Roster, RosterRow, ScanRef, why_no_id
-from grader.records import Identity, PageRef, Problem
+from grader.records import Identity, PageRef, Reason, Value
 
 
 class How(Enum):
@@ -56,7 +56,7 @@ class Unmatched:
     """A page without an owner, why, and the students whose it may be."""
 
     source: PageRef
-    problem: Problem
+    problem: Reason
     students: tuple[str, ...] = ()
 
 
@@ -73,16 +73,30 @@ class PageOwners:
     owned: tuple[Owned, ...]
     unmatched: tuple[Unmatched, ...]
     blank: tuple[PageRef, ...]
-    problems: tuple[Problem, ...] = ()
+    problems: tuple[Reason, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class _Claim:
-    """What one source says of a page: the rows it may belong to, and how a message says it."""
+    """What one source says of a page: the rows it may belong to, and what it names."""
 
     how: How
     rows: tuple[RosterRow, ...]
     text: str
+
+    @property
+    def parameter(self) -> dict[str, Value]:
+        """What it says, by the name of a problem's parameter."""
+        return {_CLAIMED[self.how]: self.text}
+
+
+_CLAIMED = {
+    How.CODE: "by_code",
+    How.SCANS: "by_scans",
+    How.ORDER: "by_order",
+    How.NAME: "by_name",
+    How.WRITTEN: "by_writing",
+}
 
 
 def assign_pages(  # noqa: PLR0913 - a source of owners each
@@ -125,7 +139,7 @@ def assign_pages(  # noqa: PLR0913 - a source of owners each
         claims = [*certain[index], *([order[index]] if index in order else [])]
         name = written.get((page.file, page.page))
         if name is not None and not claims:
-            claims = [_Claim(How.WRITTEN, listed.rows_of(name), f"the name on the sheet: {name}")]
+            claims = [_Claim(How.WRITTEN, listed.rows_of(name), name)]
         settled = _settle(page, claims, listed, assignment_id, refusals.get(page.file))
         if isinstance(settled, Owned):
             owned.append(settled)
@@ -188,10 +202,10 @@ def _certain_claims(page: PageRef, roster: Roster) -> list[_Claim]:
     )
     if rows:
         lines = " and ".join(_who(row) for row in rows)
-        claims.append(_Claim(How.SCANS, rows, f"the roster's scans: {lines}"))
+        claims.append(_Claim(How.SCANS, rows, lines))
     student = student_of_name(page.file, roster.by_student)
     if student is not None:
-        claims.append(_Claim(How.NAME, roster.rows_of(student), f"the file's name: {student}"))
+        claims.append(_Claim(How.NAME, roster.rows_of(student), student))
     return claims
 
 
@@ -203,12 +217,12 @@ def _code_claim(identity: Identity, roster: Roster) -> _Claim:
     )
     numbers = (("n", identity.n), ("position", identity.position))
     details = [f"{name} {value}" for name, value in numbers if value is not None]
-    return _Claim(How.CODE, rows, "the QR code: " + ", ".join([identity.student_id, *details]))
+    return _Claim(How.CODE, rows, ", ".join([identity.student_id, *details]))
 
 
 def _order_claims(
     pages: Sequence[PageRef], roster: Roster, certain: Sequence[Sequence[_Claim]], each: int | None
-) -> tuple[dict[int, _Claim], dict[str, str]]:
+) -> tuple[dict[int, _Claim], dict[str, Reason]]:
     """What the roster's order says of the one class file's pages, by index; or why not, by file."""
     if each is None:
         return {}, {}
@@ -219,8 +233,7 @@ def _order_claims(
     }
     files = list(dict.fromkeys(page.file for page in pages if page.pages > 1 and page.file not in named))
     if len(files) != 1:
-        reason = f"one class file is expected, there are {len(files)}: {', '.join(files)}"
-        return {}, dict.fromkeys(files, reason)
+        return {}, dict.fromkeys(files, _no_order("several_files", count=len(files), files=tuple(files)))
     file = files[0]
     indices = [
         index
@@ -241,19 +254,16 @@ def _order_claims(
         [row for row in rows if row.line not in elsewhere],
         each,
     )
-    if isinstance(dealt, OrderRefused):
-        return {}, {file: dealt.reason}
-    claims_by_index = {
-        indices[place]: _Claim(How.ORDER, (row,), f"the roster's order: {_who(row)}")
-        for place, row in dealt.items()
-    }
+    if isinstance(dealt, Reason):
+        return {}, {file: dealt}
+    claims_by_index = {indices[place]: _Claim(How.ORDER, (row,), _who(row)) for place, row in dealt.items()}
     for index, claim in claims_by_index.items():
         for other in certain[index]:
             if not pages[index].blank and not _common([claim, other]):
-                reason = f"it is disproved on page {pages[index].page}: {other.text}; {claim.text}"
+                claims = {**other.parameter, **claim.parameter}
                 # Pages with no other source may be shifted just as well; those that agree may stay.
                 agreeing = {i: c for i, c in claims_by_index.items() if certain[i]}
-                return agreeing, {file: reason}
+                return agreeing, {file: _no_order("disproved", at=pages[index].page, **claims)}
     return claims_by_index, {}
 
 
@@ -265,47 +275,44 @@ def _common(claims: Sequence[_Claim]) -> tuple[RosterRow, ...]:
 
 
 def _settle(
-    page: PageRef, claims: list[_Claim], roster: Roster, assignment_id: str, refusal: str | None
-) -> Owned | Problem:
+    page: PageRef, claims: list[_Claim], roster: Roster, assignment_id: str, refusal: Reason | None
+) -> Owned | Reason:
     """The owner on whom all claims agree, or the problem."""
     claims = sorted(claims, key=lambda claim: list(How).index(claim.how))
     identity = page.identity
 
-    def problem(code: str, message: str) -> Problem:
-        return Problem(code, f"{page}: {message}", page.file)
+    def problem(code: str, **known: Value) -> Reason:
+        where = {"page": page.page} if page.pages > 1 else {}
+        return Reason(code, {**where, **known}, page.file)
 
     if identity is not None and identity.assignment != assignment_id:
-        return problem(
-            "owner_other_assignment", f"its QR code belongs to {identity.assignment}, not to {assignment_id}"
-        )
+        return problem("owner_other_assignment", printed=identity.assignment, assignment=assignment_id)
     if not claims:
         if refusal is not None:
-            return problem("order_refused", f"the roster's order cannot be used: {refusal}")
-        why = why_no_id(PurePath(page.file).stem)
-        refused = f"; its name is no student's id: {why}" if why and not roster.file else ""
-        return problem("owner_unknown", f"nothing says whose it is{_near(page.file, roster)}{refused}")
+            return problem(refusal.code, **refusal.parameters)
+        why = None if roster.file else why_no_id(PurePath(page.file).stem)
+        return problem("owner_unknown", **_near(page.file, roster), **({"why": why.code} if why else {}))
     common = _common(claims)
     if not common:
         if identity is not None and not claims[0].rows and len(claims) == 1:
-            return problem("owner_not_listed", f"{claims[0].text}, not on the roster so")
-        return problem("owner_disagree", "; ".join(claim.text for claim in claims))
+            return problem("owner_not_listed", **claims[0].parameter)
+        return problem("owner_disagree", **{k: v for claim in claims for k, v in claim.parameter.items()})
     if len(common) > 1:
-        places = ", ".join(str(row.position) for row in common)
-        return problem(
-            "owner_ambiguous", f"{common[0].student_id} has the positions {places}; nothing says which"
-        )
+        places = tuple(str(row.position) for row in common)
+        return problem("owner_ambiguous", student=common[0].student_id, positions=places)
     return _owned(page, common[0], claims, problem)
 
 
 def _owned(
-    page: PageRef, row: RosterRow, claims: list[_Claim], problem: Callable[[str, str], Problem]
-) -> Owned | Problem:
+    page: PageRef, row: RosterRow, claims: list[_Claim], problem: Callable[..., Reason]
+) -> Owned | Reason:
     """The row's page, unless the code's number is another."""
     identity = page.identity
     n, position = row.n, row.position
     if identity is not None:
         if None not in (identity.n, n) and identity.n != n:
-            return problem("owner_disagree", f"{claims[0].text}; the roster: {row.student_id}, n {n}")
+            listed = f"{row.student_id}, n {n}"
+            return problem("owner_disagree", **claims[0].parameter, by_roster=listed)
         n = identity.n if n is None else n
         position = identity.position if position is None else position
     return Owned(page, row.student_id, n, position, tuple(claim.how for claim in claims))
@@ -315,32 +322,33 @@ def _who(row: RosterRow) -> str:
     return row.student_id if row.position is None else f"{row.student_id}, position {row.position}"
 
 
-def _near(file: str, roster: Roster) -> str:
+def _near(file: str, roster: Roster) -> dict[str, Value]:
     """A hint for a name that is almost an id; never more than a hint."""
     stem = PurePath(file).stem
     by_lower = {student.lower(): student for student in roster.student_ids}
     student = student_of_name(f"{stem.lower()}.x", by_lower)
     near = [student] if student else difflib.get_close_matches(stem.lower(), by_lower, n=1, cutoff=0.8)
-    return f" (is {by_lower[near[0]]} meant?)" if near else ""
+    return {"near": by_lower[near[0]]} if near else {}
 
 
-def _missing_scans(pages: Sequence[PageRef], roster: Roster) -> Iterable[Problem]:
+def _missing_scans(pages: Sequence[PageRef], roster: Roster) -> Iterable[Reason]:
     there: Mapping[str, int] = {page.file: page.pages for page in pages}
     for row in roster.rows:
         for ref in row.scans:
-            reason = _why_missing(ref, there)
-            if reason:
-                message = f"line {row.line}: {_who(row)} has {ref} among the scans, {reason}"
-                yield Problem("scan_missing", message, roster.file)
+            missing = _missing_parts(ref, there)
+            if missing is not None:
+                known: dict[str, Value] = {"line": row.line, "student": _who(row), "scan": str(ref)}
+                yield Reason("scan_missing", {**known, **missing}, roster.file)
 
 
-def _why_missing(ref: ScanRef, there: Mapping[str, int]) -> str | None:
+def _missing_parts(ref: ScanRef, there: Mapping[str, int]) -> dict[str, Value] | None:
+    """What is there in the place of a scan: a file of nearly this name, or fewer pages; None for the scan."""
     if ref.file not in there:
         near = [name for name in there if name.lower() == ref.file.lower()]
         near = near or difflib.get_close_matches(ref.file, there, n=1, cutoff=0.8)
-        return "which is not in the folder" + (f" (is {near[0]} meant?)" if near else "")
+        return {"near": near[0]} if near else {}
     if ref.page is not None and ref.page > there[ref.file]:
-        return f"which has {there[ref.file]} page(s)"
+        return {"pages": there[ref.file]}
     return None
 
 
@@ -349,19 +357,9 @@ def _why_missing(ref: ScanRef, there: Mapping[str, int]) -> str | None:
 Row = TypeVar("Row")
 
 
-@dataclass(frozen=True, slots=True)
-class OrderRefused:
-    """Why the order says nothing. False in a condition."""
-
-    reason: str
-
-    def __bool__(self) -> bool:
-        return False
-
-
 def deal(
     blank: Sequence[bool], rows: Sequence[Row], waiting: Sequence[Row], each: int
-) -> dict[int, Row] | OrderRefused:
+) -> dict[int, Row] | Reason:
     """The row of each page, by the page's place in the file from 0; blank pages are dealt to nobody.
 
     Arguments
@@ -381,7 +379,8 @@ def deal(
             if candidates and len(places) == each * len(candidates):
                 dealt = zip(places, (row for row in candidates for _ in range(each)), strict=True)
                 return {place: row for place, row in dealt if not blank[place]}
-    return OrderRefused(
-        f"{len(drawn)} pages that are not blank cannot be {each} for each of {len(rows)} lines of the roster;"
-        " name the pages in the roster's scans, `planmark match` makes a draft"
-    )
+    return _no_order("uneven", pages=len(drawn), each=each, rows=len(rows))
+
+
+def _no_order(why: str, **known: Value) -> Reason:
+    return Reason("order_refused", {"why": why, **known})

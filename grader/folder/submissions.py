@@ -12,7 +12,7 @@ those of `grader.folder.owners`:
 
 import re
 from collections import ChainMap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from typing import Any
@@ -21,7 +21,8 @@ from grader.documents import UnmatchedDocument
 from grader.folder.owners import How, Owned, PageOwners, student_of_name
 from grader.inputs.measurements import Measurements, StudentSubmission, combined
 from grader.inputs.roster import Roster, RosterRow, why_no_id
-from grader.records import Problem
+from grader.records import Reason, Value
+from grader.texts.spoken import message, of_error, unmatched_document
 from reference.authored.assignment import Assignment, Variant
 from reference.errors import CallError
 
@@ -39,7 +40,7 @@ class Unusable:
     position : of those students, None where it is not known or they have it not
     """
 
-    problems: tuple[Problem, ...]
+    problems: tuple[Reason, ...]
     students: tuple[str, ...] = ()
     position: int | None = None
 
@@ -51,7 +52,7 @@ class _Gathered:
     row: RosterRow | None = None
     owned: list[Owned] = field(default_factory=list)
     measured: list[Measurements] = field(default_factory=list)
-    unusable: list[Problem] = field(default_factory=list)
+    unusable: list[Reason] = field(default_factory=list)
 
 
 @dataclass(slots=True)
@@ -82,15 +83,13 @@ class _Submissions:
         """Add measurements to their owner's; or what keeps them from being used."""
         student, named = entered.student_id, self.student_of_file(entered.source)
         if student is not None and named not in {None, student}:
-            message = f"{entered.place}: the file's name says {named}, what is in it {student}"
-            problem = Problem(
-                "owner_disagree", f"{message}; it is used for neither: correct one of the two", entered.source
-            )
+            claims = {"by_name": str(named), "by_content": student}
+            problem = Reason("owner_disagree", {**_line(entered), **claims}, entered.source)
             return Unusable((problem,), (str(named), student), entered.position)
         student = named if student is None and entered.line is None else student
         if student is None:
-            why = "; ".join(problem.message for problem in entered.problems)
-            return Unusable((_unmatched(entered, why or "nothing says whose measurements these are"),))
+            why = "; ".join(map(message, entered.problems))
+            return Unusable((_unmatched(entered, {"detail": why} if why else {}),))
         if not entered.is_usable:
             return Unusable(entered.problems, (student,), entered.position)
         key = self.key_of(student, entered)
@@ -128,18 +127,17 @@ class _Submissions:
             other = self.spelled.get(student.lower(), student)
             if other == student:
                 return exact
-            why = f"{_line(entered)}{student} differs in case only from {other}: the two would share a folder"
-            return Unusable((_unmatched(entered, why),))
+            return Unusable((_unmatched(entered, {"student": student, "other": other}),))
         if (student, None) in self.by_key:
             return student, None
         if not keys:
-            return Unusable((_unmatched(entered, f"{_line(entered)}{student} is not on the roster"),))
-        places = ", ".join(str(position) for _, position in keys)
+            return Unusable((_unmatched(entered, {"student": student}),))
+        known: dict[str, Value] = {**_line(entered), "student": student}
+        known["positions"] = tuple(str(position) for _, position in keys)
         if entered.position is None:
-            message = f"{entered.place}: {student} has the positions {places}; nothing says which"
-            return Unusable((Problem("owner_ambiguous", message, entered.source),), (student,))
-        message = f"{entered.place}: {student} in position {entered.position}, the roster has {places}"
-        return Unusable((Problem("position_disagrees", message, entered.source),), (student,))
+            return Unusable((Reason("owner_ambiguous", known, entered.source),), (student,))
+        known["given"] = entered.position
+        return Unusable((Reason("position_disagrees", known, entered.source),), (student,))
 
     def report(self, unusable: Unusable) -> None:
         """Note it with everybody whose it may be; with a roster, with those on it alone."""
@@ -182,11 +180,7 @@ def submissions_of(
     for refusal in (*unusable, *(_by_name(submissions, file) for file in refused), *pages):
         submissions.report(refusal)
     students = [_submission(assignment, key, gathered, lang) for key, gathered in submissions.by_key.items()]
-    strangers = [
-        UnmatchedDocument(file=problem.file or "", code=problem.code, message=problem.message)
-        for refusal in unusable
-        for problem in refusal.problems
-    ]
+    strangers = [unmatched_document(problem) for refusal in unusable for problem in refusal.problems]
     return students, strangers
 
 
@@ -200,12 +194,12 @@ def _by_name(submissions: _Submissions, refused: Unusable) -> Unusable:
     return replace(refused, students=(*students, *refused.students))
 
 
-def _line(entered: Measurements) -> str:
-    return "" if entered.line is None else f"line {entered.line}, student_id: "
+def _line(entered: Measurements) -> dict[str, Value]:
+    return {} if entered.line is None else {"line": entered.line}
 
 
-def _unmatched(entered: Measurements, why: str) -> Problem:
-    return Problem("measurements_unmatched", f"{entered.source}: {why}", entered.source)
+def _unmatched(entered: Measurements, known: Mapping[str, Value]) -> Reason:
+    return Reason("measurements_unmatched", {**_line(entered), **known}, entered.source)
 
 
 def _blank_only(owners: PageOwners, roster: Roster | None) -> list[Owned]:
@@ -245,21 +239,20 @@ def _submission(assignment: Assignment, key: Key, gathered: _Gathered, lang: str
     )
 
 
-def _agreed(name: str, values: Iterable[int | None], problems: list[Problem]) -> int | None:
+def _agreed(name: str, values: Iterable[int | None], problems: list[Reason]) -> int | None:
     """The number that all sources give; where they differ, None and a problem: it is not guessed."""
     known = list(dict.fromkeys(value for value in values if value is not None))
     if len(known) > 1:
-        numbers = " and ".join(str(value) for value in known)
-        problems.append(Problem(f"{name}_disagrees", f"the sources give different {name}: {numbers}"))
+        problems.append(Reason(f"{name}_disagrees", {"numbers": tuple(map(str, known))}))
         return None
     return known[0] if known else None
 
 
 def _variant(
-    assignment: Assignment, n: int | None, position: int | None, problems: list[Problem]
+    assignment: Assignment, n: int | None, position: int | None, problems: list[Reason]
 ) -> Variant | None:
     try:
         return assignment.variant(n, position)
     except CallError as error:
-        problems.append(Problem(error.code, error.message))
+        problems.append(of_error(error))
         return None

@@ -25,7 +25,7 @@ from grader.inputs.measurements import StudentSubmission
 from grader.inputs.roster import Roster, RosterRow
 from grader.inputs.scale_text import SURE
 from grader.pipeline import writing_on
-from grader.records import FloatArray, PageRef, Problem, ScannedPage, Written
+from grader.records import FloatArray, PageRef, Reason, ScannedPage, Value, Written
 from grader.scan.handwriting.captions import (
     NUMBER_WORDS,
     POSITION_WORDS,
@@ -127,7 +127,7 @@ def with_written_numbers(
     ]
     result = list(students)
     for place, read in workers.run(_number, calls):
-        if not isinstance(read, Problem):
+        if not isinstance(read, Reason):
             variant, problem = read
             student = students[lacking[place]]
             problems = [one for one in student.problems if variant is None or one.code not in _MISSING]
@@ -156,7 +156,7 @@ def _possible(student: StudentSubmission, roster: Roster | None, assignment: Ass
 
 def _number(
     cache: PageCache, refs: Sequence[PageRef], assignment: Assignment, possible: Sequence[Variant]
-) -> tuple[Variant | None, Problem]:
+) -> tuple[Variant | None, Reason]:
     """As `chosen_variant`, of what is written and drawn on some pages."""
     numbers = {variant.n for variant in possible}, {variant.position for variant in possible}
     both = all(len(each) > 1 for each in numbers)
@@ -201,7 +201,7 @@ def _chance(read: Written | None, number: int | None, numbers: Collection[int | 
 
 def chosen_variant(
     variants: Sequence[Variant], chances: Sequence[float], similar: FloatArray
-) -> tuple[Variant | None, Problem]:
+) -> tuple[Variant | None, Reason]:
     """The variant whose number is written and drawn, None where that is open; and what is to be told.
 
     Arguments
@@ -214,19 +214,19 @@ def chosen_variant(
     shows = float(similar[drawn]) >= LIKE_MM
     near = np.flatnonzero(similar > CLEAR * similar[drawn]).tolist() if shows else []
     agrees = shows and similar[likely] > _AGREES * similar[drawn]
-    written = f"'{variants[likely]}' ({100 * chances[likely]:.0f} %)"
-    looks = " or ".join(str(variants[index]) for index in near[:_NAMED]) if near else "no variant for certain"
-    advice = "look, and enter the number in the roster"
+    looks: dict[str, Value] = {}
+    if near:
+        looks = {"looks": tuple(str(variants[index]) for index in near[:_NAMED])}
+
+    def read(index: int) -> dict[str, Value]:
+        return {"read": str(variants[index]), "confidence": float(chances[index])}
+
     if chances[likely] >= SURE and (agrees or not shows):
-        said = "the drawing looks like it" if shows else "the drawing shows no variant for certain"
-        return variants[likely], Problem("number_read", f"read on the sheet: {written}; {said}")
+        why = "drawn_like_it" if shows else "drawn_unclear"
+        return variants[likely], Reason("number_read", {**read(likely), "why": why})
     if shows and chances[drawn] >= _LIKELY:
-        read = f"'{variants[drawn]}' ({100 * chances[drawn]:.0f} %)"
-        return variants[drawn], Problem(
-            "number_read", f"read on the sheet: {read}; the drawing looks like it"
-        )
+        return variants[drawn], Reason("number_read", {**read(drawn), "why": "drawn_like_it"})
     if chances[likely] >= _LIKELY:
-        message = f"the sheet seems to read {written}, the drawing looks like {looks}: {advice}"
-        return None, Problem("number_contradicted" if near else "number_doubtful", message)
-    message = f"no number could be read on the sheet, the drawing looks like {looks}: {advice}"
-    return None, Problem("number_doubtful", message)
+        code = "number_contradicted" if near else "number_doubtful"
+        return None, Reason(code, {**read(likely), **looks})
+    return None, Reason("number_doubtful", looks)

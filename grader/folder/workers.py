@@ -23,7 +23,8 @@ from pebble import ProcessExpired, ProcessPool
 from pebble.pool.process import WORKERS_NAME
 
 from grader.files import CANNOT_WRITE, OutputError, log_to
-from grader.records import Problem
+from grader.records import Reason
+from grader.texts.spoken import message, of_error
 from reference.errors import InputFileError, PlanmarkError
 
 Result = TypeVar("Result")
@@ -52,7 +53,6 @@ _OUT_OF_TIME = -getattr(signal, "SIGPROF", 0) or None
 _LOST = object()
 """In the place of a result that there is not; None is a result."""
 _MEGABYTE = 1_000_000
-_ADVICE = "scan or export it again"
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,16 +71,16 @@ class Pool(Protocol):
 
     def run(
         self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]], sheets: Iterable[int] = ()
-    ) -> Iterator[tuple[int, Result | Problem]]:
-        """Results as they come, each with its index; a failure is a Problem in the place of its result."""
+    ) -> Iterator[tuple[int, Result | Reason]]:
+        """Results as they come, each with its index; a failure is a Reason in the place of its result."""
         ...
 
 
 def result_of(pool: Pool, function: Callable[..., Result], *call: object, sheets: int = 1) -> Result:
-    """What one call gives; raises InputFileError for the Problem in its place."""
+    """What one call gives; raises InputFileError for the Reason in its place."""
     ((_, result),) = pool.run(function, [call], [sheets])
-    if isinstance(result, Problem):
-        raise InputFileError(result.code, result.message)
+    if isinstance(result, Reason):
+        raise InputFileError(result.code, message(result))
     return result
 
 
@@ -95,11 +95,11 @@ class Whole:
 
     def run(
         self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]], sheets: Iterable[int] = ()
-    ) -> Iterator[tuple[int, Result | Problem]]:
+    ) -> Iterator[tuple[int, Result | Reason]]:
         """As `Pool.run`."""
         for index, result in self.pool.run(function, calls, sheets):
-            if isinstance(result, Problem) and result.code == CANNOT_WRITE:
-                raise OutputError(result.code, result.message)
+            if isinstance(result, Reason) and result.code == CANNOT_WRITE:
+                raise OutputError(result.code, message(result))
             yield index, result
 
 
@@ -131,7 +131,7 @@ class Workers:
 
     def run(
         self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]], sheets: Iterable[int] = ()
-    ) -> Iterator[tuple[int, Result | Problem]]:
+    ) -> Iterator[tuple[int, Result | Reason]]:
         """As `Pool.run`; calls that end their worker are tried once more at the end, one at a time.
 
         Arguments: `sheets` of each call multiply its time limit; 1 where not given.
@@ -142,7 +142,7 @@ class Workers:
         tasks = [(function, *call) for call in calls]
         again: list[int] = []
         for index, result in self._finished(tasks, seconds, range(len(calls))):
-            if isinstance(result, Problem) and result.code in ENDED:
+            if isinstance(result, Reason) and result.code in ENDED:
                 again.append(index)
             else:
                 yield index, result
@@ -176,7 +176,7 @@ class Workers:
             if left:
                 self._end_pool()
         for index in sorted(left):
-            yield index, Problem("crashed", "the process that worked on it was killed; grade again")
+            yield index, Reason("crashed", {"why": "killed"})
 
     def _fill(
         self,
@@ -194,7 +194,7 @@ class Workers:
                 futures[future] = waiting.popleft()
 
     def _result(self, future: "Future[Any]") -> Any:  # noqa: ANN401 - whatever the function returns
-        """A finished call's result or Problem; `_LOST` where it was ended from outside, or the pool broke."""
+        """A finished call's result or Reason; `_LOST` where it was ended from outside, or the pool broke."""
         try:
             return future.result()
         except TimeoutError:
@@ -206,19 +206,17 @@ class Workers:
                 return self._too_much_memory()
             if error.exitcode == _KILLED:
                 return _LOST
-            return Problem("crashed", f"the program crashed on it (exit code {error.exitcode}); {_ADVICE}")
+            return Reason("crashed", {"exit": error.exitcode})
         except MemoryError:
             return self._too_much_memory()
         except BrokenProcessPool:
             return _LOST
 
-    def _too_slow(self) -> Problem:
-        why = f"took more than {self._limits.seconds:g} s; {_ADVICE}, or raise --time-limit"
-        return Problem("too_slow", why)
+    def _too_slow(self) -> Reason:
+        return Reason("too_slow", {"limit_s": self._limits.seconds})
 
-    def _too_much_memory(self) -> Problem:
-        asked = f"needs more than {self._limits.memory_mb} MB of memory"
-        return Problem("too_much_memory", f"{asked}; {_ADVICE}, or raise --memory-limit")
+    def _too_much_memory(self) -> Reason:
+        return Reason("too_much_memory", {"limit": self._limits.memory_mb})
 
     def _started_pool(self) -> ProcessPool:
         with self._starting:
@@ -293,7 +291,7 @@ def _end_with(parent: BaseProcess) -> None:
     os._exit(1)
 
 
-def _timed(seconds: float, function: Callable[..., Result], *call: object) -> Result | Problem:
+def _timed(seconds: float, function: Callable[..., Result], *call: object) -> Result | Reason:
     """As `guarded`, in a process that the system ends after so many seconds of its processor time."""
     if not hasattr(signal, "setitimer"):  # Windows
         return guarded(function, *call)
@@ -304,14 +302,14 @@ def _timed(seconds: float, function: Callable[..., Result], *call: object) -> Re
         signal.setitimer(signal.ITIMER_PROF, 0.0)
 
 
-def guarded(function: Callable[..., Result], *call: object) -> Result | Problem:
-    """The function's result, or the Problem that stopped it: one bad file never stops the rest."""
+def guarded(function: Callable[..., Result], *call: object) -> Result | Reason:
+    """The function's result, or the Reason that stopped it: one bad file never stops the rest."""
     try:
         return function(*call)
     except MemoryError:
         raise
     except PlanmarkError as error:
-        return Problem(error.code, error.message)
+        return of_error(error)
     except Exception as error:
         LOG.debug("internal_error in %s", function.__name__, exc_info=True)
-        return Problem("internal_error", f"could not be processed ({type(error).__name__}: {error})")
+        return Reason("internal_error", {"error": f"{type(error).__name__}: {error}"})

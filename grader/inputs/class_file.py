@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field
 
 from reference.authored.assignment import built_in, locate
-from reference.authored.toml_file import Authored, is_file, load
+from reference.authored.toml_file import NOT_TOML, Authored, is_file, load
 from reference.errors import AuthoredFileError, Finding
 
 
@@ -87,7 +87,7 @@ def _loaded(path: Path) -> ClassFile:
         return load(ClassFile, path)
     except AuthoredFileError as error:
         (first, *_) = error.findings
-        if "is not TOML" not in first.message or b"\\" not in path.read_bytes():
+        if first.code != NOT_TOML or b"\\" not in path.read_bytes():
             raise
         told = f"{first.message}; write a path with / or between single quotes: 'lists\\roster.csv'"
         raise AuthoredFileError(error.file, (Finding(first.path, told),)) from error

@@ -4,6 +4,7 @@ import re
 from dataclasses import dataclass
 
 from grader.inputs.roster import short, why_no_id
+from grader.texts.spoken import ENGLISH, clause
 
 TURNS = (0, 90, 180, 270)
 LARGEST = 100_000.0
@@ -53,7 +54,7 @@ def page_decision(text: str) -> PageDecision:
 def _owner(text: str | None) -> str | None:
     why = None if text is None else why_no_id(text)
     if why is not None:
-        raise ValueError(f"owner '{short(text or '')}' is refused: {why}")
+        raise ValueError(f"owner '{short(text or '')}' is refused: {clause(why, ENGLISH)}")
     return text
 
 

@@ -45,6 +45,7 @@ from grader.inputs.roster import (
     whole_number,
     why_no_id,
 )
+from grader.texts.spoken import ENGLISH, clause
 from reference.authored.variant_table import delimiter_of, table_lines
 from reference.errors import CallError, Finding, InputFileError, PlanmarkError, lines_of, near_names
 
@@ -232,13 +233,13 @@ def parse_table(text: str, file: str = FILE_NAME) -> DecisionTable:
         raise _refused(file, findings)
     named = tuple(header)
     table: list[Line] = []
-    faults: list[tuple[int, Finding]] = []
+    faults: list[Finding] = []
     for number, cells in lines[1:]:
         line, found = _line(number, named, tuple(cells), delimiter)
         table.append(line)
-        faults += [(number, Finding(f"line {number}{where}", why)) for where, why in found]
+        faults += [Finding(f"line {number}{where}", why, line=number) for where, why in found]
     table, again = _without_repeated(table, delimiter)
-    ordered = (finding for _, finding in sorted([*faults, *again], key=lambda fault: fault[0]))
+    ordered = sorted([*faults, *again], key=lambda fault: fault.line)
     return DecisionTable(tuple(table), tuple(ordered), delimiter, has_mark)
 
 
@@ -300,13 +301,13 @@ def _line(
     return Line(row, key, as_it_stands if told else ()), told
 
 
-def _without_repeated(lines: Sequence[Line], delimiter: str) -> tuple[list[Line], list[tuple[int, Finding]]]:
+def _without_repeated(lines: Sequence[Line], delimiter: str) -> tuple[list[Line], list[Finding]]:
     """The lines, those that decide the same as others not to be used, and what is wrong with these."""
     numbers: dict[Key, list[int]] = defaultdict(list)
     for line in lines:
         if line.key is not None and not line.cells:
             numbers[line.key].append(line.row.line)
-    faults: list[tuple[int, Finding]] = []
+    faults: list[Finding] = []
     kept: list[Line] = []
     for line in lines:
         same = [] if line.key is None or line.cells else numbers[line.key]
@@ -315,7 +316,8 @@ def _without_repeated(lines: Sequence[Line], delimiter: str) -> tuple[list[Line]
             why = (
                 f"{line.row.criterion} is decided on line {', '.join(others[:3])} too; leave one line of them"
             )
-            faults.append((line.row.line, Finding(f"line {line.row.line}, criterion", why)))
+            number = line.row.line
+            faults.append(Finding(f"line {number}, criterion", why, line=number))
             line = replace(line, cells=_cells(line.row, delimiter))  # noqa: PLW2901 - as it is kept
         kept.append(line)
     return kept, faults
@@ -333,7 +335,7 @@ def faults_of(row: Decision) -> Iterator[tuple[str, str]]:
     if not row.student_id and row.kind != "page":
         yield "student_id", "is empty: say whose submission was decided"
     elif row.student_id and why is not None:
-        yield "student_id", f"'{short(row.student_id)}' is refused: {why}"
+        yield "student_id", f"'{short(row.student_id)}' is refused: {clause(why, ENGLISH)}"
     for column in COLUMNS:
         text = str(getattr(row, column) or "")
         if len(text) > _LONGEST:

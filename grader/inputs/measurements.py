@@ -33,12 +33,14 @@ from grader.records import (
     VELOCITY_PLAN,
     Figure,
     PageRef,
-    Problem,
     Reading,
     ReadVector,
+    Reason,
     Unread,
+    Value,
 )
 from grader.rubric import RubricFile
+from grader.texts.spoken import clause
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.authored.variant_table import delimiter_of, table_lines
 from reference.construction.derive import construction_of
@@ -83,7 +85,7 @@ class Measurements:
     values: Mapping[str, float]
     source: str
     line: int | None = None
-    problems: tuple[Problem, ...] = ()
+    problems: tuple[Reason, ...] = ()
     is_usable: bool = True
     further_scales: tuple[Mapping[str, str], ...] = ()
 
@@ -130,7 +132,7 @@ class StudentSubmission:
     measured: Measurements | None = None
     lang: str = "en"
     name: str = ""
-    problems: tuple[Problem, ...] = ()
+    problems: tuple[Reason, ...] = ()
     has_unusable: bool = False
     decided: "tuple[Decision, ...]" = ()
     opened: tuple[LikeDocument, ...] = ()
@@ -319,6 +321,11 @@ class _NoValue:
         return self.text
 
 
+def _entry(name: str, column: str, shown: str) -> Unread:
+    """What cannot be used of an entry, as it was written: not read for the vector of this name."""
+    return Unread(name, Reason("entry", {"entries": (f"{column}: {shown}",)}))
+
+
 @dataclass(slots=True)
 class _Entries:
     """What one student entered, while it is being read; what is refused costs that entry alone.
@@ -335,7 +342,7 @@ class _Entries:
     scales: dict[str, str] = field(default_factory=dict)
     tables: dict[str, dict[str, float]] = field(default_factory=lambda: {table: {} for table in TABLES})
     faults: list[Finding] = field(default_factory=list)
-    problems: list[Problem] = field(default_factory=list)
+    problems: list[Reason] = field(default_factory=list)
     unread: list[Unread] = field(default_factory=list)
 
     def fault(self, path: str, why: str) -> None:
@@ -354,7 +361,7 @@ class _Entries:
             self.tables[table][name] = value if abs(value) >= NO_SIZE else 0.0
         else:
             self.fault(path, f"'{text}': {why}")
-            self.unread.append(Unread(self.columns[column][1], f"{column}: '{text}'"))
+            self.unread.append(_entry(self.columns[column][1], column, f"'{text}'"))
 
     def _refusal(self, column: str, value: float) -> str | None:
         """Why a number cannot be what it is entered for, or None."""
@@ -370,11 +377,9 @@ class _Entries:
 
     def unknown(self, column: str, text: str, near: Sequence[str]) -> None:
         """Tell that a column is not known; what it may be meant for is not judged without it."""
-        why = self.source.say(N_("the column is not known and was passed over"))
-        self.problems.append(
-            Problem("measurement_columns", f"{short(column)}: {why}{_did_you_mean(near, self.source)}")
-        )
-        self.unread += [Unread(self.columns[meant][1], f"{column}: '{text}'") for meant in near]
+        known = {"near": tuple(near)} if near else {}
+        self.problems.append(Reason("measurement_columns", {"column": short(column), **known}))
+        self.unread += [_entry(self.columns[meant][1], column, f"'{text}'") for meant in near]
 
     def scale(self, path: str, name: str, text: str | _NoValue) -> None:
         """Enter a scale as declared, or note why it is refused."""
@@ -384,24 +389,24 @@ class _Entries:
             self.scales[name] = text
         else:
             self.fault(path, f"'{text}': {self.source.say(text.why)}")
-            self.unread.append(Unread(name, f"{name}: '{text}'"))
+            self.unread.append(_entry(name, name, f"'{text}'"))
 
     def measurements(
         self, student_id: str | None, n: int | None, position: int | None, *, is_usable: bool = True
     ) -> Measurements:
         """All that was entered, in the order of the construction."""
         lengths, directions, values = (self.tables[table] for table in TABLES)
-        names, file, say = self.source.names, self.source.file, self.source.say
+        names, file = self.source.names, self.source.file
         reading = reading_of(names.vectors, lengths, directions)
-        problems = [Problem("measurement_fault", str(fault), file) for fault in self.faults[:MOST_FINDINGS]]
+        problems = [
+            Reason("measurement_fault", {"detail": str(fault)}, file) for fault in self.faults[:MOST_FINDINGS]
+        ]
         if len(self.faults) > MOST_FINDINGS:
-            more = say(N_("... and %(count)s more faults"), count=len(self.faults) - MOST_FINDINGS)
-            problems.append(Problem("measurement_fault", more, file))
+            problems.append(Reason("measurement_fault", {"more": len(self.faults) - MOST_FINDINGS}, file))
         problems += [replace(problem, file=file) for problem in self.problems[:MOST_FINDINGS]]
         unused = sorted(names.unused.intersection({*lengths, *directions, *values}))
         if unused:
-            why = say(N_("not drawn in this mechanism's plans, and not judged"))
-            problems.append(Problem("measurement_not_used", f"{', '.join(unused)}: {why}", file))
+            problems.append(Reason("measurement_not_used", {"columns": tuple(unused)}, file))
         return Measurements(
             student_id=student_id,
             n=n,
@@ -486,7 +491,7 @@ def _line(
     student = known.get("student_id", "")
     why = None if source.is_own and not student else why_no_id(student)
     if why is not None:
-        entries.fault("student_id", source.say(NO_ID, text=student[:40], why=source.say(why)))
+        entries.fault("student_id", source.say(NO_ID, text=student[:40], why=clause(why, source.speaker)))
     numbers = {name: whole_number(known[name], delimiter) for name in ("n", "position") if name in known}
     for name, number in numbers.items():
         if number is None:
@@ -546,8 +551,11 @@ def combined(sets: Sequence[Measurements]) -> Measurements:
     first, *others = sets
     if not others:
         return first
-    places = " and ".join(each.place for each in sets)
-    problems = [Problem("measurements_twice", f"{first.student_id} is in {places}: both count", first.source)]
+    twice: dict[str, Value] = {
+        "student": first.student_id or "",
+        "places": tuple(each.place for each in sets),
+    }
+    problems = [Reason("measurements_twice", twice, first.source)]
     given: dict[str, dict[float, str]] = {}
     for each in sets:
         for column, value in each.numbers.items():
@@ -555,11 +563,9 @@ def combined(sets: Sequence[Measurements]) -> Measurements:
     unread = [gap for each in sets for gap in each.reading.unread]
     for column, where in given.items():
         if len(where) > 1:
-            unread.append(
-                Unread(_name_of(column), f"{column}: {' / '.join(f'{value:g}' for value in where)}")
-            )
-            values = ", ".join(f"{value:g} ({place})" for value, place in where.items())
-            problems.append(Problem("measurements_disagree", f"{column}: {values}; none of them is used"))
+            unread.append(_entry(_name_of(column), column, " / ".join(f"{value:g}" for value in where)))
+            values = tuple(f"{value:g} ({place})" for value, place in where.items())
+            problems.append(Reason("measurements_disagree", {"column": column, "values": values}))
     agreed = {column: next(iter(where)) for column, where in given.items() if len(where) == 1}
     figures = [figure for each in sets for figure in each.reading.figures.items()]
     plans = {name: plan for plan, figure in figures for name in figure.vectors}
@@ -665,7 +671,7 @@ def _enter(given: Mapping[str, object], table: str, end: str, entries: _Entries)
             near = near_names(name, known) if len(entries.faults) < MOST_FINDINGS else []
             why = entries.source.say(NOT_KNOWN)
             entries.fault(path, f"{why}{_did_you_mean(near, entries.source)}")
-            entries.unread += [Unread(meant, f"{name}: '{shown}'") for meant in near if meant not in given]
+            entries.unread += [_entry(meant, name, f"'{shown}'") for meant in near if meant not in given]
         elif _is_number(value):
             entries.number(path, f"{name}{end}", shown, float(value))
         else:
@@ -713,4 +719,4 @@ def _misfit(key: str, value: object, source: _Source) -> str:
     if not isinstance(value, str):
         return source.say(N_("must be text in quotes"))
     why = why_no_id(value)
-    return "" if why is None else source.say(NO_ID, text=_shown(value), why=source.say(why))
+    return "" if why is None else source.say(NO_ID, text=_shown(value), why=clause(why, source.speaker))

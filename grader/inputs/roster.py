@@ -14,7 +14,8 @@ from pathlib import Path
 from grader.files import shown_text, unguarded
 from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
 from grader.language import LANGUAGES, N_, ROOT_LANGUAGE, Tongue, tongue
-from grader.records import Problem
+from grader.records import Reason
+from grader.texts.spoken import ENGLISH, clause
 from reference.authored.assignment import SCALE_NAMES
 from reference.authored.variant_table import delimiter_of, table_lines
 from reference.errors import MOST_FINDINGS, AuthoredFileError, Finding, near_names
@@ -86,7 +87,7 @@ class Roster:
 
     file: str
     rows: tuple[RosterRow, ...]
-    problems: tuple[Problem, ...] = ()
+    problems: tuple[Reason, ...] = ()
     by_student: dict[str, tuple[RosterRow, ...]] = field(init=False, repr=False, compare=False)
     by_scan: dict[str, tuple[RosterRow, ...]] = field(init=False, repr=False, compare=False)
 
@@ -111,29 +112,26 @@ class Roster:
         return self.by_student.get(student_id, ())
 
 
-def why_no_id(text: str) -> str | None:
-    """Why a text cannot be a student's id, which names the student's folder of results; None where it can.
-
-    What it says is a key of the catalogues.
-    """
+def why_no_id(text: str) -> Reason | None:
+    """Why a text cannot be a student's id, which names the student's folder of results; None where it can."""
     if _STUDENT_ID.fullmatch(text) is None:
-        return N_("letters A-Z a-z, digits, '.', '_' and '-', at most 64, are allowed")
+        return Reason("id_letters")
     if text.startswith(".") or text.endswith("."):
-        return N_("it cannot name a folder: it begins or ends with a dot")
+        return Reason("id_dot")
     if _DEVICES.fullmatch(text):
-        return N_("it cannot name a folder: Windows has a device of that name")
+        return Reason("id_device")
     if text.lower() in _RESULT_FILES:
-        return N_("it cannot name a folder: a file of the results has that name")
+        return Reason("id_result")
     return None
 
 
-def read_roster(path: Path | str) -> Roster:
-    """Read a roster.
+def read_roster(path: Path | str, name: str = "") -> Roster:
+    """Read a roster; `name` is the one that the user knows it by, if that is not the path's own.
 
     Raises AuthoredFileError with every fault of the file, each with the number of its line.
     """
     path = Path(path)
-    return parse_roster(_text_of(path), path.name)
+    return parse_roster(_text_of(path, name or str(path)), name or path.name)
 
 
 def parse_roster(text: str, file: str = "roster.csv") -> Roster:
@@ -157,18 +155,18 @@ def parse_roster(text: str, file: str = "roster.csv") -> Roster:
     return Roster(file, tuple(rows), tuple(_passed_over(header, file)))
 
 
-def _text_of(path: Path) -> str:
+def _text_of(path: Path, name: str) -> str:
     try:
         if path.stat().st_size > _MAX_BYTES:
             finding = Finding("$", f"is larger than {_MAX_BYTES // 1_000_000} MB: no class's list is")
-            raise AuthoredFileError(str(path), (finding,))
+            raise AuthoredFileError(name, (finding,))
         return path.read_bytes().decode("utf-8-sig")
     except OSError as error:
         finding = Finding("$", f"cannot be read: {error.strerror or error}")
-        raise AuthoredFileError(str(path), (finding,)) from error
+        raise AuthoredFileError(name, (finding,)) from error
     except UnicodeDecodeError as error:
         advice = "is not UTF-8 text; save it as CSV in UTF-8"
-        raise AuthoredFileError(str(path), (Finding("$", advice),)) from error
+        raise AuthoredFileError(name, (Finding("$", advice),)) from error
 
 
 # Tables, of a roster and of measurements ----------------------------------------------------------
@@ -230,13 +228,12 @@ def _near(name: str) -> str | None:
     return near[0] if near else None
 
 
-def _passed_over(header: list[str], file: str) -> Iterator[Problem]:
+def _passed_over(header: list[str], file: str) -> Iterator[Reason]:
     unknown = _unknown(header)
     if unknown:
-        names = ", ".join(short(name) for name in unknown[:MOST_FINDINGS])
-        more = f" and {len(unknown) - MOST_FINDINGS} more" if len(unknown) > MOST_FINDINGS else ""
-        message = f"columns without meaning here are passed over: {names}{more}"
-        yield Problem("roster_columns", message, file)
+        columns = tuple(short(name) for name in unknown[:MOST_FINDINGS])
+        more = {"more": len(unknown) - MOST_FINDINGS} if len(unknown) > MOST_FINDINGS else {}
+        yield Reason("roster_columns", {"columns": columns, **more}, file)
 
 
 def _row(
@@ -278,7 +275,7 @@ def _faults_of(row: RosterRow, text: Mapping[str, str]) -> Iterator[tuple[str, s
     if not row.student_id:
         yield "student_id", "is empty"
     elif why is not None:
-        yield "student_id", f"'{short(row.student_id)}' is refused: {why}"
+        yield "student_id", f"'{short(row.student_id)}' is refused: {clause(why, ENGLISH)}"
     for name, value in (("n", row.n), ("position", row.position)):
         if text[name] and value is None:
             yield name, f"'{short(text[name])}' is no whole number"

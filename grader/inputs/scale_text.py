@@ -12,9 +12,9 @@ written instead.
 import re
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from grader.records import Written
+from grader.records import Reason, Written
 from reference.authored.assignment import SCALE_NAMES, Assignment, Scales, Variant
 from reference.mechanism import Crank
 
@@ -29,10 +29,10 @@ PAPER_MM_PER_M = 1000.0
 
 TIME_POWER: Mapping[str, int] = {"kL": 0, "kv": -1, "ka": -2}
 """A scale is real over paper: the metres cancel, powers of the second stay."""
-EXAMPLES: Mapping[str, str] = {
-    "kL": "'1:5', '5 cm/cm' or '0.005 m/mm'",
-    "kv": "'0.036 (m/s)/mm' or 'kv = omega kL'",
-    "ka": "'0.108 (m/s^2)/mm' or 'ka = omega^2 kL'",
+EXAMPLES: Mapping[str, tuple[str, ...]] = {
+    "kL": ("1:5", "5 cm/cm", "0.005 m/mm"),
+    "kv": ("0.036 (m/s)/mm", "kv = omega kL"),
+    "ka": ("0.108 (m/s^2)/mm", "ka = omega^2 kL"),
 }
 UNITS: Mapping[str, tuple[float, int, int]] = {
     "m": (1.0, 1, 0),
@@ -81,7 +81,7 @@ class ByRule:
 class Refused:
     """A declared scale that is not accepted, and why. False in a condition."""
 
-    why: str
+    why: Reason
 
     def __bool__(self) -> bool:
         return False
@@ -91,7 +91,11 @@ ParsedScale = Declared | ByRule | Refused
 
 
 class _NotUnderstoodError(ValueError):
-    """A part of the text that is no quantity."""
+    """A part of the text that is no quantity: the code of a clause, and what was said."""
+
+    def __init__(self, code: str, said: str = "", **more: str) -> None:
+        super().__init__(code)
+        self.reason = Reason(code, {"said": said, **more})
 
 
 def parse_scale(name: str, text: str | float, *, bare_unit: str | None = None) -> ParsedScale:
@@ -105,18 +109,22 @@ def parse_scale(name: str, text: str | float, *, bare_unit: str | None = None) -
     """
     cleaned = _clean(str(text))
     if not cleaned:
-        return Refused(f"nothing is written; write {EXAMPLES[name]}")
+        return _refused(name, Reason("nothing_written"))
     if len(cleaned) > MAX_LENGTH:
-        return Refused(f"more than {MAX_LENGTH} characters; write {EXAMPLES[name]}")
+        return _refused(name, Reason("too_many_characters", {"most": MAX_LENGTH}))
     parts = [part.strip(" ;") for part in cleaned.split("=")]
     if any(not part for part in parts):
-        return Refused(f"'{text}' has nothing beside an equals sign; write {EXAMPLES[name]}")
+        return _refused(name, Reason("beside_equals"))
     try:
         return _parse_chain(name, parts, bare_unit)
     except _NotUnderstoodError as error:
-        return Refused(f"{error}; write {EXAMPLES[name]}")
+        return _refused(name, error.reason)
     except OverflowError:
-        return Refused(f"'{text}' is too large a number; write {EXAMPLES[name]}")
+        return _refused(name, Reason("too_large_number"))
+
+
+def _refused(name: str, why: Reason) -> Refused:
+    return Refused(replace(why, parameters={**why.parameters, "scale": name, "examples": EXAMPLES[name]}))
 
 
 def _parse_chain(name: str, parts: list[str], bare_unit: str | None) -> ParsedScale:
@@ -127,7 +135,7 @@ def _parse_chain(name: str, parts: list[str], bare_unit: str | None) -> ParsedSc
     if powers is not None:
         return ByRule(powers)
     if re.search(r"omega|ω", last):
-        raise _NotUnderstoodError(f"'{last}' is no rule for {name}")
+        raise _NotUnderstoodError("no_rule", last)
     if ":" in last:
         return Declared(_ratio(name, last))
     quantities = _quantities(last)
@@ -140,23 +148,19 @@ def _parse_chain(name: str, parts: list[str], bare_unit: str | None) -> ParsedSc
         paired = _correspondence(name, parts[-2], quantities)
         if paired is not None:
             return Declared(_positive(paired / PAPER_MM_PER_M, last))
-    raise _NotUnderstoodError(_misfit(name, last, quantities[0]))
+    raise _NotUnderstoodError("no_unit" if quantities[0].is_bare else _NO_SUCH[name], last)
 
 
 def _positive(value: float, text: str) -> float:
     if not value > 0.0:
-        raise _NotUnderstoodError(f"'{text}': a scale is a positive number")
+        raise _NotUnderstoodError("not_positive", text)
     if not LEAST_PER_MM <= value <= MOST_PER_MM:
-        raise _NotUnderstoodError(f"'{text}' is no scale that anything could be drawn at")
+        raise _NotUnderstoodError("undrawable", text)
     return value
 
 
-def _misfit(name: str, text: str, quantity: "_Quantity") -> str:
-    if quantity.is_bare:
-        return f"'{text}' has no unit, and a unit is never guessed"
-    what = {"kL": "a length", "kv": "a velocity", "ka": "an acceleration"}[name]
-    return f"'{text}' is not {what} per length on paper"
-
+_NO_SUCH: Mapping[str, str] = {"kL": "no_length", "kv": "no_velocity", "ka": "no_acceleration"}
+"""The clause of a quantity with the wrong unit."""
 
 # Cleaning -----------------------------------------------------------------------------------------
 
@@ -239,7 +243,7 @@ class _Quantity:
 
     def times(self, other: "_Quantity", sign: int) -> "_Quantity":
         if sign < 0 and other.value == 0.0:
-            raise _NotUnderstoodError("a division by zero")
+            raise _NotUnderstoodError("division_by_zero")
         return _Quantity(
             self.value * other.value**sign,
             self.metres + sign * other.metres,
@@ -266,7 +270,7 @@ def _tokens(text: str) -> Iterator[str]:
     while place < len(text):
         token = _TOKEN.match(text, place)
         if token is None:
-            raise _NotUnderstoodError(f"'{text[place:].strip()[0]}' is not understood in '{text}'")
+            raise _NotUnderstoodError("not_understood", text, sign=text[place:].strip()[0])
         yield token[0].strip()
         place = token.end()
 
@@ -286,7 +290,7 @@ class _Reader:
     def read(self) -> _Quantity:
         quantity = self.product(depth=0)
         if self.tokens[self.place]:
-            raise _NotUnderstoodError(f"'{self.tokens[self.place]}' is not understood in '{self.text}'")
+            raise _NotUnderstoodError("not_understood", self.text, sign=self.tokens[self.place])
         return quantity
 
     def product(self, depth: int) -> _Quantity:
@@ -299,7 +303,7 @@ class _Reader:
                 if word == "/":
                     sign, divided = -1, True
             elif _is_number(word) and _is_number(self.tokens[self.place - 1]):
-                raise _NotUnderstoodError(f"'{self.text}' has two numbers side by side")
+                raise _NotUnderstoodError("two_numbers", self.text)
             quantity = quantity.times(self.power(depth), sign)
         return quantity
 
@@ -310,7 +314,7 @@ class _Reader:
         if exponent == 1:
             return base
         if base.value == 0.0:
-            raise _NotUnderstoodError(f"'{self.text}': zero has no power here")
+            raise _NotUnderstoodError("zero_power", self.text)
         return _Quantity(base.value**exponent, base.metres * exponent, base.seconds * exponent, base.is_bare)
 
     def atom(self, depth: int) -> _Quantity:
@@ -319,7 +323,7 @@ class _Reader:
         if word == "(" and depth < MAX_DEPTH:
             inside = self.product(depth + 1)
             if self.tokens[self.place] != ")":
-                raise _NotUnderstoodError(f"'{self.text}' has a bracket that is not closed")
+                raise _NotUnderstoodError("open_bracket", self.text)
             self.place += 1
             return inside
         if _is_number(word):
@@ -327,7 +331,9 @@ class _Reader:
         if word in UNITS:
             factor, metres, seconds = UNITS[word]
             return _Quantity(factor, metres, seconds, is_bare=False)
-        raise _NotUnderstoodError(f"'{word or 'the end'}' is not understood in '{self.text}'")
+        if not word:
+            raise _NotUnderstoodError("unfinished", self.text)
+        raise _NotUnderstoodError("not_understood", self.text, sign=word)
 
     def exponent(self, *, is_unit: bool) -> int:
         """``^2``, ``^-1``, ``^(-1)``; after a unit also ``s2`` and ``s-1``."""
@@ -341,11 +347,11 @@ class _Reader:
         small = digits.isdigit() and 1 <= int(digits) <= MAX_EXPONENT
         if not (small and (raised or is_unit)):
             if raised or sign:
-                raise _NotUnderstoodError(f"'{self.text}' has a power that is not understood")
+                raise _NotUnderstoodError("odd_power", self.text)
             return 1
         self.place += 1 + bool(sign)
         if bracket and self.tokens[self.place] != ")":
-            raise _NotUnderstoodError(f"'{self.text}' has a bracket that is not closed")
+            raise _NotUnderstoodError("open_bracket", self.text)
         self.place += bracket
         return -int(digits) if sign == "-" else int(digits)
 
@@ -359,19 +365,19 @@ def _ratio(name: str, text: str) -> float:
     """Paper to real, ``1:5`` or ``1 cm : 5 cm``, per millimetre."""
     sides = [side.strip() for side in text.split(":")]
     if len(sides) != 2 or not all(sides):
-        raise _NotUnderstoodError(f"'{text}' is not a ratio of two numbers")
+        raise _NotUnderstoodError("not_two_numbers", text)
     paper, real = (_quantities(side)[0] for side in sides)
     if paper.is_bare and real.is_bare:
         if name != "kL":
-            raise _NotUnderstoodError(f"'{text}' is a ratio of lengths")
+            raise _NotUnderstoodError("ratio_of_lengths", text)
         if paper.value <= 0.0:
-            raise _NotUnderstoodError(f"'{text}': a scale is a positive number")
+            raise _NotUnderstoodError("not_positive", text)
         return _positive(real.value / paper.value / PAPER_MM_PER_M, text)
     is_one = re.fullmatch(r"1(?:\.0*)?\s*[^\W\d]+", sides[0]) is not None
     per_m = _correspondence(name, sides[0], [real]) if is_one else None
     if per_m is None:
         # "0.3 m : 60 mm" may be meant as a division: never guessed.
-        raise _NotUnderstoodError(f"'{text}' does not begin with one unit on paper, such as 1 mm")
+        raise _NotUnderstoodError("not_one_unit", text)
     return _positive(per_m / PAPER_MM_PER_M, text)
 
 

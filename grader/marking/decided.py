@@ -11,7 +11,6 @@ from grader.documents import (
     AppliedDecisionDocument,
     CriterionDocument,
     DecidedDocument,
-    ProblemDocument,
     Quantity,
     ReportDocument,
     Tolerance,
@@ -21,16 +20,17 @@ from grader.inputs.decisions import Decision
 from grader.inputs.measurements import StudentSubmission
 from grader.marking.mark import CHARGED, DECIMALS, score, with_mistake
 from grader.marking.settling import at_stake
-from grader.outcomes import Judgement, NamedMistake, Outcome, Reason
+from grader.outcomes import Judgement, NamedMistake, Outcome
 from grader.reading.corrected import corrected
-from grader.records import Problem, ScannedPage
+from grader.records import Reason, ScannedPage
 from grader.rubric import CriterionTable, RubricFile
+from grader.texts.spoken import problem_documents
 from reference.authored.assignment import Assignment
 from reference.construction.derive import construction_of
 from reference.construction.graph import Construction
 
 NOT_APPLIED = "decision_not_applied"
-"""The problem of a decision that does not fit what was read; its message begins with the criterion."""
+"""The problem of a decision that does not fit what was read; its parameter names the criterion."""
 
 
 def why_not(row: Decision, criterion: CriterionTable, rubric: RubricFile) -> str | None:
@@ -156,19 +156,18 @@ def open_again(judgement: Judgement, rubric: RubricFile, submission: StudentSubm
 
 def with_nodes(
     pages: Sequence[ScannedPage], submission: StudentSubmission, assignment: Assignment
-) -> tuple[list[ScannedPage], list[Problem]]:
+) -> tuple[list[ScannedPage], list[Reason]]:
     """The pages with nodes where people put them, and what is wrong with those that lie on no page."""
     places = {row.node: row.place for row in submission.decided if row.kind == "node"}
     if not places:
         return list(pages), []
     construction = construction_of(assignment.mechanism(assignment.variants()[:1]))
     changed, astray = corrected(pages, places, construction)
-    why = "none of the student's pages has this figure; decide the verdicts in its place"
-    return changed, [_not_applied(f"node:{figure}:{node}", why) for figure, node in astray]
+    return changed, [_not_applied(f"node:{figure}:{node}", "no_page_has_figure") for figure, node in astray]
 
 
-def _not_applied(criterion: str, why: str) -> Problem:
-    return Problem(NOT_APPLIED, f"{criterion} is not applied: {why}")
+def _not_applied(criterion: str, why: str) -> Reason:
+    return Reason(NOT_APPLIED, {"criterion": criterion, "why": why})
 
 
 # The report -----------------------------------------------------------------------------------------
@@ -188,10 +187,9 @@ def with_decisions(
     if not rows:
         return report
     if report.score_range is None and any(row.kind == "total" for row in rows):
-        problem = _not_applied("total", "nothing was judged; decide the verdicts of criteria first")
-        problems = [*report.problems, ProblemDocument.model_validate(problem)]
+        problems = [*report.problems, *problem_documents([_not_applied("total", "nothing_judged")])]
         report = report.model_copy(update={"problems": problems})
-    astray = {problem.message.partition(" ")[0] for problem in report.problems if problem.code == NOT_APPLIED}
+    astray = {one.parameters["criterion"] for one in report.problems if one.code == NOT_APPLIED}
     kinds: dict[str, list[Decision]] = defaultdict(list)
     for row in rows:
         if row.criterion not in astray:

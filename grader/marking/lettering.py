@@ -12,8 +12,8 @@ from grader.comparison.evidence import Submission
 from grader.comparison.task import Task
 from grader.comparison.verdicts import FULL, NONE, OPENING, verdict_of
 from grader.marking.settling import settled
-from grader.outcomes import NamedMistake, Outcome, Reason
-from grader.records import Figure, Reading, ReadNode, ReadVector
+from grader.outcomes import NamedMistake, Outcome
+from grader.records import Figure, Reading, ReadNode, ReadVector, Reason
 from reference.construction.graph import Vector
 from reference.construction.mistakes import Mistake
 

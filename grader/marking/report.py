@@ -1,13 +1,15 @@
 """The report of a submission, as the published schema has it."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import fields
 
 from grader.comparison.task import Task
-from grader.documents import ReadingDocument, ReportDocument, Status
-from grader.outcomes import Judgement, NamedMistake, Outcome
-from grader.records import Figure, Problem, ScannedPage, Sheet
+from grader.documents import ReadingDocument, ReasonDocument, ReportDocument, Status
+from grader.outcomes import Judgement, NamedMistake, Outcome, UsedScale
+from grader.records import Figure, Reason, ScannedPage, Sheet
 from grader.rubric import RubricFile
+from grader.texts.reasons import reason_sentence
+from grader.texts.spoken import ENGLISH, as_json, clause, problem_documents, unread_document
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 
 STAGES = ("decode", "sheet", "ink", "reading")
@@ -24,8 +26,8 @@ def reading_document(page: ScannedPage, student_id: str | None) -> ReadingDocume
             "student_id": student_id,
             "sheet": None if page.sheet is None else _sheet(page.sheet),
             "figures": {name: _figure(figure) for name, figure in page.reading.figures.items()},
-            "unread": page.reading.unread,
-            "problems": (*of_sheet, *page.problems, *page.reading.problems),
+            "unread": [unread_document(gap) for gap in page.reading.unread],
+            "problems": [*problem_documents((*of_sheet, *page.problems, *page.reading.problems))],
             "timing_ms": {**timing, "total": sum(timing.values())},
         }
     )
@@ -57,7 +59,7 @@ def report_of(  # noqa: PLR0913 - what a report holds beside the judgement
     *,
     language: str = "en",
     sentences: Mapping[str, str] | None = None,
-    problems: Sequence[Problem] = (),
+    problems: Sequence[Reason] = (),
     sheets: Sequence[ReadingDocument] = (),
     sources: Mapping[str, str] | None = None,
 ) -> ReportDocument:
@@ -72,7 +74,10 @@ def report_of(  # noqa: PLR0913 - what a report holds beside the judgement
     sections = {one.id: one.section for one in task.rubric.criterion if task.rubric.weight_of(one.section)}
     maxima = task.rubric.points
     refused = [
-        Problem("scale_refused", f"{name}: {scale.refused}")
+        Reason(
+            "scale_refused",
+            {"scale": name, "text": scale.text or "", "why": scale.refused.code, **scale.refused.parameters},
+        )
         for name, scale in judgement.scales.items()
         if scale.refused
     ]
@@ -104,20 +109,25 @@ def report_of(  # noqa: PLR0913 - what a report holds beside the judgement
                 for mistake in judgement.mistakes
             ],
             "scales": {
-                name: {**asdict(scale), "source": (sources or {}).get(name)}
+                name: _scale(scale) | {"source": (sources or {}).get(name)}
                 for name, scale in judgement.scales.items()
             },
-            "problems": [*problems, *refused, *_unfit(judgement)],
+            "problems": [*problem_documents((*problems, *refused, *_unfit(judgement)))],
             "reading": {"sheets": sheets},
         }
     )
 
 
-def _unfit(judgement: Judgement) -> Iterator[Problem]:
+def _scale(scale: UsedScale) -> dict[str, object]:
+    refused = scale.refused and clause(scale.refused, ENGLISH)
+    return {**{one.name: getattr(scale, one.name) for one in fields(scale)}, "refused": refused}
+
+
+def _unfit(judgement: Judgement) -> Iterator[Reason]:
     """The problem of a submission that no explanation reaches."""
     if judgement.unfit is not None:
         vectors, of = judgement.unfit.vectors, judgement.unfit.of
-        yield Problem("not_explained", f"these vectors do not belong together: {vectors} of {of} fit nothing")
+        yield Reason("not_explained", {"unfit": vectors, "of": of})
 
 
 def unjudged_report(  # noqa: PLR0913 - what a report holds beside the status
@@ -127,7 +137,7 @@ def unjudged_report(  # noqa: PLR0913 - what a report holds beside the status
     student_id: str,
     status: Status,
     *,
-    problems: Sequence[Problem] = (),
+    problems: Sequence[Reason] = (),
     sheets: Sequence[ReadingDocument] = (),
 ) -> ReportDocument:
     """The report of a submission that is missing or unreadable: no score, the reasons in `problems`."""
@@ -138,7 +148,7 @@ def unjudged_report(  # noqa: PLR0913 - what a report holds beside the status
             "score": None,
             "score_range": None,
             "max_score": rubric.max_score,
-            "problems": problems,
+            "problems": [*problem_documents(problems)],
             "reading": {"sheets": sheets},
         }
     )
@@ -170,7 +180,13 @@ def _criterion(outcome: Outcome) -> dict[str, object]:
         "proposed": outcome.proposed_verdict if outcome.verdict == "review" else None,
         "mistake": outcome.mistake,
         "reasons": [reason.code for reason in outcome.reasons],
+        "why": [_reason(reason) for reason in outcome.reasons],
     }
+
+
+def _reason(reason: Reason) -> ReasonDocument:
+    said = reason_sentence(reason, ENGLISH, "full")
+    return ReasonDocument(code=reason.code, message=said, parameters=as_json(reason.parameters))
 
 
 def _mistake(mistake: NamedMistake) -> dict[str, object]:
@@ -179,4 +195,10 @@ def _mistake(mistake: NamedMistake) -> dict[str, object]:
         f"{key} = {value:.6g}" if isinstance(value, float) else f"{key} = {value}"
         for key, value in mistake.detail.items()
     )
-    return {"code": mistake.code, "at": mistake.at, "confidence": mistake.confidence, "detail": detail}
+    return {
+        "code": mistake.code,
+        "at": mistake.at,
+        "confidence": mistake.confidence,
+        "detail": detail,
+        "parameters": mistake.detail,
+    }

@@ -11,7 +11,8 @@ from typing import Literal
 
 from grader.documents import Quantity, Tolerance
 from grader.marking.drawn import NEARLY_CERTAIN
-from grader.outcomes import Judgement, NamedMistake, Outcome, Reason
+from grader.outcomes import Judgement, NamedMistake, Outcome
+from grader.records import Reason
 from reference.authored.assignment import SCALE_NAMES
 
 Level = Literal["symbol", "hint", "full"]
@@ -112,4 +113,4 @@ def _without_numbers(reason: Reason) -> Reason:
     """A reason without the numbers that give the answer away; a refused scale keeps its text."""
     if reason.code in {"scale_refused", "unread"}:
         return reason
-    return Reason(reason.code, {key: value for key, value in reason.params.items() if key in TELLING})
+    return Reason(reason.code, {key: value for key, value in reason.parameters.items() if key in TELLING})

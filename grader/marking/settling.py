@@ -11,7 +11,8 @@ from grader.comparison.task import Task
 from grader.comparison.verdicts import EVEN, FULL, NONE, OPENING, verdict_of
 from grader.given_data.owner import Owner
 from grader.marking.drawn import NEARLY_CERTAIN
-from grader.outcomes import NamedMistake, Outcome, Reason, Unfit
+from grader.outcomes import NamedMistake, Outcome, Unfit
+from grader.records import Reason
 from grader.rubric import RubricFile
 from reference.authored.assignment import SCALE_NAMES
 

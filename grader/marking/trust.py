@@ -34,8 +34,8 @@ from grader.documents import (
 from grader.inputs.decision_texts import audit_answer
 from grader.marking.decided import FOR_THE_STUDENT
 from grader.marking.mark import score, share_of
-from grader.outcomes import Judgement, Outcome, Reason
-from grader.records import FloatArray
+from grader.outcomes import Judgement, Outcome
+from grader.records import FloatArray, Reason
 from grader.rubric import RubricFile
 from reference.drawing.canvas import A3_MM
 

@@ -42,7 +42,16 @@ from grader.printed.pdf import (
     width_mm,
     wrap,
 )
-from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, FloatArray, Identity, Problem
+from grader.records import (
+    ACCELERATION_PLAN,
+    MECHANISM,
+    VELOCITY_PLAN,
+    Box,
+    FloatArray,
+    Identity,
+    Reason,
+    Value,
+)
 from reference.authored.assignment import Assignment, PageKind, PageTable, Variant
 from reference.drawing.canvas import Piece, pieces_of, scale_pieces
 from reference.errors import AuthoredFileError, CallError, Finding
@@ -306,7 +315,7 @@ class Sheets:
 
     pdf: bytes
     layout: Layout
-    problems: tuple[Problem, ...] = ()
+    problems: tuple[Reason, ...] = ()
 
 
 def make_sheets(
@@ -341,12 +350,12 @@ def make_sheets(
     return Sheets(drawing.finish(), layout, (*problems, *_unprintable(rows, roster)))
 
 
-def _unprintable(rows: Sequence[RosterRow], roster: str) -> Iterator[Problem]:
+def _unprintable(rows: Sequence[RosterRow], roster: str) -> Iterator[Reason]:
     for row in rows:
         letters = unprintable(row.name)
         if letters:
-            message = f"line {row.line}: the font has no {letters}; {row.student_id}'s name has boxes instead"
-            yield Problem("sheet_letters", message, roster)
+            known: dict[str, Value] = {"line": row.line, "letters": letters, "student": row.student_id}
+            yield Reason("sheet_letters", known, roster)
 
 
 def variants_of(assignment: Assignment, rows: Sequence[RosterRow], roster: str) -> list[Variant]:
@@ -365,9 +374,9 @@ def variants_of(assignment: Assignment, rows: Sequence[RosterRow], roster: str) 
 
 def _forms(
     assignment: Assignment, asked: Collection[str] | None
-) -> tuple[list[PageForm], tuple[Problem, ...]]:
+) -> tuple[list[PageForm], tuple[Reason, ...]]:
     forms: list[PageForm] = []
-    problems: list[Problem] = []
+    problems: list[Reason] = []
     for table in assignment.file.page:
         figures = list(dict.fromkeys(table.figures))
         fit = best_template(assignment, figures)
@@ -375,8 +384,8 @@ def _forms(
         names = [vector.name for figure in figures for vector in construction.vectors_of(figure)]
         boxes = _boxes(names, asked)
         if names and not boxes and (asked is None or set(names) & set(asked)):
-            message = f"page {table.kind}: {len(names)} lengths are too many for boxes; none are printed"
-            problems.append(Problem("sheet_boxes", message, str(assignment.path)))
+            known: dict[str, Value] = {"form": table.kind, "lengths": len(names)}
+            problems.append(Reason("sheet_boxes", known, str(assignment.path)))
         problems.extend(_too_small(assignment, table, fit))
         scales = {SCALE_OF[figure]: SCALE_BOXES[SCALE_OF[figure]] for figure in figures}
         forms.append(PageForm(table.kind, fit.template, scales | boxes, dict(construction.poles)))
@@ -409,18 +418,17 @@ def _boxes(names: Sequence[str], asked: Collection[str] | None) -> dict[str, Box
     return {name: boxes[name] for name in wanted if name in boxes}
 
 
-def _too_small(assignment: Assignment, table: PageTable, fit: TemplateFit) -> list[Problem]:
-    problems: list[Problem] = []
+def _too_small(assignment: Assignment, table: PageTable, fit: TemplateFit) -> list[Reason]:
+    problems: list[Reason] = []
     for figure, share in fit.room.items():
         if share >= 1.0:
             continue
         wide, high = fit.need_mm[figure]
         _, _, zone_wide, zone_high = fit.template.zones[figure]
-        message = (
-            f"page {table.kind}: {figure} needs up to {wide:.0f} x {high:.0f} mm at the assignment's scales,"
-            f" its zone has {zone_wide:.0f} x {zone_high:.0f} mm; it fits at {100 * share:.0f} % of that size"
-        )
-        problems.append(Problem("sheet_zone_small", message, str(assignment.path)))
+        sides = {"wide": wide, "high": high, "zone_wide": zone_wide, "zone_high": zone_high}
+        known: dict[str, Value] = {f"{name}_mm": round(side) for name, side in sides.items()}
+        known |= {"form": table.kind, "figure": figure, "fits_percent": round(100 * share)}
+        problems.append(Reason("sheet_zone_small", known, str(assignment.path)))
     return problems
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grader.reading.lines import Lines
-from grader.records import MECHANISM, FloatArray
+from grader.records import MECHANISM, FloatArray, Reason
 from reference.construction.elements import Normal, Scaled
 from reference.construction.graph import Construction, bars, coincident, evaluate
 from reference.construction.mistakes import Drawing, Mistake, commit, single_mistakes
@@ -192,10 +192,7 @@ COST_OF_SIMILARITY = 0.7
 """Nats: odds of one in two, against perpendiculars throughout."""
 COST_OF_MISTAKE = 8.0
 """Nats: a third of plans have a mistake, one of some forty; and strokes of one student err alike."""
-LEFT_OUT = {
-    "n": "not drawn: the normal component is left out",
-    "k": "not drawn: the Coriolis component is left out",
-}
+LEFT_OUT = {"n": Reason("normal_left_out"), "k": Reason("coriolis_left_out")}
 """By the first letter of the node in which the component ends."""
 OF_THE_WHOLE = {"figure_rotated", "scale_wrong", "rpm_not_converted", "vector_missing"}
 """Mistakes that the search for the plan's pose finds anyway, as it turns and scales the plan."""
@@ -215,7 +212,7 @@ class PlanHypothesis:
 
     label: str
     drawing: Drawing
-    absent: Mapping[str, str]
+    absent: Mapping[str, Reason]
     cost: float
 
 
@@ -246,7 +243,7 @@ def mistaken(base: PlanHypothesis, figure: str) -> Iterator[tuple[PlanHypothesis
         yield PlanHypothesis(label, changed, absent, base.cost + COST_OF_MISTAKE), mistake
 
 
-def _by_similarity(construction: Construction, figure: str) -> tuple[Construction, dict[str, str]]:
+def _by_similarity(construction: Construction, figure: str) -> tuple[Construction, dict[str, Reason]]:
     """The construction with every plate's image by similarity, and the nodes that vanish."""
     steps = {step.node: step for step in construction.figures[figure]}
     changed, absent = construction, {}
@@ -257,7 +254,7 @@ def _by_similarity(construction: Construction, figure: str) -> tuple[Constructio
         for vector in construction.vectors_of(figure):
             tail = steps.get(vector.tail)
             if vector.head == node and isinstance(tail, Given) and isinstance(tail.length, Normal):
-                absent[vector.tail] = f"not drawn: {node} found by similarity"
+                absent[vector.tail] = Reason("by_similarity", {"node": node})
     return changed, absent
 
 

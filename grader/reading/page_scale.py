@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from grader.records import MECHANISM, Figure, FloatArray, Problem, Reading, ScannedPage, Sheet
+from grader.records import MECHANISM, Figure, FloatArray, Reading, Reason, ScannedPage, Sheet, Value
 from reference.construction.graph import evaluate, pair
 from reference.construction.mistakes import Drawing
 
@@ -178,21 +178,20 @@ def _at_drawn_scale(page: ScannedPage, sheet: Sheet, shown: PageScale | None) ->
     """A page with what the drawing says of its scale; the page itself where that is nothing new."""
     unknown = next((problem for problem in page.problems if problem.code == UNKNOWN), None)
     if unknown is not None and (shown is None or shown.se > SURELY or len(shown.by) < ENOUGH):
-        why = f"{unknown.message}; nor does the drawing tell it, by declared scales"
-        return replace(page, sheet=None, ink=None, problems=(Problem("sheet_refused", why, page.ref.file),))
+        why = {**unknown.parameters, "advice": "not_by_drawing"}
+        return replace(page, sheet=None, ink=None, problems=(Reason("sheet_refused", why, page.ref.file),))
     if shown is None or not _is_news(shown, sheet):
         return page
     if shown.se > sheet.scale_se and len(shown.by) < ENOUGH:
         return page
     factor = 1.0 if abs(shown.factor - 1.0) < NEGLIGIBLE else shown.factor
-    told: tuple[Problem, ...] = ()
-    percent, se, by = 100.0 * (factor - 1.0), 100.0 * shown.se, ", ".join(shown.by)
+    told: tuple[Reason, ...] = ()
+    known: dict[str, Value] = {"by": tuple(shown.by), "se_percent": 100.0 * shown.se}
     if factor == 1.0 and shown.se > sheet.scale_se:
-        message = f"{by} would have the page at another scale than its registration: lengths may be off"
-        told = (Problem("scale_doubtful", f"{message} by {se:.1f} %", page.ref.file),)
+        told = (Reason("scale_doubtful", known, page.ref.file),)
     elif factor != 1.0 or unknown is not None:
-        message = f"by {by} lengths are {percent:+.1f} % longer than by frame, paper and resolution"
-        told = (Problem("scale_by_drawing", f"{message} (\N{PLUS-MINUS SIGN} {se:.1f} %)", page.ref.file),)
+        known["longer_percent"] = 100.0 * (factor - 1.0)
+        told = (Reason("scale_by_drawing", known, page.ref.file),)
     kept = tuple(problem for problem in page.problems if problem is not unknown)
     return replace(page.longer(factor, shown.se), problems=(*kept, *told))
 

@@ -27,6 +27,7 @@ from grader.records import (
     Reading,
     ReadNode,
     ReadVector,
+    Reason,
     Sheet,
     Unread,
 )
@@ -280,10 +281,10 @@ def _nowhere(drawing: Drawing, names: Sequence[str]) -> Iterator[Unread]:
     for name in names:
         vector = drawing.construction.vectors.get(name)
         if vector is None:
-            yield Unread(name, "it is no vector or node of this assignment")
+            yield Unread(name, Reason("not_of_assignment"))
         else:
-            plan = "velocity plan" if vector.scale == "kv" else "acceleration plan"
-            yield Unread(name, f"no {plan} was found on the sheets")
+            code = "no_velocity_plan" if vector.scale == "kv" else "no_acceleration_plan"
+            yield Unread(name, Reason(code))
 
 
 # Named nodes and vectors with their errors ---------------------------------------------------------
@@ -362,13 +363,13 @@ def _vectors(
         span = complex(fit.at[edge.head] - fit.at[edge.tail])
         row = int(plan.assignment.stroke[index])
         if row < 0 and abs(span) > LEAST_VECTOR_MM:
-            ends = f"{expected.names[edge.tail]} and {expected.names[edge.head]}"
+            ends = {"start": expected.names[edge.tail], "end": expected.names[edge.head]}
             at = complex(fit.at[edge.tail]), complex(fit.at[edge.head])
             if where.share_inked(*at) <= BLANK:
-                unread.append(Unread(edge.name, f"nothing is drawn between {ends}", is_blank=True))
+                unread.append(Unread(edge.name, Reason("blank", ends), is_blank=True))
                 continue
             if where.share_inked(*at, ON_IT_PX) < INKED:
-                unread.append(Unread(edge.name, f"no stroke between {ends} could be told apart"))
+                unread.append(Unread(edge.name, Reason("no_stroke", ends)))
                 continue
         cov = _difference_cov(fit, edge, span, scale_se)
         (_, named), *others = explanations.of(explanations.at[:, edge.head] - explanations.at[:, edge.tail])

@@ -529,7 +529,7 @@ class Session:
         found: dict[tuple[str, int], ProblemDocument] = {}
         for page in self.graded.results.unmatched:
             if page.page is not None:
-                problem = ProblemDocument(code=page.code, message=page.message)
+                problem = ProblemDocument.model_validate(page.model_dump(exclude={"page"}))
                 found.setdefault((page.file, page.page), problem)
         for student in self.students:
             for sheet in student.report.reading.sheets:

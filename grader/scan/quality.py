@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 
 from grader.printed.layout import MARKER_CORNERS, PAGE_MM
-from grader.records import ZONE_SLACK_MM, Box, Flaw, FloatArray, Page, Sheet
+from grader.records import ZONE_SLACK_MM, Box, FloatArray, Page, Reason, Sheet
 from grader.scan.pixels import (
     BoolArray,
     Flat,
@@ -46,7 +46,7 @@ _CORNERS = ("upper_left", "upper_right", "lower_right", "lower_left")
 _ROWS, _COLUMNS = ("upper", "middle", "lower"), ("left", "middle", "right")
 
 
-def flaws(page: Page, sheet: Sheet | None) -> tuple[Flaw, ...]:
+def flaws(page: Page, sheet: Sheet | None) -> tuple[Reason, ...]:
     """What spoils the reading of a decoded page, the worst first.
 
     Arguments: `sheet` is its registration, None where it was refused: the paper's outline must do then.
@@ -66,8 +66,12 @@ def flaws(page: Page, sheet: Sheet | None) -> tuple[Flaw, ...]:
     found = [*cut, *_resolution(page, mm_to_px), *light, *_blur(flat, mm_to_px)]
     if sheet is None and not found:
         share = 0.0 if outline is None else outline.share
-        found.append(Flaw("no_sheet" if outline is None else "not_placed", share, _LEAST_PAPER))
+        found.append(_flaw("no_sheet" if outline is None else "not_placed", share, _LEAST_PAPER))
     return tuple(found)
+
+
+def _flaw(code: str, measured: float, limit: float, **places: tuple[str, ...]) -> Reason:
+    return Reason(code, {"measured": measured, "limit": limit, **places})
 
 
 # Where the sheet lies -----------------------------------------------------------------------------
@@ -209,14 +213,16 @@ def _upright(corners: FloatArray, cut: BoolArray, turn_deg: int) -> tuple[FloatA
     return corners[order], cut[order]
 
 
-def _cut_corners(page: Page, sheet: Sheet | None, outline: _Outline | None) -> Iterator[Flaw]:
+def _cut_corners(page: Page, sheet: Sheet | None, outline: _Outline | None) -> Iterator[Reason]:
     """The corners that are not in the picture."""
     size = np.array(page.grey.shape[::-1], dtype=np.float64)
     if sheet is None:
         if outline is not None and outline.cut:
             at = mapped(outline.mm_to_px, _CORNERS_MM)
             beyond = np.maximum(-at, at - (size - 1.0)).max(axis=1) / _px_per_mm(outline.mm_to_px)
-            yield Flaw("corner_cut", float(beyond.max()), 0.0, tuple(_CORNERS[k] for k in outline.cut))
+            yield _flaw(
+                "corner_cut", float(beyond.max()), 0.0, corners=tuple(_CORNERS[k] for k in outline.cut)
+            )
         return
     # The frame, or the markers, of which all four corners are to be seen.
     must = _INNER_MM if not sheet.zones else MARKER_CORNERS[[0, 3, 7, 4]].reshape(4, 4, 2)
@@ -224,7 +230,7 @@ def _cut_corners(page: Page, sheet: Sheet | None, outline: _Outline | None) -> I
     beyond = np.maximum(-at, at - (size - 1.0)).max(axis=(1, 2)) / sheet.px_per_mm
     cut = np.flatnonzero(beyond > _BESIDE_MM)
     if len(cut):
-        yield Flaw("corner_cut", float(beyond.max()), _BESIDE_MM, tuple(_CORNERS[k] for k in cut))
+        yield _flaw("corner_cut", float(beyond.max()), _BESIDE_MM, corners=tuple(_CORNERS[k] for k in cut))
 
 
 # Resolution ---------------------------------------------------------------------------------------
@@ -249,16 +255,16 @@ def _px_per_mm(mm_to_px: FloatArray) -> float:
     return float(np.exp(np.log(np.maximum(_axes(mm_to_px), 1e-6)).mean()))
 
 
-def _resolution(page: Page, mm_to_px: FloatArray) -> Iterator[Flaw]:
+def _resolution(page: Page, mm_to_px: FloatArray) -> Iterator[Reason]:
     """Too few pixels on the sheet, or on a part of it."""
     axes = _axes(mm_to_px)
     dpi = _px_per_mm(mm_to_px) * MM_PER_INCH
     if dpi < _DPI_SHARE * LEAST_DPI:
         area = cv2.contourArea(mapped(mm_to_px, _CORNERS_MM).astype(np.float32)) / page.grey.size
-        yield Flaw("far_away" if area < _FAR else "too_coarse", dpi, LEAST_DPI)
+        yield _flaw("far_away" if area < _FAR else "too_coarse", round(dpi), round(LEAST_DPI))
     uneven = float(axes.max() / max(axes.min(), 1e-6))
     if uneven > _MOST_UNEVEN:
-        yield Flaw("too_tilted", uneven, _MOST_UNEVEN)
+        yield _flaw("too_tilted", uneven, _MOST_UNEVEN)
 
 
 # Light --------------------------------------------------------------------------------------------
@@ -286,7 +292,7 @@ _AROUND_MM = 16.0
 """The paper's brightness beside a reflection."""
 
 
-def _light(flat: Flat, mm_to_px: FloatArray, sheet: Sheet | None) -> Iterator[Flaw]:
+def _light(flat: Flat, mm_to_px: FloatArray, sheet: Sheet | None) -> Iterator[Reason]:
     """Too little light, too much of it, or uneven light."""
     step = np.array(flat.step)
     to_paper = np.array(
@@ -298,11 +304,11 @@ def _light(flat: Flat, mm_to_px: FloatArray, sheet: Sheet | None) -> Iterator[Fl
         return
     level = float(np.quantile(light, 0.9))
     if level < _LEAST_PAPER_LEVEL:
-        yield Flaw("too_dark", level, _LEAST_PAPER_LEVEL)
+        yield _flaw("too_dark", level, _LEAST_PAPER_LEVEL)
         return
     shaded = light < _SHADE * level
     if shaded.mean() > _LEAST_SHADE:
-        yield Flaw("shadow", float(np.quantile(light, 0.02) / level), _SHADE, _areas(shaded))
+        yield _flaw("shadow", float(np.quantile(light, 0.02) / level), _SHADE, areas=_areas(shaded))
     is_scanned = sheet is not None and not sheet.mm_to_px[2, :2].any()
     if is_scanned or is_black_and_white(flat.grey):
         return  # its brightness was settled by the scanner, which may have made the paper white
@@ -311,12 +317,12 @@ def _light(flat: Flat, mm_to_px: FloatArray, sheet: Sheet | None) -> Iterator[Fl
         boxes = [inner] if sheet is None or not sheet.zones else list(sheet.zones.values())
         ink = max(_darkest(flat, mm_to_px, box) for box in boxes)
         if ink < _LEAST_INK:
-            yield Flaw("overexposed", ink, _LEAST_INK)
+            yield _flaw("overexposed", ink, _LEAST_INK)
     elif white.mean() > _GLARE:
         side = 2 * round(_AROUND_MM * _MAP_PX_PER_MM) + 1
         around = (cv2.dilate(white.astype(np.uint8), np.ones((side, side), np.uint8)) > 0) & ~white
         if np.median(light[around]) < _AROUND_GLARE:
-            yield Flaw("glare", float(white.mean()), _GLARE, _areas(white))
+            yield _flaw("glare", float(white.mean()), _GLARE, areas=_areas(white))
 
 
 def _darkest(flat: Flat, mm_to_px: FloatArray, box: Box) -> float:
@@ -371,12 +377,12 @@ _MOST_BLUR_PX = 3.0
 """An edge that is no wider is as sharp as these pixels allow."""
 
 
-def _blur(flat: Flat, mm_to_px: FloatArray) -> Iterator[Flaw]:
+def _blur(flat: Flat, mm_to_px: FloatArray) -> Iterator[Reason]:
     """Edges of the ink wider than the reader can follow."""
     px_per_mm = _px_per_mm(mm_to_px)
     width = _edge_width_px(flat, mm_to_px, px_per_mm)
     if width > max(MOST_BLUR_MM * px_per_mm, _MOST_BLUR_PX):
-        yield Flaw("blurred", width / px_per_mm, MOST_BLUR_MM)
+        yield _flaw("blurred", width / px_per_mm, MOST_BLUR_MM)
 
 
 def _edge_width_px(flat: Flat, mm_to_px: FloatArray, px_per_mm: float) -> float:

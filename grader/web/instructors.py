@@ -295,9 +295,9 @@ def put_roster(call: Called, key: Key, body: Body) -> dict[str, Any]:
     trial = places.top / f"roster-{secrets.token_hex(6)}.csv"
     try:
         store(trial, body)
-        count = len(read_roster(trial).rows)
+        count = len(read_roster(trial, "roster.csv").rows)
     except PlanmarkError as error:
-        raise RefusedError(422, error.code, error.message.replace(str(trial), "roster.csv")) from error
+        raise RefusedError(422, error.code, error.message) from error
     finally:
         trial.unlink(missing_ok=True)
     store(places.roster, body, replace=True)

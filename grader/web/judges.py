@@ -9,7 +9,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
 from grader.folder.workers import guarded
-from grader.records import Problem
+from grader.records import Reason
 
 MOST_JUDGES = 4
 """Of 110 MB each: 100 values a second and more."""
@@ -27,7 +27,7 @@ class Judges:
 
     def run(
         self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]], sheets: Iterable[int] = ()
-    ) -> Iterator[tuple[int, Result | Problem]]:
+    ) -> Iterator[tuple[int, Result | Reason]]:
         """As `grader.folder.workers.Pool.run`; where a process was killed, in this one."""
         del sheets
         for index, call in enumerate(calls):

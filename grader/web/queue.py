@@ -22,8 +22,9 @@ from sqlalchemy import select, update
 
 from grader.folder.batch import Batch, grade
 from grader.folder.workers import Workers, guarded, result_of
-from grader.records import Problem
+from grader.records import Reason
 from grader.review.session import moves
+from grader.texts.spoken import message
 from grader.web.judges import MOST_JUDGES, Judges, end_with_parent
 from grader.web.places import batch_of, places_of
 from grader.web.settings import Settings
@@ -265,8 +266,8 @@ class Queue:
                     self.store.note_mark(job.publication.key, job.asked.get("by", ""), about, before, after)
                 case ("done", result):
                     return result  # type: ignore[no-any-return]
-                case ("failed", Problem() as problem):
-                    raise PlanmarkError(problem.code, problem.message)
+                case ("failed", Reason() as problem):
+                    raise PlanmarkError(problem.code, message(problem))
 
 
 class _StoppedError(Exception):
@@ -285,7 +286,7 @@ def _graded(batch: Batch, reports: Connection) -> None:
         reports.send(("progress", stage, done, total))
 
     results = guarded(grade, batch, tell)
-    if isinstance(results, Problem):
+    if isinstance(results, Reason):
         reports.send(("failed", results))
         return
     for move in moves(results):

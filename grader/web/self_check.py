@@ -11,7 +11,6 @@ from typing import Any
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
 from grader.feedback.advice import RESULTS, CheckedLine, checked_lines
-from grader.feedback.sentences import PLACES
 from grader.feedback.student_page import AS_MEASURED, SHEET
 from grader.feedback.words import symbols
 from grader.inputs.measurements import (
@@ -28,6 +27,7 @@ from grader.overlay.closeup import page_views, scan_element, svg
 from grader.overlay.measured import measured_picture
 from grader.overlay.scene import Picture
 from grader.rubric import rubric_of
+from grader.texts.spoken import PLACES, message
 from grader.web.guard import RefusedError
 from reference.authored.assignment import Assignment, Variant, load_assignment
 
@@ -100,9 +100,7 @@ def checked_values(
     return {
         "lines": _lines(lines, lang),
         "is_right": bool(lines) and all(line.result == "right" for line in lines),
-        "problems": [
-            one.message.removeprefix(": ") for one in (*entered.problems, *entered.reading.problems)
-        ],
+        "problems": [message(one, speaker) for one in (*entered.problems, *entered.reading.problems)],
         "drawing": [] if picture is None else _drawings([picture], assignment, lang),
     }
 

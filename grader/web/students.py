@@ -22,9 +22,10 @@ from grader.files import make_folder, result_folders, write_whole
 from grader.folder.workers import guarded, result_of
 from grader.language import N_
 from grader.lms.export import read_results
-from grader.records import Problem
+from grader.records import Reason
 from grader.review.server import page_file
 from grader.scan.decode.pages import count_pages
+from grader.texts.spoken import message, of_error
 from grader.web.guard import RefusedError, forbidden, missing
 from grader.web.places import assignment_of
 from grader.web.self_check import checked_form, form_of, variant_of
@@ -475,16 +476,16 @@ def pages_in(call: Call, publication: Publication, path: Path) -> int:
     try:
         pages, seconds = result_of(call.service.queue.workers, counted, path)
     except InputFileError as error:  # its worker was ended
-        pages, seconds = Problem(error.code, error.message), call.service.settings.limits.seconds
+        pages, seconds = of_error(error), call.service.settings.limits.seconds
     times = {"started": now - seconds, "ended": now}
     call.session.add(Job(publication=publication, kind="count", state="done", sender=sender, **times))
     call.session.commit()
-    if isinstance(pages, Problem):
-        raise RefusedError(422, pages.code, pages.message.replace(path.name, "the file"))
+    if isinstance(pages, Reason):
+        raise RefusedError(422, pages.code, message(pages).replace(path.name, "the file"))
     return pages
 
 
-def counted(path: Path) -> tuple[int | Problem, float]:
+def counted(path: Path) -> tuple[int | Reason, float]:
     """Number of pages of a file, or why it has none, and how long it took; in a worker."""
     began = time.process_time()
     return guarded(count_pages, path), time.process_time() - began

@@ -27,6 +27,8 @@ MAX_BYTES = 200_000
 """Twenty times the largest file that comes with the program."""
 MAX_DEPTH = 12
 """Three times as deep as the tables of the formats go."""
+NOT_TOML = "not_toml"
+"""The code of a file whose syntax is wrong."""
 MAX_NAME = 64
 _ENDLESS_KEY = re.compile(rb"(?:\.[ \t]*[\w\"'-]+[ \t]*){100}")
 """The parser takes time with the square of a dotted key's parts: 20,000 of them take 20 s."""
@@ -151,7 +153,7 @@ def _no_toml(error: Exception, text: str) -> Finding:
     """Where a text is no TOML, the line itself, and what most likely to do."""
     found = re.search(r" \(at line (\d+), column \d+\)", str(error))
     if found is None:
-        return Finding("$", f"is not TOML: {error}")
+        return Finding("$", f"is not TOML: {error}", NOT_TOML)
     line = text.split("\n")[int(found[1]) - 1].strip()
     advice = ""
     if re.search(r"=.*\d,\d", line):
@@ -163,7 +165,7 @@ def _no_toml(error: Exception, text: str) -> Finding:
     elif line.startswith("[") and re.search("twice|overwrite", str(error)):
         advice = f"; a table that stands more than once has two brackets: [[{line.strip('[] ')}]]"
     what = str(error).replace(found[0], "")
-    return Finding(f"line {found[1]}", f"is not TOML: {line[:MAX_NAME]} ({what}{advice})")
+    return Finding(f"line {found[1]}", f"is not TOML: {line[:MAX_NAME]} ({what}{advice})", NOT_TOML)
 
 
 def text_of(path: Path) -> str:

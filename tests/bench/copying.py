@@ -151,7 +151,7 @@ def _apart(one: Variant, other: Variant) -> int:
 def _said(judgement: Judgement, other: Variant | None) -> Said:
     named = [one for one in judgement.mistakes if one.code in OWNERS]
     asked = {
-        str(reason.params["whose"])
+        str(reason.parameters["whose"])
         for one in judgement.outcomes
         for reason in one.reasons
         if reason.code == "data_unclear"

@@ -24,6 +24,7 @@ from grader.records import (
     Reading,
     ReadNode,
     ReadVector,
+    Reason,
     Swapped,
     Unread,
 )
@@ -279,7 +280,7 @@ def _readings(work: StudentWork, lot: np.random.Generator) -> tuple[Reading, ...
             figures[drawn.name] = Figure(nodes, _vectors(work, drawn.name, nodes, se))
             unread += [
                 Unread(
-                    vector.name, f"nothing is drawn between {vector.tail} and {vector.head}", is_blank=True
+                    vector.name, Reason("blank", {"start": vector.tail, "end": vector.head}), is_blank=True
                 )
                 for vector in work.construction.vectors_of(drawn.name)
                 if vector.name in work.left_out

@@ -31,7 +31,7 @@ from grader.folder import cache, inventory
 from grader.folder.batch import Batch, Job, grade
 from grader.folder.cache import PageCache
 from grader.folder.workers import guarded
-from grader.records import PageRef, Problem
+from grader.records import PageRef, Reason
 from grader.rubric import rubric_of
 from reference.authored.assignment import load_assignment
 from tests import hostile
@@ -111,12 +111,12 @@ class Copying:
         for index, call in enumerate(calls):
             yield index, known[function](*call) if function in known else guarded(function, *call)
 
-    def _page(self, scans: PageCache, ref: PageRef) -> PageRef | Problem:
+    def _page(self, scans: PageCache, ref: PageRef) -> PageRef | Reason:
         student, _, end = Path(ref.file).stem.partition("_")
         key = self.of.get(student, ref.file) + end, ref.page
         if key not in self.pages:
             page = guarded(inventory.identify_page, scans, ref)
-            if isinstance(page, Problem) or page.problem is not None:
+            if isinstance(page, Reason) or page.problem is not None:
                 return page
             self.pages[key] = page
             return page
@@ -127,12 +127,12 @@ class Copying:
         )
         return page
 
-    def _mark(self, batch: Batch, scans: PageCache, job: Job) -> ReportDocument | Problem:
+    def _mark(self, batch: Batch, scans: PageCache, job: Job) -> ReportDocument | Reason:
         student = job.submission.student_id
         sample = self.of.get(student)
         if sample is None or sample not in self.jobs:
             report = guarded(folder_batch._mark_one, batch, scans, job)
-            if sample is not None and not isinstance(report, Problem):
+            if sample is not None and not isinstance(report, Reason):
                 self.jobs[sample] = job, report
             return report
         first, known = self.jobs[sample]

@@ -32,6 +32,7 @@ from grader.inputs.roster import read_roster
 from grader.pipeline import open_page, read_pages
 from grader.records import Figure, PageRef, Reading, ScannedPage
 from grader.rubric import load_rubric
+from grader.texts.spoken import message
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.construction.derive import construction_of
 from tests.bench.reading_scenes import SCENES, scene_named, works
@@ -174,7 +175,7 @@ def sheet_fault(seen: ScannedPage, on_paper: OnPaper | None) -> str:
     """Why the page's millimetres cannot be used; empty where they can."""
     if on_paper is not None:
         return fault_of(on_paper)
-    return "; ".join(problem.message for problem in seen.problems) or "no sheet"
+    return "; ".join(message(problem) for problem in seen.problems) or "no sheet"
 
 
 def misses_of(

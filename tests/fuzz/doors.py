@@ -31,10 +31,11 @@ from grader.lms.export import KINDS, TARGETS, draft, read_results
 from grader.lms.gradebooks import LAYOUTS
 from grader.lms.grades import Options, Person, grades_of
 from grader.lms.moodle import fill_worksheet
-from grader.records import Problem
+from grader.records import Reason
 from grader.rubric import load_rubric
 from grader.scan.decode.pages import count_pages, is_blank, page_of
 from grader.scan.register.registration import register
+from grader.texts.spoken import message
 from reference.authored.assignment import load_assignment
 from reference.authored.variant_table import DataTable, read_rows
 from reference.errors import PlanmarkError
@@ -330,16 +331,16 @@ def fuzz(
 
 
 def _singly(
-    workers: Workers, call: tuple[str, Sequence[bytes], str, int], problem: Problem
+    workers: Workers, call: tuple[str, Sequence[bytes], str, int], problem: Reason
 ) -> Iterator[Findings]:
     """The inputs of a batch that ended its worker, one by one."""
     door, *rest = call
     files = list(_inputs(door, *rest))
     for index, result in workers.run(try_files, [(door, [data]) for data in files]):
-        if isinstance(result, Problem):
+        if isinstance(result, Reason):
             yield Findings(failures=[(f"{result.code}: {result.message}", files[index])])
     if problem.code == "internal_error":
-        yield Findings(failures=[(problem.message, b"")])
+        yield Findings(failures=[(message(problem), b"")])
 
 
 def main() -> int:

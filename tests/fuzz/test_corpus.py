@@ -6,7 +6,7 @@ import json
 import pytest
 
 from grader.folder.workers import Limits, Workers
-from grader.records import Problem
+from grader.records import Reason
 from tests import hostile
 from tests.fuzz.doors import DOORS, corpus, try_files
 from tests.fuzz.seeds import seeds
@@ -56,6 +56,6 @@ def answers():
 
 @pytest.mark.parametrize("index", range(len(FILES)), ids=[f"{door}: {name}" for door, name, _ in FILES])
 def test_no_file_breaks_a_door(answers, index):
-    assert not isinstance(answers[index], Problem), answers[index].message
+    assert not isinstance(answers[index], Reason), answers[index].message
     assert not answers[index].failures, answers[index].failures[0][0]
     assert len(answers[index].answers) == 1

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from grader.inputs.measurements import names_of, read_measurements, students_in
 from grader.inputs.roster import why_no_id
+from grader.texts.spoken import message
 from reference.authored.assignment import load_assignment
 from reference.errors import InputFileError
 
@@ -41,8 +42,11 @@ def check(path):
         assert all(why_no_id(student) is None for student in students_in(path))
         return
     for one in found:
-        told = [one.student_id, dict(one.scales), one.numbers, [problem.message for problem in one.problems]]
-        json.dumps([*told, [gap.reason for gap in one.reading.unread]], allow_nan=False).encode()
+        told = [one.student_id, dict(one.scales), one.numbers, [message(problem) for problem in one.problems]]
+        json.dumps(
+            [*told, [", ".join(gap.reason.parameters["entries"]) for gap in one.reading.unread]],
+            allow_nan=False,
+        ).encode()
         assert len(one.problems) <= 22
 
 

@@ -17,7 +17,7 @@ from grader.documents import (
 )
 from grader.marking.mark import judge
 from grader.marking.report import report_of, unjudged_report
-from grader.records import Problem
+from grader.records import Reason
 from reference.construction.mistakes import Mistake
 from reference.errors import CallError
 from tests.hands import changed, measured, task_for
@@ -94,7 +94,7 @@ def test_a_mistake_is_in_the_report_with_what_it_explains():
 
 
 def test_a_report_of_nothing_has_its_reason():
-    problem = Problem("not_an_image", "cannot be opened", "s07.png")
+    problem = Reason("not_an_image", {"detail": "cannot be opened"}, "s07.png")
     written = unjudged_report(
         PUMP.assignment, PUMP.rubric, PUMP.variant, "s07", "unreadable", problems=[problem]
     )
@@ -113,3 +113,14 @@ def test_documents_refuse_what_they_do_not_know_and_what_is_not_finite():
         MeasurementsDocument(segments={"v_A": 1.0})
     with pytest.raises(ValidationError):
         SheetDocument(method="markers", px_per_mm=float("nan"), rotation_deg=0, residual_mm=0, mm_to_px=[])
+
+
+def test_every_reason_and_problem_has_its_code_its_message_and_its_parameters():
+    written = report(PUMP, changed(measured(PUMP), "v_D", confidence=0.5), declared={"kv": "0,22"})
+    for one in written.criteria:
+        assert [reason.code for reason in one.why] == one.reasons
+        assert all(reason.message for reason in one.why)
+    (refused,) = (one for one in written.problems if one.code == "scale_refused")
+    assert (refused.parameters["why"], refused.parameters["scale"]) == ("no_unit", "kv")
+    assert "no unit" in refused.message
+    assert written.scales["kv"].refused.startswith("“0.22” has no unit")

@@ -53,12 +53,12 @@ class PageContent:
     ----------
     objects : number of forms and images that the page's own commands draw
     images : each image drawn, by its object number and generation
-    damage : damaged rows of the first fax image that has some; empty where none has
+    damage : first and last damaged row of the first fax image that has some; empty where none has
     """
 
     objects: int = 0
     images: dict[tuple[int, int], pikepdf.Stream] = field(default_factory=dict)
-    damage: str = ""
+    damage: tuple[int, ...] = ()
 
 
 def drawn_by(file: InputFile, number: int, page: pikepdf.Page) -> PageContent:
@@ -232,7 +232,7 @@ class _ContentWalk:
             _check_image(self.file, self.number, stream, width, height)
             row = _fax_damage(stream, height)
             if row is not None and not self.drawn.damage:
-                self.drawn.damage = f"rows {row + 1} to {height} of {height}"
+                self.drawn.damage = (row + 1, height)
             if isinstance(stream.get("/SMask"), pikepdf.Stream):
                 self.image(cast("pikepdf.Stream", stream.SMask))
         return width * height / _PIXELS_A_BYTE

@@ -92,7 +92,7 @@ def load(path: Path | str, shown: str = "") -> InputFile:
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputFileError(
-            "file_missing", f"{name}: cannot be opened ({reason}); check the path"
+            "file_missing", f"{name}: cannot be opened ({reason}); check the path", error=reason
         ) from error
     if not data:
         raise InputFileError("file_empty", f"{name}: the file is empty (0 bytes); hand it in again")
@@ -113,6 +113,8 @@ def _content(path: Path, name: str) -> bytes:
                 "file_too_large",
                 f"{name}: {status.st_size // 1_000_000} MB, more than {MAX_FILE_BYTES // 1_000_000} MB;"
                 " split the file, or scan at 300 dpi",
+                size=status.st_size // 1_000_000,
+                most=MAX_FILE_BYTES // 1_000_000,
             )
         data = file.read(status.st_size + 1)
     if len(data) != status.st_size:
@@ -152,9 +154,11 @@ def kind_of(file: InputFile) -> str:
     suffix = Path(file.name).suffix
     named = _NAMES.get(suffix.lower())
     what = f"named {suffix} but is no {named} file" if named else "of a type that is not read"
+    known = {"suffix": suffix, "kind": named} if named else {}
     raise InputFileError(
         "file_type_unsupported",
         f"{file.name}: {what}; scan or export it as JPEG, PNG, TIFF or PDF",
+        **known,
     )
 
 
@@ -166,6 +170,8 @@ def check_size(file: InputFile, page: int, width: int, height: int) -> None:
             "image_too_small",
             f"{file.name}, page {page}: {width} x {height} pixels are too few or too narrow for a drawing; "
             "scan the whole sheet at 300 dpi",
+            wide=width,
+            high=height,
         )
 
 
@@ -182,6 +188,8 @@ def check_memory(file: InputFile, page: int, pixels: int, decoded_bytes: int) ->
             f"{file.name}, page {page}: {pixels / 1e6:.0f} million pixels that unpack to"
             f" {decoded_bytes / 1e6:.0f} MB are more than a sheet can need;"
             " scan A3 at 600 dpi or less, in grey",
+            millions=round(pixels / 1e6),
+            unpacked=round(decoded_bytes / 1e6),
         )
 
 
@@ -191,14 +199,19 @@ def check_pages(file: InputFile, pages: int) -> None:
         raise InputFileError("pages_none", f"{file.name}: the document has no pages; export it again")
     if pages > MAX_PAGES:
         raise InputFileError(
-            "pages_too_many", f"{file.name}: {pages} pages, more than {MAX_PAGES}; split the file"
+            "pages_too_many",
+            f"{file.name}: {pages} pages, more than {MAX_PAGES}; split the file",
+            pages=pages,
+            most=MAX_PAGES,
         )
 
 
 def damaged(file: InputFile, page: int, why: str) -> InputFileError:
     """The error for an image that cannot be decoded."""
     return InputFileError(
-        "image_damaged", f"{file.name}, page {page}: the image is damaged ({why}); scan or export it again"
+        "image_damaged",
+        f"{file.name}, page {page}: the image is damaged ({why}); scan or export it again",
+        error=why,
     )
 
 

@@ -55,7 +55,10 @@ def page_of(source: InputFile | Path | str, number: int) -> Page:
         page = door.page(file, number)
     if page is None:
         raise InputFileError(
-            "page_missing", f"{file.name}: there is no page {number}; it has {count_pages(file)}"
+            "page_missing",
+            f"{file.name}: there is no page {number}; it has {count_pages(file)}",
+            wanted=number,
+            pages=count_pages(file),
         )
     grey, ruling = without_ruling(page.grey)
     return page if ruling is None else replace(page, grey=grey, ruling=ruling)
@@ -97,6 +100,7 @@ def _as_input_error(file: InputFile, door: Door, number: int) -> Iterator[None]:
         raise InputFileError(
             door.code,
             f"{file.name}, page {number}: the {door.noun} is damaged ({reason}); scan or export it again",
+            error=reason,
         ) from error
 
 

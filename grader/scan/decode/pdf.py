@@ -124,7 +124,7 @@ def _leaves(document: pikepdf.Pdf) -> list[pikepdf.Object | None]:
 
 def _unreadable(file: InputFile, number: int, why: str) -> InputFileError:
     return InputFileError(
-        "pdf_damaged", f"{file.name}, page {number}: cannot be read ({why}); export it again"
+        "pdf_damaged", f"{file.name}, page {number}: cannot be read ({why}); export it again", error=why
     )
 
 

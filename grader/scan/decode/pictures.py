@@ -213,6 +213,8 @@ def check_header(file: InputFile, page: int, data: bytes, *, least: bool = True)
         raise InputFileError(
             "image_too_large",
             f"{file.name}, page {page}: the JPEG has {scans} scans, more than {_MAX_SCANS}; save it again",
+            scans=scans,
+            most=_MAX_SCANS,
         )
     planes = _PLANES.get(sampling, 3.0) if space not in _FOUR_INKS else 4.0
     decoded = 9.0 if space in _FOUR_INKS else 0.0 if space == "Gray" else 3.0

@@ -89,7 +89,7 @@ def _page(file: InputFile, number: int) -> Page | None:
             raise damaged(file, number, "its directory cannot be read")
         _check_page(file, number, page)
         tags = tags_of(_dpi(page), int(_value(page, "Orientation", 1)))
-        damage = _fax_damage(file, page) if page.compression in _FAX else ""
+        damage = _fax_damage(file, page) if page.compression in _FAX else ()
         grey = tags.unmirrored(_grey(page))
     return Page(file.name, number, grey, tags.dpi, tags.turn_deg, damage=damage)
 
@@ -150,8 +150,8 @@ def _rows(page: tifffile.TiffPage, index: int) -> int:
     return int(min(page.rowsperstrip, page.imagelength - index % strips * page.rowsperstrip))
 
 
-def _fax_damage(file: InputFile, page: tifffile.TiffPage) -> str:
-    """Where the rows of a fax are damaged; empty where they are whole."""
+def _fax_damage(file: InputFile, page: tifffile.TiffPage) -> tuple[int, ...]:
+    """The first and last damaged row of a fax; empty where all are whole."""
     options = int(_value(page, "T4Options", 0))
     if page.compression == COMPRESSION.CCITT_T6:
         coding = Coding(k=-1)
@@ -168,8 +168,8 @@ def _fax_damage(file: InputFile, page: tifffile.TiffPage) -> str:
         row = damaged_row(data, width, rows, coding)
         if row is not None:
             first = index // across * (page.tilelength if page.is_tiled else page.rowsperstrip)
-            return f"rows {first + row + 1} to {first + rows} of {page.imagelength}"
-    return ""
+            return first + row + 1, first + rows
+    return ()
 
 
 def _grey(page: tifffile.TiffPage) -> GreyImage:

@@ -12,7 +12,7 @@ import numpy as np
 
 from grader.documents import CalibrationDocument, CalibrationPoint, CalibrationSegments
 from grader.printed.answer_sheet import calibration_segments
-from grader.records import FloatArray, Page, Unread
+from grader.records import FloatArray, Page, Reason, Unread
 from grader.scan.decode.pages import page_of
 from grader.scan.pixels import lengths_and_directions
 from grader.scan.register.distortion import straighten
@@ -58,10 +58,13 @@ def calibrate(path: Path, number: int = 1) -> CalibrationDocument | Unread:
     if isinstance(sheet, Unread):
         return sheet
     if all(problem.code != "calibration_page" for problem in sheet.problems):
-        return Unread("sheet", "this is not the calibration page: print it by `planmark sheet --calibration`")
+        return Unread("sheet", Reason("sheet_refused", {"why": "not_calibration"}))
     mm, px = middles(page)
     if len(mm) < _LEAST_MARKERS:
-        return Unread("sheet", f"{len(mm)} whole markers are seen, at least {_LEAST_MARKERS} are needed")
+        return Unread(
+            "sheet",
+            Reason("sheet_refused", {"why": "few_markers", "markers": len(mm), "least": _LEAST_MARKERS}),
+        )
     linear = _linear(mm, px)
     scanned = sheet.lens is None and linear.rms_mm < _PHOTO_MM
     straight_page, straight_sheet = straighten(page, sheet)

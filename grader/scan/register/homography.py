@@ -30,10 +30,6 @@ _SCANNERS_DPI = (100.0, 150.0, 200.0, 240.0, 300.0, 400.0, 600.0)
 """Resolutions that scanners for A4 offer."""
 UNSET_DPI = 100.0
 """Below this a stated resolution is what programs write that do not know."""
-HALVES_ADVICE = (
-    "an A3 drawing scanned in two halves on A4 cannot be put together:"
-    " scan it on an A3 scanner or photograph it whole"
-)
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ from grader.printed.layout import (
     identity_of,
     template_of,
 )
-from grader.records import FloatArray, GreyImage, Identity, Lens, Page, Problem, Sheet
+from grader.records import FloatArray, GreyImage, Identity, Lens, Page, Reason, Sheet
 from grader.scan.pixels import (
     BoolArray,
     at_full_size,
@@ -319,15 +319,14 @@ def _scale_se(fit: Projection, printed_se: float) -> float:
     return float(np.linalg.norm([printed_se, stretch, fit.rms_mm / _USUAL_LENGTH_MM]))
 
 
-def _problems(page: Page, template: Template, plain: Projection | None) -> Iterator[Problem]:
+def _problems(page: Page, template: Template, plain: Projection | None) -> Iterator[Reason]:
     if template is CALIBRATION:
-        yield Problem("calibration_page", "this is the calibration page, not a drawing", page.source)
+        yield Reason("calibration_page", {}, page.source)
     if plain is not None and plain.rms_mm > _FLAT_MM:
-        off = f"the printed markers are up to {plain.misfit_mm.max():.1f} mm off one plane"
-        yield Problem("sheet_not_flat", f"{off}: the sheet was not flat", page.source)
+        yield Reason("sheet_not_flat", {"off_mm": float(plain.misfit_mm.max())}, page.source)
 
 
-def _against_resolution(page: Page, fit: Projection, px_per_mm: float) -> tuple[float, tuple[Problem, ...]]:
+def _against_resolution(page: Page, fit: Projection, px_per_mm: float) -> tuple[float, tuple[Reason, ...]]:
     """Scale error by the stated resolution: a printer that fits pages to its paper shrinks them.
 
     A camera's resolution means nothing, and it is known by its slanted view.
@@ -340,13 +339,11 @@ def _against_resolution(page: Page, fit: Projection, px_per_mm: float) -> tuple[
         return _PRINTER_SE, ()
     if abs(size - 1.0) < _SCALE_REPORTED:
         return _printed_se(float(np.log(size))), ()
-    message = (
-        f"by the file's resolution the printed sheet has {100 * size:.1f} % of its size:"
-        " it was printed or copied at another scale, or the resolution is wrong"
-    )
     # Another format of paper cannot pass for the right size; a few per cent can.
     unsure = abs(size - 1.0) / 2.0 if abs(size - 1.0) < _SCALE_NEAR else 0.0
-    return float(np.hypot(_PRINTER_SE, unsure)), (Problem("print_scaled", message, page.source),)
+    return float(np.hypot(_PRINTER_SE, unsure)), (
+        Reason("print_scaled", {"size_percent": 100.0 * size}, page.source),
+    )
 
 
 def _printed_se(off: float) -> float:

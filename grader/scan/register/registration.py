@@ -10,13 +10,12 @@ from dataclasses import replace
 import numpy as np
 
 from grader.printed.layout import PAGE_MM
-from grader.records import FloatArray, Identity, Page, Problem, Sheet, Unread
+from grader.records import FloatArray, Identity, Page, Reason, Sheet, Unread, Value
 from grader.scan.pixels import Flat, flatten, inverted, local_axes, mapped, through_corners
 from grader.scan.register import markers
 from grader.scan.register.distortion import find_lens
 from grader.scan.register.fitting import Fit, affine_of, affine_params, fit_sides
 from grader.scan.register.homography import (
-    HALVES_ADVICE,
     PAPER,
     Outline,
     drawable,
@@ -55,13 +54,26 @@ def register(
         return printed or register_by_corners(page, corners_px), identity
     sheet = printed or _by_squares(page, register_plain(page))
     if isinstance(sheet, Unread):
-        hint = f"; the page is as large as A4, and {HALVES_ADVICE}" if looks_a4(page) else ""
-        return Unread(sheet.name, f"{sheet.reason}{hint}"), identity
+        return (_with_halves(sheet) if looks_a4(page) else sheet), identity
     share = _share_in_picture(page, sheet)
     if share < _LEAST_IN_PICTURE:
-        reason = f"only {100.0 * share:.0f} % of the sheet is in the picture; {HALVES_ADVICE}"
-        return Unread("sheet", reason), identity
+        return _with_halves(_refused("part_in_picture", share_percent=round(100.0 * share))), identity
     return sheet, identity
+
+
+def _why(why: str, **known: Value) -> Reason:
+    """Why a sheet cannot be placed: the code of the clause that says it, and what that names."""
+    return Reason("sheet_refused", {"why": why, **known})
+
+
+def _refused(why: str, **known: Value) -> Unread:
+    return Unread("sheet", _why(why, **known))
+
+
+def _with_halves(sheet: Unread) -> Unread:
+    """The same, with what to do about a sheet that was scanned in two halves."""
+    reason = sheet.reason
+    return replace(sheet, reason=replace(reason, parameters={**reason.parameters, "advice": "halves"}))
 
 
 def rectify(page: Page) -> Sheet | Unread:
@@ -89,12 +101,8 @@ def _by_squares(page: Page, sheet: Sheet | Unread) -> Sheet | Unread:
     usual = _PITCHES_MM[np.abs(np.log(pitch / _PITCHES_MM)).argmin()]
     off = float(np.log(pitch / usual))
     if abs(off) > _PITCH_WITHIN:
-        return Unread(
-            "sheet",
-            f"by the scale that was found its printed squares would be {pitch:.1f} mm, and no paper has such"
-            " ones; scan it again with the stated resolution kept",
-        )
-    told = Problem("squared_paper", f"printed squares of {usual:g} mm were taken out", page.source)
+        return _refused("odd_squares", pitch_mm=pitch)
+    told = Reason("squared_paper", {"pitch_mm": float(usual)}, page.source)
     sheet = replace(sheet, problems=(*sheet.problems, told))
     if abs(off) > _PITCH_AGREES * np.hypot(sheet.scale_se, _PITCH_SE):
         return sheet
@@ -172,11 +180,11 @@ def register_plain(page: Page) -> Sheet | Unread:
     """The map of a plain sheet, or why there is none."""
     long_px = max(page.grey.shape)
     if long_px < _LEAST_PX_PER_MM * PAGE_MM[0]:
-        return Unread("sheet", f"{long_px} pixels along the long side are too few for an A3 drawing")
+        return _refused("too_few_pixels", long_side=long_px)
     flat = flatten(page.grey)
     shape = (page.grey.shape[0], page.grey.shape[1])
     lines = long_lines(flat)
-    problems: list[Problem] = []
+    problems: list[Reason] = []
     resolution = _resolution(page, problems)
     dpi = resolution.dpi if resolution is not None and resolution.is_sure else None
     if resolution is not None and _is_copy(page):
@@ -204,7 +212,7 @@ def register_plain(page: Page) -> Sheet | Unread:
             return sheet
         return _with_lens(flat, sheet, best)
     if resolution is None:
-        return Unread("sheet", "no drawing frame, no paper edges and no resolution that fits A3 were found")
+        return _refused("nothing_found")
     return _from_resolution(page, resolution, lines, problems)
 
 
@@ -260,17 +268,13 @@ def _px_per_mm(mm_to_px: FloatArray, step_mm: float) -> float:
 
 
 def _with_rival(sheet: Sheet, rival: float) -> Sheet:
-    message = (
-        "frame and paper's edges cannot be told apart, and no resolution says which:"
-        f" lengths may be {100.0 * rival:.0f} % off; scan again with the stated resolution kept"
-    )
     file = sheet.problems[0].file if sheet.problems else None
-    problem = Problem("registration_disagrees", message, file)
+    problem = Reason("registration_disagrees", {"rival_percent": round(100.0 * rival)}, file)
     scale_se = float(np.hypot(sheet.scale_se, rival))
     return replace(sheet, scale_se=scale_se, problems=(*sheet.problems, problem))
 
 
-def _resolution(page: Page, problems: list[Problem]) -> Resolution | None:
+def _resolution(page: Page, problems: list[Reason]) -> Resolution | None:
     """The stated resolution where the page is about A3 by it, else a usual one by which it is.
 
     An image of exactly A3's pixels at a usual resolution comes from a scanner that was set to both.
@@ -279,9 +283,11 @@ def _resolution(page: Page, problems: list[Problem]) -> Resolution | None:
         return Resolution(page.dpi, stated=True, is_sure=True)
     if page.dpi is not None and not np.isclose(page.dpi[0], _DEFAULT_DPI, atol=_DPI_ROUNDING).any():
         high, wide = page.grey.shape
-        size = f"{wide / page.dpi[0] * MM_PER_INCH:.0f} x {high / page.dpi[1] * MM_PER_INCH:.0f}"
-        message = f"by its stated resolution the page is {size} mm, not A3"
-        problems.append(Problem("resolution_wrong", message, page.source))
+        size = {
+            "wide_mm": round(wide / page.dpi[0] * MM_PER_INCH),
+            "high_mm": round(high / page.dpi[1] * MM_PER_INCH),
+        }
+        problems.append(Reason("resolution_wrong", size, page.source))
         if _is_cut_off(page, page.dpi):
             return Resolution(page.dpi, stated=True, is_sure=False)
     high, wide = page.grey.shape
@@ -310,30 +316,28 @@ def _from_lines(
     best: Hypothesis,
     lines: list[LongLine],
     dpi: tuple[float, float] | None,
-    problems: list[Problem],
+    problems: list[Reason],
 ) -> Sheet | Unread:
     copied = _is_copy(page)
     try:
         fit, frame = _settled(best, dpi, copied=copied), best.frame
     except np.linalg.LinAlgError:
-        return Unread("sheet", "the long lines found do not make one sheet")
+        return _refused("no_one_sheet")
     block_mm = title_block_mm(fit.mm_to_px, drawn_ends(lines))
     stated_a3 = page.dpi is not None and page.dpi == dpi
     doubt = _doubt(best, fit, block_mm, stated_a3=stated_a3, stated_other=bool(problems))
     if doubt is None and dpi is not None and not copied and _is_at_another_scale(fit, dpi, block_mm):
-        doubt = "what could be a frame has another scale than the resolution"
+        doubt = _why("other_scale")
     if doubt is not None:
         return Unread("sheet", doubt)
     if block_mm == 0.0 and not page.turn_is_sure:
         problems.append(_unsure_upright(page))
     if fit.freedom > 0 and fit.chi2 / fit.freedom > _BAD_FIT:
-        message = f"frame, paper and resolution disagree by {fit.rms_mm:.1f} mm"
-        problems.append(Problem("registration_disagrees", message, page.source))
+        problems.append(Reason("registration_disagrees", {"off_mm": float(fit.rms_mm)}, page.source))
     scale_se = fit.scale_se
     if frame is None and dpi is None:
         scale_se = float(np.hypot(scale_se, _ASSUMED_PAPER_SE))
-        message = "only the paper's edges give the scale; taken for A3"
-        problems.append(Problem("paper_assumed", message, page.source))
+        problems.append(Reason("paper_assumed", {}, page.source))
     if copied and sum(side.model is not PAPER for side in best.sides) < _ALL_SIDES:
         scale_se = float(np.hypot(scale_se, _COPY_SE))
     return _sheet(fit, frame, scale_se, problems)
@@ -345,7 +349,9 @@ def _is_copy(page: Page) -> bool:
     return bool(np.all((sample == 0) | (sample == _WHITE)))
 
 
-def _doubt(best: Hypothesis, fit: Fit, block_mm: float, *, stated_a3: bool, stated_other: bool) -> str | None:
+def _doubt(
+    best: Hypothesis, fit: Fit, block_mm: float, *, stated_a3: bool, stated_other: bool
+) -> Reason | None:
     """Why the lines found are not enough to know the sheet, or None.
 
     Arguments: whether by its stated resolution the page is A3, or something else.
@@ -354,13 +360,13 @@ def _doubt(best: Hypothesis, fit: Fit, block_mm: float, *, stated_a3: bool, stat
     of_paper = len(best.sides) - of_frame
     both = of_frame >= _MOST_SIDES and of_paper >= _SOME_SIDES
     if not np.isfinite(fit.scale_se) or fit.scale_se > _VAGUE_SE:
-        return "the long lines found do not settle the scale"
+        return _why("scale_open")
     if fit.freedom > 0 and fit.rms_mm > _NO_FIT_MM:
-        return f"what could be frame and paper's edges disagree by {fit.rms_mm:.1f} mm: not an A3 drawing"
+        return _why("edges_disagree", off_mm=float(fit.rms_mm))
     if block_mm == 0.0 and not stated_a3 and not both:
-        return "neither a title block nor frame and paper together show that this is an A3 drawing"
+        return _why("nothing_shows_a3")
     if stated_other and not (of_frame >= _MOST_SIDES and block_mm > 0.0):
-        return "by its resolution the page is not A3, and no frame with a title block says otherwise"
+        return _why("stated_not_a3")
     return None
 
 
@@ -370,8 +376,8 @@ def _is_at_another_scale(fit: Fit, dpi: tuple[float, float], block_mm: float) ->
     return bool(off > _SCANNED_SE) and (block_mm == 0.0 or fit.chi2 > _BAD_FIT * fit.freedom)
 
 
-def _unsure_upright(page: Page) -> Problem:
-    return Problem("upright_unsure", "no title block shows which way up the sheet is", page.source)
+def _unsure_upright(page: Page) -> Reason:
+    return Reason("upright_unsure", {}, page.source)
 
 
 def _with_lens(flat: Flat, sheet: Sheet, best: Hypothesis) -> Sheet:
@@ -406,8 +412,8 @@ def _from_resolution(
     page: Page,
     resolution: Resolution,
     lines: list[LongLine],
-    problems: list[Problem],
-    doubt: str | None = None,
+    problems: list[Reason],
+    doubt: Reason | None = None,
 ) -> Sheet | Unread:
     """Scale from the resolution alone, skew from ruled lines, place from the image's middle.
 
@@ -428,22 +434,22 @@ def _from_resolution(
     else:
         block, matrix = max(tried, key=lambda one: (one[0], -off_turn_deg(one[1], page.turn_deg)))
     if not resolution.is_sure if resolution.stated else block == 0.0:
-        doubt = doubt or "no whole drawing frame, no title block or no stated resolution: not known to be A3"
+        doubt = doubt or _why("not_known_a3")
     if (doubt is not None or not resolution.stated) and looks_a4(page):
-        return Unread("sheet", doubt or "no stated resolution, and the page is as large as A4")
+        return Unread("sheet", doubt or _why("as_large_as_a4"))
     if block == 0.0 and not page.turn_is_sure:
         problems.append(_unsure_upright(page))
     if not resolution.stated:
-        message = f"no stated resolution: {resolution.dpi[0]:.0f} dpi assumed, by which the page is A3"
-        problems.append(Problem("resolution_assumed", message, page.source))
-    message = "no drawing frame: the place on the sheet is rough"
+        assumed = {"assumed_dpi": round(resolution.dpi[0])}
+        problems.append(Reason("resolution_assumed", assumed, page.source))
+    copied: dict[str, Value] = {}
     scale_se = 0.0015 if resolution.stated else _WINDOW_SE
     if _is_copy(page):
         scale_se = float(np.hypot(scale_se, _COPY_SE))
-        message += f", and a copy's lengths are known to {100.0 * _COPY_SE:.0f} % only"
-    problems.append(Problem("frame_missing", message, page.source))
+        copied = {"copy_percent": round(100.0 * _COPY_SE)}
+    problems.append(Reason("frame_missing", copied, page.source))
     if doubt is not None:
-        problems.append(Problem("scale_unknown", doubt, page.source))
+        problems.append(Reason("scale_unknown", doubt.parameters, page.source))
         scale_se = max(scale_se, _UNKNOWN_SE)
     return _sheet(_placed(matrix, resolution, lines, scale_se), None, scale_se, problems)
 
@@ -488,7 +494,7 @@ def register_by_corners(page: Page, corners_px: Sequence[tuple[float, float]]) -
     corners = np.asarray(corners_px, dtype=np.float64)
     matrix = through_corners(PAPER.corners(), corners)
     if not np.all(np.isfinite(matrix)):
-        return Unread("sheet", "the corners that were given span no sheet")
+        return _refused("corners")
     pointed = _sheet(Fit(matrix, 0.0, 0, 0.0, _CLICKED_SE, np.zeros(0)), None, _CLICKED_SE, [])
     pointed = replace(pointed, method="corners")
     flat = flatten(page.grey)
@@ -513,7 +519,7 @@ def register_by_corners(page: Page, corners_px: Sequence[tuple[float, float]]) -
     return _with_lens(flat, sheet, Hypothesis(fit.mm_to_px, perspective=True, score=0.0, sides=sides))
 
 
-def _sheet(fit: Fit, frame: Outline | None, scale_se: float, problems: list[Problem]) -> Sheet:
+def _sheet(fit: Fit, frame: Outline | None, scale_se: float, problems: list[Reason]) -> Sheet:
     matrix = fit.mm_to_px / fit.mm_to_px[2, 2]
     return Sheet(
         mm_to_px=matrix,

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from grader.records import Box, FloatArray, GreyImage, Ink, InkMap, Page, Problem, Sheet, Strokes, Unread
+from grader.records import Box, FloatArray, GreyImage, Ink, InkMap, Page, Reason, Sheet, Strokes, Unread
 from grader.scan.pixels import (
     BoolArray,
     Flat,
@@ -61,11 +61,7 @@ def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> In
     """
     grey = brightness(page, sheet, boxes)
     if grey < _DARK:
-        return Unread(
-            "ink",
-            f"half of it is as dark as {grey:.0f} of 255 or darker: a picture with its tones inverted, a"
-            " pattern, or a photo taken in the dark? Scan the sheet in greyscale, dark lines on white paper",
-        )
+        return Unread("ink", Reason("page_not_a_drawing", {"why": "dark", "grey": round(grey)}))
     flat = flatten(joined_dots(page.grey, sheet.px_per_mm))
     scale = working_scale(sheet.px_per_mm)
     reduced = flat.reduced(scale)
@@ -86,13 +82,12 @@ def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> In
     return Ink(strokes, circles, marks, _ink_map(reduced, scale, sheet), tips=tips, problems=problems)
 
 
-def _left_out(field: Field, file: str) -> tuple[Problem, ...]:
+def _left_out(field: Field, file: str) -> tuple[Reason, ...]:
     """What a person must know: that an area larger than usual title blocks was left out."""
     if field.block is None or not np.any(np.array(field.block[2:]) > _USUAL_BLOCK_MM):
         return ()
     wide, high = field.block[2:]
-    message = f"{wide:.0f} x {high:.0f} mm at the lower right were taken for the title block and left out"
-    return (Problem("title_block_unsure", message, file),)
+    return (Reason("title_block_unsure", {"wide_mm": round(wide), "high_mm": round(high)}, file),)
 
 
 def _ink_map(contrast: GreyImage, scale: float, sheet: Sheet) -> InkMap:
@@ -153,11 +148,7 @@ def find_strokes(flat: Flat, seeds: Seeds, components: Components, field: Field)
 
 
 def _too_many(count: int) -> Unread:
-    reason = (
-        f"it has about {count:,} straight strokes, a drawing a few hundred: a photo, a printed pattern, or"
-        " a picture with its tones inverted? Scan the sheet in greyscale, on plain or lightly squared paper"
-    )
-    return Unread("ink", reason)
+    return Unread("ink", Reason("page_not_a_drawing", {"why": "many_strokes", "strokes": count}))
 
 
 def take(strokes: Strokes, which: BoolArray) -> Strokes:

@@ -14,7 +14,7 @@ from grader.comparison.own import PlanBasis
 from grader.comparison.task import task_of
 from grader.marking.mark import judge
 from grader.marking.self_check import checked_values
-from grader.records import Figure, OtherReading, Reading, ReadNode, ReadVector, Unread
+from grader.records import Figure, OtherReading, Reading, ReadNode, ReadVector, Reason, Unread
 from grader.rubric import Band, CriterionTable, DoubtTable, ToleranceTable, load_rubric
 from reference.authored.assignment import load_assignment
 from reference.construction.mistakes import Mistake
@@ -281,16 +281,19 @@ def test_a_vector_too_short_to_draw_is_not_asked_for():
 
 @pytest.mark.parametrize("named", ["v_D", "d"])
 def test_what_was_not_read_goes_to_a_person_with_the_reason(named):
-    reading = replace(without(sheet(PUMP), "v_D"), unread=(Unread(named, "torn off"),))
+    reading = replace(without(sheet(PUMP), "v_D"), unread=(Unread(named, Reason("torn_off")),))
     outcome = outcome_of(compare(PUMP, Submission(readings=(reading,))), "v_D")
     assert outcome.verdict == "review"
-    assert outcome.reasons[0].params["reason"] == "torn off"
+    assert outcome.reasons[0].parameters["why"] == "torn_off"
 
 
 def entered(task, name, *change, **values):
     """All vectors measured, with something that was entered for a name refused."""
     reading = change[0] if change else measured(task)
-    return Submission(measured=replace(reading, unread=(Unread(name, f"{name}: 'x'"),)), **values)
+    return Submission(
+        measured=replace(reading, unread=(Unread(name, Reason("entry", {"entries": (f"{name}: 'x'",)})),)),
+        **values,
+    )
 
 
 def test_a_vector_of_which_the_direction_was_refused_waits_for_a_person():
@@ -298,7 +301,7 @@ def test_a_vector_of_which_the_direction_was_refused_waits_for_a_person():
     comparison = compare(PUMP, entered(PUMP, "v_B", lengths))
     outcome = outcome_of(comparison, "v_B")
     assert (outcome.verdict, outcome.possible, outcome.shares) == ("review", ("none", "full"), (0.0, 1.0))
-    assert outcome.reasons[0].params["reason"] == "v_B: 'x'"
+    assert outcome.reasons[0].parameters["entries"] == ("v_B: 'x'",)
     assert lost(comparison) == ["v_B"]
 
 
@@ -493,7 +496,7 @@ def test_another_assembly_costs_once_although_no_criterion_is_the_mechanism():
     none = [name for name, verdict in verdicts(comparison).items() if verdict == "none"]
     assert none == ["v_D"]
     assert outcome_of(comparison, "v_DC").verdict == "follow_through"
-    assert outcome_of(comparison, "v_DC").reasons[0].params["of"] in {"mechanism", "v_D"}
+    assert outcome_of(comparison, "v_DC").reasons[0].parameters["of"] in {"mechanism", "v_D"}
 
 
 def test_a_normal_component_follows_from_the_own_velocity_by_its_length_alone():
@@ -502,7 +505,7 @@ def test_a_normal_component_follows_from_the_own_velocity_by_its_length_alone():
     assert outcome_of(comparison, "v_DC").verdict == "none"
     outcome = outcome_of(comparison, "a_DC_n")
     assert outcome.verdict == "follow_through"
-    assert outcome.reasons[0].params["of"] == "v_DC"
+    assert outcome.reasons[0].parameters["of"] == "v_DC"
 
 
 @pytest.mark.parametrize("directions", [True, False])
@@ -563,7 +566,9 @@ def test_a_loss_is_open_while_what_it_may_follow_from_is_not_known():
     outcome = outcome_of(comparison, "v_D")
     assert outcome.verdict == "review"
     assert outcome.possible == ("none", "follow_through")
-    assert "c, on which it hangs" in outcome.reasons[-1].params["reason"]
+    known = outcome.reasons[-1].parameters
+    assert known["why"] == "upstream_unsure"
+    assert "c" in known["nodes"]
     certain = compare(PUMP, Submission(readings=(reading,)))
     # The other line, of v_DC, is the wrong one: the guide is right.
     assert outcome_of(certain, "v_DC").verdict == "none"

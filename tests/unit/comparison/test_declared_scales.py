@@ -9,6 +9,7 @@ from grader.comparison.task import task_of
 from grader.inputs.scale_text import SURE, sure_texts
 from grader.records import MECHANISM, Figure, Reading, ReadNode, Written
 from grader.rubric import load_rubric
+from grader.texts.spoken import message
 from reference.authored.assignment import load_assignment
 
 FIRM, LIKELY, FAIR, DOUBTFUL = (
@@ -55,7 +56,7 @@ def test_a_doubtful_box_is_told_with_what_it_seems_to_read_and_not_used(task):
     found = declarations(task, {}, [reading(RULED, DOUBTFUL)])
     assert found.texts == {}
     assert codes(found) == ["scale_box_doubtful"]
-    assert RULED in found.problems[0].message
+    assert RULED in message(found.problems[0])
 
 
 def test_a_fairly_read_box_counts_only_where_it_says_the_very_scale_of_the_rule(task):
@@ -106,8 +107,10 @@ def test_of_two_scales_that_contradict_each_other_none_counts_nor_does_the_box(t
     sources = {"roster": {"kL": OTHER}, "measurements": {"kL": entered}}
     found = declarations(task, sources, [reading(RULED, FIRM)])
     assert (found.texts, codes(found)) == ({}, ["scale_disagrees"])
-    assert f"'{OTHER}' in the roster, '{entered}' in the measurements" in found.problems[0].message
-    assert [(gap.name, gap.reason) for gap in found.unread] == [("kL", f"'{OTHER}' / '{entered}'")]
+    assert f"'{OTHER}' in the roster, '{entered}' in the measurements" in message(found.problems[0])
+    assert [(gap.name, *gap.reason.parameters["entries"]) for gap in found.unread] == [
+        ("kL", f"'{OTHER}' / '{entered}'")
+    ]
 
 
 def test_two_files_of_measurements_may_contradict_each_other(task):

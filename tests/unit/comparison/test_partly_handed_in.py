@@ -12,7 +12,7 @@ from grader.comparison.task import task_of
 from grader.comparison.verdicts import both
 from grader.documents import Quantity
 from grader.marking.mark import judge
-from grader.records import Figure, ReadVector, Unread
+from grader.records import Figure, ReadVector, Reason, Unread
 from grader.rubric import CriterionTable
 from reference.authored.toml_file import Text
 from reference.construction.mistakes import Mistake
@@ -53,7 +53,7 @@ def test_a_link_is_not_judged_without_a_sketch():
 
 def test_a_vector_between_two_nodes_that_were_read_is_known_to_be_left_out():
     whole = judge(PUMP, Submission(readings=(sheet(PUMP),)))
-    blank = (Unread("v_DC", "nothing is drawn between c and d", is_blank=True),)
+    blank = (Unread("v_DC", Reason("blank", {"start": "c", "end": "d"}), is_blank=True),)
     part = judge(PUMP, Submission(readings=(replace(without(sheet(PUMP), "v_DC"), unread=blank),)))
     unread = judge(PUMP, Submission(readings=(without(sheet(PUMP), "v_DC"),)))
     assert whole.mistakes == unread.mistakes == ()

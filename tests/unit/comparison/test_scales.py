@@ -75,7 +75,7 @@ def test_a_scale_declared_without_unit_is_refused_and_reviewed_while_the_rest_is
     outcome = outcome_of(comparison, "kv")
     assert outcome.verdict == "review"
     assert codes(outcome)[0] == "scale_refused"
-    assert "no unit" in comparison.scales["kv"].refused
+    assert comparison.scales["kv"].refused.code == "no_unit"
     assert comparison.scales["kv"].assumed
     assert outcome_of(comparison, "v_B").verdict == "full"
 
@@ -93,7 +93,7 @@ def test_a_wrong_scale_costs_once(factor):
     assert outcome_of(comparison, "v_A").verdict == "follow_through"
     assert outcome_of(comparison, "a_A").verdict == "full"
     reason = outcome_of(comparison, "v_B").reasons[0]
-    assert (reason.code, reason.params["what"], reason.params["of"]) == ("follows", "scale", "kv")
+    assert (reason.code, reason.parameters["what"], reason.parameters["of"]) == ("follows", "scale", "kv")
     assert outcome_of(comparison, "kv").expected.value == pytest.approx(RULE["kv"], rel=ROUNDING)
 
 

@@ -1,8 +1,8 @@
 import pytest
 
 from grader.comparison.evidence import DrawnVector, held_against_cells
-from grader.feedback.sentences import FULL, HINTS
 from grader.rubric import ToleranceTable
+from grader.texts.reasons import FULL, HINTS
 
 TOLERANCE = ToleranceTable(length_mm=1.0, length_relative=0.02)
 SURE, LEAST = 0.97, 0.9
@@ -19,7 +19,7 @@ def test_a_written_length_far_from_the_drawn_one_makes_the_reading_doubtful_and_
     assert confidence < 0.9
     assert reasons[0].code == "written_disagrees"
     assert "written_disagrees" in HINTS.keys() & FULL.keys()
-    assert dict(reasons[0].params) == {"drawn": 46.4, "written": 64.4, "unit": "mm"}
+    assert dict(reasons[0].parameters) == {"drawn": 46.4, "written": 64.4, "unit": "mm"}
 
 
 @pytest.mark.parametrize("off_mm", [-RULER_MM, 0.0, RULER_MM, 0.9])

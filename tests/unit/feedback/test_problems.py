@@ -4,9 +4,9 @@ import re
 from pathlib import Path
 
 from grader.documents import ProblemDocument, UnmatchedDocument
-from grader.feedback.photos import FLAWS
-from grader.feedback.words import PROBLEMS, problem_sentence, unmatched_sentence
+from grader.feedback.words import problem_sentence, unmatched_sentence
 from grader.language import tongue
+from grader.texts.problems import PROBLEMS
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "errors.md"
 
@@ -14,15 +14,14 @@ ABOUT = ("Problems of a page", "Problems of a submission", "Problems of a class"
 
 
 def test_every_documented_problem_is_told_in_the_readers_language():
-    sections = DOCUMENT.read_text(encoding="utf-8").split("\n## ")
+    text = DOCUMENT.read_text(encoding="utf-8")
+    sections = text.split("\n## ")
     about = [s for s in sections if s.startswith(ABOUT)]
     lines = [line.split("|") for section in about for line in section.splitlines() if line.startswith("| `")]
-    # What is said of answer sheets is said at their printing, in the terminal.
-    rows = [codes for _, codes, meaning, *_ in lines if "answer sheet" not in meaning]
-    documented = {code for row in rows for code in re.findall(r"`(\w+)`", row)}
+    documented = {code for _, codes, *_ in lines for code in re.findall(r"`(\w+)`", codes)}
     assert len(documented) > 20
-    # What spoils a picture is a sentence in the reader's language from the beginning.
-    assert documented - {*PROBLEMS, *FLAWS, "corner_cut"} == set()
+    assert documented - set(PROBLEMS) == set()
+    assert [code for code in PROBLEMS if f"`{code}`" not in text] == []
 
 
 def test_english_readers_get_the_programs_own_more_precise_words():
@@ -31,9 +30,10 @@ def test_english_readers_get_the_programs_own_more_precise_words():
 
 
 def test_others_get_a_sentence_and_those_words_beside_it():
-    told = problem_sentence(ProblemDocument(code="pdf_encrypted", message="a.pdf: page 3 asks"), tongue("ro"))
+    asks = ProblemDocument(code="pdf_encrypted", message="page 3 asks", parameters={"detail": "page 3 asks"})
+    told = problem_sentence(asks, tongue("ro"))
     assert told.text.startswith("PDF-ul cere o parolă")
-    assert told.detail == "a.pdf: page 3 asks"
+    assert told.detail == "page 3 asks"
 
 
 def test_an_unknown_problem_is_told_by_its_words():

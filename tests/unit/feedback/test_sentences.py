@@ -8,9 +8,11 @@ import pytest
 from grader import outcomes
 from grader.documents import Quantity, Tolerance
 from grader.feedback.mistakes import MISTAKES
-from grader.feedback.sentences import FULL, HINTS, criterion_feedback, mistake_feedback, reason_sentence
+from grader.feedback.sentences import criterion_feedback, mistake_feedback
 from grader.language import LANGUAGES, tongue
-from grader.outcomes import NamedMistake, Outcome, Reason
+from grader.outcomes import NamedMistake, Outcome
+from grader.records import Reason
+from grader.texts.reasons import FULL, HINTS, reason_sentence
 from reference.construction.mistakes import CODES, Mistake
 
 TOO_LONG = Reason("too_long", {"measured_mm": 49.5, "expected_mm": 47.2, "off_mm": 2.3, "tolerance_mm": 1.0})
@@ -89,16 +91,19 @@ def test_what_waits_for_a_person_says_why():
 
 
 @pytest.mark.parametrize(
-    ("reason", "told"),
+    ("known", "told"),
     [
-        ("no stroke between o' and b' could be told apart", "nu s-a distins nicio linie între o' și b'"),
-        ("no velocity plan was found on the sheets", "nu s-a găsit planul vitezelor"),
-        ("not drawn: c found by similarity", "c a fost găsit prin asemănare"),
-        ("something new", "something new"),
+        ({"why": "no_stroke", "start": "o'", "end": "b'"}, "nu s-a distins nicio linie între o' și b'"),
+        ({"why": "no_velocity_plan"}, "nu s-a găsit planul vitezelor"),
+        ({"why": "by_similarity", "node": "c"}, "c a fost găsit prin asemănare"),
+        (
+            {"why": "scale_vector_unsure", "vector": "v_A"},
+            "v_A, care o arată, nu a fost citit cu certitudine",
+        ),
     ],
 )
-def test_why_something_was_not_read_is_told_in_the_language(reason, told):
-    assert told in reason_sentence(Reason("unread", {"reason": reason}), tongue("ro"), "full")
+def test_why_something_was_not_read_is_told_in_the_language(known, told):
+    assert told in reason_sentence(Reason("unread", known), tongue("ro"), "full")
 
 
 def test_of_several_limits_that_are_near_one_is_told():
@@ -127,7 +132,7 @@ def test_what_is_not_required_is_not_called_missing_too():
 
 
 def test_what_was_read_is_not_called_unread():
-    unread = Reason("unread", {"reason": "n_BA, on which it hangs, was not read for certain"})
+    unread = Reason("unread", {"why": "upstream_unsure", "nodes": ("n_BA",)})
     doubtful = Reason("doubtful", {"confidence": 0.4})
     read = replace(
         outcome("review", doubtful, unread), measured=Quantity(length_mm=48.1, direction_deg=255.0)
@@ -204,5 +209,5 @@ def test_names_are_those_that_the_students_know():
 
 
 def test_a_students_text_with_a_per_cent_sign_does_no_harm():
-    refused = Reason("scale_refused", {"text": "50%(x)s", "why": "no unit"})
+    refused = Reason("scale_refused", {"text": "50%(x)s", "why": "beside_equals", "examples": ("1:5",)})
     assert "50%(x)s" in reason_sentence(refused, tongue("en"), "full")

@@ -79,7 +79,7 @@ def test_a_file_that_is_nobodys_and_no_drawing_is_told_as_both(class_folder, tmp
     (class_folder / "notes.txt").write_text("hello")
     results, _ = run(class_folder, tmp_path / "out")
     (told,) = [one.message for one in results.unmatched if one.file == "notes.txt"]
-    assert "nothing says whose it is" in told
+    assert "Nothing says whose page this is" in told
     assert "JPEG, PNG, TIFF or PDF" in told
 
 

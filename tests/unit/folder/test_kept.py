@@ -37,10 +37,10 @@ from grader.records import (
     Figure,
     Page,
     PageRef,
-    Problem,
     Reading,
     ReadNode,
     ReadVector,
+    Reason,
     ScannedPage,
     Sheet,
     Swapped,
@@ -69,7 +69,10 @@ def drawn_exactly(n, off_mm=0.0):
         if name.startswith("v")
     }
     nodes = {"o": ReadNode(100.0 - 80.0j, 0.01 * np.eye(2), 0.99)}
-    return Reading({"velocity_plan": Figure(nodes, vectors)}, (Unread("v_CB", "hidden"),))
+    return Reading(
+        {"velocity_plan": Figure(nodes, vectors)},
+        (Unread("v_CB", Reason("upstream_unsure", {"nodes": ("n_CA", "c")})),),
+    )
 
 
 class Reader:
@@ -83,7 +86,10 @@ class Reader:
         reading = drawn_exactly(submission.variant.n, off_mm=self.off_mm)
         return [
             replace(
-                page, reading=reading, problems=(Problem("told", "something", page.ref.file),), timing_ms={}
+                page,
+                reading=reading,
+                problems=(Reason("told", {"detail": "something"}, page.ref.file),),
+                timing_ms={},
             )
             for page in pages
         ]
@@ -208,7 +214,7 @@ class SlowStrokes(Inline):
 
     def run(self, function, calls, sheets=()):
         if function is identify_page:
-            yield from enumerate([Problem("too_slow", "took more than 60 s")] * len(calls))
+            yield from enumerate([Reason("too_slow", {"detail": "took more than 60 s"})] * len(calls))
         else:
             yield from super().run(function, calls, sheets)
 
@@ -219,7 +225,7 @@ def test_a_page_whose_strokes_take_too_long_still_has_the_owner_that_its_code_sa
         [path], path.parent, None, SlowStrokes(), lambda *_: None, PageCache(tmp_path / "pages")
     )
     (page,) = contents[0].pages
-    assert page.problem == Problem("too_slow", "took more than 60 s", "s06_1.jpg")
+    assert page.problem == Reason("too_slow", {"detail": "took more than 60 s"}, "s06_1.jpg")
     assert page.identity is not None
     assert page.identity.student_id == "s06"
 
@@ -291,13 +297,21 @@ def test_cells_that_moved_are_read_again_on_printed_sheets_alone(tmp_path):
     before, after = PageCache(tmp_path, printed_key="before"), PageCache(tmp_path, printed_key="after")
     for page in (plain, printed):
         store_reading(
-            tmp_path, "s1", "key", [replace(page, ref=PageRef("s1", problem=Problem("a", "b")))], before
+            tmp_path,
+            "s1",
+            "key",
+            [replace(page, ref=PageRef("s1", problem=Reason("a", {"detail": "b"})))],
+            before,
         )
         assert (cached_reading(tmp_path, "s1", "key", after) is None) == (page is printed)
 
 
 def test_a_reading_is_not_found_under_another_key_nor_half_written(tmp_path, monkeypatch):
-    pages = [ScannedPage(PageRef("s1.png", problem=Problem("told", "something")), reading=drawn_exactly(4))]
+    pages = [
+        ScannedPage(
+            PageRef("s1.png", problem=Reason("told", {"detail": "something"})), reading=drawn_exactly(4)
+        )
+    ]
     cache = PageCache(tmp_path)
     store_reading(tmp_path, "s1", "one", pages, cache)
     assert cached_reading(tmp_path, "s1", "one", cache) is not None

@@ -3,6 +3,7 @@ import pytest
 from grader.folder.owners import How, assign_pages, student_of_name
 from grader.inputs.roster import parse_roster
 from grader.records import Identity, PageRef
+from grader.texts.spoken import message
 
 THREE = parse_roster("student_id,name,n\ns1,A,1\ns2,B,2\ns_3,C,3\n")
 
@@ -92,8 +93,8 @@ def test_two_sources_that_disagree_leave_the_page_unmatched_with_both_told(roste
     assert not found.owned
     (loose,) = found.unmatched
     assert loose.problem.code == "owner_disagree"
-    assert "s2" in loose.problem.message
-    assert ";" in loose.problem.message
+    assert "s2" in message(loose.problem)
+    assert ";" in message(loose.problem)
 
 
 def test_a_code_of_a_stranger_or_of_another_assignment_matches_nobody():
@@ -191,7 +192,7 @@ def test_scans_that_are_not_there_are_told():
     roster = parse_roster("student_id,name,scans\ns1,A,Scan.jpg\ns2,B,class.pdf#9\n")
     found = assign_pages([*class_file("x"), PageRef("scan.jpg", 1, 1)], roster, "pump")
     assert [problem.code for problem in found.problems] == ["scan_missing", "scan_missing"]
-    assert "is scan.jpg meant?" in found.problems[0].message
+    assert "Is scan.jpg meant?" in message(found.problems[0])
 
 
 def test_without_a_roster_codes_and_names_say_who_the_students_are():
@@ -211,7 +212,7 @@ def test_without_a_roster_nobody_is_called_as_no_folder_can_be():
     found = assign_pages([PageRef(file, 1, 1) for file in files], None, "pump")
     assert sorted([*owners(found), *codes(found)]) == sorted(files)
     assert len(owners(found)) == 1
-    told = {str(loose.source): loose.problem.message for loose in found.unmatched}
+    told = {str(loose.source): message(loose.problem) for loose in found.unmatched}
     assert "a file of the results has that name" in told["results.json.jpg"]
     assert "Windows has a device of that name" in told["CON.jpg"]
 

@@ -15,7 +15,7 @@ from pebble.pool.process import WORKERS_NAME
 
 from grader.folder import workers as workers_module
 from grader.folder.workers import Limits, Workers, result_of
-from grader.records import Problem
+from grader.records import Reason
 from reference.errors import InputFileError
 from tests.examples import slow
 from tests.unit.folder import calls
@@ -32,7 +32,7 @@ def codes(jobs, work):
         results = dict(workers.run(calls.does, work))
     assert sorted(results) == list(range(len(work)))
     return [
-        results[index].code if isinstance(results[index], Problem) else results[index]
+        results[index].code if isinstance(results[index], Reason) else results[index]
         for index in range(len(work))
     ]
 
@@ -67,7 +67,7 @@ def test_a_call_of_several_sheets_has_the_time_of_all_of_them(monkeypatch):
     monkeypatch.setattr(workers_module, "_PATIENCE", 1)
     with Workers(1, Limits(seconds=1.0), calls.__name__) as workers:
         assert result_of(workers, calls.sleeps, 1.5, sheets=3) == 1.5
-        with pytest.raises(InputFileError, match="more than 1 s"):
+        with pytest.raises(InputFileError, match=r"more than 1\ss"):
             result_of(workers, calls.sleeps, 600)
 
 

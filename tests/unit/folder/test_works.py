@@ -6,7 +6,7 @@ from grader.folder.owners import How, Owned, PageOwners, Unmatched
 from grader.folder.submissions import Unusable, submissions_of
 from grader.inputs.measurements import Measurements
 from grader.inputs.roster import Roster, RosterRow
-from grader.records import PageRef, Problem, Reading
+from grader.records import PageRef, Reading, Reason
 from reference.authored.assignment import Variant, load_assignment
 
 PUMP = load_assignment("pump")
@@ -58,7 +58,7 @@ def test_measurements_of_somebody_who_is_not_on_the_roster_are_told():
     found, strangers = works(PUMP, roster, owners(), [entered("zz", n=5)])
     assert [work.student_id for work in found] == ["s1"]
     assert strangers[0].code == "measurements_unmatched"
-    assert "line 2" in strangers[0].message
+    assert "Line 2" in strangers[0].message
 
 
 def test_without_a_roster_each_measured_student_has_a_work():
@@ -110,7 +110,7 @@ def test_a_file_whose_name_and_content_name_two_students_is_used_for_neither():
     assert (first.measured, second.measured) == (None, own)
     assert first.has_unusable
     assert codes(first)[0] == codes(second)[0] == "owner_disagree"
-    assert "s1.json: the file's name says s1, what is in it s2" in first.problems[0].message
+    assert dict(first.problems[0].parameters) == {"by_name": "s1", "by_content": "s2"}
     assert [(one.file, one.code) for one in strangers] == [("s1.json", "owner_disagree")]
 
 
@@ -143,24 +143,26 @@ def test_a_students_file_that_names_nobody_belongs_to_whom_its_name_tells():
 
 
 def test_a_line_whose_student_is_refused_belongs_to_nobody():
-    line = replace(entered(None), problems=(Problem("measurement_fault", "line 2: 'CON' is refused"),))
+    line = replace(
+        entered(None), problems=(Reason("measurement_fault", {"detail": "line 2: 'CON' is refused"}),)
+    )
     found, strangers = works(PUMP, ROSTER, owners(), [line])
     assert not any(work.measured or work.has_unusable for work in found)
-    assert "class.csv: line 2: 'CON' is refused" in strangers[0].message
+    assert (strangers[0].file, strangers[0].message) == ("class.csv", "line 2: 'CON' is refused")
 
 
 def test_a_line_of_which_nothing_can_be_used_is_its_students():
-    fault = Problem("measurement_fault", "line 2: has 9 fields", "class.csv")
+    fault = Reason("measurement_fault", {"detail": "line 2: has 9 fields"}, "class.csv")
     found, strangers = works(
         PUMP, ROSTER, owners(), [replace(entered("s1"), is_usable=False, problems=(fault,))]
     )
     assert (found[0].measured, found[0].has_unusable, found[0].problems[0]) == (None, True, fault)
-    assert [one.message for one in strangers] == [fault.message]
+    assert [one.message for one in strangers] == ["line 2: has 9 fields"]
 
 
 def test_a_file_that_cannot_be_used_is_told_to_those_whom_its_name_or_content_tells():
-    fault = Problem("measurements", "s1.json: cannot be used", "s1.json")
-    class_file = Problem("measurements", "class.csv: cannot be used", "class.csv")
+    fault = Reason("measurements", {"detail": "s1.json: cannot be used"}, "s1.json")
+    class_file = Reason("measurements", {"detail": "class.csv: cannot be used"}, "class.csv")
     refused = [Unusable((fault,)), Unusable((class_file,), ("s2", "zz"))]
     found, strangers = submissions_of(PUMP, ROSTER, owners(), [], "en", refused=refused)
     assert [(work.student_id, work.has_unusable, codes(work)) for work in found] == [
@@ -171,7 +173,7 @@ def test_a_file_that_cannot_be_used_is_told_to_those_whom_its_name_or_content_te
 
 
 def test_without_a_roster_a_students_file_that_cannot_be_used_is_a_submission():
-    fault = Problem("measurements", "s1.json: cannot be used", "s1.json")
+    fault = Reason("measurements", {"detail": "s1.json: cannot be used"}, "s1.json")
     found, _ = submissions_of(PUMP, None, owners(), [], "en", refused=[Unusable((fault,))])
     assert [(work.student_id, work.has_unusable) for work in found] == [("s1", True)]
 
@@ -194,7 +196,7 @@ def test_measurements_that_may_be_of_several_positions_are_told_at_each():
 
 
 def test_a_page_on_whose_owner_sources_disagree_is_told_to_each_of_them():
-    problem = Problem("owner_disagree", "x.jpg: the QR code: s1; the file's name: s2", "x.jpg")
+    problem = Reason("owner_disagree", {"detail": "x.jpg: the QR code: s1; the file's name: s2"}, "x.jpg")
     pages = PageOwners((), (Unmatched(PageRef("x.jpg", 1, 1), problem, ("s1", "s2")),), ())
     found, strangers = works(PUMP, ROSTER, pages)
     assert all(work.has_unusable and work.problems[0] == problem for work in found)

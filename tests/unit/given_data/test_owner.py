@@ -8,13 +8,13 @@ import pytest
 
 from grader.comparison.evidence import Submission, gather
 from grader.comparison.task import Task, task_of
-from grader.feedback.sentences import reason_sentence
 from grader.given_data.owner import owner_of
 from grader.given_data.sets import AT_SCALE_ONE, CRANK, drawn_with_mistakes, mistakes_in_plans
 from grader.language import tongue
 from grader.marking.mark import judge
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Reading
 from grader.rubric import DoubtTable
+from grader.texts.reasons import reason_sentence
 from reference.authored.assignment import Variant
 from reference.construction.graph import evaluate
 from reference.construction.mistakes import Drawing, Mistake, commit
@@ -149,7 +149,7 @@ def test_what_is_less_sure_is_left_to_a_person_with_the_number_without_a_name(mo
     first = [one.reasons[0] for one in judgement.outcomes if one.verdict == "review"]
     asked = [one for one in first if one.code == "data_unclear"]
     assert asked
-    assert str(asked[0].params["whose"]).startswith("n = 20")
+    assert str(asked[0].parameters["whose"]).startswith("n = 20")
     assert "(n = 20" in reason_sentence(asked[0], tongue("en"), "full")
 
 

@@ -5,6 +5,7 @@ import json
 import pytest
 
 from grader.inputs.measurements import MAX_BYTES, combined, names_of, read_measurements, students_in
+from grader.texts.spoken import message
 from reference.authored.assignment import load_assignment
 from reference.errors import InputFileError
 
@@ -29,7 +30,7 @@ def vector(measurements, name):
 
 
 def told(measurements):
-    return " | ".join(problem.message for problem in measurements.problems)
+    return " | ".join(message(problem) for problem in measurements.problems)
 
 
 # CSV ----------------------------------------------------------------------------------------------
@@ -72,8 +73,8 @@ def test_a_column_that_is_not_known_is_told_and_loses_nothing_else(entered):
     first, second = entered("student_id,n,v_A,v_BAA,colour\ns01,7,60,58,red\ns02,8,61,,\n")
     assert vector(first, "v_A").length_mm == 60.0
     assert [problem.code for problem in first.problems] == ["measurement_columns"] * 2
-    assert "v_BAA" in first.problems[0].message
-    assert "did you mean v_BA" in first.problems[0].message
+    assert "v_BAA" in message(first.problems[0])
+    assert "did you mean v_BA" in message(first.problems[0])
     assert "v_BA" in {gap.name for gap in first.reading.unread}
     assert first.is_usable
     assert not second.problems
@@ -101,8 +102,8 @@ def test_faults_are_told_in_the_readers_language(tmp_path, lang, line):
     (tmp_path / "mine.csv").write_text("v_A,kv\nx,1\n", encoding="utf-8")
     (one,) = read_measurements(tmp_path / "mine.csv", NAMES, lang=lang, is_own=True)
     (problem,) = one.problems
-    assert problem.message.startswith(f"{line}, v_A: 'x': ")
-    assert "number" not in problem.message
+    assert message(problem).startswith(f"{line}, v_A: 'x': ")
+    assert "number" not in message(problem)
 
 
 @pytest.mark.parametrize(
@@ -144,7 +145,9 @@ def test_a_student_id_that_is_none_is_refused(entered, student_id):
 )
 def test_a_refused_value_is_carried_with_what_was_entered(entered, column, cell):
     (one,) = entered(f"student_id,{column},v_B\ns01,{cell},58\n")
-    assert [(gap.name, gap.reason) for gap in one.reading.unread] == [("v_A", f"{column}: '{cell}'")]
+    assert [(gap.name, ", ".join(gap.reason.parameters["entries"])) for gap in one.reading.unread] == [
+        ("v_A", f"{column}: '{cell}'")
+    ]
     assert one.numbers == {"v_B": 58.0}
 
 
@@ -166,7 +169,7 @@ def test_no_more_faults_are_told_than_a_person_reads(entered):
     vectors = list(NAMES.vectors)[:30]
     (one,) = entered(f"student_id,{','.join(vectors)}\ns01{',x' * 30}\n")
     assert len(one.problems) == 21
-    assert one.problems[-1].message == "... and 10 more faults"
+    assert message(one.problems[-1]) == "... and 10 more faults"
     assert len(one.reading.unread) == 30
 
 
@@ -290,7 +293,7 @@ def test_a_students_file_need_not_name_its_student(entered):
 def test_a_refused_value_of_a_students_file_costs_that_value_alone(entered, change, where, entry):
     (one,) = entered(json.dumps(GOOD | change), "s07.json")
     assert where in told(one)
-    assert [gap.reason for gap in one.reading.unread] == [entry]
+    assert [", ".join(gap.reason.parameters["entries"]) for gap in one.reading.unread] == [entry]
     assert vector(one, "v_B").length_mm == 58.0
     assert one.scales["kL"] == "1:5"
 
@@ -305,7 +308,9 @@ def test_a_number_that_no_computer_number_can_be_is_refused_alone(entered, numbe
 def test_a_misspelt_name_is_told_and_what_it_may_have_been_meant_for_is_not_judged(entered):
     (one,) = entered('{"segments_mm": {"v_BAA": 12, "v_A": 60}}', "s07.json")
     assert "$.segments_mm.v_BAA: is not known here; did you mean v_BA" in told(one)
-    assert ("v_BA", "v_BAA: '12'") in [(gap.name, gap.reason) for gap in one.reading.unread]
+    assert ("v_BA", "v_BAA: '12'") in [
+        (gap.name, ", ".join(gap.reason.parameters["entries"])) for gap in one.reading.unread
+    ]
     assert "v_A" not in {gap.name for gap in one.reading.unread}
     assert one.numbers == {"v_A": 60.0}
 
@@ -364,7 +369,7 @@ def test_sets_that_agree_are_taken_together(entered):
     assert both.numbers == {"v_A": 60.0, "v_B": 58.0, "v_B_deg": 12.0, "omega_3_value": -4.0}
     assert both.reading.unread == ()
     assert [problem.code for problem in both.problems] == ["measurements_twice"]
-    assert "a.csv, line 2 and b.csv, line 2" in told(both)
+    assert "a.csv, line 2, b.csv, line 2" in told(both)
     assert both.further_scales == (second.scales,)
 
 
@@ -373,7 +378,9 @@ def test_of_a_value_in_which_two_sets_differ_neither_counts(entered):
     (second,) = entered("student_id,v_A,v_A_deg\ns01,65,10\n", "b.csv")
     both = combined([first, second])
     assert both.numbers == {"v_A_deg": 10.0}
-    assert [(gap.name, gap.reason) for gap in both.reading.unread] == [("v_A", "v_A: 60 / 65")]
+    assert [(gap.name, ", ".join(gap.reason.parameters["entries"])) for gap in both.reading.unread] == [
+        ("v_A", "v_A: 60 / 65")
+    ]
     assert "v_A: 60 (a.csv, line 2), 65 (b.csv, line 2)" in told(both)
 
 

@@ -1,6 +1,7 @@
 import pytest
 
 from grader.inputs.roster import ScanRef, parse_roster, parse_scan, read_roster
+from grader.texts.spoken import message
 from reference.errors import AuthoredFileError
 
 
@@ -165,7 +166,7 @@ def test_an_id_that_only_begins_like_a_device_is_none(student):
 def test_columns_without_number_are_passed_over_without_being_listed_one_by_one():
     columns = ",".join(f"extra{number}" for number in range(20_000))
     (problem,) = parse_roster(f"student_id,name,{columns}\ns1,A\n").problems
-    assert problem.message.endswith("extra19 and 19980 more")
+    assert message(problem).endswith("extra19, and 19980 more.")
 
 
 def test_a_page_is_one_students_however_many_lines_name_the_file():

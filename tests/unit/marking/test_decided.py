@@ -8,7 +8,8 @@ from grader.documents import Quantity, Tolerance
 from grader.inputs.decisions import Decision
 from grader.marking.decided import decide
 from grader.marking.mark import score
-from grader.outcomes import Judgement, NamedMistake, Outcome, Reason
+from grader.outcomes import Judgement, NamedMistake, Outcome
+from grader.records import Reason
 from grader.rubric import load_rubric
 from reference.construction.mistakes import Mistake
 

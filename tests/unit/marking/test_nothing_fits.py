@@ -50,7 +50,7 @@ def test_the_report_and_the_sentence_count_the_vectors():
     of = judgement.unfit.of
     assert (
         problem.message
-        == f"these vectors do not belong together: {judgement.unfit.vectors} of {of} fit nothing"
+        == f"These vectors do not belong together: {judgement.unfit.vectors} of {of} fit nothing."
     )
     waiting = next(one for one in judgement.outcomes if one.verdict == "review")
     assert f"{judgement.unfit.vectors} of {of}" in criterion_feedback(waiting, "en")

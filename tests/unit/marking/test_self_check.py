@@ -39,14 +39,14 @@ def test_a_hint_says_in_which_way_without_a_number():
     assert one.expected is None
     for checked in self_check(PUMP, Submission(measured=TOO_LONG), "hint"):
         for reason in checked.reasons:
-            assert not any(isinstance(value, float) for value in reason.params.values())
+            assert not any(isinstance(value, float) for value in reason.parameters.values())
 
 
 def test_an_instructor_sees_the_numbers():
     one = found(self_check(PUMP, Submission(measured=TOO_LONG), "full"), "v_D")
     assert one.measured.length_mm == 99.0
     assert one.expected.length_mm == pytest.approx(abs(PUMP.real["v_D"]) / float(PUMP.parameters["kv"]))
-    assert "expected_mm" in one.reasons[0].params
+    assert "expected_mm" in one.reasons[0].parameters
 
 
 def test_what_was_not_handed_in_is_passed_over():
@@ -60,7 +60,7 @@ def test_a_refused_scale_is_open_and_told_with_its_reason():
     submission = Submission(measured=measured(PUMP), declared={"kv": "0,22"})
     one = found(self_check(PUMP, submission), "kv")
     assert one.result == "open"
-    assert "no unit" in one.reasons[0].params["why"]
+    assert one.reasons[0].parameters["why"] == "no_unit"
     assert not is_all_right((one,))
 
 

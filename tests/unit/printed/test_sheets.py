@@ -33,6 +33,7 @@ from grader.printed.pdf import number, width_mm, wrap
 from grader.records import Page, Sheet
 from grader.scan.register.registration import rectify
 from grader.scan.strokes.ink import find_ink
+from grader.texts.spoken import message
 from reference.authored.assignment import built_in, load_assignment
 from reference.drawing.canvas import pieces_of
 from reference.errors import AuthoredFileError
@@ -217,7 +218,7 @@ def test_the_same_input_gives_the_same_file():
 def test_a_figure_that_does_not_fit_its_zone_is_told_and_no_other(name):
     assignment = load_assignment(name)
     told = {
-        (p.message.split(":")[0].removeprefix("page "), p.message.split()[2])
+        (p.parameters["form"], p.parameters["figure"])
         for p in make_sheets(assignment, rows_for(assignment)).problems
     }
     expected = set()
@@ -332,8 +333,8 @@ def test_letters_that_the_font_lacks_are_told_and_the_languages_are_complete():
     ]
     (problem,) = make_sheets(load_assignment("pump"), rows).problems
     assert problem.code == "sheet_letters"
-    assert "line 2" in problem.message
-    assert "王" in problem.message
+    assert "Line 2" in message(problem)
+    assert "王" in message(problem)
 
 
 @pytest.mark.parametrize("lang", ["en", "ro", "ru"])

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.reading.corrected import POINTED_MM, REACH_MM, corrected, snapped
-from grader.records import MECHANISM, VELOCITY_PLAN, PageRef, Reading, ScannedPage, Unread
+from grader.records import MECHANISM, VELOCITY_PLAN, PageRef, Reading, Reason, ScannedPage, Unread
 from reference.authored.assignment import Variant
 from tests.unit.reading.drawn import Pen, draw, ink_of, task
 
@@ -130,7 +130,7 @@ def test_a_vector_is_no_surer_than_its_other_end(sheet):
 def test_what_was_not_drawn_is_not_read_between_moved_nodes(sheet):
     page, drawn, construction = sheet
     wrong = read_as(page, drawn, construction, 6.0 + 0j)
-    gaps = (Unread("v_DB", "no stroke"), Unread("d", "not found"), Unread("v_BA", "no stroke"))
+    gaps = tuple(Unread(name, Reason("not_found")) for name in ("v_DB", "d", "v_BA"))
     wrong = replace(wrong, reading=replace(wrong.reading, unread=gaps))
     true = drawn.nodes["d"]
     (right,), _ = corrected([wrong], {(VELOCITY_PLAN, "d"): (true.real, -true.imag)}, construction)

@@ -23,10 +23,10 @@ from grader.records import (
     Ink,
     InkMap,
     PageRef,
-    Problem,
     Reading,
     ReadNode,
     ReadVector,
+    Reason,
     ScannedPage,
     Sheet,
     Strokes,
@@ -42,7 +42,7 @@ NO_STROKES = Strokes(
 )
 
 
-def page(scale_se: float, *problems: Problem) -> ScannedPage:
+def page(scale_se: float, *problems: Reason) -> ScannedPage:
     ink = Ink(
         NO_STROKES, np.zeros((0, 3)), np.zeros((0, 4)), InkMap(np.zeros((9, 9), np.uint8), 6.0), tips=NO_TIPS
     )
@@ -126,7 +126,7 @@ def test_lengths_at_scales_that_nobody_declared_tell_nothing():
 
 
 def test_a_page_of_unknown_scale_is_refused_unless_its_drawing_tells_it():
-    unknown = page(0.03, Problem("scale_unknown", "no frame was found"))
+    unknown = page(0.03, Reason("scale_unknown", {"detail": "no frame was found"}))
     assert answered(drawn(1.03, 1.03, 1.03), unknown).sheet.px_per_mm == pytest.approx(12.36, abs=0.04)
     for refused in (
         answered(Reading({}), unknown),

@@ -8,7 +8,7 @@ from grader.inputs.decisions import Decision
 from grader.inputs.measurements import StudentSubmission
 from grader.marking.answers import along_of
 from grader.pipeline import report_on
-from grader.records import MECHANISM, Figure, PageRef, ScannedPage, Unread
+from grader.records import MECHANISM, Figure, PageRef, Reason, ScannedPage, Unread
 from grader.review.doubts import doubts_of, figures_read
 from reference.construction.mistakes import Mistake
 from samples.simulation.wording import declared_texts
@@ -16,7 +16,7 @@ from tests.hands import changed, rule_scales, sheet, task_for, without
 
 PUMP, ENGINE = task_for("pump", 7), task_for("engine", 3)
 MISSING = Mistake("normal_missing", "n_BA")
-LEFT_OUT = "not drawn: the normal component is left out"
+LEFT_OUT = Reason("normal_left_out")
 
 
 def unsure(reading, figure, node, confidence=0.3):
@@ -31,7 +31,7 @@ def unread(reading, node, *, is_blank):
     plan = reading.figures["acceleration_plan"]
     nodes = {name: one for name, one in plan.nodes.items() if name != node}
     vectors = {name: one for name, one in plan.vectors.items() if name != "a_BA_n"}
-    gap = Unread("a_BA_n", LEFT_OUT if is_blank else "no stroke could be told apart", is_blank=is_blank)
+    gap = Unread("a_BA_n", LEFT_OUT if is_blank else Reason("no_stroke"), is_blank=is_blank)
     figures = {**reading.figures, "acceleration_plan": Figure(nodes, vectors)}
     return replace(reading, figures=figures, unread=(gap,))
 
@@ -113,7 +113,7 @@ def test_a_stroke_is_told_as_its_vector_points_whichever_end_is_in_doubt():
 
 
 def test_what_nothing_speaks_for_is_not_proposed():
-    gap = Unread("v_D", "torn off")
+    gap = Unread("v_D", Reason("torn_off"))
     reading = replace(without(sheet(PUMP), "v_D"), unread=(gap,))
     report, doubts = reviewed(PUMP, reading)
     (waiting,) = (one for one in report.criteria if one.verdict == "review")

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from grader.records import Flaw, GreyImage, Page, Sheet
+from grader.records import GreyImage, Page, Reason, Sheet
 from grader.scan.decode.pages import page_of
 from grader.scan.quality import LEAST_DPI, MOST_BLUR_MM, flaws
 from grader.scan.register.registration import register
@@ -35,7 +35,7 @@ def good() -> tuple[Page, float]:
     return photo(PRINTED, 1)
 
 
-def flaws_of(page: Page) -> dict[str, Flaw]:
+def flaws_of(page: Page) -> dict[str, Reason]:
     """Of a page, registered where it can be."""
     sheet, _ = register(page)
     return {flaw.code: flaw for flaw in flaws(page, sheet if isinstance(sheet, Sheet) else None)}
@@ -115,7 +115,7 @@ def test_blur_is_measured_in_the_direction_in_which_it_is_worst(
 ) -> None:
     page, px_per_mm = good
     flaw = flaws_of(replace(page, grey=spoil(page.grey, px_per_mm)))["blurred"]
-    assert MOST_BLUR_MM < flaw.measured < 3.0
+    assert MOST_BLUR_MM < flaw.parameters["measured"] < 3.0
 
 
 def test_a_scan_whose_paper_was_made_white_is_not_overexposed() -> None:
@@ -148,7 +148,7 @@ def test_the_corners_that_are_not_in_the_picture_are_named(scene: ReadingScene) 
         ((slice(0, high), slice(round(0.2 * wide), wide)), {"upper_left", "lower_left"}),
     ]:
         flaw = flaws_of(replace(page, grey=np.ascontiguousarray(page.grey[keep])))["corner_cut"]
-        assert set(flaw.places) == corners
+        assert set(flaw.parameters["corners"]) == corners
 
 
 def test_a_picture_without_a_sheet_is_told_and_a_turned_sheet_is_none() -> None:
@@ -176,8 +176,8 @@ def test_scans_and_copies_have_no_flaw(device: str) -> None:
 def test_a_scan_at_a_low_resolution_is_told_its_dots_per_inch() -> None:
     page, _ = photo(ReadingScene("scan", "", dpi=100.0, hardship=0.0), 1)
     flaw = flaws_of(page)["too_coarse"]
-    assert flaw.measured == pytest.approx(100.0, rel=0.03)
-    assert flaw.limit == LEAST_DPI
+    assert flaw.parameters["measured"] == pytest.approx(100.0, rel=0.03)
+    assert flaw.parameters["limit"] == LEAST_DPI
 
 
 @pytest.mark.skipif(not REAL.is_dir(), reason="real pictures are not in the repository")

@@ -7,7 +7,7 @@ import time
 import pytest
 from starlette.testclient import TestClient
 
-from grader.records import Problem
+from grader.records import Reason
 from grader.web.app import application
 from grader.web.judges import Judges
 from grader.web.queue import Queue
@@ -139,6 +139,6 @@ def test_values_are_judged_in_processes_and_where_one_was_killed_here():
         assert elsewhere[1] != os.getpid()
         os.kill(elsewhere[1], signal.SIGKILL)
         assert list(judges.run(os.getpid, [(), ()])) == [(0, os.getpid()), (1, os.getpid())]
-        assert isinstance(next(judges.run(int, [("x",)]))[1], Problem)
+        assert isinstance(next(judges.run(int, [("x",)]))[1], Reason)
     finally:
         judges.end()

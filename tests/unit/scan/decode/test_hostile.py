@@ -299,7 +299,7 @@ def test_whole_faxes_are_accepted(drawing, coding):
     compression, tags = FAXES[coding]
     bits = DRAWINGS[drawing]
     page = page_of(handed_in(hostile.stored(bits, "TIFF", compression=compression, tiffinfo=tags)), 1)
-    assert page.damage == ""
+    assert page.damage == ()
 
 
 def strip_of(data):

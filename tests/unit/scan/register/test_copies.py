@@ -7,6 +7,7 @@ import pytest
 
 from grader.scan.decode.pages import page_of
 from grader.scan.register.registration import rectify
+from grader.texts.spoken import message
 from reference.authored.assignment import load_assignment
 from samples.simulation import any_settings, simulate
 
@@ -33,4 +34,4 @@ def test_the_frame_of_a_copy_tells_its_scale_alone(copy_scale, tmp_path):
 def test_a_copy_without_a_frame_says_how_little_its_scale_is_known(tmp_path):
     sheet, px_per_mm = copied("none", 0.98, tmp_path)
     assert abs(np.log(sheet.px_per_mm / px_per_mm)) < STANDARD_ERRORS * sheet.scale_se
-    assert any("copy" in problem.message for problem in sheet.problems)
+    assert any("copy" in message(problem) for problem in sheet.problems)

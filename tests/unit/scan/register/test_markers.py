@@ -200,7 +200,7 @@ def test_a_sheet_printed_on_a4_is_told():
     grey, _ = printed(150)
     sheet = register(Page("s.jpg", 1, warped(grey, np.diag([0.707, 0.707, 1.0])), (150.0, 150.0)))
     assert [problem.code for problem in sheet.problems] == ["print_scaled"]
-    assert "70.7 %" in sheet.problems[0].message
+    assert sheet.problems[0].parameters["size_percent"] == pytest.approx(70.7, abs=0.1)
 
 
 def test_a_resolution_that_is_plainly_wrong_says_nothing_about_the_print():

@@ -11,6 +11,7 @@ from grader.records import Page, Ruling
 from grader.scan.decode.pages import page_of
 from grader.scan.register.distortion import straight, straighten, straightened
 from grader.scan.register.registration import rectify
+from grader.texts.spoken import message
 
 SHARED = Path(__file__).resolve().parents[5] / "shared"
 RULED_MM = 0.06
@@ -213,8 +214,8 @@ def test_a_bent_photo_is_straightened(bend):
 def unknown_because(sheet) -> str:
     """Why the page's scale is not known by what is printed on it or stated; empty where it is."""
     if not sheet:
-        return sheet.reason
-    return next((problem.message for problem in sheet.problems if problem.code == "scale_unknown"), "")
+        return message(sheet.reason)
+    return next((message(problem) for problem in sheet.problems if problem.code == "scale_unknown"), "")
 
 
 def test_squared_paper_has_no_title_block():
@@ -254,14 +255,14 @@ def on_squares(pitch_mm, dpi=None):
 def test_squares_are_a_second_witness_of_the_scale():
     sheet, off = on_squares(5.0), on_squares(5.02)
     assert sheet.problems[-1].code == "squared_paper"
-    assert "5 mm" in sheet.problems[-1].message
+    assert sheet.problems[-1].parameters == {"pitch_mm": 5.0}
     assert 0.0025 < sheet.scale_se < 0.003
     # Half-way between edges, known to 0.4 per cent, and squares, which are known as well as they.
     assert 0.4 * 0.004 < off.px_per_mm / sheet.px_per_mm - 1.0 < 0.6 * 0.004
 
 
 def test_squares_of_a_size_that_no_paper_has_say_that_the_scale_is_wrong():
-    assert "squares would be 5.8 mm" in on_squares(5.85).reason
+    assert on_squares(5.85).reason.parameters["why"] == "odd_squares"
 
 
 @pytest.mark.parametrize(

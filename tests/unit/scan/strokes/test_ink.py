@@ -13,6 +13,7 @@ from grader.scan.decode.pages import page_of
 from grader.scan.decode.ruling import without_ruling
 from grader.scan.register.registration import rectify
 from grader.scan.strokes.ink import find_ink
+from grader.texts.spoken import message
 
 SHARED = Path(__file__).resolve().parents[5] / "shared"
 PX_PER_MM = 200 / 25.4
@@ -453,7 +454,7 @@ def refusal(paper):
     ink = paper.ink()
     assert isinstance(ink, Unread)
     assert not ink
-    return ink.reason
+    return message(ink.reason)
 
 
 def test_noise_has_more_strokes_than_a_drawing():

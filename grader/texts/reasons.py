@@ -1,0 +1,154 @@
+"""The sentences of reasons: why a criterion has its verdict, with numbers and without."""
+
+from collections.abc import Mapping
+from typing import Literal
+
+from grader.language import N_, Tongue
+from grader.texts.spoken import Coded, filled, spoken
+
+Level = Literal["symbol", "hint", "full"]
+
+_NO_NAMES: Mapping[str, str] = {}
+
+UNDECIDED = "scale_undecided"
+"""Stands for `scale_assumed` and `follows` together, under review: neither alone says what is in doubt."""
+UNSURE = "read_unsurely"
+"""Stands for `unread` where something was read, though not surely, and for `doubtful` beside it."""
+UNCHECKED = "unchecked"
+"""Stands where nothing was judged and no reason is given."""
+MISREAD = "misread"
+"""Stands for what is off as read, where it is proposed as right: most probably it was misread."""
+HINTS: dict[str, str] = {
+    "right": N_("Right."),
+    "too_long": N_("It is too long."),
+    "too_short": N_("It is too short."),
+    "turned_left": N_("Its direction is off: it is turned too far counter-clockwise."),
+    "turned_right": N_("Its direction is off: it is turned too far clockwise."),
+    "reversed": N_("It points the opposite way."),
+    "should_be_zero": N_("Look at this position of the mechanism again: how large can it be here?"),
+    "too_short_to_judge": N_("It is too short for its direction to be judged; only its length counts."),
+    "value_too_large": N_("The value is too large."),
+    "value_too_small": N_("The value is too small."),
+    "value_reversed": N_("The sign is wrong: counter-clockwise is positive."),
+    "not_measured": N_("Nothing was handed in for it."),
+    "optional": N_("It was not handed in, and is not required."),
+    "unread": N_("It could not be read on the sheet."),
+    "entry_refused": N_("An entry that it rests on cannot be used: a person must look."),
+    "doubtful": N_("It was read with too little certainty."),
+    "found_wrong_elsewhere": N_("A verdict like this one was found wrong in this class: a person must look."),
+    "near_limit": N_("It lies so near the limit of the tolerance that the scan cannot decide."),
+    "counted_for_you": N_("It is beyond the limit by no more than the scan can tell: counted for you."),
+    "not_certainly_within": N_("It is not certainly within the limit, as far as the scan can tell."),
+    "at_stake": N_("What is open here is worth very little: counted for you."),
+    "other_variant": N_("The drawing follows another student's data."),
+    "not_explained": N_("The vectors of this plan do not belong together: a person must look."),
+    "data_misread": N_("The drawing follows another crank angle than the one given."),
+    "data_unclear": N_("It is not clear whether the drawing follows your own data: a person must look."),
+    "not_drawn": N_("It is not drawn."),
+    "value_alone": N_(
+        "A value alone earns no points here: the vector must be drawn, and its length handed in."
+    ),
+    "by_similarity": N_("It need not be drawn: the point was found by similar triangles."),
+    "letters_exchanged": N_("Two letters stand at each other's point: it is compared under the right ones."),
+    "letters_unclear": N_("Two letters seem to stand at each other's point: a person must look."),
+    "hand_may_miss": N_(
+        "Its lines meet at so small an angle that a careful hand may be off by as much: a person must look."
+    ),
+    "readings_disagree": N_("The drawing and the entered measurement differ."),
+    "written_disagrees": N_("The drawing and the length written on the sheet differ: a person must look."),
+    "follows": N_(
+        "It follows rightly from your own earlier work; the earlier mistake is charged once, there."
+    ),
+    "decided": N_("A person has decided this."),
+    "scale_refused": N_("The declared scale could not be understood."),
+    "scale_off": N_("The declared scale does not fit the drawing and the data."),
+    "scale_assumed": N_("The scale was not declared; the assignment's own rule was assumed."),
+    UNDECIDED: N_(
+        "No scale was declared: it is off at the assignment's own, and right at the one"
+        " that the drawing follows."
+    ),
+    UNSURE: N_("It was read with too little certainty."),
+    MISREAD: N_("It was probably misread; a person will look."),
+    "scale_seems_off": N_("The declared scale seems not to be the one that the drawing was made with."),
+    UNCHECKED: N_("Nothing was drawn that it could be held against."),
+}
+"""What is said at level `hint`, by code of the reason."""
+
+FULL: dict[str, str] = {
+    "too_long": N_("It is too long by %(off)s (tolerance ±%(tolerance)s)."),
+    "too_short": N_("It is too short by %(off)s (tolerance ±%(tolerance)s)."),
+    "turned_left": N_("It is turned %(off)s too far counter-clockwise (tolerance ±%(tolerance)s)."),
+    "turned_right": N_("It is turned %(off)s too far clockwise (tolerance ±%(tolerance)s)."),
+    "should_be_zero": N_("It is zero in this position of the mechanism; %(measured)s were drawn."),
+    "too_short_to_judge": N_(
+        "It is too short for its direction to be judged (%(length)s, at least %(least)s are needed);"
+        " only its length counts."
+    ),
+    "value_too_large": N_("The value is too large: %(measured)s instead of %(expected)s."),
+    "value_too_small": N_("The value is too small: %(measured)s instead of %(expected)s."),
+    "value_reversed": N_(
+        "The sign is wrong: %(measured)s instead of %(expected)s; counter-clockwise is positive."
+    ),
+    "unread": N_("It could not be read on the sheet (%(why)s)."),
+    "entry_refused": N_("An entry that it rests on cannot be used (%(entries)s): a person must look."),
+    "doubtful": N_("It was read with too little certainty (%(confidence)s)."),
+    UNSURE: N_("It was read with too little certainty (%(why)s)."),
+    MISREAD: N_("It was probably misread; the dotted stroke may be the one meant."),
+    "scale_seems_off": N_("%(declared)s is declared, %(expected)s was probably drawn with: %(factor)s."),
+    "near_limit": N_(
+        "It lies so near the limit of the tolerance that the scan cannot decide (standard error %(se)s)."
+    ),
+    "counted_for_you": N_(
+        "It is %(beyond)s beyond the limit; the scan is good to %(good_to)s: counted for you."
+    ),
+    "not_certainly_within": N_(
+        "It is %(beyond)s within the limit; the scan is good to %(good_to)s:"
+        " only what is certainly within counts."
+    ),
+    "other_variant": N_("The drawing follows another student's data (%(whose)s)."),
+    "data_unclear": N_(
+        "It may follow other data than the student's own (%(whose)s; probability %(confidence)s):"
+        " a person must look."
+    ),
+    "letters_exchanged": N_(
+        "The letters %(first)s and %(second)s stand at each other's point:"
+        " it is compared under the right ones."
+    ),
+    "letters_unclear": N_(
+        "The letters %(first)s and %(second)s seem to stand at each other's point: a person must look."
+    ),
+    "not_explained": N_("These vectors do not belong together: %(unfit)s of %(of)s fit nothing."),
+    "readings_disagree": N_("The drawing gives %(first)s, the entered measurement %(second)s."),
+    "written_disagrees": N_("Drawn are %(drawn)s, written on the sheet %(written)s: a person must look."),
+    "scale_refused": N_(
+        "The declared scale “%(text)s” could not be understood: %(why)s. Write for example %(examples)s."
+    ),
+    "scale_off": N_("%(declared)s is declared, %(expected)s was drawn with: %(factor)s."),
+    "scale_assumed": N_("The scale was not declared; %(used)s was assumed."),
+}
+"""What is said at level `full` where that differs."""
+
+FOLLOWS: dict[str, str] = {
+    "nodes": N_(
+        "It follows rightly from your own earlier points; the earlier mistake is charged once, there."
+    ),
+    "small_errors": N_(
+        "It follows rightly from your own earlier points: their small errors, each within its tolerance,"
+        " add up here."
+    ),
+    "scale": N_("It is right at the scale that you used; the scale is charged once, there."),
+    "vector": N_("It follows rightly from your own %(of)s; that mistake is charged once, there."),
+    "value": N_("It follows rightly from your own %(of)s; that mistake is charged once, there."),
+}
+"""Reason `follows`, by what it follows from."""
+
+
+def reason_sentence(
+    reason: Coded, speaker: Tongue, level: Level, names: Mapping[str, str] = _NO_NAMES
+) -> str:
+    """One reason; a code without a sentence is told by its name, so that nothing is lost."""
+    hint = HINTS.get(reason.code, reason.code)
+    texts = [FULL[reason.code], hint] if level == "full" and reason.code in FULL else [hint]
+    if reason.code == "follows":
+        texts = [FOLLOWS.get(str(reason.parameters.get("what")), hint), hint]
+    return filled(texts, spoken(reason.parameters, speaker, names), speaker)

@@ -1,0 +1,228 @@
+"""Sentences of reasons and problems in a language: numbers with their units, names as students know them."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Protocol, cast
+
+from grader.documents import ProblemDocument, UnmatchedDocument, UnreadDocument
+from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
+from grader.records import Reason, Unread, Value
+from grader.texts.clauses import CLAIMS, CLAUSES
+from grader.texts.problems import PROBLEMS
+from reference.errors import PlanmarkError
+
+ENGLISH = tongue(ROOT_LANGUAGE)
+_NO_NAMES: Mapping[str, str] = {}
+
+
+class Coded(Protocol):
+    """A record with a code and parameters: a `Reason`, or what a document holds of one."""
+
+    @property
+    def code(self) -> str:
+        """The stable code."""
+
+    @property
+    def parameters(self) -> Mapping[str, float | str | Sequence[str]]:
+        """What its sentence names."""
+
+
+PLACES = {
+    "mechanism": N_("the mechanism"),
+    "velocity_plan": N_("the velocity plan"),
+    "acceleration_plan": N_("the acceleration plan"),
+    "directions": N_("the directions"),
+    "lengths": N_("the lengths"),
+    "scales": N_("the scales"),
+    "values": N_("the values"),
+}
+CORNERS = {
+    "upper_left": N_("the upper left corner"),
+    "upper_right": N_("the upper right corner"),
+    "lower_left": N_("the lower left corner"),
+    "lower_right": N_("the lower right corner"),
+}
+AREAS = {
+    "upper_left": N_("at the upper left"),
+    "upper_middle": N_("at the top"),
+    "upper_right": N_("at the upper right"),
+    "middle_left": N_("at the left"),
+    "middle": N_("in the middle"),
+    "middle_right": N_("at the right"),
+    "lower_left": N_("at the lower left"),
+    "lower_middle": N_("at the bottom"),
+    "lower_right": N_("at the lower right"),
+}
+"""Where a flaw lies on the sheet."""
+_NOUNS = {"corners": CORNERS, "areas": AREAS}
+"""Words of codes that lists hold, by the parameter's name."""
+
+
+def place(at: str, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES) -> str:
+    """A node, vector, scale or figure as a sentence names it."""
+    return speaker.gettext(PLACES[at]) if at in PLACES else names.get(at, at)
+
+
+# Parameters in words ------------------------------------------------------------------------------
+
+
+def spoken(
+    parameters: Mapping[str, float | str | Sequence[str]],
+    speaker: Tongue,
+    names: Mapping[str, str] = _NO_NAMES,
+) -> dict[str, str]:
+    """Parameters in words: `off_mm` becomes `off`, with its unit."""
+    # `near_limit` says what it speaks of instead of a unit.
+    unit_of_limit = {"length": "mm", "scale": "mm", "direction": "°"}.get(str(parameters.get("what", "")), "")
+    unit = str(parameters.get("unit", unit_of_limit))
+    said: dict[str, str] = {}
+    for key, value in parameters.items():
+        stem, _, suffix = key.rpartition("_")
+        if isinstance(value, str):
+            said[key] = place(value, speaker, names)
+        elif not isinstance(value, int | float):
+            words = _NOUNS.get(key, PLACES)
+            said[key] = ", ".join(
+                speaker.gettext(words[one]) if one in words else names.get(one, one) for one in value
+            )
+        elif suffix in _UNIT_WRITERS and stem:
+            said[stem] = _UNIT_WRITERS[suffix](speaker, value)
+        elif key == "confidence":
+            said[key] = _UNIT_WRITERS["percent"](speaker, round(100.0 * value))
+        elif isinstance(value, int):
+            said[key] = str(value)
+        else:
+            said[key] = _real(speaker, value, unit)
+    for key in {"why", "advice"} & parameters.keys():
+        clause = CLAUSES.get(str(parameters[key]))
+        if clause is not None and (told := filled([clause], said, speaker)):
+            said[key] = told
+        elif clause is not None:
+            del said[key]
+    claims = [speaker.gettext(CLAIMS[key]) % {"claim": said[key]} for key in parameters if key in CLAIMS]
+    if claims:
+        said["claims"] = "; ".join(claims)
+    if {"declared", "expected"} <= parameters.keys():
+        declared, expected = (cast("float", parameters[key]) for key in ("declared", "expected"))
+        said["factor"] = _how_far_off(declared, expected, speaker)
+    return said
+
+
+def filled(texts: Sequence[str], said: Mapping[str, str], speaker: Tongue) -> str:
+    """The first of the texts whose parameters are all known, in the language; empty where none is."""
+    for text in texts:
+        try:
+            return speaker.gettext(text) % said
+        except KeyError:
+            continue
+    return ""
+
+
+TOO_LARGE, TOO_SMALL = N_("%(times)s times too large"), N_("%(times)s times too small")
+SHARE_TOO_LARGE, SHARE_TOO_SMALL = N_("%(share)s too large"), N_("%(share)s too small")
+SEVERAL_TIMES = 1.5
+"""From this factor on a scale is said to be so many times too large, below it by so many per cent."""
+
+
+def _how_far_off(declared: float, right: float, speaker: Tongue) -> str:
+    """How far a declared scale is from the right one: "10 times too small", "5 % too large"."""
+    factor = declared / right if right else 1.0
+    ratio = max(factor, 1.0 / factor) if factor > 0.0 else 1.0
+    if ratio >= SEVERAL_TIMES:
+        text = TOO_LARGE if factor > 1.0 else TOO_SMALL
+        return speaker.gettext(text) % {"times": speaker.trimmed(ratio, 1 if ratio < 20.0 else 0)}
+    share = f"{speaker.number(100.0 * abs(factor - 1.0), 1)}\N{NO-BREAK SPACE}%"
+    return speaker.gettext(SHARE_TOO_LARGE if factor > 1.0 else SHARE_TOO_SMALL) % {"share": share}
+
+
+def _real(speaker: Tongue, value: float, unit: str) -> str:
+    if unit == "mm":
+        return speaker.quantity(value, 2, unit)
+    if unit == "°":
+        return f"{speaker.number(value, 2)}°"
+    return speaker.value(value, unit)
+
+
+def _with_unit(unit: str) -> Callable[[Tongue, float], str]:
+    """What writes a number with a unit, whole numbers without decimals."""
+    return lambda speaker, value: speaker.quantity(value, 0 if isinstance(value, int) else 1, unit)
+
+
+_UNIT_WRITERS: dict[str, Callable[[Tongue, float], str]] = {
+    "mm": _with_unit("mm"),
+    "deg": lambda speaker, value: f"{speaker.number(value, 1)}°",
+    "percent": _with_unit("%"),
+    "dpi": _with_unit("dpi"),
+    "s": lambda speaker, value: f"{speaker.trimmed(value, 1)}\N{NO-BREAK SPACE}{speaker.unit('s')}",
+}
+
+# Problems -----------------------------------------------------------------------------------------
+
+AT_PAGE, AT_LINE = N_("Page %(page)s: %(text)s"), N_("Line %(line)s: %(text)s")
+
+
+def sentence(
+    reason: Coded, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES, *, brief: bool = False
+) -> str:
+    """The sentence of a problem; empty where its code has none, or `brief` the one without numbers.
+
+    What an error says in its own words (`detail`) is no sentence: `details` are told beside it.
+    """
+    texts = PROBLEMS.get(reason.code, ())
+    said = spoken(reason.parameters, speaker, names)
+    text = filled(texts[-1:] if brief else texts, said, speaker)
+    also = PROBLEMS.get(str(reason.parameters.get("also", "")))
+    if also and text and not brief:
+        text = f"{text} {speaker.gettext(also[-1])}"
+    for key, where in (("line", AT_LINE), ("page", AT_PAGE)):
+        if key in said and text and not brief:
+            text = speaker.gettext(where) % {key: said[key], "text": text}
+    return text
+
+
+def clause(reason: Coded, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES) -> str:
+    """Why something is not read or understood, as a part of a sentence; the code of one without words."""
+    said = spoken(reason.parameters, speaker, names)
+    return filled([CLAUSES[reason.code]], said, speaker) if reason.code in CLAUSES else reason.code
+
+
+def message(reason: Coded, speaker: Tongue = ENGLISH) -> str:
+    """A problem in an error's own words, else its sentence; its code where it has neither."""
+    return str(reason.parameters.get("detail", "")) or sentence(reason, speaker) or reason.code
+
+
+def of_error(error: PlanmarkError, file: str | None = None) -> Reason:
+    """An error as a problem: its parameters, and its own words as the `detail`."""
+    return Reason(error.code, {**error.parameters, "detail": error.message}, file)
+
+
+# Documents ----------------------------------------------------------------------------------------
+
+
+def problem_documents(problems: Sequence[Reason]) -> Iterator[ProblemDocument]:
+    """Problems as documents hold them."""
+    for one in problems:
+        yield ProblemDocument(
+            code=one.code, message=message(one), parameters=as_json(one.parameters), file=one.file
+        )
+
+
+def unmatched_document(problem: Reason, page: int | None = None) -> UnmatchedDocument:
+    """A problem of a page or file that is nobody's, as documents hold it: the page in a field of its own."""
+    known = {key: value for key, value in problem.parameters.items() if page is None or key != "page"}
+    return UnmatchedDocument(
+        file=problem.file or "", page=page, code=problem.code, message=message(Reason(problem.code, known)),
+        parameters=as_json(known),
+    )  # fmt: skip
+
+
+def unread_document(gap: Unread) -> UnreadDocument:
+    """A vector or node that was not read, as documents hold it."""
+    reason = gap.reason
+    return UnreadDocument(
+        name=gap.name, reason=clause(reason, ENGLISH), code=reason.code, parameters=as_json(reason.parameters)
+    )
+
+
+def as_json(parameters: Mapping[str, Value]) -> dict[str, float | str | list[str]]:
+    """Parameters as documents hold them."""
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in parameters.items()}

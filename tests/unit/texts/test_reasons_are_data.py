@@ -1,0 +1,158 @@
+"""Reasons are data: no code takes a message apart, and sentences are made of codes and parameters alone."""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from grader.language import LANGUAGES, tongue
+from grader.records import Reason, Unread
+from grader.texts.clauses import CLAIMS, CLAUSES
+from grader.texts.problems import PROBLEMS
+from grader.texts.reasons import FOLLOWS, FULL, HINTS, reason_sentence
+from grader.texts.spoken import ENGLISH, clause, message, of_error, sentence, unread_document
+from reference.errors import InputFileError
+
+ROOT = Path(__file__).parents[3]
+PROSE = {"message", "reason", "feedback"}
+"""Fields that hold sentences."""
+APART = {
+    "split", "rsplit", "partition", "rpartition", "splitlines", "startswith", "endswith", "removeprefix",
+    "removesuffix", "find", "index",
+}  # fmt: skip
+SEARCHES = {"match", "fullmatch", "search", "findall", "finditer", "sub"}
+MAKERS = {"Reason", "_why", "_no_order", "_NotUnderstoodError"}
+"""What makes a reason: the codes stand in its arguments."""
+PLACEHOLDER = re.compile(r"%\((\w+)\)s")
+
+
+def trees() -> Iterator[tuple[str, ast.Module]]:
+    for top in ("grader", "reference"):
+        for path in sorted((ROOT / top).rglob("*.py")):
+            name = path.relative_to(ROOT).as_posix()
+            if not name.startswith("grader/texts/"):
+                yield name, ast.parse(path.read_text(encoding="utf-8"))
+
+
+def _is_prose(node: ast.AST) -> bool:
+    if isinstance(node, ast.Call):
+        return isinstance(node.func, ast.Name) and node.func.id in {"message", "sentence", "clause"}
+    return isinstance(node, ast.Attribute) and node.attr in PROSE
+
+
+def taken_apart(tree: ast.AST) -> Iterator[int]:
+    """The lines on which a sentence is searched, cut or compared."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.Call(func=ast.Attribute(value=value, attr=attr)) if attr in APART and _is_prose(value):
+                yield node.lineno
+            case ast.Call(func=ast.Attribute(attr=attr), args=args) if attr in SEARCHES:
+                yield from (node.lineno for one in args if _is_prose(one))
+            case ast.Compare(left=left, comparators=[*others]):
+                is_none = any(isinstance(one, ast.Constant) and one.value is None for one in others)
+                yield from (node.lineno for one in (left, *others) if _is_prose(one) and not is_none)
+            case ast.Subscript(value=value) if _is_prose(value):
+                yield node.lineno
+
+
+@pytest.mark.parametrize(
+    "code", ['a.message.partition(" ")', '"no" in a.message', "re.match(x, a.reason)", "message(a)[:3]"]
+)
+def test_what_takes_a_sentence_apart_is_seen(code: str) -> None:
+    assert list(taken_apart(ast.parse(code))) == [1]
+
+
+def test_no_code_takes_a_sentence_apart() -> None:
+    assert [f"{name}:{line}" for name, tree in trees() for line in taken_apart(tree)] == []
+
+
+def test_no_key_of_the_catalogues_is_made_at_run_time() -> None:
+    made = []
+    for name, tree in trees():
+        for node in ast.walk(tree):
+            match node:
+                case ast.Call(func=ast.Name(id="N_"), args=[key]) if not isinstance(key, ast.Constant):
+                    made.append(f"{name}:{node.lineno}")
+                case ast.Call(func=ast.Attribute(attr="gettext" | "ngettext"), args=[key, *_]):
+                    is_made = isinstance(key, ast.JoinedStr | ast.BinOp) or _is_prose(key)
+                    made += [f"{name}:{node.lineno}"] if is_made else []
+    assert made == []
+
+
+def codes_made() -> Iterator[tuple[str, str]]:
+    """Every code that stands where a reason is made, and where that is."""
+    for name, tree in trees():
+        for node in ast.walk(tree):
+            match node:
+                case ast.Call(func=ast.Name(id=maker), args=[*args]) if maker in MAKERS:
+                    for one in ast.walk(ast.Module([ast.Expr(arg) for arg in args[:1]], [])):
+                        if isinstance(one, ast.Constant) and re.fullmatch("[a-z][a-z0-9_]+", str(one.value)):
+                            yield str(one.value), f"{name}:{node.lineno}"
+                case ast.Dict(keys=keys, values=values):
+                    for key, value in zip(keys, values, strict=True):
+                        is_why = isinstance(key, ast.Constant) and key.value in {"why", "advice"}
+                        if is_why and isinstance(value, ast.Constant):
+                            yield str(value.value), f"{name}:{node.lineno}"
+
+
+def test_every_code_that_is_made_has_its_sentence() -> None:
+    known = {*PROBLEMS, *HINTS, *CLAUSES, *FOLLOWS}
+    found = dict(codes_made())
+    assert len(found) > 100
+    assert {code: where for code, where in found.items() if code not in known} == {}
+
+
+@pytest.mark.parametrize("lang", LANGUAGES)
+def test_every_code_has_a_sentence_in_every_language(lang: str) -> None:
+    speaker = tongue(lang)
+    for code, texts in PROBLEMS.items():
+        told = sentence(Reason(code), speaker, brief=True)
+        assert told, code
+        assert lang == "en" or told != texts[-1], code
+        assert not PLACEHOLDER.search(told), code
+    for code in HINTS:
+        assert reason_sentence(Reason(code), speaker, "full") not in {"", code}
+    for text in (*CLAUSES.values(), *CLAIMS.values(), *FULL.values()):
+        assert lang == "en" or not PLACEHOLDER.sub("", text).strip() or speaker.gettext(text) != text
+
+
+@pytest.mark.parametrize("code", sorted(PROBLEMS))
+def test_of_a_problems_sentences_the_last_one_needs_nothing(code: str) -> None:
+    *precise, least = PROBLEMS[code]
+    assert not PLACEHOLDER.search(least)
+    assert all(PLACEHOLDER.search(text) for text in precise)
+
+
+@pytest.mark.parametrize(
+    ("lang", "told"),
+    [
+        ("en", "The sheet could not be placed: only 63\u00a0% of the sheet is in the picture."),
+        ("ro", "Poziția foii nu a putut fi stabilită: în imagine se află numai 63\u00a0% din foaie."),
+        ("ru", "Не удалось определить положение листа: на изображении только 63\u00a0% листа."),
+    ],
+)
+def test_numbers_and_clauses_are_said_in_the_readers_language(lang: str, told: str) -> None:
+    refused = Reason("sheet_refused", {"why": "part_in_picture", "share_percent": 63})
+    assert sentence(refused, tongue(lang)) == told
+
+
+def test_without_its_parameters_a_problem_is_told_by_the_sentence_that_needs_none() -> None:
+    assert sentence(Reason("squared_paper", {"pitch_px": 3}), ENGLISH) == PROBLEMS["squared_paper"][-1]
+    assert message(Reason("brand_new")) == "brand_new"
+
+
+def test_an_error_becomes_a_problem_with_its_parameters_and_its_own_words() -> None:
+    error = InputFileError("pages_too_many", "a.pdf: 900 pages, more than 500", pages=900, most=500)
+    problem = of_error(error, "a.pdf")
+    assert (message(problem), problem.file) == (error.message, "a.pdf")
+    assert "900" in sentence(problem, tongue("ro"))
+    assert "more than" not in sentence(problem, tongue("ro"))
+
+
+def test_what_was_not_read_keeps_its_reason_and_gains_code_and_parameters() -> None:
+    written = unread_document(Unread("v_BA", Reason("no_stroke", {"start": "a", "end": "b"})))
+    assert written.reason == "no stroke between a and b could be told apart"
+    assert (written.code, written.parameters) == ("no_stroke", {"start": "a", "end": "b"})
+    assert clause(Reason("by_similarity", {"node": "c"}), tongue("ru")) != ""
