@@ -16,7 +16,16 @@ from grader.overlay.scene import MARKS
 from grader.printed.layout import SCALE_BOXES, SCALE_OF
 from grader.records import MECHANISM
 from grader.review.doubts import SURE, Choice, Doubt
-from grader.review.questions import UNSURE, Facts, badge, look_of, per_cent, question_facts, state_of
+from grader.review.questions import (
+    UNSURE,
+    Facts,
+    badge,
+    doubt_sentence,
+    look_of,
+    per_cent,
+    question_facts,
+    state_of,
+)
 from grader.review.session import OPEN, Session, Standing, Student, mark_of
 
 WHOSE = N_("Whose data were drawn?")
@@ -141,7 +150,7 @@ def _doubt_facts(session: Session, student: Student, doubt: Doubt, speaker: Tong
         "state": state_of(first, None, "", speaker),
         "brief": "",
         "accept": accept,
-        "why": symbols(first.feedback) if doubt.kind != "node" else Markup(),
+        "why": doubt_sentence(session, first, speaker) if doubt.kind != "node" else Markup(),
         "sentence": symbols(told),
         "settles": _settles(doubt, speaker),
         "look": _doubt_look(session, student, doubt, first),

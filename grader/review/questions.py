@@ -8,15 +8,17 @@ from markupsafe import Markup
 
 from grader.documents import CriterionDocument, Quantity
 from grader.feedback.numbers import quantity_cells, score_text, tolerance_cells
+from grader.feedback.sentences import feedback_again
 from grader.feedback.words import VERDICTS, problem_sentence, symbols, unmatched_sentence
 from grader.inputs.decisions import Decision
 from grader.language import N_, Tongue
 from grader.overlay.closeup import look
 from grader.overlay.scene import MARKS
-from grader.records import MECHANISM, Box
+from grader.records import MECHANISM, Box, Reason
 from grader.review.doubts import SURE, known_probability
 from grader.review.session import OPEN, Session, Standing, Student, mark_of, page_criterion
 from grader.rubric import RubricFile
+from grader.texts.spoken import clause
 
 Facts = dict[str, Any]
 """An object of JSON."""
@@ -163,7 +165,7 @@ def question_facts(session: Session, student: Student, name: str, speaker: Tongu
         "state": state_of(criterion, decision, said, speaker),
         "brief": said or speaker.gettext(VERDICTS[criterion.verdict]),
         "accept": _accept(criterion, what, speaker),
-        "why": _why(student, criterion, asked=row["asked"], speaker=speaker),
+        "why": _why(session, student, criterion, asked=row["asked"], speaker=speaker),
         "sentence": symbols(session.sentence_if(student, criterion))
         if is_default or criterion.verdict != OPEN
         else "",
@@ -214,12 +216,20 @@ def _accept(criterion: CriterionDocument, what: str, speaker: Tongue) -> Markup:
     return Markup.escape(speaker.gettext(UNSURE) % {"least": per_cent(SURE)})
 
 
-def _why(student: Student, criterion: CriterionDocument, *, asked: bool, speaker: Tongue) -> Markup:
+def _why(
+    session: Session, student: Student, criterion: CriterionDocument, *, asked: bool, speaker: Tongue
+) -> Markup:
     """Why a person is asked: the doubt, or the student's request."""
     if asked:
         said = speaker.gettext(ASKED) % {"text": student.requests[criterion.id].text}
         return Markup.escape(said)
-    return symbols(criterion.feedback) if criterion.verdict == OPEN else Markup()
+    return doubt_sentence(session, criterion, speaker) if criterion.verdict == OPEN else Markup()
+
+
+def doubt_sentence(session: Session, criterion: CriterionDocument, speaker: Tongue) -> Markup:
+    """Why a criterion waits, in the reviewer's language."""
+    batch = session.batch
+    return symbols(feedback_again(criterion, speaker.lang, batch.level, batch.assignment.file.names))
 
 
 def per_cent(probability: float) -> str:
@@ -355,7 +365,8 @@ def _idle(session: Session, speaker: Tongue) -> Iterator[str]:
     results = None if session.graded is None else session.graded.results
     for one in [] if results is None else results.stale:
         what = speaker.gettext(VERDICTS[one.verdict]) if one.verdict in VERDICTS else one.verdict
-        yield f"{one.student_id} {one.criterion}: {what}. {speaker.gettext(one.reason)}".strip()
+        why = clause(Reason(one.code), speaker)
+        yield f"{one.student_id} {one.criterion}: {what}. {why}".strip()
     for fault in [] if results is None else results.unmatched:
         if fault.code == FAULT:
             yield unmatched_sentence(fault, speaker).text

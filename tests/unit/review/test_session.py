@@ -51,6 +51,18 @@ def test_a_question_says_what_was_measured_and_shows_where(page):
     assert look["marks"].startswith("<")
 
 
+def test_why_a_verdict_waits_is_told_in_the_reviewers_language(session):
+    told = {}
+    for lang in ("en", "ro", "ru"):
+        page = Page(application(session, lang), base_url="http://127.0.0.1:8321")
+        waiting = [row for row in page.rows().values() if row["verdict"] == "review" and row["proposed"]]
+        asked = {"student": waiting[0]["student"], "criterion": waiting[0]["criterion"]}
+        told[lang] = page.get("/api/question", params=asked).json()["why"]
+    assert len(set(told.values())) == 3
+    assert set("абвгдежзиклмнопрст") & set(told["ru"])
+    assert not set("абвгдежзиклмнопрст") & set(told["ro"])
+
+
 def test_a_question_says_why_it_waits_and_what_the_student_will_read(page):
     waiting = [row for row in page.rows().values() if row["verdict"] == "review" and row["proposed"]]
     assert waiting
