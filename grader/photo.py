@@ -17,7 +17,7 @@ from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, PageRef, Reason, Sc
 from grader.rubric import RubricFile, asked_of
 from grader.scan.decode.pages import count_pages
 from grader.texts.reasons import Level
-from grader.texts.spoken import sentence, message
+from grader.texts.spoken import message, sentence
 from reference.authored.assignment import Assignment, Variant
 from reference.errors import InputFileError
 

@@ -15,7 +15,9 @@ HEAVY = frozenset(
 )
 SCANS = frozenset("scipy cv2 PIL pikepdf pypdfium2 tifffile imagecodecs simplejpeg zxingcpp".split())
 PAGES = frozenset({"jinja2", "reportlab"})
-JUDGING = "cli comparison documents feedback files given_data inputs language marking outcomes records rubric"
+JUDGING = (
+    "cli comparison documents feedback files given_data inputs language marking outcomes records rubric texts"
+)
 """The rooms of the program that entered measurements pass through."""
 
 PROGRAM = """

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from grader.folder.owners import assign_pages
 from grader.inputs.roster import Roster, RosterRow, ScanRef
 from grader.records import Identity, PageRef
-from grader.texts.spoken import message
+from grader.texts.spoken import ENGLISH, sentence
 
 STUDENTS = ("s1", "s2", "s_3", "s")
 FILES = ("s1.jpg", "s_3_2.jpg", "class.pdf", "other.pdf", "S2.png", "x.tif")
@@ -79,4 +79,4 @@ def test_a_page_that_is_unmatched_says_why_and_where(pages, roster, each):
     for loose in assign_pages(pages, roster, "pump", pages_per_student=each).unmatched:
         assert loose.problem.file == loose.source.file
         assert loose.problem.code.startswith(("owner_", "order_"))
-        assert str(loose.source) in message(loose.problem)
+        assert sentence(loose.problem, ENGLISH)

@@ -367,8 +367,8 @@ def fax_pdf(damaged, stamp=b""):
 
 @pytest.mark.parametrize("stamp", [b"", b"0 0 20 20 re f"])
 def test_damaged_rows_are_seen_in_a_pdf_too(stamp):
-    assert page_of(handed_in(fax_pdf(damaged=False, stamp=stamp)), 1).damage == ""
-    assert page_of(handed_in(fax_pdf(damaged=True, stamp=stamp)), 1).damage.startswith("rows ")
+    assert page_of(handed_in(fax_pdf(damaged=False, stamp=stamp)), 1).damage == ()
+    assert page_of(handed_in(fax_pdf(damaged=True, stamp=stamp)), 1).damage[0] > 1
 
 
 def test_a_page_with_damaged_rows_is_told_and_not_read(tmp_path):

@@ -472,7 +472,7 @@ def test_a_negative_is_refused_by_its_darkness():
         paper.line(start, end)
     assert len(paper.ink().strokes) == len(SEGMENTS)
     paper.grey = 255 - paper.grey
-    assert "tones inverted" in refusal(paper)
+    assert "inverted" in refusal(paper)
 
 
 def test_strokes_are_counted_before_any_is_fitted(monkeypatch):
