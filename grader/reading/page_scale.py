@@ -190,7 +190,7 @@ def _at_drawn_scale(page: ScannedPage, sheet: Sheet, shown: PageScale | None) ->
     if factor == 1.0 and shown.se > sheet.scale_se:
         told = (Reason("scale_doubtful", known, page.ref.file),)
     elif factor != 1.0 or unknown is not None:
-        known["longer_percent"] = 100.0 * (factor - 1.0)
+        known["longer_percent" if factor >= 1.0 else "shorter_percent"] = 100.0 * abs(factor - 1.0)
         told = (Reason("scale_by_drawing", known, page.ref.file),)
     kept = tuple(problem for problem in page.problems if problem is not unknown)
     return replace(page.longer(factor, shown.se), problems=(*kept, *told))

@@ -130,6 +130,10 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
             "By %(by)s, lengths are %(longer)s longer than by frame, paper and resolution"
             " (±%(se)s); the page's scale was corrected."
         ),
+        N_(
+            "By %(by)s, lengths are %(shorter)s shorter than by frame, paper and resolution"
+            " (±%(se)s); the page's scale was corrected."
+        ),
         N_("The page's scale was corrected by lengths that are known: links, v_A and a_A."),
     ),
     "scale_doubtful": (
