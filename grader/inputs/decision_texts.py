@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 
 from grader.inputs.roster import short, why_no_id
-from grader.texts.spoken import ENGLISH, clause
+from grader.language import ID_RULES
 
 TURNS = (0, 90, 180, 270)
 LARGEST = 100_000.0
@@ -54,7 +54,7 @@ def page_decision(text: str) -> PageDecision:
 def _owner(text: str | None) -> str | None:
     why = None if text is None else why_no_id(text)
     if why is not None:
-        raise ValueError(f"owner '{short(text or '')}' is refused: {clause(why, ENGLISH)}")
+        raise ValueError(f"owner '{short(text or '')}' is refused: {ID_RULES[why.code]}")
     return text
 
 

@@ -45,7 +45,7 @@ from grader.inputs.roster import (
     whole_number,
     why_no_id,
 )
-from grader.texts.spoken import ENGLISH, clause
+from grader.language import ID_RULES
 from reference.authored.variant_table import delimiter_of, table_lines
 from reference.errors import CallError, Finding, InputFileError, PlanmarkError, lines_of, near_names
 
@@ -335,7 +335,7 @@ def faults_of(row: Decision) -> Iterator[tuple[str, str]]:
     if not row.student_id and row.kind != "page":
         yield "student_id", "is empty: say whose submission was decided"
     elif row.student_id and why is not None:
-        yield "student_id", f"'{short(row.student_id)}' is refused: {clause(why, ENGLISH)}"
+        yield "student_id", f"'{short(row.student_id)}' is refused: {ID_RULES[why.code]}"
     for column in COLUMNS:
         text = str(getattr(row, column) or "")
         if len(text) > _LONGEST:

@@ -13,9 +13,8 @@ from pathlib import Path
 
 from grader.files import shown_text, unguarded
 from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
-from grader.language import LANGUAGES, N_, ROOT_LANGUAGE, Tongue, tongue
+from grader.language import ID_RULES, LANGUAGES, N_, ROOT_LANGUAGE, Tongue, tongue
 from grader.records import Reason
-from grader.texts.spoken import ENGLISH, clause
 from reference.authored.assignment import SCALE_NAMES
 from reference.authored.variant_table import delimiter_of, table_lines
 from reference.errors import MOST_FINDINGS, AuthoredFileError, Finding, near_names
@@ -275,7 +274,7 @@ def _faults_of(row: RosterRow, text: Mapping[str, str]) -> Iterator[tuple[str, s
     if not row.student_id:
         yield "student_id", "is empty"
     elif why is not None:
-        yield "student_id", f"'{short(row.student_id)}' is refused: {clause(why, ENGLISH)}"
+        yield "student_id", f"'{short(row.student_id)}' is refused: {ID_RULES[why.code]}"
     for name, value in (("n", row.n), ("position", row.position)):
         if text[name] and value is None:
             yield name, f"'{short(text[name])}' is no whole number"

@@ -3,7 +3,7 @@
 By the code that the parameter ``why`` or ``advice`` of a reason has.
 """
 
-from grader.language import N_
+from grader.language import ID_RULES, N_
 
 READING: dict[str, str] = {
     "no_stroke": N_("no stroke between %(start)s and %(end)s could be told apart"),
@@ -99,10 +99,7 @@ OWNERS: dict[str, str] = {
         " name the pages in the roster's scans, `planmark match` makes a draft"
     ),
     "disproved": N_("page %(at)s disproves it: %(claims)s"),
-    "id_letters": N_("letters A-Z a-z, digits, '.', '_' and '-', at most 64, are allowed"),
-    "id_dot": N_("it cannot name a folder: it begins or ends with a dot"),
-    "id_device": N_("it cannot name a folder: Windows has a device of that name"),
-    "id_result": N_("it cannot name a folder: a file of the results has that name"),
+    **ID_RULES,
     "killed": N_("the process that worked on it was killed"),
     "workers_lost": N_("every worker that worked on it was lost"),
     "no_page_has_figure": N_("none of the student's pages has this figure; decide the verdicts in its place"),
