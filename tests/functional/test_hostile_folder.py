@@ -94,7 +94,7 @@ def test_the_run_ends_with_work_for_a_person(results):
 def test_what_is_wrong_with_a_file_stands_in_its_owners_report(results, name, code):
     report = next(one for one in results[2]["reports"] if one["student_id"] == name[:3])
     assert report["status"] == "unreadable"
-    assert any(problem["code"] == code and name in problem["message"] for problem in report["problems"])
+    assert any(problem["code"] == code and name in problem["file"] for problem in report["problems"])
     assert (results[1] / name[:3] / "feedback.html").is_file()
 
 
