@@ -104,7 +104,9 @@ def test_what_a_person_decided_is_told_with_the_comment():
 def test_one_comment_on_several_criteria_is_told_once():
     decided = DecidedDocument(by="x", at="2026-11-22T10:00:00+00:00", before=None, comment="It is here.")
     rows = [
-        criterion(name, feedback="A person has decided this.").model_copy(update={"decided": decided})
+        criterion(name, feedback="A person has decided this.").model_copy(
+            update={"decided": decided, "reasons": ["decided"], "mistake": None}
+        )
         for name in ("v_A", "v_B")
     ]
     page = page_of(report(criteria=rows, mistakes=[]))
