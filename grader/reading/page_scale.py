@@ -71,7 +71,7 @@ def is_upside_down(reading: Reading, drawing: Drawing | None) -> bool:
     return sum(turned) > 1
 
 
-def turn_doubts(page: ScannedPage) -> tuple[Problem, ...]:
+def turn_doubts(page: ScannedPage) -> tuple[Reason, ...]:
     """What registration says of not knowing which way up a page is."""
     return tuple(problem for problem in page.problems if problem.code == UPRIGHT_UNSURE)
 

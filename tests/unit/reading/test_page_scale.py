@@ -147,7 +147,7 @@ def test_two_figures_turned_by_half_say_that_the_page_lies_upside_down():
 
 
 def test_what_is_read_on_a_page_that_its_plans_alone_turned_is_not_asserted():
-    unsure = page(0.001, Problem(UPRIGHT_UNSURE, "no title block"))
+    unsure = page(0.001, Reason(UPRIGHT_UNSURE))
     turned = replace(unsure, ref=replace(unsure.ref, turn_deg=180))
     for sure in (unsure, replace(turned, problems=())):
         assert no_surer_than_turn(reading := drawn(), sure) is reading
