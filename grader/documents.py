@@ -518,46 +518,6 @@ class ResultsDocument(Document):
     """What people checked says of the verdicts; null before anybody has checked one."""
 
 
-# Plan: the exact plan of a variant ----------------------------------------------------------------
-
-
-class ScalesDocument(Document):
-    """Real units per millimetre on paper: m/mm, (m/s)/mm, (m/s^2)/mm."""
-
-    kL: float  # noqa: N815 - the field's own name for it
-    kv: float
-    ka: float
-
-
-class PlanVector(Document):
-    """An exact vector; a zero vector's direction is null."""
-
-    value: float
-    unit: str
-    drawn_mm: float
-    direction_deg: float | None
-
-
-class PlanDocument(Document):
-    """The exact plan of one variant; plan nodes relative to their pole, y up.
-
-    `centres_m`: instantaneous centres (``I3``, of two links ``I34``) and acceleration poles (``J3``) in
-    the mechanism's coordinates; null where a link does not turn.
-    """
-
-    schema_version: Version = 1
-    assignment: str
-    variant: dict[str, int]
-    position: int | None
-    scales: ScalesDocument
-    points_m: dict[str, tuple[float, float]]
-    vectors: dict[str, PlanVector]
-    nodes_mm: dict[str, dict[str, tuple[float, float]]]
-    angular: dict[str, float]
-    centres_m: dict[str, tuple[float, float] | None]
-    conditioning: dict[str, float | dict[str, float]]
-
-
 # Lint: an assignment held against every variant ---------------------------------------------------
 
 

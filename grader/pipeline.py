@@ -29,10 +29,13 @@ from grader.marking.decided import decide, open_again, with_decisions, with_node
 from grader.marking.mark import judge
 from grader.marking.report import reading_document, report_of, unjudged_report
 from grader.marking.trust import opened_by_audit, with_said
+from grader.options import Level
 from grader.outcomes import Judgement
+from grader.overlay.backdrop import backdrop
 from grader.overlay.measured import measured_picture
-from grader.overlay.picture import backdrop, overlay
+from grader.overlay.picture import overlay
 from grader.overlay.scene import Picture
+from grader.printed.layout import cells_of
 from grader.reading import page_scale
 from grader.reading.corrected import corrected
 from grader.reading.read import read_figures
@@ -55,7 +58,6 @@ from grader.scan.quality import flaws
 from grader.scan.register.distortion import straighten
 from grader.scan.register.registration import register
 from grader.scan.strokes.ink import find_ink
-from grader.texts.reasons import Level
 from grader.texts.spoken import of_error
 from reference.authored.assignment import SCALE_NAMES, Assignment, Scales, Variant
 from reference.construction.graph import Construction
@@ -72,8 +74,6 @@ def scan(ref: PageRef, asked: Asked) -> ScannedPage:
         return page
     reading = page.reading
     if page.sheet is not None and page.sheet.zones and asked.assignment is not None:
-        from grader.printed.answer_sheet import cells_of  # noqa: PLC0415 - brings the PDF writer
-
         cells = cells_of(asked.assignment, tuple(page.sheet.zones), asked.entries)
         reading = replace(reading, lengths=written_lengths(page.image, page.sheet, cells))
     return replace(page, image=None, reading=reading, backdrop=backdrop(page.image, page.sheet))

@@ -45,7 +45,6 @@ from grader.documents import (
     LintWorst,
 )
 from grader.language import LANGUAGES
-from grader.printed.layout import SCALE_OF
 from grader.rubric import RubricFile, check_rubric
 from reference.authored.assignment import TRADITIONS, Assignment, Variant
 from reference.authored.formula import Formula
@@ -55,6 +54,7 @@ from reference.construction.derive import image_name
 from reference.construction.graph import Construction, ancestors
 from reference.geometry import FloatArray
 from reference.plan import Plan, construction_for, exact_plan
+from reference.quantities import SCALE_OF
 
 ODD_RATIO = 200.0
 """Of the longest link to another one: no drawing shows both, and metres are a thousand millimetres."""

@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from grader.authoring.findings import NAMED, BoolArray, LintFinding, chosen
 from grader.documents import LintLeast, LintScales
-from grader.printed.layout import FRAME_MM, MARGIN_MM, SCALE_OF, TEMPLATES, Template, template_for
+from grader.printed.layout import FRAME_MM, MARGIN_MM, TEMPLATES, Template, template_for
 from grader.records import MECHANISM, Box
 from grader.rubric import RubricFile
 from reference.authored.assignment import SCALE_NAMES, Assignment, Scales, Variant
 from reference.geometry import FloatArray
 from reference.plan import ZERO_SHARE, Plan
+from reference.quantities import SCALE_OF
 
 WELL_READ_MM = 8.0
 """Shorter vectors are read from scans with less certainty."""

@@ -31,9 +31,10 @@ from reference.drawing.canvas import (
     width_of,
 )
 from reference.drawing.sheets import ENGLISH, reference_drawing
-from reference.drawing.subject import SCALE_UNITS, VECTOR_UNITS, Wording
+from reference.drawing.subject import Wording
 from reference.geometry import FloatArray
 from reference.plan import Plan
+from reference.quantities import SCALE_UNITS, unit_of
 
 Title = Literal["Scales", "Mechanism", "Velocities", "Accelerations"]
 PLANS: dict[Title, str] = {"Velocities": "velocity_plan", "Accelerations": "acceleration_plan"}
@@ -101,17 +102,7 @@ def sections_of(plan: Plan) -> tuple[Section, ...]:
         Column(name, name, unit, np.broadcast_to(getattr(plan.scales, name), (count,)), 5, "g")
         for name, unit in SCALE_UNITS.items()
     ]
-    rates = [
-        Column(
-            f"{name}_value",
-            name,
-            "rad/s" if name.startswith("omega") else "rad/s²",
-            _rate(plan, name),
-            5,
-            "g",
-        )
-        for name in plan.rates
-    ]
+    rates = [Column(f"{name}_value", name, unit_of(name), _rate(plan, name), 5, "g") for name in plan.rates]
     sections = [
         Section("Scales", tuple((column,) for column in (*scales, *rates))),
         Section("Mechanism", tuple(_point(joint, at, count) for joint, at in plan.motion.position.items())),
@@ -139,10 +130,9 @@ def _rate(plan: Plan, name: str) -> FloatArray:
 
 def _vector(plan: Plan, name: str) -> tuple[Column, ...]:
     drawn, value, zero = np.abs(plan.drawn_mm(name)), np.abs(plan.vectors_si[name]), plan.is_zero(name)
-    unit = VECTOR_UNITS[plan.construction.vectors[name].scale]
     return (
         Column(name, name, "mm", np.where(zero, 0.0, drawn), 2),
-        Column(f"{name}_value", name, unit, np.where(zero, 0.0, value), 4, "g"),
+        Column(f"{name}_value", name, unit_of(name), np.where(zero, 0.0, value), 4, "g"),
         Column(f"{name}_deg", name, "°", plan.direction_deg(name), 2),
     )
 

@@ -3,6 +3,9 @@
 import gc
 import os
 import sys
+from collections.abc import Sequence
+
+from typer.models import CommandInfo
 
 from grader.cli import commands  # noqa: F401 - registers the commands on the application
 from grader.cli.app import app
@@ -12,12 +15,19 @@ COLLECT_FROM = 50_000
 """New objects before Python looks for cycles: imports make many that all stay, and each look costs time."""
 
 
+def commands_called(arguments: Sequence[str]) -> list[CommandInfo]:
+    """The command that is named first, which needs the options of no other; else all commands."""
+    every = app.registered_commands
+    return [one for one in every if getattr(one.callback, "__name__", "") in arguments[:1]] or every
+
+
 def main() -> None:
     """Run ``planmark``; see `grader.cli.app` for exit statuses."""
     gc.set_threshold(COLLECT_FROM)
     # planmark has no plugins of pydantic; a search for them reads the metadata of every installed package.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     set_encoding()
+    app.registered_commands = commands_called(sys.argv[1:])
     try:
         app(prog_name="planmark")
     except SystemExit as end:

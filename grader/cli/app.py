@@ -10,15 +10,18 @@ import signal
 import time
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
+from dataclasses import MISSING
 from functools import wraps
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_origin, get_type_hints
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
 from grader import __version__
 from grader.cli import class_folder, terminal
+from grader.options import is_record, offered
 from reference.errors import CallError, PlanmarkError
 
 if TYPE_CHECKING:
@@ -142,6 +145,47 @@ def _common(*, quiet: QuietOption = False, verbose: VerboseOption = False, log: 
     terminal.set_up(quiet=quiet, verbose=verbose, log=log)
 
 
+def _assignments() -> list[str]:
+    """The built-in names, for a shell that completes them."""
+    from reference.authored.assignment import built_in
+
+    return built_in()
+
+
+def _languages() -> list[str]:
+    """The languages, for a shell that completes them."""
+    from grader.language import LANGUAGES
+
+    return list(LANGUAGES)
+
+
+def _platforms() -> list[str]:
+    """What there are exports for, for a shell that completes it."""
+    from grader.lms.export import TARGETS
+
+    return list(TARGETS)
+
+
+_COMPLETED = {"lang": _languages, "to": _platforms}
+"""Options whose values a shell completes."""
+_KEYWORD = inspect.Parameter.KEYWORD_ONLY
+
+
+def _parameters(record: type) -> list[inspect.Parameter]:
+    """The parameters of a command for the options of a record; what a choice may be, the command checks."""
+    types, made = get_type_hints(record), []
+    for one, told in offered(record):
+        flags = told.flags or (f"--{one.name.replace('_', '-')}",)
+        offer = typer.Option(
+            *flags, help=told.help, min=told.least, max=told.most, metavar=told.metavar, hidden=told.hidden,
+            autocompletion=_COMPLETED.get(one.name),
+        )  # fmt: skip
+        kind = str if get_origin(types[one.name]) is Literal else types[one.name]
+        default = inspect.Parameter.empty if one.default is MISSING else one.default
+        made.append(inspect.Parameter(one.name, _KEYWORD, default=default, annotation=Annotated[kind, offer]))
+    return made
+
+
 class _Application(typer.Typer):
     """An application in which every command has the common options."""
 
@@ -152,12 +196,16 @@ class _Application(typer.Typer):
 
         def add(function: Callable[..., None]) -> Callable[..., None]:
             own, common = (inspect.signature(one, eval_str=True).parameters for one in (function, _common))
+            annotations = {whole: one.annotation for whole, one in own.items()}
+            records = {whole: one for whole, one in annotations.items() if is_record(one)}
 
             @wraps(function)
             def run(context: typer.Context, **values: Any) -> None:  # noqa: ANN401 - the commands' options
                 _common(**{option: values.pop(option) for option in common})
                 terminal.note_call()
                 class_folder.tell_used(context)
+                for whole, record in records.items():
+                    values[whole] = record(**{one.name: values.pop(one.name) for one, _ in offered(record)})
                 start = time.monotonic()
                 try:
                     function(**values)
@@ -169,10 +217,11 @@ class _Application(typer.Typer):
                 finally:
                     terminal.LOG.debug("ended after %.1f s", time.monotonic() - start)
 
-            parameters = [*own.values(), *common.values()]
+            every = [_parameters(one.annotation) if name in records else [one] for name, one in own.items()]
+            parameters = [*chain.from_iterable(every), *common.values()]
             first = inspect.signature(run, follow_wrapped=False).parameters["context"]
-            first = first.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)
-            parameters = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in parameters]
+            first = first.replace(kind=_KEYWORD, annotation=typer.Context)
+            parameters = [one.replace(kind=_KEYWORD) for one in parameters]
             run.__signature__ = inspect.Signature([*parameters, first])  # type: ignore[attr-defined]
             run.__annotations__ = {one.name: one.annotation for one in (*parameters, first)}
             register(run)
@@ -210,20 +259,6 @@ def _options(
     ] = False,
 ) -> None:
     """Options of the program itself."""
-
-
-def _assignments() -> list[str]:
-    """The built-in names, for a shell that completes them."""
-    from reference.authored.assignment import built_in
-
-    return built_in()
-
-
-def _languages() -> list[str]:
-    """The languages, for a shell that completes them."""
-    from grader.language import LANGUAGES
-
-    return list(LANGUAGES)
 
 
 AssignmentArgument = Annotated[

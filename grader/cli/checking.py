@@ -4,23 +4,24 @@ import csv
 import io
 import shutil
 import textwrap
+from collections.abc import Sequence
 from pathlib import Path
+from typing import cast
 
 import typer
 
 from grader.cli import terminal
 from grader.cli.app import check_language
-from grader.comparison.evidence import Submission
-from grader.comparison.task import task_of
 from grader.documents import Quantity
-from grader.feedback.advice import RESULTS, CheckedLine, checked_lines
 from grader.feedback.sentences import mistake_feedback
 from grader.files import shown_text, write_whole
 from grader.inputs.measurements import Measurements, columns_of, names_of, read_measurements
 from grader.language import N_, Tongue, tongue
-from grader.marking.mark import judge
-from grader.marking.self_check import LEVELS, Level, is_all_right, likely_mistakes
+from grader.options import CheckOptions, Level, VariantOptions
 from grader.rubric import RubricFile, rubric_of
+from grader.self_check.advice import RESULTS, CheckedLine
+from grader.self_check.results import LEVELS, likely_mistakes
+from grader.self_check.values import check_values
 from grader.texts.spoken import message, of_error, problem_documents, sentence
 from reference.authored.assignment import Assignment, Variant, built_in, load_assignment
 from reference.errors import CallError, MechanismError
@@ -49,32 +50,24 @@ HOW_TO_FILL_IN = N_(
 )
 
 
-def check_measured(
-    name: str,
-    n: int | None,
-    position: int | None,
-    file: Path | None,
-    lang: str,
-    level: str,
-    page: Path | None = None,
-    template: Path | None = None,
-) -> bool:
+def check_measured(name: str, options: CheckOptions) -> bool:
     """Print right or off for every value of a measurement file; whether anything is off.
 
     With a `page`, one student's values are drawn and told in that file, too. With a `template`, the file
     to fill in is written.
     """
+    lang, file, page = options.lang, options.measured, options.page
     check_language(lang)
     speaker = tongue(lang)
     if page is not None and page.suffix.lower() != ".html":
         raise _refused(speaker, "page_file", PAGE_NAME, file=page)
-    wanted = checked_level(level, speaker)
+    wanted = checked_level(options.level, speaker)
     assignment = _assignment(name, speaker)
     rubric = rubric_of(assignment)
-    if template is not None:
-        _write_template(template, rubric, _variant(assignment, None, n, position, speaker), speaker)
+    if options.template is not None:
+        _write_template(options.template, rubric, _variant(assignment, None, options, speaker), speaker)
     if file is None:
-        if template is None:
+        if options.template is None:
             raise _refused(speaker, "measured_needed", NO_MEASUREMENTS)
         return False
     all_right = True
@@ -83,47 +76,45 @@ def check_measured(
         raise _refused(speaker, "page_students", PAGE_STUDENTS, file=file, count=len(students))
     if not students:
         typer.secho(speaker.gettext(NOTHING), fg="yellow")
-    driven = assignment.mechanism_file.driver.pin
-    names = assignment.file.names
     for entered in students:
-        variant = _variant(assignment, entered, n, position, speaker)
+        variant = _variant(assignment, entered, options, speaker)
         _tell_head(entered, variant, speaker)
-        submission = Submission(measured=entered.reading, values=entered.values, declared=entered.scales)
         try:
-            judgement = judge(task_of(assignment, rubric, variant), submission)
+            check = check_values(entered, assignment, variant, speaker, wanted)
         except MechanismError as error:
             known = sentence(of_error(error), speaker) or error.message
             raise CallError(error.code, f"{variant}: {known}") from error
-        lines = checked_lines(judgement, wanted, speaker, names, driven)
-        _tell(lines, wanted, speaker)
-        likely = likely_mistakes(judgement, wanted)
-        mistakes = [mistake_feedback(mistake, lang, "full", names) for mistake in likely]
+        _tell(check.lines, wanted, speaker)
+        likely = likely_mistakes(check.judgement, wanted)
+        mistakes = [mistake_feedback(mistake, lang, "full", assignment.file.names) for mistake in likely]
         for mistake, sentences in zip(likely, mistakes, strict=True):
             _print(f"{mistake.code}: {sentences}", "  ")
         if page is not None:
-            _write_page(page, assignment, rubric, variant, entered, lang, wanted, lines, mistakes)
-        is_right = is_all_right(tuple(line.checked for line in lines))
-        all_right = all_right and is_right and bool(lines) and not entered.problems
+            _write_page(options, assignment, variant, entered, check.lines, mistakes)
+        all_right = all_right and check.is_all_right and not entered.problems
     return not (all_right and students)
 
 
-def check_photo(name: str, n: int | None, position: int | None, file: Path, lang: str, level: str) -> bool:
+def check_photo(name: str, options: CheckOptions) -> bool:
     """Print what spoils a photo, and right or off for every value read on it; whether anything is off."""
     from grader.folder.workers import Limits, Workers, result_of
-    from grader.photo import photo_check
+    from grader.self_check.photo import photo_check
 
+    lang, file = options.lang, cast("Path", options.photo)
+    if any((options.measured, options.page, options.template)):
+        raise CallError("photo_alone", "--photo goes without --measured, --page and --template")
     check_language(lang)
     speaker = tongue(lang)
-    wanted = checked_level(level, speaker)
+    wanted = checked_level(options.level, speaker)
     assignment = _assignment(name, speaker)
-    variant = _variant(assignment, None, n, position, speaker)
+    variant = _variant(assignment, None, options, speaker)
     with Workers(1, Limits(), photo_check.__module__) as workers:
         told = result_of(workers, photo_check, file, assignment, rubric_of(assignment), variant, lang, wanted)
     typer.secho(f"{shown_text(file.name)}, {variant}", bold=True)
     for text in (*told.flaws.values(), *told.problems):
         _print(text, "  ", "yellow")
-    if told.is_read:
-        _tell(list(told.lines), wanted, speaker)
+    if told.judgement is not None:
+        _tell(told.lines, wanted, speaker)
     return not told.is_all_right
 
 
@@ -170,24 +161,22 @@ def _write_template(file: Path, rubric: RubricFile, variant: Variant, speaker: T
 
 
 def _write_page(
-    page: Path,
+    options: CheckOptions,
     assignment: Assignment,
-    rubric: RubricFile,
     variant: Variant,
     entered: Measurements,
-    lang: str,
-    level: Level,
-    lines: list[CheckedLine],
+    lines: Sequence[CheckedLine],
     mistakes: list[str],
 ) -> None:
     """The same as a page, with the plans drawn as measured."""
-    from grader.feedback.check_page import check_page
     from grader.feedback.student_page import About
     from grader.inputs.measurements import StudentSubmission
     from grader.pipeline import mark
+    from grader.self_check.page import check_page
 
+    page, lang = cast("Path", options.page), options.lang
     submission = StudentSubmission(entered.student_id or "", variant, measured=entered, lang=lang)
-    report, pictures = mark(submission, (), assignment, rubric, level)
+    report, pictures = mark(submission, (), assignment, rubric_of(assignment), options.level)
     problems = [*entered.problems, *entered.reading.problems]
     told = [*problem_documents(problems)]
     about = About(assignment.file.title.in_language(lang), "", assignment.file.names)
@@ -196,12 +185,12 @@ def _write_page(
 
 
 def _variant(
-    assignment: Assignment, entered: Measurements | None, n: int | None, position: int | None, speaker: Tongue
+    assignment: Assignment, entered: Measurements | None, options: VariantOptions, speaker: Tongue
 ) -> Variant:
     """The variant of the call or the file; raises CallError where they contradict each other."""
     chosen: dict[str, int | None] = {}
     spec = assignment.file.variant
-    for what, called, allowed in (("n", n, spec.n), ("position", position, spec.position)):
+    for what, called, allowed in (("n", options.n, spec.n), ("position", options.position, spec.position)):
         filed = None if entered is None else getattr(entered, what)
         if entered is not None and called is not None and filed is not None and called != filed:
             known = {"what": what, "called": called, "filed": filed, "file": entered.source}
@@ -225,7 +214,7 @@ def _tell_head(entered: Measurements, variant: Variant, speaker: Tongue) -> None
         _print(message(problem, speaker), "  ", "yellow")
 
 
-def _tell(lines: list[CheckedLine], level: Level, speaker: Tongue) -> None:
+def _tell(lines: Sequence[CheckedLine], level: Level, speaker: Tongue) -> None:
     if not lines:
         typer.secho(f"  {speaker.gettext(NOTHING)}", fg="yellow")
         return

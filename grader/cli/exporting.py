@@ -13,7 +13,6 @@ from grader.documents import (
     CalibrationDocument,
     LintDocument,
     MeasurementsDocument,
-    PlanDocument,
     ReadingDocument,
     ReportDocument,
     ResultsDocument,
@@ -26,7 +25,9 @@ from grader.lms.grades import Delivery, Options, people_of
 from grader.lms.moodle_guide import MoodleMarksDocument, MoodleRubricDocument
 from grader.lms.scores import GradescopeDocument, LtiDocument
 from grader.lms.table import with_ids
+from grader.options import ExportCall, ExportOptions, taken
 from grader.rubric import RubricFile
+from grader.solution.document import PlanDocument
 from reference.authored.assignment import AssignmentFile
 from reference.authored.mechanism import MechanismFile
 from reference.errors import CallError
@@ -72,20 +73,24 @@ def schema(name: str) -> dict[str, Any]:
     }
 
 
-def export_results(
-    folder: Path, file: Path | None, options: Options, roster: Path | None, ids: Path | None
-) -> tuple[bool, Path]:
+def export_results(folder: Path, call: ExportCall) -> tuple[bool, Path]:
     """Write the export file and report who is not in it; whether anybody is missing, and the file."""
-    check_language(options.lang)
-    path = file or folder / usual_name(options)
-    for source in (folder / "results.json", options.form, options.criteria, options.submissions, roster, ids):
+    check_language(call.lang)
+    if call.worksheet is not None and (call.gradebook is not None or call.to != "moodle"):
+        raise CallError("option_unused", "--worksheet is Moodle's: give it with --to moodle alone")
+    if call.gradebook is not None and call.to in {"moodle", "canvas-api"}:
+        raise CallError("option_unused", f"--gradebook has no meaning for {call.to}: leave it out")
+    options = Options(form=call.worksheet or call.gradebook, out=folder, **taken(ExportOptions, call))
+    path = call.file or folder / usual_name(options)
+    sources = (options.form, options.criteria, options.submissions, call.roster, call.ids)
+    for source in (folder / "results.json", *sources):
         if source is not None and path.resolve() == source.resolve():
             raise CallError("file_exists", f"{path}: is read for this export; name another file (--file)")
     results = read_results(folder)
-    people = {} if roster is None else people_of(roster)
-    if ids is not None:
-        people = with_ids(people, ids)
-    delivery = deliver(results, path, replace(options, people=people, out=folder))
+    people = {} if call.roster is None else people_of(call.roster)
+    if call.ids is not None:
+        people = with_ids(people, call.ids)
+    delivery = deliver(results, path, replace(options, people=people))
     _report(delivery, path)
     return not delivery.is_complete, path
 

@@ -28,6 +28,7 @@ from grader.folder.watch import arrivals
 from grader.folder.workers import Limits, Workers, result_of
 from grader.language import ROOT_LANGUAGE, tongue
 from grader.marking.report import reading_document
+from grader.options import ClassOptions, GradeOptions, taken
 from grader.pipeline import open_page, read_pages
 from grader.records import PageRef, ScannedPage
 from grader.rubric import Asked, rubric_of
@@ -36,30 +37,14 @@ from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, InputFileError
 
 
-def grade_folder(
-    folder: Path,
-    name: str,
-    out: Path,
-    *,
-    roster: Path | None,
-    pages_per_student: int | None,
-    jobs: int | None,
-    lang: str,
-    limits: Limits | None = None,
-    level: str = "full",
-    with_ghosts: bool = True,
-    decisions: Path | None = None,
-    watch_s: float | None = None,
-    cluster: str | None = None,
-) -> ResultsDocument:
+def grade_folder(folder: Path, name: str, out: Path, options: GradeOptions) -> ResultsDocument:
     """Grade a folder and print the outcome.
 
-    Arguments: with `watch_s` what comes into it counts too, until Ctrl+C; with `cluster`, the address of a
-    scheduler, the work is done by its workers.
+    What comes into a folder that is watched counts too, until Ctrl+C; a cluster's workers do its work.
     """
-    check_language(lang)
-    wanted = checked_level(level)
-    if pages_per_student is not None and pages_per_student < 1:
+    check_language(options.lang)
+    wanted, cluster, decisions = checked_level(options.level), options.cluster, options.decisions
+    if options.pages_per_student is not None and options.pages_per_student < 1:
         raise CallError("pages_per_student", "--pages-per-student must be 1 or more")
     if decisions is not None and not decisions.is_file():
         raise CallError("file_missing", f"{decisions}: there is no such file of decisions")
@@ -75,14 +60,15 @@ def grade_folder(
             folder, decisions = on_cluster.image_of(address, out), decisions or out / "decisions.csv"
         elif not folder.is_dir():
             raise CallError("folder_missing", f"{folder}: there is no such folder")
+    limits = Limits(options.time_limit, options.memory_limit)
+    given = {**taken(ClassOptions, options), "level": wanted, "decisions": decisions}
     batch = Batch(
-        assignment, rubric, folder, out, roster, pages_per_student, jobs or os.cpu_count() or 1,
-        limits or Limits(), lang, wanted, with_ghosts, decisions,
-    )  # fmt: skip
-    if watch_s is not None and cluster is not None:
+        assignment, rubric, folder, out, jobs=options.jobs or os.cpu_count() or 1, limits=limits, **given
+    )
+    if options.watch and cluster is not None:
         raise CallError("option_unused", "--watch looks at a folder of this machine: leave --cluster out")
-    if watch_s is not None:
-        return _watch(batch, watch_s)
+    if options.watch:
+        return _watch(batch, options.every)
     with ExitStack() as stack:
         pool = None
         if cluster is not None:
@@ -164,9 +150,7 @@ def demo(out: Path, lang: str, jobs: int | None) -> None:
         # A copy: what is decided on it lies beside it.
         folder = out / "handed-in" / name
         shutil.copytree(samples_folder() / name, folder, dirs_exist_ok=True)
-        results = grade_folder(
-            folder, name, out / name, roster=None, pages_per_student=None, jobs=jobs, lang=lang
-        )
+        results = grade_folder(folder, name, out / name, GradeOptions(jobs=jobs, lang=lang))
         title = load_assignment(name).file.title.in_language(lang)
         classes[name] = (title, results)
     write_demo_page(classes, out, lang)

@@ -12,6 +12,7 @@ from grader.cli import terminal
 from grader.cli.app import check_language, progress
 from grader.cli.grading import fill_image, tell_class, tell_next_of_class
 from grader.folder.batch import noted_batch
+from grader.options import ReviewOptions
 from grader.review.server import LOOPBACK, application
 from grader.review.session import Session
 from reference.errors import CallError
@@ -20,13 +21,12 @@ LEAST_TOKEN = 8
 """Letters of a token: fewer could be tried out."""
 
 
-def review_class(
-    folder: Path, *, host: str, token: str, port: int, jobs: int | None, lang: str | None
-) -> None:
+def review_class(folder: Path, options: ReviewOptions) -> None:
     """Serve the review of a class until it is ended; then bring the results up to date.
 
     Raises CallError for a folder of which nothing is known, a host without a token, a port that is taken.
     """
+    host, token, lang = options.host, options.token, options.lang
     if lang is not None:
         check_language(lang)
     if host not in LOOPBACK and not token:
@@ -35,9 +35,9 @@ def review_class(
         )
     if token and len(token) < LEAST_TOKEN:
         raise CallError("token_short", f"--token must have {LEAST_TOKEN} signs or more")
-    batch = replace(noted_batch(folder), jobs=jobs or os.cpu_count() or 1)
+    batch = replace(noted_batch(folder), jobs=options.jobs or os.cpu_count() or 1)
     fill_image(batch.folder)
-    listener = listener_on(host, port)
+    listener = listener_on(host, options.port)
     session = Session(batch)
     with progress() as tell:
         session.bring_up_to_date(tell)

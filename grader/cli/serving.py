@@ -17,6 +17,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from grader.cli import terminal
 from grader.cli.reviewing import listener_on
+from grader.options import ServeOptions
 from reference.errors import CallError
 
 MISSING = "planmark serve needs its extra: install it with pip install 'planmark[web]'"
@@ -80,21 +81,13 @@ class Bounded(H11Protocol):
             self._head = None
 
 
-def serve(
-    data: Path,
-    *,
-    host: str,
-    port: int,
-    address: str | None,
-    database: str | None,
-    mail: str | None,
-    jobs: int | None,
-) -> None:
+def serve(data: Path, options: ServeOptions) -> None:
     """Serve the web application until it is ended.
 
     Raises CallError where the extra is missing, for a port that is taken, a data base that cannot be opened,
     a host that others reach without an address.
     """
+    host, address = options.host, options.address
     try:
         from grader.web.app import application, first_invitation
         from grader.web.settings import LOOPBACK, settings_of
@@ -103,14 +96,14 @@ def serve(
     if address is None and host not in LOOPBACK:
         why = "say under which name students reach it: --address https://NAME"
         raise CallError("address_needed", f"--host {host} opens the server to other machines: {why}")
-    with listener_on(host, port) as listener:
+    with listener_on(host, options.port) as listener:
         shown = f"[{host}]" if ":" in host else host
         settings = settings_of(
             data,
             address or f"http://{shown}:{listener.getsockname()[1]}",
-            database,
-            mail,
-            jobs=jobs or os.cpu_count() or 1,
+            options.database,
+            options.mail,
+            jobs=options.jobs or os.cpu_count() or 1,
         )
         app = application(settings)
         invitation = first_invitation(settings)

@@ -14,11 +14,11 @@ from grader.cli.terminal import note
 from grader.documents import CalibrationDocument
 from grader.files import write_whole
 from grader.folder.cache import PageCache
-from grader.folder.draft_roster import SURE, contact_sheet, draft_csv, suggest, thumbnail
 from grader.folder.inventory import submissions, take_inventory
 from grader.folder.workers import Limits, Workers, result_of
 from grader.inputs.measurements import names_of
 from grader.inputs.roster import RosterRow, read_roster
+from grader.owners.draft_roster import SURE, contact_sheet, draft_csv, suggest, thumbnail
 from grader.printed.answer_sheet import make_calibration, make_sheets
 from grader.printed.handout import make_handout
 from grader.records import FloatArray, PageRef, Reason, Unread

@@ -67,6 +67,8 @@ def note(text: str) -> None:
 
 def note_call() -> None:
     """Log the versions, and how the program was called."""
+    if not LOG.isEnabledFor(logging.DEBUG):
+        return  # to find the system's version takes longer than to solve a mechanism
     system = f"Python {platform.python_version()}, {platform.platform()}"
     LOG.debug("planmark %s, %s, in %s", __version__, system, Path.cwd())
     LOG.debug("%s", shown_command("planmark", *sys.argv[1:]))

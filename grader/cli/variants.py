@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +18,7 @@ from grader.cli.plans import check_crank
 from grader.cycle.quantities import CycleSubject, Extreme, Selection, cycle_csv, extremes, strokes_of
 from grader.files import write_whole
 from grader.language import Tongue, tongue
+from grader.options import CycleOptions, PlanOptions
 from grader.solution.document import plan_documents
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant, load_assignment
 from reference.errors import CallError, MechanismError
@@ -36,30 +37,24 @@ LONG = 20
 """So many drawings take seconds: their progress is shown."""
 
 
-def refuse_single(*, every: bool, options: Mapping[str, object]) -> None:
+def _refuse_single(options: PlanOptions) -> None:
     """Refuse `--all` with options for one variant, and `--csv` for one."""
-    given = [name for name, value in options.items() if value is not None]
-    if not every:
+    if not options.every:
         raise CallError("all_or_one", "--csv is a table of all variants: add --all")
+    single = ("n", "position", "svg", "steps", "altitude")
+    given = [f"--{name}" for name in single if getattr(options, name) not in (None, False)]
     if given:
         told = "--all is every variant, and" if given != ["--svg"] else "drawings of --all go into --pdf:"
         raise CallError("all_or_one", f"{told} {' and '.join(given)} one of them: leave out either")
 
 
-def show_class(
-    name: str,
-    crank_mm: float | None,
-    *,
-    as_json: bool,
-    csv: Path | None,
-    pdf: Path | None,
-    drawings: bool,
-    lang: str,
-) -> bool:
+def show_class(name: str, options: PlanOptions) -> bool:
     """Write the plans of all variants as JSON, as a table, or on pages; without any, a short table.
 
     Variants that cannot be solved are listed and left out; returns whether there are any.
     """
+    _refuse_single(options)
+    crank_mm, csv, pdf, lang = options.crank_mm, options.csv, options.pdf, options.lang
     check_crank(crank_mm)
     check_language(lang)
     assignment = load_assignment(name)
@@ -69,8 +64,8 @@ def show_class(
     if csv is not None:
         write_whole(csv, class_csv(plan, decimal_comma=tongue(lang).decimal_mark == ","))
     if pdf is not None:
-        _print_pages(assignment, plan, pdf, drawings=drawings, lang=lang)
-    if as_json:
+        _print_pages(assignment, plan, pdf, drawings=options.drawings, lang=lang)
+    if options.as_json:
         documents = [one.model_dump(mode="json") for one in plan_documents(assignment, plan)]
         terminal.say(json.dumps(documents, indent=2, ensure_ascii=False))
         return is_open
@@ -143,25 +138,15 @@ ZERO = 1e-8
 """Against the largest of its kind: a least value below it is zero but for rounding."""
 
 
-def show_cycle(
-    name: str,
-    n: int | None,
-    position: int | None,
-    *,
-    of: list[str],
-    samples: int,
-    csv: Path | None,
-    svg: Path | None,
-    pdf: Path | None,
-    lang: str,
-) -> None:
+def show_cycle(name: str, options: CycleOptions) -> None:
     """Write a variant's cycle as a table or a diagram; without files, print its extremes and strokes."""
-    words = tongue(lang)
+    words, csv = tongue(options.lang), options.csv
     assignment = load_assignment(name)
-    variant = assignment.variant(n, position)
-    subject = CycleSubject(cycle(assignment.mechanism([variant]), samples))
-    selection = subject.select([part.strip() for text in of for part in text.split(",") if part.strip()])
-    drawn_in = {kind: file for kind, file in (("svg", svg), ("pdf", pdf)) if file is not None}
+    variant = assignment.variant(options.n, options.position)
+    subject = CycleSubject(cycle(assignment.mechanism([variant]), options.samples))
+    names = [part.strip() for text in options.of or () for part in text.split(",")]
+    selection = subject.select([name for name in names if name])
+    drawn_in = {kind: file for kind, file in (("svg", options.svg), ("pdf", options.pdf)) if file is not None}
     diagrams = _diagrams(assignment, variant, subject, selection, words, list(drawn_in))
     if csv is not None:
         write_whole(csv, cycle_csv(subject, selection, decimal_comma=words.decimal_mark == ","))
@@ -207,7 +192,7 @@ def _print(assignment: Assignment, variant: Variant, subject: CycleSubject, sele
     for quantity in selection.quantities:
         least, largest = extremes(subject, quantity)
         here = float(subject.values_at(quantity, np.array([subject.cycle.start]))[0])
-        unit = quantity.unit.replace("²", "^2")
+        unit = quantity.unit
         size = subject.size(quantity)
         if largest.value - least.value <= CONSTANT * size:
             told = here if abs(here) > ZERO * size else 0.0

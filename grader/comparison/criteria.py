@@ -25,7 +25,7 @@ from grader.comparison.follow_through import (
 )
 from grader.comparison.images import with_images
 from grader.comparison.scales import Scale, settle
-from grader.comparison.task import Task, TaskSegment, unit_of
+from grader.comparison.task import Task, TaskSegment
 from grader.comparison.verdicts import (
     ALL_RIGHT,
     EVEN,
@@ -49,6 +49,7 @@ from reference.construction.elements import Normal
 from reference.construction.graph import AngularRate
 from reference.construction.steps import Given
 from reference.construction.uncertainty import EndSpread
+from reference.quantities import unit_of
 
 
 @dataclass(frozen=True, slots=True)

@@ -94,7 +94,7 @@ class FollowThrough:
     explanation : the result of the search for what was done, once it was needed
     instead : the other construction by which the plans were drawn
     own_cache, trace_cache : by scales and basis
-    turned_cache : by ``v`` or ``a``, the plan as it is turned as a whole
+    turned_cache : by the driven link's vector, the plan as it is turned as a whole
     """
 
     task: Task
@@ -270,7 +270,7 @@ class FollowThrough:
 
     def turned_plan(self, segment: TaskSegment) -> Iterator[Expectation]:
         """The vector in a plan that is turned as a whole by quarter turns, as the crank's vector is."""
-        crank, basis = self.driven_vector(segment.name[0]), self.turned_basis(segment.name[0])
+        crank, basis = self.task.driven_vector(segment.name), self.turned_basis(segment.name)
         if basis is not None and segment.head not in basis.wrong:
             quarters = basis.quarters
             turned = segment.drawn(self.followed) * 1j**quarters
@@ -279,15 +279,12 @@ class FollowThrough:
             one = self.from_nodes(segment, self.followed, basis)
             yield replace(one, what="vector", of=crank, causes=basis.wrong)
 
-    def driven_vector(self, letter: str) -> str:
-        """The name of the driven link's velocity (``v``) or acceleration (``a``)."""
-        return f"{letter}_{self.task.pin}"
-
-    def turned_basis(self, letter: str) -> PlanBasis | None:
-        """The plan turned as a whole as the driven link's vector is; None where that is not turned."""
-        if letter not in self.turned_cache:
-            self.turned_cache[letter] = self._turned_basis(self.driven_vector(letter))
-        return self.turned_cache[letter]
+    def turned_basis(self, name: str) -> PlanBasis | None:
+        """A vector's plan turned as a whole as the driven link's vector is; None where that is not turned."""
+        crank = self.task.driven_vector(name)
+        if crank not in self.turned_cache:
+            self.turned_cache[crank] = self._turned_basis(crank)
+        return self.turned_cache[crank]
 
     def _turned_basis(self, crank: str) -> PlanBasis | None:
         task, own = self.task, self.evidence.vector(crank)
@@ -372,7 +369,7 @@ class FollowThrough:
         if node in construction.images:
             yield wrong, self.followed, None, True
         if figure in construction.poles:
-            turned = self.turned_basis(construction.vectors_of(figure)[0].name[0])
+            turned = self.turned_basis(construction.vectors_of(figure)[0].name)
             if turned is not None and node not in turned.wrong:
                 yield turned.wrong | wrong, self.followed, turned, False
             basis = self.drawn_instead()

@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import Literal, cast
 
 from grader.comparison.evidence import DrawnVector, Evidence, Submission, gather
-from grader.comparison.task import Task, Yardstick, unit_of
+from grader.comparison.task import Task, Yardstick
 from grader.comparison.verdicts import EVEN, FULL, NONE, Limit, MarkRange, by_rule, mark
 from grader.inputs.scale_text import (
     EXAMPLES,
@@ -23,6 +23,7 @@ from grader.records import Reading, Reason, Unread, Value, Written
 from grader.rubric import ToleranceTable
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.uncertainty import spread
+from reference.quantities import unit_of
 
 TELLING = 2
 """So many vectors of the right length confirm a scale as well as the crank's vector does."""
@@ -143,7 +144,7 @@ def _evidence_of(
         if task.yardstick is None or evidence.yardstick_mm is None or evidence.yardstick_mm[0] <= 0.0:
             return None
         return (task.yardstick.length_m, *evidence.yardstick_mm)
-    vector = f"{name[1]}_{task.pin}"
+    vector = task.driven_vector(name)
     drawn = evidence.vector(vector)
     if drawn is None or drawn.length_mm <= 0.0 or not task.real.get(vector):
         return None
@@ -169,7 +170,7 @@ def _contradiction(task: Task, evidence: Evidence, name: str, used: float) -> fl
 def _fitting(task: Task, evidence: Evidence, name: str, scale: float, least: float = 0.0) -> int:
     """How many drawn vectors of such a confidence, beside the crank's, have the right length at a scale."""
     vectors = [v for v in task.construction.vectors.values() if v.scale == name]
-    known = [(v.name, evidence.vector(v.name)) for v in vectors if v.name != f"{name[1]}_{task.pin}"]
+    known = [(v.name, evidence.vector(v.name)) for v in vectors if v.name != task.driven_vector(name)]
     return sum(
         _fits(drawn, abs(task.real[vector]) / scale, task.rubric.tolerance_of(vector))
         for vector, drawn in known
@@ -235,8 +236,7 @@ def _unseen(
 
     Arguments: `doubtful` is what shows it as read, where that contradicts it.
     """
-    vector = f"{name[1]}_{task.pin}"
-    unread = Reason("unread", {"why": "scale_vector_unsure", "vector": vector})
+    unread = Reason("unread", {"why": "scale_vector_unsure", "vector": task.driven_vector(name)})
     other = None if doubtful is None else doubtful[0] / doubtful[1]
     off = 0.0 if other is None else _is_off(task, evidence, name, scale.used, other)
     if other is None or off < EVEN:
@@ -255,7 +255,7 @@ def _is_off(task: Task, evidence: Evidence, name: str, declared: float, other: f
 
     Else that vector was misread; the other vectors of the plan fit one or the other.
     """
-    drawn = evidence.vector(f"{name[1]}_{task.pin}")
+    drawn = evidence.vector(task.driven_vector(name))
     confidence = 0.0 if drawn is None else drawn.confidence
     more = _fitting(task, evidence, name, other) - _fitting(task, evidence, name, declared)
     is_other, is_misread = WRONG_SCALE * confidence, FITS_BY_CHANCE**more * (1.0 - confidence)
@@ -316,7 +316,7 @@ def _ends(task: Task, name: str) -> tuple[str, str]:
     if name == "kL":
         yardstick = cast("Yardstick", task.yardstick)
         return yardstick.tail, yardstick.head
-    vector = task.construction.vectors[f"{name[1]}_{task.pin}"]
+    vector = task.construction.vectors[task.driven_vector(name)]
     return vector.tail, vector.head
 
 

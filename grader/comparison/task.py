@@ -15,28 +15,14 @@ from reference.construction.graph import Construction, evaluate
 from reference.construction.uncertainty import Skill, TracedDrawing, trace
 from reference.mechanism import Crank, Dyad, Mechanism, Slider
 from reference.plan import exact_plan
+from reference.quantities import kind_of
 
 Made = TypeVar("Made")
 
-UNITS: Mapping[str, str] = {
-    "kL": "m/mm",
-    "kv": "(m/s)/mm",
-    "ka": "(m/s^2)/mm",
-    "v": "m/s",
-    "a": "m/s^2",
-    "omega": "rad/s",
-    "epsilon": "rad/s^2",
-}
-"""By scale, or by the part of a name before its first underscore."""
 CACHE_SIZE = 64
 """Results in the cache of one task, at students' own scales."""
 TASK_CACHE_SIZE = 256
 """Tasks in the cache: students of the same variant have the same one."""
-
-
-def unit_of(name: str) -> str:
-    """The SI unit of a vector, angular quantity, scale (per millimetre on paper) or link."""
-    return UNITS.get(name.partition("_")[0], "m")
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +91,10 @@ class Task:
 
     def __repr__(self) -> str:
         return f"Task({self.assignment.file.id}, {self.variant})"
+
+    def driven_vector(self, name: str) -> str:
+        """The driven link's vector of the kind of a vector or scale: it shows the scale and the turn."""
+        return f"{kind_of(name).letter}_{self.pin}"
 
     def tolerance_at(self, node: str) -> ToleranceTable:
         """The tolerance of a node's position: that of the vector or link asked for that ends there.

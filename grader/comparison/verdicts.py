@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from typing import cast
 
 from grader.comparison.evidence import DrawnVector
-from grader.comparison.task import unit_of
 from grader.documents import Quantity, Tolerance, Verdict
 from grader.outcomes import Outcome
 from grader.records import Reason
 from grader.rubric import CriterionTable, ToleranceTable
 from reference.construction.uncertainty import EndSpread
+from reference.quantities import unit_of
 
 FULL, NONE = 1.0, 0.0
 ROUNDING = 1e-9

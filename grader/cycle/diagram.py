@@ -17,10 +17,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
 from grader.cycle.quantities import (
-    UNITS,
     CycleQuantity,
     CycleSubject,
-    Kind,
     Selection,
     strokes_of,
     unbounded_ends,
@@ -30,6 +28,7 @@ from reference.authored.assignment import Assignment, Variant
 from reference.drawing.canvas import MM_PER_INCH, pieces_of
 from reference.geometry import ComplexArray, FloatArray
 from reference.mechanism import PointOnLine, SlotPoint
+from reference.quantities import KindName
 
 MM = 1.0 / MM_PER_INCH
 """Inches, matplotlib's unit of pages."""
@@ -62,7 +61,7 @@ COLOURS = ("#0b62a8", "#c8501e", "#11806a", "#8e3b8c", "#b07a00", "#4a4f57", "#d
 DASHES = {"": "-", "x": "--", "y": ":"}
 OWN, DEAD, FLAT, END = "#1b1f24", "#7a5c00", "#8e3b8c", "#b42318"
 LINK, GREY, SHADE = "#9aa3ad", "#5b6470", "#eceff2"
-TITLES: dict[Kind, str] = {
+TITLES: dict[KindName, str] = {
     "velocity": N_("Velocities"),
     "acceleration": N_("Accelerations"),
     "omega": N_("Angular velocities"),
@@ -197,7 +196,7 @@ def _panels(
     figure: Figure,
     subject: CycleSubject,
     quantities: Sequence[CycleQuantity],
-    kinds: Sequence[Kind],
+    kinds: Sequence[KindName],
     setting: Setting,
     colours: Mapping[str, str],
 ) -> None:
@@ -259,7 +258,7 @@ def _panel(
     axes.set_ylim(low - room if low < 0.0 else 0.0, high + room)
     axes.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
     power = _number_ticks(axes.yaxis, words)
-    unit = words.unit(UNITS[kind])
+    unit = words.unit(quantities[0].unit)
     axes.set_ylabel(f"{words.gettext(TITLES[kind])},\n" + (f"$10^{{{power}}}$ {unit}" if power else unit))
     if low < 0.0:
         axes.axhline(0.0, color=GREY, linewidth=0.7, zorder=1.5)

@@ -20,13 +20,12 @@ from reference.kinematics.cycle import Cycle
 from reference.kinematics.motion import Motion, move_where_possible
 from reference.mechanism import CrossSlider, Dyad, FixedGuide, Mechanism, Slider, SlottedLink, Yoke
 from reference.plan import vectors_of
+from reference.quantities import KindName, kind_of, unit_of
 
 # Quantities ---------------------------------------------------------------------------------------
 
-Kind = Literal["velocity", "acceleration", "omega", "epsilon"]
-UNITS: dict[Kind, str] = {"velocity": "m/s", "acceleration": "m/s²", "omega": "rad/s", "epsilon": "rad/s²"}
 AXES: tuple[Literal["x", "y"], ...] = ("x", "y")
-_LETTERS: dict[str, Kind] = {"v": "velocity", "a": "acceleration"}
+_LETTERS = ("v", "a")
 FINE = 361
 """Samples of a cycle among which extremes and dead points are sought: one degree of a full turn."""
 MANY = 24
@@ -38,7 +37,7 @@ class CycleQuantity:
     """A number that changes over the cycle: a vector's length or component, or a link's rate."""
 
     name: str
-    kind: Kind
+    kind: KindName
     of: str
     """The vector's or the rate's own name."""
     axis: Literal["", "x", "y"] = ""
@@ -46,7 +45,7 @@ class CycleQuantity:
     @property
     def unit(self) -> str:
         """SI."""
-        return UNITS[self.kind]
+        return unit_of(self.of)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,19 +68,16 @@ class CycleSubject:
         self._known = self._quantities()
 
     def _quantities(self) -> dict[str, CycleQuantity]:
-        kinds: dict[str, Kind] = {"kv": "velocity", "ka": "acceleration"}
-        vectors: dict[str, Kind] = {
-            name: kinds[vector.scale] for name, vector in self.construction.vectors.items()
-        }
-        vectors |= {f"{letter}_{joint}": kind for letter, kind in _LETTERS.items() for joint in self.points}
+        vectors = [
+            *self.construction.vectors,
+            *(f"{letter}_{at}" for letter in _LETTERS for at in self.points),
+        ]
+        rates = [f"{rate}_{link}" for link in self.cycle.motion.omega for rate in ("omega", "epsilon")]
         known = {}
-        for name, kind in vectors.items():
-            known[name] = CycleQuantity(name, kind, name)
-            for axis in AXES:
-                known[f"{name}_{axis}"] = CycleQuantity(f"{name}_{axis}", kind, name, axis)
-        for link in self.cycle.motion.omega:
-            known[f"omega_{link}"] = CycleQuantity(f"omega_{link}", "omega", f"omega_{link}")
-            known[f"epsilon_{link}"] = CycleQuantity(f"epsilon_{link}", "epsilon", f"epsilon_{link}")
+        for name in dict.fromkeys((*vectors, *rates)):
+            known[name] = CycleQuantity(name, kind_of(name).name, name)
+            for axis in AXES if name in vectors else ():
+                known[f"{name}_{axis}"] = CycleQuantity(f"{name}_{axis}", kind_of(name).name, name, axis)
         return known
 
     def select(self, names: list[str]) -> Selection:
@@ -153,7 +149,7 @@ class CycleSubject:
     def _vector(self, name: str, motion: Motion) -> ComplexArray:
         joint = name[2:]
         if joint in self.points:
-            return (motion.velocity if name[0] == "v" else motion.acceleration)[joint]
+            return (motion.velocity if kind_of(name).name == "velocity" else motion.acceleration)[joint]
         with np.errstate(all="ignore"):
             return vectors_of(self.construction, self.structure, motion)[name]
 
@@ -167,7 +163,7 @@ class CycleSubject:
         return move_where_possible(mechanism)
 
 
-def _largest(kind: Kind, motion: Motion) -> FloatArray:
+def _largest(kind: KindName, motion: Motion) -> FloatArray:
     """The size of all that is of a kind, at each sample; angular accelerations are squares of velocities."""
     match kind:
         case "velocity":
@@ -196,9 +192,7 @@ def cycle_csv(subject: CycleSubject, selection: Selection, *, decimal_comma: boo
         else ("displacement [m]", cycle.driven)
     )
     columns: list[tuple[str, FloatArray]] = [first]
-    for quantity in selection.quantities:
-        unit = quantity.unit.replace("s²", "s^2")
-        columns.append((f"{quantity.name} [{unit}]", subject.values(quantity)))
+    columns += [(f"{one.name} [{one.unit}]", subject.values(one)) for one in selection.quantities]
     for point in selection.points:
         place = np.broadcast_to(cycle.motion.position[point], cycle.driven.shape)
         columns += [(f"x_{point} [m]", place.real), (f"y_{point} [m]", place.imag)]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from grader.documents import Quantity, ReportDocument, Tolerance
 from grader.language import N_, Tongue
-from reference.drawing.subject import SCALE_UNITS
+from reference.quantities import unit_of
 
 SUM = N_("The points of all criteria add up to %(sum)s.")
 SCALED = N_(
@@ -53,7 +53,7 @@ def tolerance_cells(tolerance: Tolerance, unit: str, speaker: Tongue) -> list[st
 
 def scale_text(value: float | None, name: str, speaker: Tongue) -> str:
     """A scale with its unit; a dash where there is none."""
-    return "–" if value is None else speaker.value(value, SCALE_UNITS[name])
+    return "–" if value is None else speaker.value(value, unit_of(name))
 
 
 # The score ----------------------------------------------------------------------------------------

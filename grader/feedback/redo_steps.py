@@ -13,11 +13,11 @@ from markupsafe import Markup
 from grader.documents import MistakeDocument, ReportDocument
 from grader.feedback.sentences import mistake_sentences
 from grader.language import N_, Tongue, tongue
+from grader.options import Level
 from grader.outcomes import Judgement, NamedMistake
 from grader.solution import sentences
 from grader.solution.sentences import Speaker, speaker_of, wording_of
 from grader.solution.steps import computed
-from grader.texts.reasons import Level
 from reference.authored.assignment import Assignment, Variant
 from reference.construction.elements import Along, Coriolis, Normal
 from reference.construction.steps import Coincide, Divide, Given, Similar, Step, TwoLines

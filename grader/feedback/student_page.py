@@ -30,9 +30,9 @@ from grader.feedback.numbers import (
 from grader.feedback.words import ProblemText, environment, problem_sentence
 from grader.files import write_whole
 from grader.language import N_, Tongue, tongue
+from grader.options import Level
 from grader.overlay.closeup import PageView, detail, page_views, scan_element, svg
 from grader.overlay.scene import Picture
-from grader.texts.reasons import Level
 from grader.texts.spoken import PLACES, place
 
 NUMBER, POSITION, PAGE = N_("number"), N_("position"), N_("page")

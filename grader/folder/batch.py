@@ -4,7 +4,7 @@ import json
 import logging
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -22,8 +22,6 @@ from grader.feedback.class_page import write_index
 from grader.feedback.student_page import About, write_feedback
 from grader.files import remove_parts, result_folders, write_parts, write_whole
 from grader.folder.cache import (
-    CELL_STAGE,
-    CELLS_OF,
     MARK_STAGE,
     READ_STAGE,
     SCAN_STAGE,
@@ -49,21 +47,21 @@ from grader.folder.changes import (
 from grader.folder.decisions import ClassDecisions, class_decisions, decisions_path
 from grader.folder.inventory import FileContent, Progress, natural_key, submissions, take_inventory
 from grader.folder.lock import only_run
-from grader.folder.owners import Unmatched, assign_pages
 from grader.folder.submissions import Unusable, submissions_of
-from grader.folder.title_block import with_written_numbers, written_owners
 from grader.folder.workers import ENDED, Limits, Pool, Whole, Workers
 from grader.inputs.measurements import StudentSubmission, names_of
 from grader.inputs.roster import Roster, read_roster
 from grader.lms.table import write_summary
 from grader.marking.report import unjudged_report
 from grader.marking.trust import opened_in, trust_of
+from grader.options import ClassOptions, taken
+from grader.owners.pages import Unmatched, assign_pages
+from grader.owners.title_block import with_written_numbers, written_owners
 from grader.pipeline import mark, missing_scales, read_submission
 from grader.records import PageRef, Reason, ScannedPage
 from grader.rubric import RubricFile, asked_of, rubric_of
 from grader.similarity.groups import by_chance, compared_together, find_similar
 from grader.similarity.submission import compared_submission
-from grader.texts.reasons import Level
 from grader.texts.spoken import unmatched_document
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, PlanmarkError
@@ -84,34 +82,24 @@ class InterruptedRunError(PlanmarkError):
 
 
 @dataclass(frozen=True, slots=True)
-class Batch:
-    """What to grade, and how.
+class Batch(ClassOptions):
+    """What to grade, and how: beside the class's options, where, and by what means.
 
     Attributes
     ----------
     folder, out : where the submissions are, and where results go
-    roster : path of the roster, or None (a `roster.csv` in the folder is taken)
-    decisions : path of what people decided, or None (`decisions.csv` in the folder is taken)
+    jobs, limits : worker processes, and what a file or a sheet may take in one
     growing : files that are still being written: this run passes them over
     called : what people call files that are stored under other names
-    pages_per_student : pages of each student in one class file, blank ones not counted
-    jobs, limits : worker processes, and what a file or a sheet may take in one
-    lang, level : of feedback, where the roster does not say
-    with_ghosts : whether pictures show expected vectors beside wrong ones, at level `full`
     """
 
     assignment: Assignment
     rubric: RubricFile
     folder: Path
     out: Path
-    roster: Path | None = None
-    pages_per_student: int | None = None
+    _: KW_ONLY
     jobs: int = 1
     limits: Limits = field(default_factory=Limits)
-    lang: str = "en"
-    level: Level = "full"
-    with_ghosts: bool = True
-    decisions: Path | None = None
     growing: tuple[Path, ...] = ()
     called: Mapping[Path, str] = field(default_factory=dict)
 
@@ -217,18 +205,10 @@ def _graded(
 
 
 def _note_of(batch: Batch) -> RunNote:
-    return RunNote(
-        assignment=str(batch.assignment.path),
-        assignment_id=batch.assignment.id,
-        folder=batch.folder.resolve(),
-        out=batch.out.resolve(),
-        roster=None if batch.roster is None else batch.roster.resolve(),
-        decisions=None if batch.decisions is None else batch.decisions.resolve(),
-        pages_per_student=batch.pages_per_student,
-        lang=batch.lang,
-        level=batch.level,
-        with_ghosts=batch.with_ghosts,
-    )
+    options = taken(ClassOptions, batch)
+    options |= {name: path.resolve() for name, path in options.items() if isinstance(path, Path)}
+    where = batch.folder.resolve(), batch.out.resolve()
+    return RunNote(str(batch.assignment.path), *where, assignment_id=batch.assignment.id, **options)
 
 
 def noted_batch(folder: Path) -> Batch:
@@ -238,10 +218,7 @@ def noted_batch(folder: Path) -> Batch:
     """
     note = noted_run(folder)
     assignment = load_assignment(note.assignment)
-    return Batch(
-        assignment, rubric_of(assignment), note.folder, note.out, note.roster, note.pages_per_student,
-        lang=note.lang, level=note.level, with_ghosts=note.with_ghosts, decisions=note.decisions,
-    )  # fmt: skip
+    return Batch(assignment, rubric_of(assignment), note.folder, note.out, **taken(ClassOptions, note))
 
 
 def _expected_wrong(reports: Sequence[ReportDocument]) -> float:
@@ -302,7 +279,7 @@ def _submissions(
         decided=decisions.owners(roster),
     )
     owners = assigned()
-    written = written_owners(owners.unmatched, roster, cache, workers)
+    written = written_owners(owners.unmatched, roster, cache, workers.run)
     owners = assigned(written=written) if written else owners
     refused = [(content.refused, content.students) for content in contents if content.refused is not None]
     unusable = [Unusable((problem,), who) for problem, who in refused]
@@ -311,7 +288,7 @@ def _submissions(
     )
     unmatched = [_unmatched(page) for page in owners.unmatched]
     missing = map(unmatched_document, owners.problems)
-    students = with_written_numbers(students, roster, batch.assignment, cache, workers)
+    students = with_written_numbers(students, roster, batch.assignment, cache, workers.run)
     students = decisions.give(students, batch.assignment, batch.rubric)
     return students, [
         *(unmatched_document(problem) for problem, _ in refused),
@@ -397,9 +374,7 @@ def _compared(
 def _page_cache(batch: Batch) -> PageCache:
     asked = asked_of(batch.assignment, batch.rubric)
     key = digest_of((stage_digest(SCAN_STAGE), asked.figures, asked.units))
-    cells = digest_of(
-        (stage_digest(CELL_STAGE, CELLS_OF), asked.entries, batch.assignment.file.model_dump_json())
-    )
+    cells = digest_of((asked.entries, batch.assignment.file.model_dump_json()))
     return PageCache(batch.out / CACHE_FOLDER / "pages", asked, key, cells)
 
 

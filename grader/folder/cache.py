@@ -36,12 +36,9 @@ RECORDS: Mapping[str, type] = {
 
 SCAN_STAGE = (
     "grader.scan.decode.pages", "grader.scan.register.registration", "grader.scan.strokes.ink",
-    "grader.scan.handwriting.letters", "grader.scan.handwriting.fields", "grader.overlay.picture",
+    "grader.scan.handwriting.letters", "grader.scan.handwriting.fields", "grader.overlay.backdrop",
 )  # fmt: skip
 """What `grader.pipeline.scan` calls."""
-CELL_STAGE = ("grader.printed.layout",)
-"""What says where a printed sheet's cells are, beside `CELLS_OF`."""
-CELLS_OF = ("grader.printed.answer_sheet",)
 READ_STAGE = ("grader.reading.read", "grader.inputs.scale_text", "grader.scan.handwriting.captions")
 """What `grader.pipeline.read_submission` calls beside them."""
 MARK_STAGE = ("grader.folder.batch",)

@@ -6,10 +6,11 @@ each submission's files and line of the roster. What differs from the note of th
 
 import hashlib
 from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
-from pydantic import BaseModel, Field, ValidationError, field_validator
+from pydantic import BaseModel, TypeAdapter, ValidationError, field_validator
 
 from grader.documents import (
     Cause,
@@ -23,6 +24,7 @@ from grader.documents import (
 )
 from grader.files import Stamp, stamp_of, write_whole
 from grader.inputs.measurements import StudentSubmission
+from grader.options import ClassOptions
 from reference.errors import CallError
 
 Key = tuple[str, int | None]
@@ -177,27 +179,29 @@ def note_inputs(folder: Path, inputs: Inputs) -> None:
 RUN_NOTE = "run.json"
 
 
-class RunNote(BaseModel):
-    """What `planmark grade` was called with last; all paths absolute."""
+@dataclass(frozen=True, slots=True)
+class RunNote(ClassOptions):
+    """What `planmark grade` was called with last; all paths absolute.
+
+    Attributes
+    ----------
+    assignment_id : empty in notes of earlier versions
+    was_at : where the results were when the note was written, if they are elsewhere now
+    """
 
     assignment: str
-    assignment_id: str = ""
-    """Empty in notes of earlier versions."""
     folder: Path
     out: Path
-    was_at: Path | None = Field(default=None, exclude=True)
-    """Where the results were when the note was written."""
-    roster: Path | None = None
-    decisions: Path | None = None
-    pages_per_student: int | None = None
-    lang: str = "en"
-    level: Literal["symbol", "hint", "full"] = "full"
-    with_ghosts: bool = True
+    assignment_id: str = ""
+    was_at: Path | None = None
+
+
+_NOTE = TypeAdapter(RunNote)
 
 
 def note_run(note: RunNote, folder: Path) -> None:
     """Leave a note beside the results."""
-    write_whole(folder / RUN_NOTE, note.model_dump_json(indent=1))
+    write_whole(folder / RUN_NOTE, _NOTE.dump_json(note, indent=1, exclude={"was_at"}))
 
 
 def noted_run(folder: Path) -> RunNote:
@@ -228,10 +232,10 @@ def noted_run(folder: Path) -> RunNote:
 def earlier_run(out: Path) -> RunNote | None:
     """The last run into a folder of results, which may have been moved since; None where nothing says."""
     try:
-        note = RunNote.model_validate_json((out / CACHE_FOLDER / RUN_NOTE).read_bytes())
+        note = _NOTE.validate_json((out / CACHE_FOLDER / RUN_NOTE).read_bytes())
     except (OSError, ValidationError):
         return None
-    return note.model_copy(update={"out": out.resolve(), "was_at": note.out})
+    return replace(note, out=out.resolve(), was_at=note.out)
 
 
 # Changes ---------------------------------------------------------------------------------------

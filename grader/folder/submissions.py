@@ -2,7 +2,7 @@
 
 What cannot be used, and what two students may have handed in, stands in the reports of both: nobody
 is missing where a file of theirs lies in the folder. Codes of the problems of measurements, beside
-those of `grader.folder.owners`:
+those of `grader.owners.pages`:
 
 | code | meaning |
 |---|---|
@@ -18,9 +18,9 @@ from pathlib import PurePath
 from typing import Any
 
 from grader.documents import UnmatchedDocument
-from grader.folder.owners import How, Owned, PageOwners, student_of_name
 from grader.inputs.measurements import Measurements, StudentSubmission, combined
 from grader.inputs.roster import Roster, RosterRow, why_no_id
+from grader.owners.pages import How, Owned, PageOwners, student_of_name
 from grader.records import Reason, Value
 from grader.texts.spoken import message, of_error, unmatched_document
 from reference.authored.assignment import Assignment, Variant

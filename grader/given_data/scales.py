@@ -10,6 +10,7 @@ from grader.comparison.task import Task
 from grader.given_data.sets import ExactDrawings
 from grader.inputs.scale_text import Declared, parse_scale
 from reference.geometry import FloatArray
+from reference.quantities import kind_of
 
 WRONG_SCALE, OF_ANY = 0.1, 0.5
 """Probability that a plan follows the rule's scale instead of the declared one, and that it follows any
@@ -35,11 +36,11 @@ def _driven(
     task: Task, drawn: Mapping[str, DrawnVector], scales: Mapping[str, float]
 ) -> tuple[str, float] | None:
     """The driven link's vector of a plan, and its scale as declared; None without them or a length."""
-    for kind in ("v", "a"):
-        name = f"{kind}_{task.pin}"
+    for scale in ("kv", "ka"):
+        name = task.driven_vector(scale)
         has_length = name in drawn and drawn[name].length_mm > 0.0
-        if has_length and f"k{kind}" in scales and task.real.get(name):
-            return name, scales[f"k{kind}"]
+        if has_length and scale in scales and task.real.get(name):
+            return name, scales[scale]
     return None
 
 
@@ -64,7 +65,7 @@ def by_scale(
     name, declared = found
     real = np.abs(exact.real[name])
     is_other = np.array([one.kind == "other_variant" for one in exact.data])
-    rule = np.array([one.rule.get(f"k{name[0]}", declared) for one in exact.data])
+    rule = np.array([one.rule.get(kind_of(name).scale, declared) for one in exact.data])
     at_declared, at_rule = (
         np.exp(-0.5 * (off / sigma) ** 2) / (sigma * math.sqrt(math.tau))
         for off, sigma in (_off_scale(drawn[name], declared, real), _off_scale(drawn[name], 1.0, real / rule))

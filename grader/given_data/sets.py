@@ -325,7 +325,7 @@ def _drawn_angles(task: Task, drawn: DrawnParts) -> dict[str, float]:
 def _images(task: Task) -> Iterable[str]:
     """The heads of the driven link's vectors."""
     vectors = task.construction.vectors
-    return [vectors[name].head for name in (f"v_{task.pin}", f"a_{task.pin}") if name in vectors]
+    return [vectors[name].head for name in map(task.driven_vector, "va") if name in vectors]
 
 
 def _apart(one: float, other: float) -> float:

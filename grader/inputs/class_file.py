@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
+from grader.options import GradeOptions, offered
 from reference.authored.assignment import built_in, locate
 from reference.authored.toml_file import NOT_TOML, Authored, is_file, load
 from reference.errors import AuthoredFileError, Finding
@@ -54,8 +55,8 @@ class ClassSettings:
         return Path(str(self.values["out"]))
 
 
-_PARAMETERS = {"language": "lang", "pages": "pages_per_student", "platform": "to"}
-"""Keys that have another name than the parameter they stand for."""
+_PARAMETERS = {told.key: one.name for one, told in offered(GradeOptions) if told.key}
+"""The parameters that keys stand for, where a record of options says so."""
 
 
 _PATHS = ("roster", "out", "log")

@@ -29,8 +29,6 @@ from grader.inputs.roster import MAX_LINES, short, surplus_of, whole_number, why
 from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
 from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
 from grader.records import (
-    ACCELERATION_PLAN,
-    VELOCITY_PLAN,
     Figure,
     PageRef,
     Reading,
@@ -46,6 +44,7 @@ from reference.authored.variant_table import delimiter_of, table_lines
 from reference.construction.derive import construction_of
 from reference.construction.graph import Construction, coincident
 from reference.errors import MOST_FINDINGS, Finding, InputFileError, lines_of, near_names
+from reference.quantities import SCALE_UNITS, kind_of, unit_of
 
 if TYPE_CHECKING:
     from grader.inputs.decisions import Decision
@@ -162,7 +161,6 @@ def names_of(assignment: Assignment) -> Names:
     """The names that an assignment's measurement files may hold."""
     mechanism = assignment.mechanism(assignment.variants()[:1])
     construction: Construction = construction_of(mechanism)
-    plans = {"v": VELOCITY_PLAN, "a": ACCELERATION_PLAN}
     joints = mechanism.joints
     abouts = [*joints, *(f"{head}{tail}" for head in joints for tail in joints if head != tail)]
     possible = [f"v_{about}" for about in abouts]
@@ -172,24 +170,19 @@ def names_of(assignment: Assignment) -> Names:
     ]
     possible += [f"a_{about}_{part}" for about in under for part in ("c", "r")]
     unused = frozenset(possible) - construction.vectors.keys()
-    vectors = {name: plans[name[0]] for name in (*construction.vectors, *sorted(unused))}
+    vectors = {name: kind_of(name).figure for name in (*construction.vectors, *sorted(unused))}
     return Names(vectors, tuple(construction.rates), unused)
-
-
-UNITS_OF_SCALES = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s²)/mm"}
 
 
 def columns_of(rubric: RubricFile) -> dict[str, str]:
     """The columns of a file with all that a rubric asks for, each with its unit."""
-    columns = {
-        name: unit for name, unit in UNITS_OF_SCALES.items() if name != "ka" or rubric.needs_accelerations
-    }
+    columns = {name: unit for name, unit in SCALE_UNITS.items() if name != "ka" or rubric.needs_accelerations}
     for criterion in rubric.criterion:
         if criterion.vector:
             columns[criterion.vector] = "mm"
             columns |= {f"{criterion.vector}_deg": "°"} if criterion.direction else {}
         elif criterion.angular:
-            columns[f"{criterion.angular}_value"] = "rad/s" if criterion.angular[0] == "o" else "rad/s²"
+            columns[f"{criterion.angular}_value"] = unit_of(criterion.angular)
     return columns
 
 

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from grader.documents import ReportDocument, ResultsDocument
 from grader.files import result_folders
 from grader.inputs.roster import read_roster, why_no_id
+from grader.options import ExportOptions
 from reference.errors import CallError, InputFileError, lines_of
 
 Content = Mapping[str, bytes | Path]
@@ -46,8 +47,8 @@ def people_of(roster: Path) -> dict[str, Person]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Options:
-    """The options of ``planmark export`` by their names; None or empty where not given.
+class Options(ExportOptions):
+    """An export's options, and what they lead to.
 
     Attributes
     ----------
@@ -55,35 +56,13 @@ class Options:
     people : names, addresses and the platform's numbers by student_id
     titles : the criteria's, in the language of the class, by id; `export` takes them from the results
     form : the platform's own file to fill in: Moodle's worksheet, an exported gradebook
-    criteria, submissions : the platform's answers for its rubric and for the students' submissions
-    item : the grade item's name; the assignment's id where empty
-    replace_guide : Moodle's answer with everybody's points in the guide that goes
-    groups : whether students hand in as groups; None where not said
     now : time of the export; the clock's if None
     """
 
-    to: str
-    what: str | None = None
     out: Path | None = None
     people: Mapping[str, Person] = field(default_factory=lambda: MappingProxyType({}))
     titles: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     form: Path | None = None
-    criteria: Path | None = None
-    submissions: Path | None = None
-    identity: str | None = None
-    item: str = ""
-    position: int | None = None
-    combine: str | None = None
-    maximum: float | None = None
-    rescale: bool = False
-    visibility: str | None = None
-    course_id: str | None = None
-    assignment_id: str | None = None
-    cmid: int | None = None
-    context_id: int | None = None
-    replace_guide: Path | None = None
-    groups: bool | None = None
-    lang: str = "en"
     now: datetime | None = None
 
     @property

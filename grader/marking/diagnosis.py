@@ -23,6 +23,7 @@ from reference.construction.graph import Construction, evaluate
 from reference.construction.mistakes import RPM_FACTOR, Drawing, Mistake, affected, commit
 from reference.construction.steps import Given, Step, TwoLines
 from reference.construction.uncertainty import Skill
+from reference.quantities import kind_of
 from reference.replay.explanations import RARITY, SLIP, Observations
 from reference.replay.nothing import with_nothing
 from reference.replay.replay import Replay, Root, replay
@@ -281,7 +282,7 @@ def _other_scales(case: Case) -> Iterator[Root]:
         name: value * factor
         for name, value in case.drawing.parameters.items()
         for scale, factor in factors.items()
-        if name.startswith(f"{scale[1]}_")
+        if name.startswith(f"{kind_of(scale).letter}_")
     }
     for parameters in (scales, starts):
         yield Root(made, parameters, cost=RARITY["scale_wrong"] + FURTHER_SCALE * (len(made) - 1))

@@ -20,6 +20,7 @@ from reference.construction.mistakes import Drawing, Mistake, line_of
 from reference.construction.steps import Given, TwoLines
 from reference.construction.uncertainty import trace
 from reference.geometry import ComplexArray, FloatArray
+from reference.quantities import kind_of
 from reference.replay.explanations import AREA_MM, Covariance, Observation, Observations
 
 LEAST_ERROR_MM = 0.15
@@ -129,9 +130,9 @@ def _scales_of_the_drawn_driver(
     """The scales of the plans as they follow from the drawn lengths of the driven link's vectors."""
     found = {}
     for scale in ("kv", "ka"):
-        drawn = evidence.vector(f"{scale[1]}_{task.pin}")
+        drawn = evidence.vector(task.driven_vector(scale))
         size = math.hypot(
-            *(float(one) for name, one in parameters.items() if name.startswith(f"{scale[1]}_"))
+            *(float(one) for name, one in parameters.items() if name.startswith(f"{kind_of(scale).letter}_"))
         )
         if drawn is not None and drawn.length_mm > 0.0 and size > 0.0:
             found[scale] = np.asarray(size / drawn.length_mm)

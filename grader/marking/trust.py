@@ -17,7 +17,7 @@ from hashlib import sha256
 from typing import Literal, get_args
 
 import numpy as np
-from scipy.special import betaln, gammaln, logsumexp
+import scipy
 
 from grader.comparison.verdicts import EVEN, FULL, NONE
 from grader.documents import (
@@ -76,14 +76,16 @@ def wrong_between(total: int, wrong: int, right: int) -> tuple[int, int]:
     log[is_possible] = _log_choose(some, wrong) + _log_choose(total - some, right)
     log -= _log_choose(np.array([float(total)]), checked)
     prior = np.log1p(-PRIOR_NONE) + _log_choose(np.full(total + 1, float(total)), numbers)
+    betaln = scipy.special.betaln
     prior += betaln(numbers + 1.0, total - numbers + PRIOR_FEW) - betaln(1.0, PRIOR_FEW)
     prior[0] = np.logaddexp(prior[0], np.log(PRIOR_NONE))
-    left = np.flatnonzero(logsumexp(prior + log) - log < -np.log1p(-CONFIDENCE))
+    left = np.flatnonzero(scipy.special.logsumexp(prior + log) - log < -np.log1p(-CONFIDENCE))
     return int(left[0]), int(left[-1])
 
 
 def _log_choose(of: FloatArray, some: FloatArray | float) -> FloatArray:
-    return np.asarray(gammaln(of + 1.0) - gammaln(some + 1.0) - gammaln(of - some + 1.0))
+    log = scipy.special.gammaln
+    return np.asarray(log(of + 1.0) - log(some + 1.0) - log(of - some + 1.0))
 
 
 # The verdicts that can be checked -----------------------------------------------------------------

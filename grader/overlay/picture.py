@@ -1,8 +1,4 @@
-"""Overlay pictures: what was read, drawn on the upright scan; and the cleaned scan by itself.
-
-Pixels of the output: sheet point (x, y) mm lies at (x s - 0.5, y s - 0.5) from the centre of the
-top left pixel, s = width / paper's width.
-"""
+"""Overlay pictures: what was read, drawn on the upright scan; and parts of a page as they were scanned."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,21 +21,6 @@ from reference.drawing.canvas import Area, Curve, Label, Ring, Shape, Stroke, se
 ColourImage = NDArray[np.uint8]
 Colour = tuple[int, int, int]
 
-WIDTH_PX = 2000
-INK_STRENGTH = 1.25
-"""Pencil is shown darker than it is, so that it can be followed under the overlay,"""
-DARKEST = 0.8
-"""and ink lighter, so that the overlay stands out."""
-PAPER_FROM = 0.90
-"""Share of the local paper's brightness from which everything is shown white."""
-_TONES = np.array(
-    [
-        255.0 - 255.0 * min(INK_STRENGTH * (1.0 - min(share / 255.0 / PAPER_FROM, 1.0)), DARKEST)
-        for share in range(256)
-    ],
-    dtype=np.uint8,
-)
-"""What is shown for each share of the paper's brightness, 0..255."""
 PNG_COMPRESSION = 1
 _FEW_TONES = np.array([17 * round(tone / 17) for tone in range(256)], dtype=np.uint8)
 """Sixteen tones: pencil and ink look the same, and a PNG is half a JPEG."""
@@ -54,16 +35,6 @@ FRACTION_BITS = 4
 JPEG_QUALITY = 78
 CUT_QUALITY = 90
 """Close up, the blocks of a coarser JPEG file are seen beside thin lines."""
-
-
-def backdrop(page: Page, sheet: Sheet | None, *, width_px: int = WIDTH_PX) -> Backdrop:
-    """The scan to draw on; `sheet` is None where the page could not be registered."""
-    if sheet is None:
-        scan = _clean(_turned(page, width_px))
-        height, width = scan.shape
-        return Backdrop(page.source, page.page, scan, (420.0, 420.0 * height / width), registered=False)
-    scan = _clean(_upright(page.grey, sheet, width_px))
-    return Backdrop(page.source, page.page, scan, sheet.page_mm, registered=True)
 
 
 def overlay(
@@ -91,7 +62,7 @@ def overlay(
         scene = scene_of(
             behind.page_mm, reading, vectors, outcomes, show_expected=show_expected, links=links or {}
         )
-    plain = _grey(cv2.LUT(scan, _FEW_TONES))
+    plain = np.asarray(cv2.LUT(scan, _FEW_TONES), dtype=np.uint8)
     png = encode(".png", paint(plain, scene), _FLAT_PNG)
     return Picture(behind.source, behind.page, png, _smaller(scan, plain), scene)
 
@@ -113,22 +84,6 @@ def encode(kind: str, image: NDArray[np.uint8], options: list[int]) -> bytes:
 # The scan -----------------------------------------------------------------------------------------
 
 
-def _turned(page: Page, width_px: int) -> GreyImage:
-    """The page turned as its file asks, at most so wide."""
-    grey = np.rot90(page.grey, page.turn_deg // 90)
-    scale = min(1.0, width_px / grey.shape[1])
-    size = (max(1, round(grey.shape[1] * scale)), max(1, round(grey.shape[0] * scale)))
-    return _grey(cv2.resize(np.ascontiguousarray(grey), size, interpolation=cv2.INTER_AREA))
-
-
-def _upright(grey: GreyImage, sheet: Sheet, width_px: int) -> GreyImage:
-    """The sheet upright, the paper's width across `width_px`."""
-    scale = width_px / sheet.page_mm[0]
-    less = max(1, int(sheet.px_per_mm / scale))
-    to_px = reduction(1.0 / less) @ sheet.mm_to_px
-    return cut_out(averaged(grey, less), to_px, (0.0, 0.0, *sheet.page_mm), scale, outside=255)
-
-
 def cut(page: Page, sheet: Sheet | None, box: Box, px_per_mm: float) -> bytes:
     """A part of a page as it was scanned, as JPEG.
 
@@ -145,19 +100,6 @@ def cut(page: Page, sheet: Sheet | None, box: Box, px_per_mm: float) -> bytes:
     if not part.size:  # nothing of the page is there
         part = np.full((1, 1), 255, np.uint8)
     return encode(".jpg", part, [cv2.IMWRITE_JPEG_QUALITY, CUT_QUALITY])
-
-
-def _clean(grey: GreyImage) -> GreyImage:
-    """Shadows evened out, paper white, strokes of one strength."""
-    height, width = grey.shape
-    small = cv2.resize(grey, (max(1, width // 8), max(1, height // 8)), interpolation=cv2.INTER_AREA)
-    paper = cv2.GaussianBlur(cv2.dilate(small, np.ones((7, 7), np.uint8)), (0, 0), 5)
-    level = cv2.resize(paper, (width, height), interpolation=cv2.INTER_LINEAR)
-    return _grey(cv2.LUT(cv2.divide(grey, level, scale=255.0), _TONES))
-
-
-def _grey(image: NDArray[np.generic]) -> GreyImage:
-    return np.asarray(image, dtype=np.uint8)
 
 
 # The painter --------------------------------------------------------------------------------------

@@ -3,7 +3,6 @@
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
 import segno
 from reportlab.lib.units import mm
 
@@ -12,19 +11,18 @@ from grader.language import N_, SIDES, Tongue, tongue
 from grader.printed.layout import (
     CALIBRATION,
     CODE_MM,
-    EASY_FIELDS,
     SCALE_BOXES,
-    SCALE_OF,
     WHOLE_CELLS,
     Layout,
     PageLayout,
     Template,
     TemplateFit,
     best_template,
+    boxes_of,
+    calibration_segments,
     code_of,
     comb_cells,
     combs_of,
-    field_boxes,
     marker_places,
     page_construction,
     poles_mm,
@@ -42,19 +40,11 @@ from grader.printed.pdf import (
     width_mm,
     wrap,
 )
-from grader.records import (
-    ACCELERATION_PLAN,
-    MECHANISM,
-    VELOCITY_PLAN,
-    Box,
-    FloatArray,
-    Identity,
-    Reason,
-    Value,
-)
+from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, Identity, Reason, Value
 from reference.authored.assignment import Assignment, PageKind, PageTable, Variant
 from reference.drawing.canvas import Piece, pieces_of, scale_pieces
 from reference.errors import AuthoredFileError, CallError, Finding
+from reference.quantities import SCALE_OF
 
 # One page -----------------------------------------------------------------------------------------
 
@@ -382,7 +372,7 @@ def _forms(
         fit = best_template(assignment, figures)
         construction = page_construction(assignment, figures)
         names = [vector.name for figure in figures for vector in construction.vectors_of(figure)]
-        boxes = _boxes(names, asked)
+        boxes = boxes_of(names, asked)
         if names and not boxes and (asked is None or set(names) & set(asked)):
             known: dict[str, Value] = {"form": table.kind, "lengths": len(names)}
             problems.append(Reason("sheet_boxes", known, str(assignment.path)))
@@ -390,32 +380,6 @@ def _forms(
         scales = {SCALE_OF[figure]: SCALE_BOXES[SCALE_OF[figure]] for figure in figures}
         forms.append(PageForm(table.kind, fit.template, scales | boxes, dict(construction.poles)))
     return forms, tuple(problems)
-
-
-def cells_of(
-    assignment: Assignment, figures: Sequence[str], asked: Collection[str] | None = None
-) -> dict[str, tuple[Box, ...]]:
-    """The cells for measured lengths on a page with these figures, in the order of its zones; by vector."""
-    table = next((page for page in assignment.file.page if set(page.figures) == set(figures)), None)
-    if table is None:
-        return {}
-    construction = page_construction(assignment, table.figures)
-    ordered = dict.fromkeys(table.figures)
-    return combs_of(_boxes([v.name for figure in ordered for v in construction.vectors_of(figure)], asked))
-
-
-def _boxes(names: Sequence[str], asked: Collection[str] | None) -> dict[str, Box]:
-    """The boxes for the lengths asked for.
-
-    A vector's box is where it would be if all had one: a rubric that asks for others tomorrow finds
-    those printed today in their places. Only where all would be too small are those asked for alone
-    counted.
-    """
-    if asked is None:
-        return field_boxes(tuple(names))
-    wanted = [name for name in names if name in asked]
-    boxes = field_boxes(tuple(names if len(names) <= EASY_FIELDS else wanted))
-    return {name: boxes[name] for name in wanted if name in boxes}
 
 
 def _too_small(assignment: Assignment, table: PageTable, fit: TemplateFit) -> list[Reason]:
@@ -445,29 +409,6 @@ _CALIBRATION_TEXT = N_(
     "Calibration page of planmark. Print it on A3 at 100 %, scan it as the drawings will be scanned, and let"
     " planmark read it: the segments are known, so their errors are the printer's and the scanner's."
 )
-_LENGTHS_MM = (5.0, 10.0, 20.0, 40.0, 80.0)
-_ANGLES_DEG = tuple(range(0, 180, 15))
-
-
-def calibration_segments() -> FloatArray:
-    """(n, 2, 2) ends of the printed segments in mm, y down: stars of directions, ladders of lengths.
-
-    A star has twelve diameters of 60 mm, 15 degrees apart, with its middle left free; a ladder has
-    horizontal or vertical segments of 5 to 80 mm.
-    """
-    segments: list[tuple[complex, complex]] = []
-    for centre in (85.0 + 100.0j, 215.0 + 100.0j, 345.0 + 100.0j):
-        for angle in _ANGLES_DEG:
-            along = np.exp(-1j * np.radians(angle))
-            segments.append((centre + 12.0 * along, centre + 40.0 * along))
-            segments.append((centre - 12.0 * along, centre - 40.0 * along))
-    for row, length in enumerate(_LENGTHS_MM):
-        y = 165.0 + 18.0 * row
-        segments.extend((x + 1j * y, x + length + 1j * y) for x in (40.0, 140.0, 240.0))
-    for column, length in enumerate(_LENGTHS_MM):
-        x = 335.0 + 14.0 * column
-        segments.append((x + 160.0j, x + 1j * (160.0 + length)))
-    return np.array([[(end.real, end.imag) for end in ends] for ends in segments])
 
 
 def make_calibration(lang: str = "en") -> Sheets:

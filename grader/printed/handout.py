@@ -19,11 +19,12 @@ from grader.rubric import RubricFile
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.drawing.canvas import Piece, bounds, pieces_of, scale_pieces
 from reference.drawing.sketch import scheme
-from reference.drawing.subject import SCALE_UNITS, VECTOR_UNITS, Subject
+from reference.drawing.subject import Subject
 from reference.errors import MechanismError
 from reference.geometry import ComplexArray
 from reference.mechanism import DrivenSlider, FixedGuide, guides_of
 from reference.plan import exact_plan
+from reference.quantities import SCALE_OF, kind_of, unit_of
 
 NAME, GROUP, DATE = N_("Name"), N_("Group"), N_("Date")
 NUMBER = {"n": N_("number"), "position": N_("position")}
@@ -246,7 +247,7 @@ def _tables(assignment: Assignment, rubric: RubricFile, speaker: Tongue) -> Iter
             head = [_(QUANTITY), _(VALUE)]
             rows = [[_rate_cell(names.get(name, name), name, speaker), ""] for name in asked[kind]]
         else:
-            unit = speaker.unit(VECTOR_UNITS["kv" if kind == "velocity_plan" else "ka"])
+            unit = speaker.unit(kind_of(SCALE_OF[kind]).unit)
             head = [_(VECTOR), _(LENGTH), _(DIRECTION), f"{_(VALUE)}, {unit}"]
             rows = [[_letters(pieces_of(names.get(name, name))), "", "", ""] for name in asked[kind]]
         return [
@@ -267,12 +268,11 @@ def _tables(assignment: Assignment, rubric: RubricFile, speaker: Tongue) -> Iter
 
 
 def _scale_cell(shown: str, scale: str, speaker: Tongue) -> Markup:
-    return Markup("{}, {}").format(_letters(scale_pieces(shown)), speaker.unit(SCALE_UNITS[scale]))
+    return Markup("{}, {}").format(_letters(scale_pieces(shown)), speaker.unit(unit_of(scale)))
 
 
 def _rate_cell(shown: str, rate: str, speaker: Tongue) -> Markup:
-    unit = "rad/s" if rate.startswith("omega") else "rad/s²"
-    return Markup("{}, {}").format(_letters(pieces_of(shown)), speaker.unit(unit))
+    return Markup("{}, {}").format(_letters(pieces_of(shown)), speaker.unit(unit_of(rate)))
 
 
 def _empty(head: list[str], rows: Iterable[Sequence[str]], wide_mm: float) -> Table:

@@ -5,7 +5,7 @@ sheet's top left corner, x right, y down.
 """
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 from typing import Literal, get_args
@@ -61,6 +61,10 @@ DRAWING_MM: Box = (23.0, 51.0, 384.0, 212.0)
 """Between the head and the foot of the sheet; the zones divide it."""
 
 MARKER_MM = 12.0
+MARKER_CELLS = 6
+"""Along a marker's side, its black border included."""
+MARKER_DICTIONARY: Literal["DICT_4X4_250"] = "DICT_4X4_250"
+"""OpenCV's name of it (Garrido-Jurado et al., Pattern Recognition 47, 2014)."""
 MARKERS_PER_TEMPLATE = 8
 _MARKER_X_MM = (24.0, 144.0, 274.0, 394.0)
 _MARKER_Y_MM = (14.0, 271.0)
@@ -70,8 +74,6 @@ CODE_MM: Box = (363.0, 13.0, 28.0, 28.0)
 SCALE_BOXES: dict[str, Box] = {
     name: (306.0, 13.0 + 9.5 * row, 53.0, 8.0) for row, name in enumerate(SCALE_NAMES)
 }
-SCALE_OF = {MECHANISM: "kL", VELOCITY_PLAN: "kv", ACCELERATION_PLAN: "ka"}
-"""The scale that each figure is drawn at."""
 _ZONE_GAP_MM = 4.0
 """Ink of one zone does not reach the next."""
 _FIELD_COLUMNS = ((39.0, 103.0), (159.0, 113.0), (289.0, 103.0))
@@ -220,6 +222,59 @@ def combs_of(fields: Mapping[str, Box]) -> dict[str, tuple[Box, ...]]:
     return {name: comb_cells(box) for name, box in fields.items() if name not in SCALE_BOXES}
 
 
+def cells_of(
+    assignment: Assignment, figures: Sequence[str], asked: Collection[str] | None = None
+) -> dict[str, tuple[Box, ...]]:
+    """The cells for measured lengths on a page with these figures, in the order of its zones; by vector."""
+    table = next((page for page in assignment.file.page if set(page.figures) == set(figures)), None)
+    if table is None:
+        return {}
+    construction = page_construction(assignment, table.figures)
+    ordered = dict.fromkeys(table.figures)
+    return combs_of(boxes_of([v.name for figure in ordered for v in construction.vectors_of(figure)], asked))
+
+
+def boxes_of(names: Sequence[str], asked: Collection[str] | None) -> dict[str, Box]:
+    """The boxes for the lengths asked for.
+
+    A vector's box is where it would be if all had one: a rubric that asks for others tomorrow finds
+    those printed today in their places. Only where all would be too small are those asked for alone
+    counted.
+    """
+    if asked is None:
+        return field_boxes(tuple(names))
+    wanted = [name for name in names if name in asked]
+    boxes = field_boxes(tuple(names if len(names) <= EASY_FIELDS else wanted))
+    return {name: boxes[name] for name in wanted if name in boxes}
+
+
+# The calibration page -----------------------------------------------------------------------------
+
+_LENGTHS_MM = (5.0, 10.0, 20.0, 40.0, 80.0)
+_ANGLES_DEG = tuple(range(0, 180, 15))
+
+
+def calibration_segments() -> FloatArray:
+    """(n, 2, 2) ends of the printed segments in mm, y down: stars of directions, ladders of lengths.
+
+    A star has twelve diameters of 60 mm, 15 degrees apart, with its middle left free; a ladder has
+    horizontal or vertical segments of 5 to 80 mm.
+    """
+    segments: list[tuple[complex, complex]] = []
+    for centre in (85.0 + 100.0j, 215.0 + 100.0j, 345.0 + 100.0j):
+        for angle in _ANGLES_DEG:
+            along = np.exp(-1j * np.radians(angle))
+            segments.append((centre + 12.0 * along, centre + 40.0 * along))
+            segments.append((centre - 12.0 * along, centre - 40.0 * along))
+    for row, length in enumerate(_LENGTHS_MM):
+        y = 165.0 + 18.0 * row
+        segments.extend((x + 1j * y, x + length + 1j * y) for x in (40.0, 140.0, 240.0))
+    for column, length in enumerate(_LENGTHS_MM):
+        x = 335.0 + 14.0 * column
+        segments.append((x + 160.0j, x + 1j * (160.0 + length)))
+    return np.array([[(end.real, end.imag) for end in ends] for ends in segments])
+
+
 # The file layout.json -----------------------------------------------------------------------------
 
 
@@ -251,7 +306,7 @@ class Layout(_Document):
     """`layout.json`: millimetres from the upright sheet's top left corner, x right, y down."""
 
     schema_version: Literal[1] = 1
-    marker_dictionary: Literal["DICT_4X4_250"] = "DICT_4X4_250"
+    marker_dictionary: Literal["DICT_4X4_250"] = MARKER_DICTIONARY
     page_mm: tuple[float, float] = PAGE_MM
     pages: list[PageLayout]
 

@@ -16,25 +16,25 @@ from reportlab.pdfbase.ttfonts import TTFont
 from reportlab.pdfgen.canvas import Canvas
 from reportlab.pdfgen.pathobject import PDFPathObject
 
-from grader.printed.layout import FRAME_MM, MARKER_CORNERS, MARKER_MM, PAGE_MM, Template
+from grader.printed.layout import (
+    FRAME_MM,
+    MARKER_CELLS,
+    MARKER_CORNERS,
+    MARKER_DICTIONARY,
+    MARKER_MM,
+    PAGE_MM,
+    Template,
+)
 from grader.records import Box
 from reference.drawing.canvas import SLANT, Area, Curve, Label, Piece, Point, Ring, Shape, Stroke, set_pieces
 
 # Markers ------------------------------------------------------------------------------------------
 
-CELLS = 6
-"""Cells along a marker's side, its black border included."""
-
-
-@cache
-def dictionary() -> cv2.aruco.Dictionary:
-    """OpenCV's DICT_4X4_250 (Garrido-Jurado et al., Pattern Recognition 47, 2014)."""
-    return cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_250)
-
 
 def cells(marker_id: int) -> NDArray[np.bool_]:
     """(6, 6), True where a marker's cell is white, upright, rows downwards."""
-    image = cv2.aruco.generateImageMarker(dictionary(), marker_id, CELLS, borderBits=1)
+    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, MARKER_DICTIONARY))
+    image = cv2.aruco.generateImageMarker(dictionary, marker_id, MARKER_CELLS, borderBits=1)
     return np.asarray(image > 127)
 
 
@@ -300,10 +300,10 @@ class PdfDrawing:
 
     def markers(self, template: Template) -> None:
         """All markers of a template."""
-        side = MARKER_MM / CELLS
+        side = MARKER_MM / MARKER_CELLS
         for number, corners in zip(template.marker_ids, MARKER_CORNERS, strict=True):
             corner = (float(corners[0, 0]), float(corners[0, 1]))
-            self.cells(corner, side, ((row, 0, CELLS) for row in range(CELLS)), BLACK)
+            self.cells(corner, side, ((row, 0, MARKER_CELLS) for row in range(MARKER_CELLS)), BLACK)
             self.cells(corner, side, runs(cells(number).tolist()), 1.0)
 
 

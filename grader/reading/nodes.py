@@ -101,13 +101,11 @@ class NodeFit:
     Attributes
     ----------
     at, cov : (n,) complex mm and (2n, 2n) covariance
-    redraw_mm : standard error of strokes as a distance from their nodes, on this figure
     residual_mm : (edges, 2) distance of the tail and the head from the edge's stroke, nan without one
     """
 
     at: ComplexArray
     cov: FloatArray
-    redraw_mm: float
     residual_mm: FloatArray
 
 
@@ -198,7 +196,7 @@ def fit_nodes(
     at = state[0::2] + 1j * state[1::2]
     residual_mm = np.full((len(assignment.stroke), 2), np.nan)
     residual_mm[taken.edge] = taken.from_middle(at).imag
-    return NodeFit(at, SPREAD**2 * np.linalg.inv(normal - repeated), redraw, residual_mm)
+    return NodeFit(at, SPREAD**2 * np.linalg.inv(normal - repeated), residual_mm)
 
 
 def _repeated(ends: _EndRows) -> FloatArray:

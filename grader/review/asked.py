@@ -13,7 +13,7 @@ from grader.feedback.words import VERDICTS, symbols
 from grader.language import N_, Tongue
 from grader.overlay.closeup import LEAST_LOOK_MM, LOOK_MARGIN_MM, box_around
 from grader.overlay.scene import MARKS
-from grader.printed.layout import SCALE_BOXES, SCALE_OF
+from grader.printed.layout import SCALE_BOXES
 from grader.records import MECHANISM
 from grader.review.doubts import SURE, Choice, Doubt
 from grader.review.questions import (
@@ -27,6 +27,7 @@ from grader.review.questions import (
     state_of,
 )
 from grader.review.session import OPEN, Session, Standing, Student, mark_of
+from reference.quantities import SCALE_OF
 
 WHOSE = N_("Whose data were drawn?")
 WHICH = N_("Which stroke is meant: %(vectors)s?")

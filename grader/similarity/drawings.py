@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import betainc, gammaincc
 
 from grader.records import MECHANISM, FloatArray, IntArray
 from grader.similarity.submission import (
@@ -173,7 +173,7 @@ def _by_student(
 
 def _fisher_combined(first: FloatArray, second: FloatArray) -> FloatArray:
     """Fisher's rule: log of the chance that two independent pieces of evidence are so rare together."""
-    both = gammaincc(2.0, -(first + second))
+    both = scipy.special.gammaincc(2.0, -(first + second))
     with np.errstate(divide="ignore"):
         return np.where(second < 0.0, np.maximum(np.log(both), -690.0), first)
 
@@ -369,7 +369,7 @@ def log_chance(cosine: FloatArray, dimensions: FloatArray) -> FloatArray:
     The half of a regularised incomplete beta function, I_{1 - c^2}((d - 1) / 2, 1 / 2) / 2.
     """
     half = np.maximum(dimensions - 1.0, 1e-9) / 2.0
-    tail = 0.5 * betainc(half, 0.5, np.clip(1.0 - cosine**2, 0.0, 1.0))
+    tail = 0.5 * scipy.special.betainc(half, 0.5, np.clip(1.0 - cosine**2, 0.0, 1.0))
     chance = np.where(cosine >= 0.0, tail, 1.0 - tail)
     return np.where(dimensions >= 2.0, np.log(np.maximum(chance, 1e-300)), 0.0)
 

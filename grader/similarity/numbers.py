@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import gammaln
 
 from grader.records import FloatArray
 from grader.similarity.drawings import LEAST_CLASS
@@ -136,7 +136,8 @@ def _counted(table: _Table, single: FloatArray) -> tuple[FloatArray, FloatArray,
 
 def _choices(both: FloatArray, equal: FloatArray) -> FloatArray:
     """Log of the number of combinations in which so many of the values can be the equal ones."""
-    return np.asarray(gammaln(both + 1.0) - gammaln(equal + 1.0) - gammaln(both - equal + 1.0))
+    log = scipy.special.gammaln
+    return np.asarray(log(both + 1.0) - log(equal + 1.0) - log(both - equal + 1.0))
 
 
 # The table ----------------------------------------------------------------------------------------

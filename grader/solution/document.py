@@ -4,17 +4,18 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict
 
-from grader.documents import PlanDocument, PlanVector, ScalesDocument
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.construction.graph import Construction
 from reference.geometry import ComplexArray, FloatArray
 from reference.kinematics.motion import Motion
 from reference.mechanism import Crank, Mechanism
 from reference.plan import Plan, conditioning
+from reference.quantities import unit_of
 
 # Centres and poles --------------------------------------------------------------------------------
 
@@ -80,9 +81,48 @@ def _divided(over: ComplexArray, under: ComplexArray, least: FloatArray) -> Comp
         return np.where(np.abs(under) > least, over / under, np.nan)
 
 
-# The document -------------------------------------------------------------------------------------
+# The document ----------------------------------------------------------------------------------
 
-UNITS = {"kv": "m/s", "ka": "m/s^2"}
+
+class _Document(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
+
+
+class ScalesDocument(_Document):
+    """Real units per millimetre on paper: m/mm, (m/s)/mm, (m/s^2)/mm."""
+
+    kL: float  # noqa: N815 - the field's own name for it
+    kv: float
+    ka: float
+
+
+class PlanVector(_Document):
+    """An exact vector; a zero vector's direction is null."""
+
+    value: float
+    unit: str
+    drawn_mm: float
+    direction_deg: float | None
+
+
+class PlanDocument(_Document):
+    """The exact plan of one variant; plan nodes relative to their pole, y up.
+
+    `centres_m`: instantaneous centres (``I3``, of two links ``I34``) and acceleration poles (``J3``) in
+    the mechanism's coordinates; null where a link does not turn.
+    """
+
+    schema_version: Literal[1] = 1
+    assignment: str
+    variant: dict[str, int]
+    position: int | None
+    scales: ScalesDocument
+    points_m: dict[str, tuple[float, float]]
+    vectors: dict[str, PlanVector]
+    nodes_mm: dict[str, dict[str, tuple[float, float]]]
+    angular: dict[str, float]
+    centres_m: dict[str, tuple[float, float] | None]
+    conditioning: dict[str, float | dict[str, float]]
 
 
 def variant_numbers(variant: Variant) -> dict[str, int]:
@@ -149,11 +189,11 @@ def _document(assignment: Assignment, plan: Plan, columns: _Columns, index: int)
         vectors={
             name: PlanVector(
                 value=value[name],
-                unit=UNITS[vector.scale],
+                unit=unit_of(name),
                 drawn_mm=drawn[name],
                 direction_deg=None if math.isnan(direction[name]) else direction[name],
             )
-            for name, vector in plan.construction.vectors.items()
+            for name in plan.construction.vectors
         },
         nodes_mm={figure: points(figure) for figure in plan.construction.poles},
         angular=numbers("rate"),

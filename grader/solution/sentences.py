@@ -37,8 +37,9 @@ from reference.construction.steps import (
     TwoLines,
 )
 from reference.drawing.canvas import Piece, pieces_of, scale_pieces
-from reference.drawing.subject import SCALE_UNITS, VECTOR_UNITS, Subject, Wording
+from reference.drawing.subject import Subject, Wording
 from reference.mechanism import SlottedLink, moving_guides
+from reference.quantities import unit_of
 
 PERPENDICULAR = N_("perpendicular to %(link)s")
 PARALLEL = N_("parallel to %(link)s")
@@ -192,12 +193,8 @@ class Speaker:
 
     def scale_with_value(self, scale: str) -> Markup:
         """A scale with its value."""
-        value = self.real(self.scale_value(scale), SCALE_UNITS[scale])
+        value = self.real(self.scale_value(scale), unit_of(scale))
         return Markup("{} = {}").format(self.scale(scale), value)
-
-    def unit_of(self, scale: str) -> str:
-        """The unit of what is drawn at a scale."""
-        return VECTOR_UNITS.get(scale, "m")
 
     def line_direction(self, along: Direction) -> Markup:
         """Where a line runs, without a sense."""

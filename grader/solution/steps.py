@@ -12,8 +12,9 @@ from grader.solution.sentences import TITLES, Speaker, speaker_of
 from reference.construction.elements import Coriolis, Normal, Scaled
 from reference.construction.graph import Vector
 from reference.construction.steps import Given, Step
-from reference.drawing.subject import SCALE_OF, Subject
+from reference.drawing.subject import Subject
 from reference.mechanism import Crank
+from reference.quantities import SCALE_OF, kind_of, unit_of
 
 INTRODUCTIONS = {
     "mechanism": N_("Every real length is divided by %(scale)s."),
@@ -103,9 +104,7 @@ def computed(speaker: Speaker, step: Step) -> Iterator[Markup]:
             continue
         formula = _crank_formula(speaker, length)
         if formula is not None:
-            yield Markup("{} = {} = {}").format(
-                name, formula, speaker.real(real, speaker.unit_of(length.scale))
-            )
+            yield Markup("{} = {} = {}").format(name, formula, speaker.real(real, kind_of(length.scale).unit))
         yield _divided(speaker, name, real, length.scale)
 
 
@@ -143,7 +142,7 @@ def _component(speaker: Speaker, step: Given) -> Iterator[Markup]:
     if speaker.is_nothing(step.node, mm):
         return
     name, real = speaker.vector(step.start, step.node), mm * speaker.scale_value("ka")
-    unit = speaker.unit_of("ka")
+    unit = kind_of("ka").unit
     if isinstance(step.length, Normal):
         squared, arm = _speed(speaker, (step.length.tail, step.length.head)), _arm(speaker, step.length)
         link = speaker.link_of(step.node)
@@ -201,7 +200,7 @@ def _measured(speaker: Speaker, vector: Vector) -> Markup:
     by = speaker.scale_value(vector.scale)
     return Markup("{} = {} · {} = {} · {} = {}").format(
         speaker.name(vector.name), speaker.name(vector.tail, vector.head), speaker.scale(vector.scale),
-        speaker.tongue.number(mm, 2), speaker.bare(by), speaker.real(mm * by, speaker.unit_of(vector.scale)),
+        speaker.tongue.number(mm, 2), speaker.bare(by), speaker.real(mm * by, unit_of(vector.name)),
     )  # fmt: skip
 
 
@@ -212,10 +211,9 @@ def _turning(speaker: Speaker, name: str, vector: Vector) -> Markup:
     arm = float(speaker.view.parameters[rate.length])
     zero = speaker.subject.is_zero(vector.name)
     turn = 0.0 if zero else speaker.subject.number(plan.rates[name])
-    unit = "rad/s" if name.startswith("omega") else "rad/s²"
     told = Markup("{} = {} / {} = {} / {} = {}").format(
         speaker.rate(name), speaker.name(vector.name), speaker.name(*rate.link),
-        speaker.bare(abs(turn) * arm), speaker.bare(arm), speaker.real(abs(turn), unit),
+        speaker.bare(abs(turn) * arm), speaker.bare(arm), speaker.real(abs(turn), unit_of(name)),
     )  # fmt: skip
     if turn == 0.0:
         return told

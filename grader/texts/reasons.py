@@ -1,12 +1,10 @@
 """The sentences of reasons: why a criterion has its verdict, with numbers and without."""
 
 from collections.abc import Mapping
-from typing import Literal
 
 from grader.language import N_, Tongue
+from grader.options import Level
 from grader.texts.spoken import Coded, filled, spoken
-
-Level = Literal["symbol", "hint", "full"]
 
 _NO_NAMES: Mapping[str, str] = {}
 

@@ -8,28 +8,27 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
-from grader.feedback.advice import RESULTS, CheckedLine, checked_lines
 from grader.feedback.student_page import AS_MEASURED, SHEET
 from grader.feedback.words import symbols
 from grader.inputs.measurements import (
     NOTHING_MEASURED,
-    UNITS_OF_SCALES,
     columns_of,
     measurements_in,
     names_of,
 )
 from grader.language import N_, Tongue, tongue
-from grader.marking.mark import judge
-from grader.marking.self_check import Level
+from grader.options import Level
 from grader.overlay.closeup import page_views, scan_element, svg
 from grader.overlay.measured import measured_picture
 from grader.overlay.scene import Picture
 from grader.rubric import rubric_of
-from grader.texts.spoken import PLACES, message
+from grader.self_check.advice import RESULTS, CheckedLine
+from grader.self_check.values import check_values
+from grader.texts.spoken import PLACES
 from grader.web.guard import RefusedError
 from reference.authored.assignment import Assignment, Variant, load_assignment
+from reference.quantities import SCALE_UNITS, unit_of
 
 RANGES = {
     "n": N_("give your number n, from %(first)s to %(last)s"),
@@ -59,7 +58,7 @@ def form_of(assignment: Assignment, lang: str) -> dict[str, Any]:
     for column, unit in columns_of(rubric_of(assignment)).items():
         name = column.removesuffix("_deg").removesuffix("_value")
         group = (
-            "scales" if name in {"kL", "kv", "ka"}
+            "scales" if name in SCALE_UNITS
             else "directions" if column.endswith("_deg")
             else "values" if column.endswith("_value") else "lengths"
         )  # fmt: skip
@@ -87,29 +86,23 @@ def checked_values(
 
     Raises CallError for a variant whose mechanism does not assemble, InputFileError for unusable columns.
     """
-    speaker, rubric = tongue(lang), rubric_of(assignment)
     filled = {column: _with_unit(column, text.strip()) for column, text in cells.items() if text.strip()}
     entered = measurements_in(filled, names_of(assignment), "", lang) if filled else NOTHING_MEASURED
-    task = task_of(assignment, rubric, variant)
-    submission = Submission(measured=entered.reading, values=entered.values, declared=entered.scales)
-    judgement = judge(task, submission)
-    outcomes = {outcome.name: outcome for outcome in judgement.outcomes}
-    names = assignment.file.names
-    picture = measured_picture("", entered.reading, task.construction, outcomes, show_expected=False)
-    lines = checked_lines(judgement, level, speaker, names, assignment.mechanism_file.driver.pin)
+    check = check_values(entered, assignment, variant, tongue(lang), level)
+    outcomes = {} if check.judgement is None else {one.name: one for one in check.judgement.outcomes}
+    construction = task_of(assignment, rubric_of(assignment), variant).construction
+    picture = measured_picture("", entered.reading, construction, outcomes, show_expected=False)
     return {
-        "lines": _lines(lines, lang),
-        "is_right": bool(lines) and all(line.result == "right" for line in lines),
-        "problems": [message(one, speaker) for one in (*entered.problems, *entered.reading.problems)],
+        "lines": _lines(check.lines, lang),
+        "is_right": check.is_all_right,
+        "problems": list(check.problems),
         "drawing": [] if picture is None else _drawings([picture], assignment, lang),
     }
 
 
 def _with_unit(column: str, text: str) -> str:
     """A scale's text with the unit that stands beside its field, where it is a bare number."""
-    return (
-        f"{text} {UNITS_OF_SCALES[column]}" if column in UNITS_OF_SCALES and _BARE.fullmatch(text) else text
-    )
+    return f"{text} {unit_of(column)}" if column in SCALE_UNITS and _BARE.fullmatch(text) else text
 
 
 def checked_photo(path: Path, asked: Mapping[str, Any]) -> dict[str, Any]:
@@ -117,7 +110,7 @@ def checked_photo(path: Path, asked: Mapping[str, Any]) -> dict[str, Any]:
 
     Arguments: `asked` has the ``assignment``, ``n``, ``position``, ``lang`` and ``level``.
     """
-    from grader.photo import photo_check  # noqa: PLC0415 - processes that judge values need no reading
+    from grader.self_check.photo import photo_check  # noqa: PLC0415 - processes that judge values need no reading
 
     assignment, lang = load_assignment(asked["assignment"]), asked["lang"]
     variant = variant_of(assignment, asked["n"], asked["position"])
@@ -125,7 +118,7 @@ def checked_photo(path: Path, asked: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "lines": _lines(check.lines, lang),
         "is_right": check.is_all_right,
-        "is_read": check.is_read,
+        "is_read": check.judgement is not None,
         "problems": [*check.flaws.values(), *check.problems],
         "drawing": _drawings(check.pictures, assignment, lang),
         "attempts_left": asked.get("attempts_left"),

@@ -36,6 +36,7 @@ from reference.errors import AuthoredFileError, CallError, Faults, Finding, near
 from reference.geometry import FloatArray
 from reference.kinematics.motion import BoolArray
 from reference.mechanism import Crank, Driver, Mechanism
+from reference.quantities import SCALE_UNITS
 
 
 class Range(Authored):
@@ -154,7 +155,7 @@ class Variant:
         return ", ".join(parts) or "the only variant"
 
 
-SCALE_NAMES = ("kL", "kv", "ka")
+SCALE_NAMES = tuple(SCALE_UNITS)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,10 +10,8 @@ from reference.construction.elements import View
 from reference.drawing.canvas import Bounds, Piece, Shape, Text, bounds, pieces_of, scale_pieces
 from reference.geometry import FloatArray
 from reference.plan import ZERO_SHARE, Plan
+from reference.quantities import SCALE_OF, unit_of
 
-SCALE_OF = {"mechanism": "kL", "velocity_plan": "kv", "acceleration_plan": "ka"}
-SCALE_UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s²)/mm"}
-VECTOR_UNITS = {"kv": "m/s", "ka": "m/s²"}
 PLAN_COLOURS = {"velocity_plan": "#1456a0", "acceleration_plan": "#a03014"}
 FARTHEST_MM = 1e4
 TOUCHING_MM = 0.05
@@ -155,7 +153,7 @@ class Subject:
     def scale_with_value(self, scale: str) -> tuple[Piece, ...]:
         """A scale with its value: kL = 0.005 m/mm."""
         value = self.wording.number(f"{self.number(getattr(self.plan.scales, scale)):.5g}")
-        unit = self.wording.unit(SCALE_UNITS[scale])
+        unit = self.wording.unit(unit_of(scale))
         return (*scale_pieces(self.shown(scale)), Piece(f" = {value} {unit}"))
 
     def caption(self, figure: str) -> Text:

@@ -18,7 +18,8 @@ from reference.drawing.canvas import (
     width_of,
     wrapped,
 )
-from reference.drawing.subject import VECTOR_UNITS, Subject
+from reference.drawing.subject import Subject
+from reference.quantities import unit_of
 
 COLUMN_MM = 96.0
 EDGE_MM = 3.0
@@ -123,7 +124,7 @@ def table_rows(subject: Subject, figures: Sequence[str]) -> Iterator[TableRow]:
             subject.letter(vector.name),
             (*subject.letter(vector.tail), Piece(" "), *subject.letter(vector.head)),
             wording.number(f"{drawn:.2f}"),
-            wording.number(f"{four_digits(real)}") + f" {wording.unit(VECTOR_UNITS[vector.scale])}",
+            wording.number(f"{four_digits(real)}") + f" {wording.unit(unit_of(vector.name))}",
             "–" if subject.is_zero(vector.name) else wording.number(angle),
         )
     names = {vector.name for vector in shown}
@@ -131,7 +132,7 @@ def table_rows(subject: Subject, figures: Sequence[str]) -> Iterator[TableRow]:
         rate = plan.construction.rates[name]
         if rate.vector in names:
             turns = 0.0 if subject.is_zero(rate.vector) else subject.number(values)
-            unit = wording.unit("rad/s" if name.startswith("omega") else "rad/s²")
+            unit = wording.unit(unit_of(name))
             value = wording.number(f"{four_digits(abs(turns))}")
             yield TableRow(subject.letter(name), "", "", f"{value} {unit}", "" if turns else "–", turns)
 

@@ -20,9 +20,9 @@ import numpy as np
 
 from grader.documents import ReportDocument
 from grader.folder.batch import Batch, graded
-from grader.folder.title_block import SURELY, names_of
 from grader.inputs.roster import read_roster
 from grader.inputs.scale_text import Declared, parse_scale
+from grader.owners.title_block import SURELY, names_of
 from grader.pipeline import open_page, writing_on
 from grader.records import PageRef, ScannedPage
 from grader.scan.handwriting.captions import (

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 from grader.feedback.student_page import About, write_feedback
 from grader.inputs.measurements import StudentSubmission
-from grader.overlay.picture import backdrop
+from grader.overlay.backdrop import backdrop
 from grader.pipeline import mark, open_page, read_pages, report_on
 from grader.reading import expected
 from grader.records import PageRef, ScannedPage

@@ -8,6 +8,7 @@ import pytest
 
 from grader.cli.checking import check_measured
 from grader.cli.grading import grade_folder
+from grader.options import CheckOptions, GradeOptions
 from reference.errors import CallError
 
 SAMPLE = Path(__file__).parents[2] / "samples" / "pump" / "s08.json"
@@ -54,7 +55,7 @@ def test_print_ghosts_and_levels_are_as_asked_for(planmark, folder, tmp_path):
 def test_a_level_that_there_is_not_is_refused_before_anything_is_written(folder, tmp_path):
     out = tmp_path / "marks"
     with pytest.raises(CallError, match="symbol, hint, full"):
-        grade_folder(folder, "pump", out, roster=None, pages_per_student=None, jobs=1, lang="en", level="all")
+        grade_folder(folder, "pump", out, GradeOptions(jobs=1, level="all"))
     assert not out.exists()
 
 
@@ -69,11 +70,11 @@ def test_a_student_gets_a_page_of_values_measured_at_home(planmark, folder, tmp_
 @pytest.mark.parametrize("name", ["mine.pdf", "mine"])
 def test_a_page_of_another_kind_is_refused(folder, name):
     with pytest.raises(CallError, match=r"must end in \.html"):
-        check_measured("pump", None, None, folder / "s08.json", "en", "hint", Path(name))
+        check_measured("pump", CheckOptions(measured=folder / "s08.json", page=Path(name)))
 
 
 def test_one_page_is_of_one_student(tmp_path):
     page = tmp_path / "mine.html"
     with pytest.raises(CallError, match="holds 2"):
-        check_measured("pump", None, None, SAMPLE.with_name("measurements.csv"), "en", "hint", page)
+        check_measured("pump", CheckOptions(measured=SAMPLE.with_name("measurements.csv"), page=page))
     assert not page.exists()

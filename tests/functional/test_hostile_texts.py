@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from pypdfium2 import PdfDocument
 
 from grader.files import guarded, is_formula, unguarded
-from grader.folder.draft_roster import RosterDraft, draft_csv
 from grader.inputs.roster import read_roster
+from grader.owners.draft_roster import RosterDraft, draft_csv
 from reference.authored.assignment import library
 from tests.inline import planmark
 
@@ -25,7 +25,7 @@ FORMULAS = ["=1+1", "+1", "-1", "@SUM(A1)", " =1", "\ufeff=1", "＝1+1"]
 PDF_MARKUP = "<a href='http://evil.example'>Ana</a> <img src='/etc/passwd'/> (a\\) \u202eJohn & <b>"
 WRITERS = {
     "grader/authoring/variant_table.py", "grader/cli/checking.py", "grader/cycle/quantities.py",
-    "grader/folder/collect.py", "grader/folder/draft_roster.py", "grader/inputs/decisions.py",
+    "grader/folder/collect.py", "grader/owners/draft_roster.py", "grader/inputs/decisions.py",
     "grader/inputs/measurements.py",
     "grader/lms/table.py",
 }  # fmt: skip

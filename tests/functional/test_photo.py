@@ -7,7 +7,8 @@ import cv2
 import numpy as np
 import pytest
 
-from grader.photo import PhotoCheck, photo_check
+from grader.self_check.photo import photo_check
+from grader.self_check.values import SelfCheck
 from tests.bench.reading_scenes import ReadingScene, SceneWork, work
 from tests.functional.conftest import Run
 
@@ -21,7 +22,7 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> tuple[SceneWork, Path]:
     return student, student.sheets[0].save(tmp_path_factory.mktemp("photo") / "sheet")
 
 
-def checked(student: SceneWork, path: Path, lang: str = "en", level: str = "hint") -> PhotoCheck:
+def checked(student: SceneWork, path: Path, lang: str = "en", level: str = "hint") -> SelfCheck:
     return photo_check(path, student.assignment, student.rubric, student.variant, lang, level)
 
 
@@ -65,7 +66,7 @@ def test_a_file_that_is_no_picture_is_told(drawn: tuple[SceneWork, Path], tmp_pa
     file.write_bytes(b"no picture")
     told = checked(student, file)
     assert told.problems
-    assert not told.is_read
+    assert told.judgement is None
     assert not told.flaws
 
 

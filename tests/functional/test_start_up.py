@@ -7,6 +7,8 @@ from functools import cache
 
 import pytest
 
+from grader.cli import commands_called
+from grader.cli.app import app
 from tests.functional.conftest import ENVIRONMENT
 
 HEAVY = frozenset(
@@ -16,7 +18,8 @@ HEAVY = frozenset(
 SCANS = frozenset("scipy cv2 PIL pikepdf pypdfium2 tifffile imagecodecs simplejpeg zxingcpp".split())
 PAGES = frozenset({"jinja2", "reportlab"})
 JUDGING = (
-    "cli comparison documents feedback files given_data inputs language marking outcomes records rubric texts"
+    "cli comparison documents feedback files given_data inputs language marking options outcomes records"
+    " rubric self_check texts"
 )
 """The rooms of the program that entered measurements pass through."""
 
@@ -82,8 +85,8 @@ def test_a_command_imports_no_heavy_library_that_it_does_not_use(folder, command
 @pytest.mark.parametrize(
     ("command", "needed"),
     [
-        ("--help", "cli files"),
-        ("plan pump --n 7 --json", "cli documents files language solution"),
+        ("--help", "cli files options"),
+        ("plan pump --n 7 --json", "cli files language options solution"),
         ("check pump --measured measured.json", JUDGING),
     ],
 )
@@ -92,8 +95,50 @@ def test_a_command_imports_no_room_of_the_program_that_it_does_not_use(folder, c
     assert {names[1] for names in modules if names[0] == "grader" and len(names) > 1} <= set(needed.split())
 
 
+def test_a_command_that_is_named_builds_the_options_of_no_other():
+    assert [one.callback.__name__ for one in commands_called(["schema", "plan"])] == ["schema"]
+    for arguments in ([], ["--version"], ["scheme"]):
+        assert commands_called(arguments) == app.registered_commands
+
+
 def test_grading_imports_no_heavy_library_beyond_those_of_scans_pages_and_processes(folder):
     allowed = {*SCANS, *PAGES, "rich", "pebble", "psutil", "filelock"}
     call = "grade class --assignment pump --roster class/roster.csv --out out --jobs 1"
     modules = imported(folder, call)
     assert HEAVY & modules <= allowed
+
+
+SCANNER = """
+import importlib, pkgutil, sys
+import grader.scan
+for module in pkgutil.walk_packages(grader.scan.__path__, "grader.scan."):
+    importlib.import_module(module.name)
+print(*sys.modules)
+"""
+SCANNED = "documents files inputs.scale_text printed.layout records scan"
+"""What of the program a scan may rest on: of what is printed, where it stands, not how it is written."""
+
+
+def test_the_scanner_loads_where_things_are_printed_and_not_the_pdf_writer():
+    run = subprocess.run(  # noqa: S603 - our own program
+        [sys.executable, "-c", SCANNER],
+        env=ENVIRONMENT,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=True,
+    )
+    modules = set(run.stdout.split())
+    assert not {"reportlab", "segno", "jinja2", "skimage", "typer", "rich"} & modules
+    rooms = {name.removeprefix("grader.") for name in modules if name.startswith("grader.")}
+    allowed = set(SCANNED.split())
+    assert {name for name in rooms if not name.startswith("scan.")} == allowed | {"inputs", "printed"}
+
+
+def test_who_marks_or_serves_loads_scipy_with_the_first_scan_alone():
+    program = "import sys, grader.pipeline; print(*sys.modules)"
+    run = subprocess.run(  # noqa: S603 - our own program
+        [sys.executable, "-c", program], env=ENVIRONMENT, capture_output=True, text=True, check=True
+    )
+    heavy = {f"scipy.{name}" for name in ("ndimage", "optimize", "sparse", "spatial", "special")}
+    assert not heavy & set(run.stdout.split())

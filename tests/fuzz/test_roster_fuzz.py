@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.files import shown_text
-from grader.folder.draft_roster import RosterDraft, draft_csv
 from grader.inputs.roster import Roster, RosterRow, ScanRef, parse_roster, parse_scan, read_roster
+from grader.owners.draft_roster import RosterDraft, draft_csv
 from reference.errors import AuthoredFileError, Finding
 
 HEADER = st.lists(

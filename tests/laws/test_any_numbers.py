@@ -7,13 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.inputs.measurements import UNITS_OF_SCALES, StudentSubmission, measurements_in, names_of
+from grader.inputs.measurements import StudentSubmission, measurements_in, names_of
 from grader.pipeline import mark
 from grader.rubric import RubricFile, rubric_of
 from grader.web.self_check import checked_values
 from reference.authored.assignment import Assignment, Variant, built_in, load_assignment
 from reference.construction.mistakes import Drawing, single_mistakes
 from reference.mechanism import Mechanism
+from reference.quantities import unit_of
 from tests.examples import examples
 from tests.hands import measured, rule_scales, task_of
 from tests.laws.test_marking_any_mechanism import asked_of
@@ -51,7 +52,7 @@ def entered(assignment: Assignment, rubric: RubricFile, variant: Variant, lot) -
     for _ in range(lot.choice([0, 1, 4])):
         one, other = lot.choice(list(cells)), lot.choice(list(cells))
         cells[one], cells[other] = cells[other], cells[one]
-    scales = {name: f"{scale!r} {UNITS_OF_SCALES[name]}" for name, scale in rule_scales(task).items()}
+    scales = {name: f"{scale!r} {unit_of(name)}" for name, scale in rule_scales(task).items()}
     return cells | {
         name: lot.choice([text, lot.choice(SCALES)]) for name, text in scales.items() if lot.random() < 0.7
     }

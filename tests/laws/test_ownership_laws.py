@@ -3,8 +3,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.folder.owners import assign_pages
 from grader.inputs.roster import Roster, RosterRow, ScanRef
+from grader.owners.pages import assign_pages
 from grader.records import Identity, PageRef
 from grader.texts.spoken import ENGLISH, sentence
 

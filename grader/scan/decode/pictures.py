@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-import simplejpeg
 from PIL import Image
 
 from grader.records import GreyImage, Page
+from grader.scan.decode import jpeg
 from grader.scan.decode.colour import COLOUR_STEP, Colours, colours_of
 from grader.scan.decode.limits import Door, InputFile, check_memory, check_size, damaged, truncated
 from reference.drawing.canvas import MM_PER_INCH
@@ -206,7 +206,7 @@ def check_header(file: InputFile, page: int, data: bytes, *, least: bool = True)
 
     Arguments: it may be of any size without `least`, as a part of a page.
     """
-    high, wide, space, sampling = simplejpeg.decode_jpeg_header(data, strict=False)
+    high, wide, space, sampling = jpeg.header(data)
     # Counts those of a thumbnail too: more never harms a picture of a sheet's size.
     scans = data.count(_SCAN)
     if scans > _MAX_SCANS:
@@ -222,7 +222,7 @@ def check_header(file: InputFile, page: int, data: bytes, *, least: bool = True)
     check_memory(file, page, wide * high, int(wide * high * pixel_bytes))
     if least:
         check_size(file, page, wide, high)
-    return str(space)
+    return space
 
 
 def decode(file: InputFile, page: int, data: bytes) -> GreyImage:
@@ -231,19 +231,14 @@ def decode(file: InputFile, page: int, data: bytes) -> GreyImage:
     libjpeg fills what is missing with grey and only warns: the warning is an error here.
     """
     try:
-        return _grey_of(data, strict=True)
+        return to_grey(jpeg.pixels(data, strict=True))
     except ValueError as error:
         message = str(error)
     if any(sign in message for sign in _CUT_OFF):
         raise truncated(file, page)
     if not any(harmless in message for harmless in _HARMLESS):
         raise damaged(file, page, message)
-    return _grey_of(data, strict=False)
-
-
-def _grey_of(data: bytes, *, strict: bool) -> GreyImage:
-    is_grey = simplejpeg.decode_jpeg_header(data, strict=False)[2] == "Gray"
-    return to_grey(simplejpeg.decode_jpeg(data, colorspace="GRAY" if is_grey else "BGR", strict=strict))
+    return to_grey(jpeg.pixels(data, strict=False))
 
 
 JPEG = Door(_jpeg_page)

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from grader.inputs.scale_text import ByRule, Declared, ParsedScale, parse_scale
-from grader.printed.layout import SCALE_BOXES, SCALE_OF
+from grader.printed.layout import SCALE_BOXES
 from grader.records import Box, FloatArray, GreyImage, Page, Sheet, Written
 from grader.scan.handwriting.model import (
     COLUMN,
@@ -22,6 +22,7 @@ from grader.scan.handwriting.model import (
     recognise,
 )
 from grader.scan.pixels import cut_out
+from reference.quantities import SCALE_OF
 
 # What may stand in a scale's box, sign by sign ----------------------------------------------------
 

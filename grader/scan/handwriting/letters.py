@@ -7,9 +7,8 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from grader.records import Box, FloatArray, GreyImage, Ink, IntArray, Letters
 from grader.scan.handwriting.model import COLUMN, JUNK, SIGNS
@@ -268,7 +267,8 @@ def _in_words(box: FloatArray) -> BoolArray:
     x, y, w, h = box.T[:, :, None]
     beside = x.T - x - w < _GAP * np.maximum(h, h.T)
     level = np.minimum(y + h, (y + h).T) - np.maximum(y, y.T) > _LEVEL * np.minimum(h, h.T)
-    line = connected_components(coo_matrix(beside & level & (x < x.T)), directed=False)[1]
+    beside_left = scipy.sparse.coo_matrix(beside & level & (x < x.T))
+    line = scipy.sparse.csgraph.connected_components(beside_left, directed=False)[1]
     return np.asarray(np.bincount(line, minlength=1)[line] > _WORDS)
 
 

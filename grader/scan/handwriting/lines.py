@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from grader.records import Box, FloatArray, GreyImage, InkMap
 from grader.scan.handwriting.fields import PX_PER_MM
@@ -163,7 +163,8 @@ def _rows(pieces: NDArray[np.int32], unit: float) -> list[_Row]:
     lower, higher = np.minimum(high, high.T), np.maximum(high, high.T)
     beside = np.maximum(left, left.T) - np.minimum(right, right.T) < _GAP * higher
     level = np.minimum(bottom, bottom.T) - np.maximum(top, top.T) > _LEVEL * lower
-    count, of_row = connected_components(beside & level & (higher < _LIKE * lower), directed=False)
+    alike = beside & level & (higher < _LIKE * lower)
+    count, of_row = scipy.sparse.csgraph.connected_components(alike, directed=False)
     own = [letters[of_row == number] for number in range(count)]
     boxes = [(*some[:, :2].min(axis=0).tolist(), *some[:, 2:4].max(axis=0).tolist()) for some in own]
     several = np.array([len(some) > 1 for some in own])

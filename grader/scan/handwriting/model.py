@@ -247,10 +247,6 @@ class Lattice:
     count: int
     segments: tuple[Segment, ...]
 
-    def starting(self, piece: int) -> list[Segment]:
-        """The candidates whose first piece this is."""
-        return [segment for segment in self.segments if segment.first == piece]
-
 
 def lattice_of(grey: GreyImage, px_per_mm: float) -> Lattice:
     """The lattice of a line of writing.

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from grader.documents import CalibrationDocument, CalibrationPoint, CalibrationSegments
-from grader.printed.answer_sheet import calibration_segments
+from grader.printed.layout import calibration_segments
 from grader.records import FloatArray, Page, Reason, Unread
 from grader.scan.decode.pages import page_of
 from grader.scan.pixels import lengths_and_directions

@@ -106,7 +106,7 @@ def find_bend(marked: MarkedPoints, plain: Projection, shape: tuple[int, int]) -
         at = mapped(matrix, marked.mm + params[1] * marked.outward)
         return (at - straight(marked.px, float(params[0]), shape)).ravel()
 
-    start = np.concatenate([[0.0, plain.gain_mm], plain.params, np.zeros(8 - len(plain.params))])
+    start = np.concatenate([np.zeros(2), plain.params, np.zeros(8 - len(plain.params))])
     bend = float(solve(off_px, start).params[0])
     if abs(bend) > MAX_BEND:
         return 0.0, plain

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 from grader.printed.layout import PAGE_MM
 from grader.records import FloatArray
@@ -62,7 +62,7 @@ def solve(residuals: Callable[[FloatArray], FloatArray], start: FloatArray) -> L
         raise np.linalg.LinAlgError("too few residuals, or some that are not finite")
     tolerances = dict.fromkeys(("ftol", "xtol", "gtol"), _TOLERANCE)
     slope = partial(_derivative, residuals)
-    fit = least_squares(residuals, start, slope, method="lm", x_scale="jac", **tolerances)
+    fit = scipy.optimize.least_squares(residuals, start, slope, method="lm", x_scale="jac", **tolerances)
     covariance = np.linalg.pinv(fit.jac.T @ fit.jac)
     return LeastSquares(np.asarray(fit.x), np.asarray(covariance), 2.0 * float(fit.cost))
 
@@ -258,7 +258,6 @@ class Projection:
     mm_to_px : (3, 3), last element 1
     rms_mm : root mean square misfit of the points, the gain taken off
     misfit_mm : (n,) misfit of each point
-    gain_mm : how far the markers' sides stand outward of where they should
     params, covariance : the numbers of `homography_of` (4, 6 or 8), and their covariance
     centre_mm, size_mm : of the points, about which and in units of which the numbers are
     """
@@ -266,7 +265,6 @@ class Projection:
     mm_to_px: FloatArray
     rms_mm: float
     misfit_mm: FloatArray
-    gain_mm: float
     params: FloatArray
     covariance: FloatArray
     centre_mm: FloatArray
@@ -322,8 +320,7 @@ def fit_projection(marked: MarkedPoints) -> Projection:
     rms = float(np.sqrt(np.mean(misfit**2)))
     # A misfit beyond the corners' own error (bent paper, a lens) makes the map less sure by as much.
     covariance = best.covariance[1:, 1:] * max(1.0, (rms / (_POINT_SE_MM * np.sqrt(2.0))) ** 2)
-    gain, params = float(best.params[0]), best.params[1:]
-    return Projection(matrix / matrix[2, 2], rms, misfit, gain, params, covariance, centre, size)
+    return Projection(matrix / matrix[2, 2], rms, misfit, best.params[1:], covariance, centre, size)
 
 
 def _similarity(mm: FloatArray, px: FloatArray) -> FloatArray:

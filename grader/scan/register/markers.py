@@ -9,12 +9,13 @@ import numpy as np
 import zxingcpp
 from numpy.typing import NDArray
 
-from grader.printed import pdf
 from grader.printed.layout import (
     CALIBRATION,
     CODE_MM,
     DRAWING_MM,
+    MARKER_CELLS,
     MARKER_CORNERS,
+    MARKER_DICTIONARY,
     MARKER_MM,
     MARKERS_PER_TEMPLATE,
     PAGE_MM,
@@ -127,7 +128,7 @@ _SCALE_NEAR = 0.1
 _SCALE_FAR = 1.6
 """Between A3 and A4 lies a factor of 1.41; what is farther off is a wrong resolution."""
 
-_REACH = 0.9 / pdf.CELLS
+_REACH = 0.9 / MARKER_CELLS
 """How far outward and inward to look, in sides: within the border's cell and the quiet zone."""
 _ACROSS, _SAMPLES = 37, 40
 """Places across a side at which the grey is taken, and profiles along it."""
@@ -243,7 +244,8 @@ def _detector() -> cv2.aruco.ArucoDetector:
     settings.minMarkerPerimeterRate = 0.02
     settings.maxMarkerPerimeterRate = 0.4
     settings.errorCorrectionRate = 0.3
-    return cv2.aruco.ArucoDetector(pdf.dictionary(), settings)
+    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, MARKER_DICTIONARY))
+    return cv2.aruco.ArucoDetector(dictionary, settings)
 
 
 def _agreed(markers: _Markers) -> tuple[_Markers, Projection] | None:

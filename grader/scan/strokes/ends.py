@@ -7,7 +7,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import scipy.ndimage
+import scipy
 from numpy.typing import NDArray
 
 from grader.records import NO_TIPS, FloatArray, IntArray, Strokes, Tips

@@ -5,8 +5,7 @@ from dataclasses import fields
 
 import cv2
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 from grader.records import Box, FloatArray, GreyImage, Ink, InkMap, Page, Reason, Sheet, Strokes, Unread
 from grader.scan.pixels import (
@@ -324,8 +323,8 @@ def _linked(ends: FloatArray, length: FloatArray, weight: FloatArray) -> tuple[R
 
 def _family_size(first: Rows, second: Rows, count: int) -> Rows:
     """(count,) how many strokes hang together with each through links."""
-    links = coo_matrix((np.ones(len(first)), (first, second)), shape=(count, count))
-    _, label = connected_components(links, directed=False)
+    links = scipy.sparse.coo_matrix((np.ones(len(first)), (first, second)), shape=(count, count))
+    _, label = scipy.sparse.csgraph.connected_components(links, directed=False)
     return np.asarray(np.bincount(label, minlength=count)[label], dtype=np.intp)
 
 

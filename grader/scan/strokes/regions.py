@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from grader.records import Box, FloatArray, Page, Sheet
 from grader.scan.pixels import (
@@ -54,12 +54,13 @@ def near_pairs(ends: FloatArray, others: FloatArray, reach_px: float) -> tuple[R
     step = reach_px + _SLACK_PX
     count = len(others)
     at, row = _samples(others, step)
-    tree = KDTree(at)
+    tree = scipy.spatial.KDTree(at)
     pairs = [np.zeros(0, dtype=np.intp)]
     for part in parts(len(ends), _NEIGHBOURHOOD):
         own_at, own = _samples(ends[part], step)
         # No point of a segment is further than half a step from a sample.
-        close = KDTree(own_at).sparse_distance_matrix(tree, reach_px + step, output_type="ndarray")
+        own_tree = scipy.spatial.KDTree(own_at)
+        close = own_tree.sparse_distance_matrix(tree, reach_px + step, output_type="ndarray")
         pairs.append(np.unique((part.start + own[close["i"]]) * count + row[close["j"]]))
     first, second = np.divmod(np.concatenate(pairs), max(count, 1))
     return first, second

@@ -13,9 +13,9 @@ from grader.comparison.follow_through import ReplayResult
 from grader.comparison.own import PlanBasis
 from grader.comparison.task import task_of
 from grader.marking.mark import judge
-from grader.marking.self_check import checked_values
 from grader.records import Figure, OtherReading, Reading, ReadNode, ReadVector, Reason, Unread
 from grader.rubric import Band, CriterionTable, DoubtTable, ToleranceTable, load_rubric
+from grader.self_check.results import checked_values
 from reference.authored.assignment import load_assignment
 from reference.construction.mistakes import Mistake
 from tests.hands import changed, drawn_nodes, measured, rule_scales, sheet, task_for, without

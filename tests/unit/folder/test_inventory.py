@@ -11,8 +11,8 @@ from grader.folder.inventory import (
     submissions,
     take_inventory,
 )
-from grader.folder.owners import assign_pages
 from grader.inputs.roster import parse_roster
+from grader.owners.pages import assign_pages
 from grader.records import PageRef
 from tests.inline import Inline
 

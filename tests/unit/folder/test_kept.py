@@ -16,8 +16,6 @@ from grader.folder import batch as jobs_module
 from grader.folder import cache as kept_module
 from grader.folder.batch import Batch, InterruptedRunError, grade
 from grader.folder.cache import (
-    CELL_STAGE,
-    CELLS_OF,
     MARK_STAGE,
     READ_STAGE,
     SCAN_STAGE,
@@ -32,7 +30,7 @@ from grader.folder.cache import (
 )
 from grader.folder.changes import standing_text
 from grader.folder.inventory import identify_page, take_inventory
-from grader.overlay.picture import backdrop
+from grader.overlay.backdrop import backdrop
 from grader.records import (
     Figure,
     Page,
@@ -346,8 +344,7 @@ def sources(tmp_path_factory):
 def digests(top):
     """Of each stage of the work, by the sources in a folder."""
     stage_digest.cache_clear()
-    found = {stage: stage_digest(modules, top=top) for stage, modules in STAGES.items()}
-    return found | {"cells": stage_digest(CELL_STAGE, CELLS_OF, top)}
+    return {stage: stage_digest(modules, top=top) for stage, modules in STAGES.items()}
 
 
 @pytest.mark.parametrize(
@@ -356,13 +353,16 @@ def digests(top):
         ("grader/scan/strokes/tips.onnx", {"scan", "mark"}),
         ("grader/scan/handwriting/letters.npz", {"scan", "read", "mark"}),
         ("grader/scan/decode/pictures.py", {"scan", "mark"}),
-        ("grader/records.py", {"scan", "cells", "read", "mark"}),
+        ("grader/records.py", {"scan", "read", "mark"}),
         ("grader/pipeline.py", {"scan", "read", "mark"}),
         ("grader/reading/plans.py", {"read", "mark"}),
         ("grader/marking/mark.py", {"mark"}),
         ("grader/feedback/templates/feedback.html", {"mark"}),
         ("grader/locale/ro/LC_MESSAGES/planmark.mo", {"mark"}),
-        ("grader/printed/answer_sheet.py", {"cells", "mark"}),
+        ("grader/printed/layout.py", {"scan", "read", "mark"}),
+        ("grader/printed/answer_sheet.py", set()),
+        ("grader/printed/pdf.py", set()),
+        ("reference/drawing/labels.py", {"mark"}),
         ("grader/cli/grading.py", set()),
         ("tests/bench.py", set()),
     ],

@@ -25,7 +25,7 @@ def graded(tmp_path):
         load_rubric("pump"),
         folder,
         tmp_path / "out",
-        roster,
+        roster=roster,
         lang="ro",
         level="hint",
         with_ghosts=False,

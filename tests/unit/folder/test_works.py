@@ -2,10 +2,10 @@ from dataclasses import replace
 
 import pytest
 
-from grader.folder.owners import How, Owned, PageOwners, Unmatched
 from grader.folder.submissions import Unusable, submissions_of
 from grader.inputs.measurements import Measurements
 from grader.inputs.roster import Roster, RosterRow
+from grader.owners.pages import How, Owned, PageOwners, Unmatched
 from grader.records import PageRef, Reading, Reason
 from reference.authored.assignment import Variant, load_assignment
 

@@ -9,7 +9,8 @@ import pytest
 
 from grader.documents import Quantity, Tolerance
 from grader.outcomes import Outcome
-from grader.overlay.picture import backdrop, overlay, paint
+from grader.overlay.backdrop import backdrop
+from grader.overlay.picture import overlay, paint
 from grader.overlay.scene import ARROW_WIDTH_MM, COLOURS, MARKS, Arrow, Ghost, Scene, labels_of, scene_of
 from grader.records import Figure, Page, Reading, ReadNode, ReadVector, Sheet
 from reference.construction.graph import Vector

@@ -9,12 +9,7 @@ import pytest
 from grader.inputs.roster import RosterRow
 from grader.language import tongue
 from grader.printed import answer_sheet
-from grader.printed.answer_sheet import (
-    calibration_segments,
-    cells_of,
-    make_calibration,
-    make_sheets,
-)
+from grader.printed.answer_sheet import make_calibration, make_sheets
 from grader.printed.layout import (
     FRAME_MM,
     MARKER_CORNERS,
@@ -23,6 +18,8 @@ from grader.printed.layout import (
     TEMPLATES,
     Layout,
     best_template,
+    calibration_segments,
+    cells_of,
     comb_cells,
     extents_mm,
     field_boxes,

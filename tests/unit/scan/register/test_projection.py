@@ -56,7 +56,6 @@ def test_ink_that_spreads_moves_nothing(markers):
     fit = fit_projection(seen(FLATBED, markers, 1, gain_mm=0.12))
     off_mm = np.hypot(*(apply(fit.mm_to_px, GRID_MM) - apply(FLATBED, GRID_MM)).T) / 11.8
     assert off_mm.max() < 0.15
-    assert fit.gain_mm == pytest.approx(0.12, abs=0.02)
 
 
 def test_unequal_axes_are_followed():

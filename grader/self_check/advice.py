@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from grader.feedback.mistakes import ALONG_GUIDE, CORIOLIS_END, DRIVEN_ACROSS, DRIVEN_ALONG
 from grader.feedback.sentences import line_of
 from grader.language import N_, Tongue
-from grader.marking.self_check import Checked, Level, Result, certain_mistakes, checked_values
+from grader.options import Level
 from grader.outcomes import Judgement, NamedMistake
 from grader.records import Reason
+from grader.self_check.results import Checked, Result, certain_mistakes, checked_values
 from grader.texts.reasons import reason_sentence
 from reference.authored.assignment import SCALE_NAMES
 

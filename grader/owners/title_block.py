@@ -11,19 +11,18 @@ drawing looks like that number's variant. Codes of the problems:
 """
 
 import unicodedata
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import permutations
+from typing import Any, Protocol
 
 import numpy as np
 
-from grader.folder.cache import PageCache
-from grader.folder.draft_roster import CLEAR, LIKE_MM, figure_similarity
-from grader.folder.owners import Unmatched
-from grader.folder.workers import Pool
 from grader.inputs.measurements import StudentSubmission
 from grader.inputs.roster import Roster, RosterRow
 from grader.inputs.scale_text import SURE
+from grader.owners.draft_roster import CLEAR, LIKE_MM, figure_similarity
+from grader.owners.pages import Unmatched
 from grader.pipeline import writing_on
 from grader.records import FloatArray, PageRef, Reason, ScannedPage, Value, Written
 from grader.scan.handwriting.captions import (
@@ -35,6 +34,17 @@ from grader.scan.handwriting.captions import (
 )
 from reference.authored.assignment import Assignment, Variant
 
+
+class Pages(Protocol):
+    """What knows pages as they were scanned."""
+
+    def page(self, ref: PageRef) -> ScannedPage:
+        """The page."""
+
+
+Run = Callable[[Callable[..., Any], Sequence[tuple[Any, ...]]], Iterable[tuple[int, Any]]]
+"""Makes many calls of a function, wherever that may be: the number of each, and what it returned."""
+
 # Whose page it is ---------------------------------------------------------------------------------
 
 SURELY = 0.97
@@ -44,7 +54,7 @@ _LEAST_LETTERS = 4
 
 
 def written_owners(
-    unmatched: Sequence[Unmatched], roster: Roster | None, cache: PageCache, workers: Pool
+    unmatched: Sequence[Unmatched], roster: Roster | None, cache: Pages, run: Run
 ) -> dict[tuple[str, int], str]:
     """The students whose names surely stand on pages of which nothing else says whose they are.
 
@@ -56,7 +66,7 @@ def written_owners(
     ]
     if not names or not pages:
         return {}
-    found = workers.run(_owner, [(cache, page, names) for page in pages])
+    found = run(_owner, [(cache, page, names) for page in pages])
     return {
         (pages[index].file, pages[index].page): student
         for index, student in found
@@ -64,7 +74,7 @@ def written_owners(
     }
 
 
-def _owner(cache: PageCache, ref: PageRef, names: Mapping[str, Collection[str]]) -> str | None:
+def _owner(cache: Pages, ref: PageRef, names: Mapping[str, Collection[str]]) -> str | None:
     """The student whose name surely stands on a plain page."""
     for closely in (False, True):
         student, chance = written_name(writing_on(cache.page(ref), closely=closely), names)
@@ -116,8 +126,8 @@ def with_written_numbers(
     students: Sequence[StudentSubmission],
     roster: Roster | None,
     assignment: Assignment,
-    cache: PageCache,
-    workers: Pool,
+    cache: Pages,
+    run: Run,
 ) -> list[StudentSubmission]:
     """The submissions, those without a number with the number on their sheets, or why it does not count."""
     lacking = [index for index, student in enumerate(students) if _lacks_number(student)]
@@ -126,7 +136,7 @@ def with_written_numbers(
         for index in lacking
     ]
     result = list(students)
-    for place, read in workers.run(_number, calls):
+    for place, read in run(_number, calls):
         if not isinstance(read, Reason):
             variant, problem = read
             student = students[lacking[place]]
@@ -155,7 +165,7 @@ def _possible(student: StudentSubmission, roster: Roster | None, assignment: Ass
 
 
 def _number(
-    cache: PageCache, refs: Sequence[PageRef], assignment: Assignment, possible: Sequence[Variant]
+    cache: Pages, refs: Sequence[PageRef], assignment: Assignment, possible: Sequence[Variant]
 ) -> tuple[Variant | None, Reason]:
     """As `chosen_variant`, of what is written and drawn on some pages."""
     numbers = {variant.n for variant in possible}, {variant.position for variant in possible}

@@ -1,60 +1,27 @@
-"""A student's own check of a photo: what is right, off or not read, and what spoils the picture."""
+"""The check of a photo: what is right, off or not read, and what spoils the picture."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from grader.feedback.advice import CheckedLine, checked_lines
 from grader.files import shown_text
 from grader.inputs.measurements import NOTHING_MEASURED, StudentSubmission
 from grader.language import N_, Tongue, tongue
-from grader.marking.self_check import is_all_right
-from grader.outcomes import Judgement
+from grader.options import Level
 from grader.overlay.picture import overlay
-from grader.overlay.scene import Picture
 from grader.pipeline import judged, pictures_of, read_submission, scan
 from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, PageRef, Reason, ScannedPage
 from grader.rubric import RubricFile, asked_of
 from grader.scan.decode.pages import count_pages
-from grader.texts.reasons import Level
+from grader.self_check.advice import checked_lines
+from grader.self_check.values import SelfCheck
 from grader.texts.spoken import message, sentence
 from reference.authored.assignment import Assignment, Variant
 from reference.errors import InputFileError
 
 
-@dataclass(frozen=True, slots=True)
-class PhotoCheck:
-    """What a self-check tells of a photo, in the student's language; nothing in it gives the answer away.
-
-    Attributes
-    ----------
-    flaws : what spoils reading, by code, with what to do
-    problems : what else a student should know
-    lines : of every value that was asked for and drawn, or could not be read (`open`)
-    judgement : None where nothing was read
-    pictures : each page with what was read on it, without expected vectors
-    """
-
-    flaws: Mapping[str, str] = field(default_factory=dict)
-    problems: tuple[str, ...] = ()
-    lines: tuple[CheckedLine, ...] = ()
-    judgement: Judgement | None = None
-    pictures: tuple[Picture, ...] = ()
-
-    @property
-    def is_read(self) -> bool:
-        """Whether any figure of the assignment was read."""
-        return self.judgement is not None
-
-    @property
-    def is_all_right(self) -> bool:
-        """Whether something was read, and nothing is off or open."""
-        return bool(self.lines) and is_all_right(tuple(line.checked for line in self.lines))
-
-
 def photo_check(
     path: Path, assignment: Assignment, rubric: RubricFile, variant: Variant, lang: str, level: Level = "hint"
-) -> PhotoCheck:
+) -> SelfCheck:
     """What a student's own check of a photo, a scan, or a PDF of several tells.
 
     Raises InputFileError for a file that is not there, CallError for an unknown language.
@@ -79,7 +46,7 @@ def photo_check(
     if isinstance(answer, Reason):
         known = [*problems, answer]
         pictures = tuple(overlay(page.backdrop, page.reading, {}, {}) for page in pages if page.backdrop)
-        return PhotoCheck(spoilt, _said(known, speaker), pictures=pictures)
+        return SelfCheck(problems=_said(known, speaker), flaws=spoilt, pictures=pictures)
     task, judgement, _ = answer
     names, driven = assignment.file.names, assignment.mechanism_file.driver.pin
     drawn = {figure for reading in readings for figure in reading.figures}
@@ -93,7 +60,7 @@ def photo_check(
     told = [*(speaker.gettext(PLANS_UNSEEN[figure]) for figure in absent), *_said(problems, speaker)]
     lines = checked_lines(judgement, level, speaker, names, driven, unread)
     pictures = pictures_of(pages, NOTHING_MEASURED, task.construction, judgement, show_expected=False)
-    return PhotoCheck(spoilt, tuple(told), tuple(lines), judgement, pictures)
+    return SelfCheck(tuple(lines), tuple(told), judgement, spoilt, pictures)
 
 
 PLANS_UNSEEN = {

@@ -1,9 +1,11 @@
+import io
+
 import numpy as np
 import pytest
-import simplejpeg
+from PIL import Image
 
-from grader.folder.draft_roster import contact_sheet, draft_csv, figure_similarity, suggest, thumbnail
 from grader.inputs.roster import parse_roster
+from grader.owners.draft_roster import contact_sheet, draft_csv, figure_similarity, suggest, thumbnail
 from grader.records import Identity, PageRef
 from reference.authored.assignment import load_assignment
 from reference.construction.derive import construction_of
@@ -208,4 +210,4 @@ def test_a_thumbnail_is_a_small_picture_of_the_whole_page():
 
 
 def decoded(jpeg):
-    return simplejpeg.decode_jpeg(jpeg, colorspace="GRAY")[:, :, 0]
+    return np.asarray(Image.open(io.BytesIO(jpeg)))

@@ -4,7 +4,7 @@ import pytest
 
 from grader.comparison.evidence import Submission
 from grader.marking.mark import judge
-from grader.marking.self_check import Checked, checked_values, is_all_right
+from grader.self_check.results import Checked, checked_values
 from tests.hands import changed, measured, sheet, task_for, without
 
 PUMP = task_for("pump", 7)
@@ -13,6 +13,10 @@ TOO_LONG = changed(measured(PUMP), "v_D", length_mm=99.0)
 
 def self_check(task, submission, level="hint"):
     return checked_values(judge(task, submission), level)
+
+
+def is_all_right(checked):
+    return all(one.result == "right" for one in checked)
 
 
 def found(checked, name):

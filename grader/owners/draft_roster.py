@@ -19,12 +19,12 @@ from dataclasses import dataclass, field, replace
 from html import escape
 
 import numpy as np
-import simplejpeg
+from PIL import Image
 
 from grader.files import guarded
-from grader.folder.owners import How, Owned, assign_pages
 from grader.inputs.roster import COLUMNS, DRAFT_COLUMNS, Roster, RosterRow
 from grader.language import N_, Tongue, tongue
+from grader.owners.pages import How, Owned, assign_pages
 from grader.records import FloatArray, GreyImage, PageRef, Reason
 from grader.scan.pixels import shrink
 from grader.texts.spoken import unmatched_document
@@ -365,8 +365,9 @@ figcaption b{font-size:1.1em}
 def thumbnail(grey: GreyImage) -> bytes:
     """A page reduced, as JPEG."""
     small = shrink(grey, min(1.0, _THUMBNAIL_PX / max(grey.shape)))
-    image = np.ascontiguousarray(small)[:, :, None]
-    return bytes(simplejpeg.encode_jpeg(image, quality=_QUALITY, colorspace="GRAY"))
+    picture = io.BytesIO()
+    Image.fromarray(small).save(picture, "JPEG", quality=_QUALITY)
+    return picture.getvalue()
 
 
 def contact_sheet(entries: Sequence[tuple[Suggestion, bytes]], lang: str = "en") -> str:

@@ -1,7 +1,7 @@
 import pytest
 
-from grader.folder.owners import How, assign_pages, student_of_name
 from grader.inputs.roster import parse_roster
+from grader.owners.pages import How, assign_pages, student_of_name
 from grader.records import Identity, PageRef
 from grader.texts.spoken import message
 

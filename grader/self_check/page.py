@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 
 from grader.documents import ReportDocument
-from grader.feedback.advice import RESULTS, CheckedLine
 from grader.feedback.student_page import About, StudentPage
 from grader.feedback.words import environment
 from grader.language import tongue
 from grader.overlay.scene import Picture
+from grader.self_check.advice import RESULTS, CheckedLine
 
 VERDICTS = {"right": "full", "off": "none", "open": "not_judged"}
 """The verdict whose colour each result has."""
@@ -26,7 +26,7 @@ def check_page(
     Arguments
     ---------
     report : its variant, its problems and the names of its criteria are shown, no verdict of it
-    lines : what is said of each value, as `grader.feedback.advice.checked_lines` gives it
+    lines : what is said of each value, as `grader.self_check.advice.checked_lines` gives it
     mistakes : what is said of mistakes; empty where nothing may be
     """
     speaker = tongue(lang)

@@ -7,16 +7,16 @@ not show.
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from grader.documents import Quantity, Tolerance
 from grader.marking.drawn import NEARLY_CERTAIN
+from grader.options import Level
 from grader.outcomes import Judgement, NamedMistake, Outcome
 from grader.records import Reason
 from reference.authored.assignment import SCALE_NAMES
 
-Level = Literal["symbol", "hint", "full"]
-LEVELS: tuple[Level, ...] = ("symbol", "hint", "full")
+LEVELS: tuple[Level, ...] = get_args(Level)
 Result = Literal["right", "off", "open"]
 
 TELLING = frozenset({"what", "of"})
@@ -57,19 +57,15 @@ def checked_values(judgement: Judgement, level: Level, unread: Collection[str] =
     )
 
 
-def likely_mistakes(judgement: Judgement, level: Level) -> tuple[NamedMistake, ...]:
+def likely_mistakes(judgement: Judgement | None, level: Level) -> tuple[NamedMistake, ...]:
     """The mistakes that explain what is off, at level `full`; what was left out is no mistake of a check."""
-    return tuple(one for one in judgement.mistakes if level == "full" and one.code != "vector_missing")
+    mistakes = () if judgement is None or level != "full" else judgement.mistakes
+    return tuple(one for one in mistakes if one.code != "vector_missing")
 
 
 def certain_mistakes(judgement: Judgement) -> tuple[NamedMistake, ...]:
     """The mistakes that nothing else explains nearly as well: a hint may tell the law that they break."""
     return tuple(one for one in judgement.mistakes if one.confidence >= NEARLY_CERTAIN and not one.rivals)
-
-
-def is_all_right(checked: tuple[Checked, ...]) -> bool:
-    """Whether nothing is off or open."""
-    return all(one.result == "right" for one in checked)
 
 
 def _is_handed_in(outcome: Outcome) -> bool:

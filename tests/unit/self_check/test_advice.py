@@ -5,12 +5,12 @@ import re
 import pytest
 
 from grader.comparison.evidence import Submission
-from grader.feedback.advice import ADVICE, LAWS, advice_on, checked_lines, law_of
 from grader.feedback.mistakes import ALONG_GUIDE, DRIVEN_ACROSS, DRIVEN_ALONG, MISTAKES
 from grader.language import tongue
 from grader.marking.mark import judge
 from grader.outcomes import NamedMistake
 from grader.records import Reason
+from grader.self_check.advice import ADVICE, LAWS, advice_on, checked_lines, law_of
 from grader.texts.reasons import HINTS
 from reference.construction.mistakes import Mistake
 from tests.hands import changed, measured, task_for

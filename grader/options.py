@@ -1,0 +1,237 @@
+"""The options of commands, one record each, from which all who offer, keep or heed them take them.
+
+The command line makes its options of a record's fields, `planmark.toml` its keys, the note of a run and the
+work itself are the record and more.
+"""
+
+from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+Level = Literal["symbol", "hint", "full"]
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """How a field is offered.
+
+    Attributes
+    ----------
+    help : what it does, in a sentence
+    flags : as they are typed; ``--`` and the field's name if empty
+    key : its key in `planmark.toml`, empty for none
+    least, most : of a number
+    """
+
+    help: str
+    flags: tuple[str, ...] = ()
+    key: str = ""
+    least: float | None = None
+    most: float | None = None
+    metavar: str | None = None
+    hidden: bool = False
+
+
+def option(help_: str, *flags: str, default: Any = None, **more: Any) -> Any:  # noqa: ANN401 - as `field`
+    """A field of a record that is offered as an option; its default may be `MISSING`."""
+    return field(default=default, metadata={"option": Option(help_, flags, **more)})
+
+
+def offered(record: type) -> list[tuple[Field[Any], Option]]:
+    """The fields of a record that are offered, in their order."""
+    return [(one, one.metadata["option"]) for one in fields(record) if "option" in one.metadata]
+
+
+def is_record(kind: Any) -> bool:  # noqa: ANN401 - any annotation
+    """Whether it is a record that is offered as options."""
+    return is_dataclass(kind) and isinstance(kind, type) and bool(offered(kind))
+
+
+def taken(record: type, source: object) -> dict[str, Any]:
+    """The options of a record by name, as they are in another record that has them."""
+    return {one.name: getattr(source, one.name) for one, _ in offered(record)}
+
+
+def _lang(help_: str = "Language of feedback: en, ro or ru.", default: str | None = "en") -> Any:  # noqa: ANN401
+    return option(help_, default=default, key="language")
+
+
+def _jobs() -> Any:  # noqa: ANN401 - as above
+    return option("Processes; all processors if absent.", least=1)
+
+
+def _port(default: int) -> Any:  # noqa: ANN401 - as above
+    return option("0 takes any that is free.", default=default, least=0, most=65535)
+
+
+# A variant ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VariantOptions:
+    """Which variant."""
+
+    n: int | None = option("The student's number, where data depend on it.")
+    position: int | None = option("The position, where there are some.")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanOptions(VariantOptions):
+    """The options of ``planmark plan``."""
+
+    crank_mm: float | None = option("Drawn length of the crank, mm; the scales follow.")
+    as_json: bool = option("Print the plan as JSON.", "--json", default=False)
+    svg: Path | None = option("Draw the plan into this SVG file.")
+    pdf: Path | None = option("Draw the plan into this PDF file; with --all the tables too.")
+    steps: Path | None = option("Write the construction step by step, in words and pictures: .html or .pdf.")
+    altitude: bool = option(
+        "Draw normal components by right triangles on the mechanism too.", "--altitude", default=False
+    )
+    every: bool = option("All variants, for the instructor's own records.", "--all", default=False)
+    csv: Path | None = option("With --all: a table for spreadsheets, a row per variant.")
+    drawings: bool = option(
+        "With --all --pdf: a drawing of each variant too.", "--drawings/--no-drawings", default=True
+    )
+    lang: str = _lang()
+
+    @property
+    def drawn(self) -> tuple[Path, ...]:
+        """The files that a plan is drawn into."""
+        return tuple(file for file in (self.svg, self.pdf, self.steps) if file is not None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CycleOptions(VariantOptions):
+    """The options of ``planmark cycle``."""
+
+    of: list[str] | None = option(
+        "What to tell: v_B, a_B, v_BA, a_BA_n (with _x or _y a component), omega_3, epsilon_3, D (the path of"
+        " point D); several with commas. All speeds and accelerations if absent."
+    )
+    samples: int = option("Positions over the cycle.", default=361)
+    csv: Path | None = option("Write every position to this CSV file.")
+    svg: Path | None = option("Draw the diagram into this SVG file.")
+    pdf: Path | None = option("Draw the diagram into this PDF file.")
+    lang: str = _lang()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckOptions(VariantOptions):
+    """The options of ``planmark check``."""
+
+    measured: Path | None = option("Measurement file, CSV or JSON.")
+    photo: Path | None = option("Photo or scan of the drawn sheet, instead of measurements.")
+    lang: str = _lang()
+    level: Level = option("symbol (right or off), hint (in which way), full (numbers).", default="hint")
+    page: Path | None = option("Draw and tell it in this HTML file, too.")
+    template: Path | None = option("Write the CSV file to fill in.")
+
+
+# Grading ------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClassOptions:
+    """What stays the same whenever a class is graded again: a run's note keeps it."""
+
+    roster: Path | None = option("The class: roster.csv.", key="roster")
+    pages_per_student: int | None = option("Of one class file, in the roster's order.", key="pages")
+    lang: str = _lang()
+    level: Level = option("What students are told: symbol, hint, or full (with the answers).", default="full")
+    with_ghosts: bool = option(
+        "With --level full: draw expected vectors, dotted.", "--ghosts/--no-ghosts", default=True
+    )
+    decisions: Path | None = option("What people decided; decisions.csv in the folder if absent.")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GradeOptions(ClassOptions):
+    """The options of ``planmark grade``."""
+
+    jobs: int | None = _jobs()
+    time_limit: float = option("Seconds that a file or a sheet may take.", default=60.0, least=1.0)
+    memory_limit: int = option("Megabytes that a file or a sheet may take.", default=1500, least=300)
+    watch: bool = option("Grade what comes into the folder, too, until Ctrl+C.", "--watch", default=False)
+    every: float = option("With --watch: seconds between two looks.", default=5.0, least=0.1)
+    cluster: str | None = option(
+        "Scheduler of a Dask cluster that does the work; FOLDER may be s3://bucket/class then.",
+        metavar="ADDRESS",
+    )
+    to: str | None = option("The platform, for the line on what is next.", key="platform", hidden=True)
+
+
+# Exports ------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExportOptions:
+    """What an export heeds; None or empty where not given."""
+
+    to: str = option(
+        "csv, moodle, canvas, canvas-api, openedx, google-classroom, ms-education, brightspace,"
+        " blackboard, ilias, gradescope or lti.",
+        default=MISSING,
+        key="platform",
+    )
+    what: str | None = option(
+        "grades (totals), marks (points by criterion), rubric (the criteria), feedback (the pages)."
+    )
+    criteria: Path | None = option("The platform's criteria: its JSON answer, or a CSV criterion,id.")
+    submissions: Path | None = option("The platform's answer that lists the students' submissions.")
+    identity: str | None = option("How Moodle's gradebook knows users: idnumber, email, username, id.")
+    item: str = option(
+        "The grade item's, assignment's or rubric's name; the assignment's id if absent.", default=""
+    )
+    position: int | None = option("The position, where there are some.")
+    combine: str | None = option("Of several positions: sum or mean.")
+    maximum: float | None = option("The grade item's maximum.")
+    rescale: bool = option("Convert points to the platform's.", "--rescale", default=False)
+    visibility: str | None = option("Gradescope: visible, hidden, after_due_date, after_published.")
+    course_id: str | None = option("The platform's own, of the course or class.")
+    assignment_id: str | None = option("The platform's own, of the assignment.")
+    cmid: int | None = option("Moodle's number of the activity: the id in its address.", least=1)
+    context_id: int | None = option("Moodle's number of the activity's context.", least=1)
+    replace_guide: Path | None = option(
+        "Delete the guide there: Moodle's core_grading_get_gradingform_instances tells the points."
+    )
+    groups: bool | None = option("Whether students hand in as groups.", "--groups/--no-groups")
+    lang: str = _lang()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExportCall(ExportOptions):
+    """The options of ``planmark export``: an export's, and the files that it reads and writes."""
+
+    file: Path | None = option("The file to write; OUT/export-... if absent.", "--file", "-o")
+    roster: Path | None = option("The class: roster.csv.", key="roster")
+    worksheet: Path | None = option("Moodle's downloaded offline grading worksheet, to fill in.")
+    gradebook: Path | None = option(
+        "The gradebook as the platform exports it (ILIAS: status.csv), to fill in."
+    )
+    ids: Path | None = option("The platform's numbers: a CSV student_id,id[,username,participant].")
+
+
+# Servers ------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReviewOptions:
+    """The options of ``planmark review``."""
+
+    host: str = option("Address to listen on; other machines need the --token, too.", default="127.0.0.1")
+    token: str = option("What people must have in the address: 8 signs or more.", default="")
+    port: int = _port(8321)
+    jobs: int | None = _jobs()
+    lang: str | None = _lang("Of the page: en, ro or ru; as graded if absent.", None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServeOptions:
+    """The options of ``planmark serve``."""
+
+    host: str = option("Address to listen at; others reach 0.0.0.0.", default="127.0.0.1")
+    port: int = _port(8000)
+    address: str | None = option("Under which students reach it: https://NAME.")
+    database: str | None = option("postgresql+psycopg://...; SQLite in the folder if not given.")
+    mail: str | None = option("smtps://USER@HOST/SENDER sends links to new passwords.")
+    jobs: int | None = _jobs()

@@ -1,0 +1,1 @@
+"""Whose page is it: by code, roster, file name or title block; a draft of the roster where none says so."""

@@ -1,0 +1,59 @@
+"""The check of measured values."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from grader.comparison.evidence import Submission
+from grader.comparison.task import task_of
+from grader.inputs.measurements import Measurements
+from grader.language import Tongue
+from grader.marking.mark import judge
+from grader.options import Level
+from grader.outcomes import Judgement
+from grader.rubric import rubric_of
+from grader.self_check.advice import CheckedLine, checked_lines
+from grader.texts.spoken import message
+from reference.authored.assignment import Assignment, Variant
+
+if TYPE_CHECKING:
+    from grader.overlay.scene import Picture
+
+
+@dataclass(frozen=True, slots=True)
+class SelfCheck:
+    """What a self-check tells, in the student's language; nothing in it gives the answer away.
+
+    Attributes
+    ----------
+    lines : of every value that was asked for and handed in, or could not be read on a photo (`open`)
+    problems : what else a student should know
+    judgement : None where nothing was read on a photo
+    flaws : what spoils a photo, by code, with what to do
+    pictures : each page of a photo with what was read on it, without expected vectors
+    """
+
+    lines: tuple[CheckedLine, ...] = ()
+    problems: tuple[str, ...] = ()
+    judgement: Judgement | None = None
+    flaws: Mapping[str, str] = field(default_factory=dict)
+    pictures: "tuple[Picture, ...]" = ()
+
+    @property
+    def is_all_right(self) -> bool:
+        """Whether something was handed in and read, and nothing is off or open."""
+        return bool(self.lines) and all(line.result == "right" for line in self.lines)
+
+
+def check_values(
+    entered: Measurements, assignment: Assignment, variant: Variant, speaker: Tongue, level: Level
+) -> SelfCheck:
+    """What a student's own check of measured values tells.
+
+    Raises MechanismError for a variant whose mechanism does not assemble.
+    """
+    evidence = Submission(measured=entered.reading, values=entered.values, declared=entered.scales)
+    judgement = judge(task_of(assignment, rubric_of(assignment), variant), evidence)
+    names, driven = assignment.file.names, assignment.mechanism_file.driver.pin
+    problems = tuple(message(one, speaker) for one in (*entered.problems, *entered.reading.problems))
+    return SelfCheck(tuple(checked_lines(judgement, level, speaker, names, driven)), problems, judgement)

@@ -1,0 +1,54 @@
+"""The quantities of a mechanism and its plans, one table: kind, letter, unit, scale, figure."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+KindName = Literal["length", "velocity", "acceleration", "omega", "epsilon"]
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of quantities.
+
+    Attributes
+    ----------
+    letter : what names of the kind begin with, before the first underscore
+    unit : SI, as files have it: ``m/s^2``
+    scale : the scale at which it is drawn, empty for what is not drawn
+    figure : where it is drawn, empty as well
+    """
+
+    name: KindName
+    letter: str
+    unit: str
+    scale: str = ""
+    figure: str = ""
+
+    @property
+    def unit_per_mm(self) -> str:
+        """The unit of its scale."""
+        return f"({self.unit})/mm" if "/" in self.unit else f"{self.unit}/mm"
+
+
+KINDS = (
+    Kind("length", "l", "m", "kL", "mechanism"),
+    Kind("velocity", "v", "m/s", "kv", "velocity_plan"),
+    Kind("acceleration", "a", "m/s^2", "ka", "acceleration_plan"),
+    Kind("omega", "omega", "rad/s"),
+    Kind("epsilon", "epsilon", "rad/s^2"),
+)
+DRAWN = tuple(kind for kind in KINDS if kind.scale)
+SCALE_OF = {kind.figure: kind.scale for kind in DRAWN}
+"""The scale that each figure is drawn at."""
+SCALE_UNITS = {kind.scale: kind.unit_per_mm for kind in DRAWN}
+_KNOWN = {key: kind for kind in KINDS for key in (kind.letter, kind.scale) if key}
+
+
+def kind_of(name: str) -> Kind:
+    """The kind of a vector, angular quantity or scale; a length for any other name, as links have."""
+    return _KNOWN.get(name.partition("_")[0], KINDS[0])
+
+
+def unit_of(name: str) -> str:
+    """The SI unit of a vector, angular quantity or link; of a scale, per millimetre on paper."""
+    return SCALE_UNITS.get(name) or kind_of(name).unit
