@@ -6,7 +6,6 @@ Everything is in drawn millimetres, complex, y up, and an array over variants. `
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -53,13 +52,7 @@ class FromNodes:
     @property
     def needs(self) -> tuple[str, ...]:
         """The nodes that it is made from."""
-        return _needs_of(self)
-
-
-@lru_cache(maxsize=4096)
-def _needs_of(part: FromNodes) -> tuple[str, ...]:
-    """Kept for the steps that many changed constructions share."""
-    return _nodes_in(tuple([getattr(part, name) for name in part.reads]))
+        return _nodes_in(tuple([getattr(self, name) for name in self.reads]))
 
 
 def _nodes_in(value: object) -> tuple[str, ...]:
