@@ -93,22 +93,23 @@ class Lines:
         return np.asarray((self.start + self.end) / 2.0)
 
     def tips_towards(
-        self, rows: IntArray, forward: BoolArray, *, head: bool
+        self, rows: IntArray, forward: BoolArray, *, head: bool | None = None
     ) -> tuple[FloatArray, FloatArray]:
         """Tips that may mark one end of a vector on each of some lines.
 
         Arguments
         ---------
         rows, forward : lines (r,), and whether the vector's end in question is its farther one along it
-        head : whether that end is the vector's head; tips of the other sort count for `OTHER_SORT`
+        head : whether that end is the vector's head: tips of the other sort then count for `OTHER_SORT`.
+            Without it both sorts count alike, as where the strokes are given and only the place is asked
 
         Returns the distances from `start` (r, t), mm, and the probabilities (r, t).
         """
         kind = self.tip_kind[rows]
         ahead = forward[:, None]
-        same = np.where(ahead, HEAD_AHEAD, HEAD_BACK) if head else np.where(ahead, TAIL_BACK, TAIL_AHEAD)
-        other = np.where(ahead, TAIL_BACK, TAIL_AHEAD) if head else np.where(ahead, HEAD_AHEAD, HEAD_BACK)
-        share = np.where(kind == same, 1.0, np.where(kind == other, OTHER_SORT, 0.0))
+        heads = np.where(ahead, HEAD_AHEAD, HEAD_BACK), 1.0 if head is not False else OTHER_SORT
+        tails = np.where(ahead, TAIL_BACK, TAIL_AHEAD), 1.0 if head is not True else OTHER_SORT
+        share = sum(weight * (kind == sort) for sort, weight in (heads, tails))
         return self.tip_along[rows], self.tip_sure[rows] * share
 
     def take(self, chosen: BoolArray | IntArray) -> "Lines":

@@ -178,7 +178,8 @@ class PlanReading:
     def strokes(self) -> Hashable:
         """Which stroke it takes for which vector."""
         stroke = self.assignment.stroke
-        taken = np.where(stroke[:, None] < 0, -1, self.lines.members[stroke])
+        taken = np.full((len(stroke), self.lines.members.shape[1]), -1)
+        taken[stroke >= 0] = self.lines.members[stroke[stroke >= 0]]
         return self.placed.edges, taken.tobytes(), self.assignment.shared.tobytes()
 
 

@@ -527,7 +527,7 @@ def _marked(plan: PlanReading, fit: NodeFit, edge: Edge, row: int) -> float:
     along = complex(plan.lines.along[row])
     for node, other in ((edge.tail, edge.head), (edge.head, edge.tail)):
         forward = np.array([((fit.at[node] - fit.at[other]) * np.conj(along)).real > 0])
-        tips, sure = plan.lines.tips_towards(np.array([row]), forward, head=node == edge.head)
+        tips, sure = plan.lines.tips_towards(np.array([row]), forward)
         apart = np.abs(tips[0] - ((fit.at[node] - plan.lines.start[row]) * np.conj(along)).real)
         marked.append(float(sure[0, apart < MARKED_MM].max(initial=0.0)))
     return min(marked)

@@ -263,7 +263,11 @@ LEAST_DARK, MOST_INK = 0.08, 1.5
 """Contrast below which a stroke counts as so dark, and the most that ink counts."""
 LEAST_MM = 2.0
 """No vector is drawn shorter."""
-LEAST_SURE = 0.15
+CERTAINTY = (2.76, 1.61)
+"""What the network's log odds are multiplied by, and what is added: trained by focal loss, it says 0.7 where it
+is right in 97 of 100. Logistic regression on 4,900 peaks along the vectors of 99 simulated sheets."""
+LEAST_SURE, MOST_SURE = 0.04, 0.9
+"""Where more is said 97 of 100 are right; but what misleads the network misleads those who follow it."""
 ASIDE_MM = 0.5
 """A tip lies in its own cell or the next."""
 KINDS = 4
@@ -334,7 +338,8 @@ def answers(ink: FloatArray) -> FloatArray:
 
 def _peaks(strip: Strip, scores: FloatArray, rows: IntArray) -> Tips:
     """Cells likelier than their neighbours on the same band."""
-    sure = 1.0 / (1.0 + np.exp(-np.clip(scores[:KINDS], -30.0, 30.0)))
+    odds = CERTAINTY[0] * scores[:KINDS] + CERTAINTY[1]
+    sure = np.minimum(1.0 / (1.0 + np.exp(-np.clip(odds, -30.0, 30.0))), MOST_SURE)
     near = np.stack([np.roll(sure, shift, axis=1) for shift in (-2, -1, 1, 2)]).max(axis=0)
     kind, cell = np.nonzero((sure > LEAST_SURE) & (sure >= near))
     column = cell * CELL
