@@ -490,10 +490,11 @@ class _Explanations:
     def of(self, values: ComplexArray) -> list[tuple[complex, float]]:
         """What they say of something (k,): the plan's own value, then others, likeliest first.
 
-        With each stands the probability of it and those before it; values within `NEAR_MM` are one.
+        With each stands the probability of it and those before it, among all explanations, those without
+        it too; values within `NEAR_MM` are one.
         """
         left = np.isfinite(values)
-        total, together = self.weight[left].sum(), 0.0
+        total, together = self.weight.sum(), 0.0
         found: list[tuple[complex, float]] = []
         while left.any() and len(found) <= MOST_OTHERS:
             near = left & (np.abs(values - values[:, None]) < NEAR_MM)
