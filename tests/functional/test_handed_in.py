@@ -94,12 +94,12 @@ def test_a_file_that_cannot_be_used_is_in_its_students_report_and_in_the_list(re
     file = "wrong.csv" if student in {"s18", "s19"} else f"{student}.json"
     assert file in {one["file"] for one in results[0]["unmatched"]}
     page = (results[1] / student / "feedback.html").read_text(encoding="utf-8")
-    assert "nothing that was handed in can be used" in page
+    assert "Nothing that was handed in can be used." in page
 
 
 def test_a_file_that_claims_another_student_is_told_to_both_and_used_for_neither(results):
     for student in ("s07", "s08"):
-        assert "the file's name says s07, what is in it s08" in problems(results, student)["owner_disagree"]
+        assert "the file's name: s07; the file's content: s08" in problems(results, student)["owner_disagree"]
     assert report(results, "s08")["score"] == report(results, "s01")["score"]
     assert [one["code"] for one in results[0]["unmatched"] if one["file"] == "s07.json"] == ["owner_disagree"]
 
@@ -121,7 +121,7 @@ def test_what_was_refused_or_is_disputed_waits_alone(results, student, criterion
 
 
 def test_two_files_that_agree_are_one_submission_and_are_told(results):
-    assert "s15.json and s15_again.json" in problems(results, "s15")["measurements_twice"]
+    assert "s15.json, s15_again.json" in problems(results, "s15")["measurements_twice"]
     assert report(results, "s15")["score"] == report(results, "s01")["score"]
 
 
