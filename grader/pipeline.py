@@ -58,6 +58,7 @@ from grader.scan.quality import flaws
 from grader.scan.register.distortion import straighten
 from grader.scan.register.registration import register
 from grader.scan.strokes.ink import find_ink
+from grader.scan.strokes.nodes import node_places
 from grader.texts.spoken import of_error
 from reference.authored.assignment import SCALE_NAMES, Assignment, Scales, Variant
 from reference.construction.graph import Construction
@@ -281,8 +282,7 @@ def _readings(
 ) -> list[Reading]:
     """What is drawn on each page; nothing on those that were refused."""
     drawn = [(page.ink, page.sheet) for page in pages if page.ink is not None and page.sheet is not None]
-    inks, sheets = [ink for ink, _ in drawn], [sheet for _, sheet in drawn]
-    readings = iter(read_figures(inks, sheets, assignment, variant, scales, wanted) if drawn else ())
+    readings = iter(read_figures(drawn, assignment, variant, scales, wanted, node_places) if drawn else ())
     return [Reading({}) if page.ink is None else next(readings) for page in pages]
 
 

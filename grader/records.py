@@ -298,6 +298,40 @@ class InkMap:
 
 
 @dataclass(frozen=True, slots=True)
+class NodeView:
+    """A node of a plan as far as it is known, and all vectors of the plan: complex mm, y up.
+
+    Attributes
+    ----------
+    at : the node
+    vectors : (k, 2) tails and heads
+    """
+
+    at: complex
+    vectors: NDArray[np.complex128]
+
+
+@dataclass(frozen=True, slots=True)
+class NodePlaces:
+    """Where nodes lie by the ink about them: a mixture of normal distributions for each.
+
+    Attributes
+    ----------
+    at : (r, c) means, complex mm, y up
+    se_mm : (r, c) standard errors along x and along y
+    share : (r, c) probabilities; what a row lacks to 1 is that the node is nowhere near
+    """
+
+    at: NDArray[np.complex128]
+    se_mm: FloatArray
+    share: FloatArray
+
+    def take(self, row: int) -> "NodePlaces":
+        """The places of one node (c,)."""
+        return NodePlaces(self.at[row], self.se_mm[row], self.share[row])
+
+
+@dataclass(frozen=True, slots=True)
 class Letters:
     """Pieces of ink that can be written signs, a row each, with what each may be.
 

@@ -39,7 +39,10 @@ SCAN_STAGE = (
     "grader.scan.handwriting.letters", "grader.scan.handwriting.fields", "grader.overlay.backdrop",
 )  # fmt: skip
 """What `grader.pipeline.scan` calls."""
-READ_STAGE = ("grader.reading.read", "grader.inputs.scale_text", "grader.scan.handwriting.captions")
+READ_STAGE = (
+    "grader.reading.read", "grader.inputs.scale_text", "grader.scan.handwriting.captions",
+    "grader.scan.strokes.nodes",
+)  # fmt: skip
 """What `grader.pipeline.read_submission` calls beside them."""
 MARK_STAGE = ("grader.folder.batch",)
 """What marks and writes, with all that it rests on."""

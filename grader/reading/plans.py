@@ -7,6 +7,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from grader.reading.by_ink import Look, held_against_ink
 from grader.reading.expected import (
     LEFT_OUT,
     REGULAR,
@@ -118,6 +119,7 @@ class PlanProblem:
     letters : of the sheet, None where they were not looked for
     renamed : what students write for a node, by name, where it is not the name
     elsewhere : strokes, by their number, that belong to the sketch
+    look : tells where nodes lie by the sheet's ink
     """
 
     lines: Lines
@@ -126,6 +128,7 @@ class PlanProblem:
     letters: Letters | None = None
     renamed: Mapping[str, str] = field(default_factory=dict)
     elsewhere: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
+    look: Look | None = None
 
     @property
     def free(self) -> Lines:
@@ -152,6 +155,7 @@ class PlanReading:
     score : log likelihood ratio less costs, nats
     rivals : other explanations, best first
     named : probability that its letters say the names, of one whose nodes the construction does not place
+    by_ink : the nodes by strokes and ink together, of the one that is chosen
     """
 
     hypothesis: PlanHypothesis
@@ -162,11 +166,12 @@ class PlanReading:
     lines: Lines
     rivals: tuple["PlanReading", ...] = ()
     named: float = 1.0
+    by_ink: NodeFit | None = None
 
     @cached_property
     def fit(self) -> NodeFit:
-        """The nodes by the strokes alone."""
-        return fit_nodes(self.assignment, self.lines)
+        """The nodes, by the strokes alone unless they were held against the ink."""
+        return self.by_ink or fit_nodes(self.assignment, self.lines)
 
     @property
     def members(self) -> IntArray:
@@ -221,7 +226,9 @@ def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) 
     if not everything:
         return None
     best, *rivals = _with_letters(problem, everything)
-    return replace(best, rivals=(*rivals[: RIVALS - 1], *_without_each_stroke(best)))
+    rivals = [*rivals[: RIVALS - 1], *_without_each_stroke(best)]
+    by_ink = problem.look and held_against_ink(best.fit, best.placed.edges, problem.look)
+    return replace(best, rivals=tuple(rivals), by_ink=by_ink)
 
 
 # Where a plan may lie -----------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from functools import cache, partial
 
 import numpy as np
 
+from grader.reading.by_ink import Look
 from grader.reading.expected import Edge
 from grader.reading.lettering import lettered, support
 from grader.reading.lines import Lines, lines_of
@@ -23,6 +24,8 @@ from grader.records import (
     FloatArray,
     Ink,
     InkMap,
+    NodePlaces,
+    NodeView,
     OtherReading,
     Reading,
     ReadNode,
@@ -57,30 +60,34 @@ class _PageReading:
     lines: Lines
     ink: Ink
     sheet: Sheet
+    look: Look | None
     sketch: SketchReading | None = None
     plans: dict[str, PlanReading] = field(default_factory=dict)
 
 
 def read_figures(
-    inks: Sequence[Ink],
-    sheets: Sequence[Sheet],
+    drawn: Sequence[tuple[Ink, Sheet]],
     assignment: Assignment,
     variant: Variant | None,
     scales: Scales | None,
     wanted: Collection[str],
+    places: Callable[[InkMap, Sequence[NodeView]], NodePlaces] | None = None,
 ) -> list[Reading]:
     """Name what was drawn on a student's sheets.
 
     Arguments
     ---------
-    inks, sheets : one each per sheet, in order
+    drawn : the ink of each sheet, and the sheet
     variant : the student's own, None where not known; the drawing may follow another one
     scales : as declared, None where not; the drawing may follow others
     wanted : names of vectors (and nodes) asked for: each is in a figure or in `unread` of one reading
+    places : tells of nodes where an ink map has them; without it the strokes alone place them
 
     Returns one Reading per sheet.
     """
-    pages = [_PageReading(lines_of(ink), ink, sheet) for ink, sheet in zip(inks, sheets, strict=True)]
+    pages = [
+        _PageReading(lines_of(ink), ink, sheet, places and partial(places, ink.where)) for ink, sheet in drawn
+    ]
     own, others = _drawings(assignment, variant, scales)
     renamed = assignment.file.names
     for page in pages:
@@ -173,7 +180,8 @@ def _find_plan(
     for page in sorted(pages, key=lambda page: figure not in page.sheet.zones):
         joints, guide_turn = _sketched(page, pages)
         links = page.sketch.members if page.sketch is not None else np.zeros(0, np.int64)
-        problem = PlanProblem(page.lines, figure, {**joints, **known}, page.ink.letters, renamed, links)
+        given = {**joints, **known}
+        problem = PlanProblem(page.lines, figure, given, page.ink.letters, renamed, links, page.look)
         for drawing in at_scales:
             turned = Drawing(drawing.construction, {**drawing.parameters, "turn": np.asarray(guide_turn)})
             laid.append(_LaidPlan(page, problem, turned, regular_plans(problem, turned)))
@@ -425,10 +433,10 @@ MOST_OTHERS = 3
 TEMPERATURE = 3.0
 """Scores are divided by this: errors of one student's strokes are not independent."""
 WEIGHTS = {"placed": 0.2, "named": 0.5, "off_mm": -2.2, "marked": 2.4}
-CONSTANT = -1.6
+CONSTANT = -1.85
 """Of a logistic regression on 1,800 vectors of eleven kinds of sheets, each kind judged by the other ten, the
-constant lowered by 0.35, since a wrong mark costs more than a look. A line's thinness, a mistaken plan and
-further tips add nothing to them."""
+constant lowered by 0.6, since a wrong mark costs more than a look. A line's thinness, a mistaken plan,
+further tips, and how surely the ink has a node at both ends add nothing to them."""
 PLACED_AND = 0.3
 """A confidence exceeds the geometric probability by no more than this: its standard errors are wide."""
 HIGHEST = 0.985

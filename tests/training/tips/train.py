@@ -9,7 +9,6 @@ The drawings are simulated sheets of every built-in assignment, hand, pen and sc
 
 import argparse
 import pickle
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -17,16 +16,10 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from grader.pipeline import open_page
-from grader.records import PageRef
 from grader.scan.pixels import flatten
 from grader.scan.strokes.ends import BEYOND_MM, CELL, HALF, KINDS, LEAST_MM, STEP_MM, strip_of
-from reference.authored.assignment import load_assignment
-from samples.simulation import any_settings, simulate
+from tests.training.pages import simulated_pages
 
-ASSIGNMENTS = ("pump", "press", "engine", "shaper", "piston", "pump-230")
-DEVICES = ("flatbed", "flatbed", "flatbed", "copier", "phone")
-RESOLUTIONS_DPI = (150.0, 200.0, 300.0, 300.0, 300.0, 400.0)
 OFF_MM, FAR_OFF_MM, TILT = 0.5, 0.9, 0.16
 """How far a drawn vector may lie off the stroke that was found for it, at its nearer and its farther end."""
 LINK_MM = 1.2
@@ -61,26 +54,11 @@ def main() -> None:
 
 def draw(folder: Path, seed: int) -> None:
     """One simulated student's strokes as bands, with the ends of the vectors drawn along each."""
-    assignment = load_assignment(ASSIGNMENTS[seed % len(ASSIGNMENTS)])
-    variants = assignment.variants()
-    variant = variants[(seed * 7) % len(variants)]
-    rng = np.random.default_rng(seed)
-    device, dpi = str(rng.choice(DEVICES)), float(rng.choice(RESOLUTIONS_DPI))
-    settings = any_settings(seed, device=device, dpi=dpi, work=(assignment, variant))
-    try:
-        sheets = simulate(assignment, variant, seed, settings)
-    except ValueError as cannot:  # a mistake drawn by lot that has no place in this variant
-        print(seed, cannot)
-        return
-    for number, sheet in enumerate(sheets):
-        with tempfile.TemporaryDirectory() as place:
-            seen = open_page(PageRef("sheet", path=sheet.save(Path(place) / "sheet")))
-        if seen.ink is None or seen.image is None or seen.sheet is None:
-            continue
+    for number, (seen, truth) in enumerate(simulated_pages(seed)):
         strokes = seen.ink.strokes
         long = np.hypot(*(strokes.ends[:, 1] - strokes.ends[:, 0]).T) >= LEAST_MM
         ends, dark = strokes.ends[long], strokes.darkness[long]
-        vectors, links = _drawn(sheet.truth["figures"])
+        vectors, links = _drawn(truth["figures"])
         strip = strip_of(flatten(seen.image.grey), ends, dark, seen.sheet.mm_to_px)
         kept = [
             (

@@ -350,7 +350,7 @@ def digests(top):
 @pytest.mark.parametrize(
     ("file", "stale"),
     [
-        ("grader/scan/strokes/tips.onnx", {"scan", "mark"}),
+        ("grader/scan/strokes/nodes.onnx", {"scan", "read", "mark"}),
         ("grader/scan/handwriting/letters.npz", {"scan", "read", "mark"}),
         ("grader/scan/decode/pictures.py", {"scan", "mark"}),
         ("grader/records.py", {"scan", "read", "mark"}),

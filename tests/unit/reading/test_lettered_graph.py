@@ -60,7 +60,7 @@ def drawn_and_read(assignment: Assignment, seed: int, *, letters: bool, primes: 
     ink = ink_of(list(vectors.values()))
     ink = lettered_ink(ink, nodes) if letters else ink
     ink = with_primes(ink, nodes) if primes else ink
-    reading = read_figures([ink], [blank_sheet()], assignment, variant, None, tuple(vectors))[0]
+    reading = read_figures([(ink, blank_sheet())], assignment, variant, None, tuple(vectors))[0]
     figure = reading.figures.get(VELOCITY_PLAN)
     found = {} if figure is None else figure.vectors
     read = {

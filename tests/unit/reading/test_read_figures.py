@@ -25,7 +25,7 @@ MEASURABLE_MM = 5.0
 def read(
     drawn: Drawn, assignment: Assignment, variant: Variant | None, wanted: tuple[str, ...] = ()
 ) -> Reading:
-    return read_figures([drawn.ink], [drawn.sheet], assignment, variant, None, wanted)[0]
+    return read_figures([(drawn.ink, drawn.sheet)], assignment, variant, None, wanted)[0]
 
 
 def vectors_read(reading: Reading) -> dict[str, tuple[complex, float]]:
@@ -147,9 +147,8 @@ def test_sketch_and_plans_on_different_sheets_are_read_together():
     assignment, variant, drawing = task()
     first = draw(drawing, {name: PLACES[name] for name in (MECHANISM, VELOCITY_PLAN)})
     second = draw(drawing, {ACCELERATION_PLAN: PLACES[ACCELERATION_PLAN]})
-    readings = read_figures(
-        [first.ink, second.ink], [first.sheet, second.sheet], assignment, variant, None, ()
-    )
+    drawn = [(page.ink, page.sheet) for page in (first, second)]
+    readings = read_figures(drawn, assignment, variant, None, ())
     assert set(readings[0].figures) == {MECHANISM, VELOCITY_PLAN}
     assert set(readings[1].figures) == {ACCELERATION_PLAN}
     assert right_share(second, readings[1]) == 1.0

@@ -1,0 +1,37 @@
+"""Simulated students' sheets to learn from: any assignment, hand, pen and scanner."""
+
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from grader.pipeline import open_page
+from grader.records import PageRef, ScannedPage
+from reference.authored.assignment import load_assignment
+from samples.simulation import any_settings, simulate
+
+ASSIGNMENTS = ("pump", "press", "engine", "shaper", "piston", "pump-230")
+DEVICES = ("flatbed", "flatbed", "flatbed", "copier", "phone")
+RESOLUTIONS_DPI = (150.0, 200.0, 300.0, 300.0, 300.0, 400.0)
+
+
+def simulated_pages(seed: int) -> Iterator[tuple[ScannedPage, dict[str, Any]]]:
+    """One student's pages as opened, with the truth; those that were refused are left out."""
+    assignment = load_assignment(ASSIGNMENTS[seed % len(ASSIGNMENTS)])
+    variants = assignment.variants()
+    variant = variants[(seed * 7) % len(variants)]
+    rng = np.random.default_rng(seed)
+    device, dpi = str(rng.choice(DEVICES)), float(rng.choice(RESOLUTIONS_DPI))
+    settings = any_settings(seed, device=device, dpi=dpi, work=(assignment, variant))
+    try:
+        sheets = simulate(assignment, variant, seed, settings)
+    except ValueError as cannot:  # a mistake drawn by lot that has no place in this variant
+        print(seed, cannot)
+        return
+    for sheet in sheets:
+        with tempfile.TemporaryDirectory() as place:
+            page = open_page(PageRef("sheet", path=sheet.save(Path(place) / "sheet")))
+        if page.ink is not None and page.image is not None and page.sheet is not None:
+            yield page, sheet.truth
