@@ -422,8 +422,8 @@ def _support(
         from_tail, from_head = (xy(node[part]).reshape(-1, 2) @ across - off for node in ends)
         squared = from_tail**2 + from_head**2
         segment, stroke = np.nonzero(squared < FARTHEST_SQUARED * sigma[part, None] ** 2)
-        places = ((ends[:, part][:, segment] - start[stroke]) * np.conj(along[stroke])).real
-        low, high = places.min(axis=0), places.max(axis=0)
+        one, other = ((ends[:, part][:, segment] - start[stroke]) * np.conj(along[stroke])).real
+        low, high = np.minimum(one, other), np.maximum(one, other)
         shared = np.minimum(high, length[stroke]) - np.maximum(low, 0.0)
         true_span = np.abs(head[part] - tail[part])[segment]
         share = np.clip(shared / np.maximum(true_span, np.maximum(high - low, 1e-6)), 0.0, 1.0)

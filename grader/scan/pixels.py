@@ -159,8 +159,10 @@ class Flat:
         """
         middle = x.shape[1] // 2
         level = self._paper_at(x[:, middle], y[:, middle])
-        share = sampled(self.grey, x, y) / np.maximum(level, np.float32(1.0))[:, None]
-        return np.clip(np.float32(1.0) - share, np.float32(0.0), np.float32(1.0))
+        dark = sampled(self.grey, x, y)
+        dark /= np.maximum(level, np.float32(1.0))[:, None]
+        np.subtract(np.float32(1.0), dark, out=dark)
+        return np.clip(dark, np.float32(0.0), np.float32(1.0), out=dark)
 
     def brightness(self, x: FloatArray, y: FloatArray) -> Float32Array:
         """Pixels as stored, 0..255, at points (r, m) given in pixels."""
@@ -175,7 +177,7 @@ class Flat:
         """Contrast of the whole page at `scale` times its resolution, 0 = paper .. 255 = black."""
         small = shrink(self.grey, scale)
         level = cv2.resize(self.paper, (small.shape[1], small.shape[0]), interpolation=cv2.INTER_LINEAR)
-        return np.asarray(255 - np.asarray(cv2.divide(small, level, scale=255)), dtype=np.uint8)
+        return np.asarray(cv2.bitwise_not(cv2.divide(small, level, scale=255)), dtype=np.uint8)
 
 
 def parts(count: int, each: int) -> Iterator[slice]:
@@ -344,7 +346,7 @@ def _cut_part(
         peak = np.where(captured[:, None, :], contrast, np.float32(0.0)).max(axis=2)
         level = 0.5 * np.median(np.sort(peak, axis=1)[:, int(0.3 * n) :], axis=1)
     left, right, dark = _borders(
-        contrast.reshape(k * n, m), across, np.repeat(captured, n, axis=0), np.repeat(level, n)
+        contrast.reshape(k * n, m), across, np.repeat(captured.T, n, axis=1), np.repeat(level, n)
     )
     along = share[None, :] * length[:, None]
     return Cuts(along, left.reshape(k, n), right.reshape(k, n), dark.reshape(k, n))
@@ -377,34 +379,45 @@ def sampled(
 def _borders(
     contrast: Float32Array, across: Float32Array, near: BoolArray, level: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Per row: left border, right border, contrast in the middle of the ink run nearest to 0."""
-    level32 = level.astype(np.float32)
-    inked = contrast > level32[:, None]
-    rows, count = np.arange(len(contrast)), len(across)
-    off = np.where(inked & near, np.abs(across), np.float32(np.inf))
-    middle = off.argmin(axis=1)
-    inked_there = np.isfinite(off[rows, middle])
+    """Per row: left border, right border, contrast in the middle of the ink run nearest to 0.
+
+    Arguments: `near` (m, r) tells where the run may be begun from.
+    """
+    level32, count = level.astype(np.float32), len(across)
+    # Largest numbers of columns, rows side by side: a row alone is too short for numpy.
+    paper = np.ascontiguousarray((contrast <= level32[:, None]).T)
+    outward = np.abs(across).argsort(kind="stable")
+    nearness = np.empty((count, 1), dtype=np.int16)
+    nearness[outward, 0] = np.arange(count, 0, -1)
+    nearest = ((near & ~paper) * nearness).max(axis=0)
+    middle = np.where(nearest > 0, outward[count - np.maximum(nearest, 1)], -1).astype(np.int16)
     # The run reaches from the last paper before its middle to the first paper after it.
-    column, at = np.arange(count, dtype=np.int16), middle.astype(np.int16)[:, None]
-    before = np.where(inked | (column > at), np.int16(-1), column).max(axis=1)
-    behind = np.where(inked | (column < at), np.int16(count), column).min(axis=1)
-    left = np.where(inked_there, _crossing(contrast, across, before, 1, level32), np.nan)
-    right = np.where(inked_there, _crossing(contrast, across, behind, -1, level32), np.nan)
-    dark = np.where(inked_there, contrast[rows, middle], 0.0).astype(np.float64)
-    return left, right, dark
+    column = np.arange(count, dtype=np.int16)[:, None]
+    before = ((paper & (column < middle)) * (column + 1)).max(axis=0) - 1
+    behind = count - ((paper & (column > middle)) * (count - column)).max(axis=0)
+    row = np.flatnonzero(middle >= 0)
+    borders = np.full((3, len(contrast)), np.nan)
+    borders[0, row] = _crossing(contrast, across, row, before[row], 1, level32)
+    borders[1, row] = _crossing(contrast, across, row, behind[row], -1, level32)
+    borders[2] = 0.0
+    borders[2, row] = contrast[row, middle[row]]
+    return borders[0], borders[1], borders[2]
 
 
 def _crossing(
-    contrast: Float32Array, across: Float32Array, outer: NDArray[np.int16], inward: int, level: Float32Array
+    contrast: Float32Array,
+    across: Float32Array,
+    row: NDArray[np.intp],
+    outer: NDArray[np.int16],
+    inward: int,
+    level: Float32Array,
 ) -> FloatArray:
-    """Where the contrast passes `level` between `outer` (paper) and its neighbour inward (ink)."""
-    rows = np.arange(len(contrast))
+    """Where rows' contrast passes `level` between `outer` (paper) and its neighbour inward (ink)."""
     last = len(across) - 1
     beyond = (outer < 0) | (outer > last)
-    outside = np.clip(outer, 0, last).astype(np.intp)
-    inside = np.clip(outer + inward, 0, last).astype(np.intp)
-    low, high = contrast[rows, outside], contrast[rows, inside]
-    share = np.clip((level - low) / np.maximum(high - low, np.float32(1e-6)), 0.0, 1.0)
+    outside, inside = np.clip(outer, 0, last), np.clip(outer + inward, 0, last)
+    low, high = contrast[row, outside], contrast[row, inside]
+    share = np.clip((level[row] - low) / np.maximum(high - low, np.float32(1e-6)), 0.0, 1.0)
     crossed = across[outside] + share * (across[inside] - across[outside])
     return np.where(beyond, across[outside], crossed).astype(np.float64)
 

@@ -270,7 +270,11 @@ def evaluate(
     given = given or {}
     steps = construction.steps
     if wanted is not None:
-        needed = ancestors(construction, wanted)
+        # Steps come after those they need; what a given node is made from is not asked for.
+        needed = {construction.step(node).node for node in wanted}
+        for step in reversed(steps):
+            if step.node in needed and step.node not in given:
+                needed.update(step.needs)
         steps = tuple(step for step in steps if step.node in needed)
     nodes: dict[str, ComplexArray] = {}
     view = View(nodes, parameters, errors or {})

@@ -7,7 +7,7 @@ import numpy as np
 
 from grader.printed.layout import PAGE_MM
 from grader.records import FloatArray
-from grader.scan.pixels import inverted, mapped, through_corners
+from grader.scan.pixels import BoolArray, inverted, mapped, through_corners
 from grader.scan.register.fitting import Side, affine_of, affine_params
 from grader.scan.register.homography import FRAMES, PAPER, Outline, drawn_ends, title_block_mm
 from grader.scan.register.lines import RIDGE, STEP, LongLine
@@ -82,12 +82,17 @@ def hypotheses(
     Half turns differ by the title block and, where the paper's edges are seen too, by the margins.
     """
     readings: list[Hypothesis] = []
-    for quad in _quadrilaterals(lines, shape):
-        corners = _corners(quad)
-        for model in (PAPER, *FRAMES):
-            trust = _kind_trust(model, quad)
-            if trust > 0.0:
-                readings += _in_each_turn(corners, model, trust, shape, resolution)
+    quads = _quadrilaterals(lines, shape)
+    corners = _corners(quads)
+    known = resolution if _is_scan(resolution, shape) else None
+    for model in (PAPER, *FRAMES):
+        for turns in (0, 1):
+            turned = np.roll(corners, turns, axis=1)
+            possible = np.ones(len(quads), bool) if known is None else _may_be_as_large(turned, model, known)
+            for row in np.flatnonzero(possible):
+                trust = _kind_trust(model, quads[row])
+                if trust > 0.0:
+                    readings += _both_ways(turned[row], model, trust, shape, (resolution, known))
     drawn = drawn_ends(lines)
     best = sorted(readings, key=lambda hypothesis: -hypothesis.score)[:_MOST_READINGS]
     return sorted(
@@ -133,34 +138,31 @@ def _kind_trust(model: Outline, quad: tuple[LongLine, ...]) -> float:
     return 0.5 + 0.1 * kinds.count(STEP)
 
 
-def _in_each_turn(
+def _both_ways(
     corners: FloatArray,
     model: Outline,
     trust: float,
     shape: tuple[int, int],
-    resolution: Resolution | None,
+    resolutions: tuple[Resolution | None, Resolution | None],
 ) -> list[Hypothesis]:
-    """Readings of four corners (left top, clockwise) as those of a model; half turns look alike."""
-    readings = []
-    sides_px = _sides(corners)
-    known = resolution if _is_scan(resolution, shape) else None
-    for turns in (0, 1):
-        if known is not None and not _may_be_as_large(np.roll(sides_px, turns), model, known):
-            continue
-        map_px = _quad_map(model, np.roll(corners, turns, axis=0))
-        params = None if map_px is None else affine_params(map_px)
-        if map_px is None or params is None or not np.all(np.isfinite(params)):
-            continue
-        bend = np.abs(mapped(affine_of(params), model.corners()) - mapped(map_px, model.corners())).max()
-        perspective = bool(bend / np.exp(params[:2].mean()) > _SCAN_BEND_MM)
-        if known is not None and (perspective or not _is_possible(params, known)):
-            continue
-        penalty = _camera_misfit(map_px, shape) if perspective else _scan_misfit(params, resolution)
-        if penalty < _HOPELESS:
-            turned = _quad_map(model, np.roll(corners, turns + 2, axis=0))
-            readings.append(Hypothesis(map_px, perspective, trust - penalty))
-            readings += [] if turned is None else [Hypothesis(turned, perspective, trust - penalty)]
-    return readings
+    """Readings of four corners (left top, clockwise) as those of a model, upright and on its head.
+
+    Arguments: `resolutions` to go by, and the one that is known, each None without one.
+    """
+    resolution, known = resolutions
+    map_px = _quad_map(model, corners)
+    params = None if map_px is None else affine_params(map_px)
+    if map_px is None or params is None or not np.all(np.isfinite(params)):
+        return []
+    bend = np.abs(mapped(affine_of(params), model.corners()) - mapped(map_px, model.corners())).max()
+    perspective = bool(bend / np.exp(params[:2].mean()) > _SCAN_BEND_MM)
+    if known is not None and (perspective or not _is_possible(params, known)):
+        return []
+    penalty = _camera_misfit(map_px, shape) if perspective else _scan_misfit(params, resolution)
+    if penalty >= _HOPELESS:
+        return []
+    ways = (map_px, _quad_map(model, np.roll(corners, 2, axis=0)))
+    return [Hypothesis(way, perspective, trust - penalty) for way in ways if way is not None]
 
 
 def _is_scan(resolution: Resolution | None, shape: tuple[int, int]) -> bool:
@@ -179,18 +181,19 @@ def _is_possible(params: FloatArray, resolution: Resolution) -> bool:
     return bool(np.all(np.abs(off) < _SCANNED_WITHIN))
 
 
-def _may_be_as_large(sides_px: FloatArray, model: Outline, resolution: Resolution) -> bool:
-    """Whether a quadrilateral's sides leave room for such a map: most do not, and need no map to be made."""
+def _may_be_as_large(corners: FloatArray, model: Outline, resolution: Resolution) -> BoolArray:
+    """(q,) which corners (q, 4, 2) are far enough apart for such a map: most are not, and need no map."""
     px_per_mm = np.array(resolution.dpi) / MM_PER_INCH
     least, most = px_per_mm.min() * np.exp(-_SCANNED_WITHIN), px_per_mm.max() * np.exp(_SCANNED_WITHIN)
-    sides_mm = _sides(model.corners())
+    sides_px, sides_mm = _sides(corners), _sides(model.corners())
     long_enough = sides_px >= least * (sides_mm - 2.0 * _SCAN_BEND_MM)
-    return bool(np.all(long_enough & (sides_px <= most * (sides_mm + 2.0 * _SCAN_BEND_MM))))
+    return np.asarray(np.all(long_enough & (sides_px <= most * (sides_mm + 2.0 * _SCAN_BEND_MM)), axis=1))
 
 
 def _sides(corners: FloatArray) -> FloatArray:
-    """(4,) lengths of the sides from each of four corners to the next."""
-    return np.asarray(np.hypot(*(corners[[1, 2, 3, 0]] - corners).T))
+    """(..., 4) lengths of the sides from each of four corners (..., 4, 2) to the next."""
+    side = np.roll(corners, -1, axis=-2) - corners
+    return np.asarray(np.hypot(side[..., 0], side[..., 1]))
 
 
 def _quad_map(model: Outline, corners: FloatArray) -> FloatArray | None:
@@ -200,16 +203,15 @@ def _quad_map(model: Outline, corners: FloatArray) -> FloatArray | None:
     return matrix if good else None
 
 
-def _corners(quad: tuple[LongLine, ...]) -> FloatArray:
-    left, top, right, bottom = quad
-    return np.array([_meet(top, left), _meet(top, right), _meet(bottom, right), _meet(bottom, left)])
-
-
-def _meet(a: LongLine, b: LongLine) -> FloatArray:
-    p, u = a.ends[0], a.ends[1] - a.ends[0]
-    (x, y), (vx, vy) = (b.ends[0] - p).tolist(), (b.ends[1] - b.ends[0]).tolist()
-    ux, uy = u.tolist()
-    return np.asarray(p + (x * vy - y * vx) / (ux * vy - uy * vx) * u)
+def _corners(quads: list[tuple[LongLine, ...]]) -> FloatArray:
+    """(q, 4, 2) where the sides (left, top, right, bottom) meet: left top, and on clockwise."""
+    ends = np.array([[line.ends for line in quad] for quad in quads]).reshape(-1, 4, 2, 2)
+    level, upright = ends[:, [1, 1, 3, 3]], ends[:, [0, 2, 2, 0]]
+    start, through = level[..., 0, :], upright[..., 0, :]
+    u, v, apart = level[..., 1, :] - start, upright[..., 1, :] - through, through - start
+    share = apart[..., 0] * v[..., 1] - apart[..., 1] * v[..., 0]
+    share /= u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+    return np.asarray(start + share[..., None] * u)
 
 
 def _scan_misfit(params: FloatArray, resolution: Resolution | None) -> float:

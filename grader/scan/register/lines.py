@@ -175,7 +175,7 @@ def _straight(x: IntArray, y: FloatArray, chain: IntArray) -> FloatArray:
     """(n, 4) ends of the lines through chains of points; a bent chain is cut until it is straight."""
     parts: list[FloatArray] = []
     for stretch in (*_STRETCHES_PX, 0):
-        _, chain = np.unique(chain, return_inverse=True)
+        chain = np.cumsum(np.bincount(chain) > 0)[chain] - 1
         ends, rms = _lines_through(x, y, chain)
         straight = rms <= np.maximum(_CROOKED_PX, _CROOKED_SHARE * (ends[:, 2] - ends[:, 0]))
         parts.append(ends[straight])
@@ -267,8 +267,10 @@ def _paired(chains: dict[int, list[_Chain]], *, across: bool) -> list[LongLine]:
         for index, (other, other_inked) in enumerate(chains[1]):
             low, high = max(ends[0, 0], other[0, 0]), min(ends[1, 0], other[1, 0])
             shorter = min(ends[1, 0] - ends[0, 0], other[1, 0] - other[0, 0])
+            if high - low <= _SHARED * shorter:
+                continue
             gap = _value(other, (low + high) / 2) - _value(ends, (low + high) / 2)
-            if high - low > _SHARED * shorter and _STROKE_PX[0] < gap < _STROKE_PX[1]:
+            if _STROKE_PX[0] < gap < _STROKE_PX[1]:
                 both = np.array([min(ends[0, 0], other[0, 0]), max(ends[1, 0], other[1, 0])])
                 middle = [(_value(ends, p) + _value(other, p)) / 2 for p in both]
                 lines.append(line(np.column_stack([both, middle]), max(inked, other_inked), RIDGE, 0))

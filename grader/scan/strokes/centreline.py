@@ -185,9 +185,9 @@ def rejoined(fitted: Fitted, px_per_mm: float) -> tuple[FloatArray, BoolArray]:
     ends, stay = fitted.ends.copy(), np.ones(len(fitted), dtype=bool)
     length = fitted.length
     may_join = length > _LEAST_JOINED_MM * px_per_mm
-    doubted = np.zeros(len(ends), dtype=bool)
+    doubted, others = np.zeros(len(ends), dtype=bool), ends[may_join]
     for part in parts(len(ends), 4 * len(ends)):
-        doubted[part] = (_goes_on(ends[part, None], ends, px_per_mm)[0] & may_join).any(axis=1)
+        doubted[part] = _goes_on(ends[part, None], others, px_per_mm)[0].any(axis=1)
     for row in np.argsort(-length):
         if not stay[row] or not doubted[row]:
             continue

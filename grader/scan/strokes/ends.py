@@ -11,7 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from grader.records import NO_TIPS, FloatArray, IntArray, Strokes, Tips
-from grader.scan.pixels import BoolArray, Flat, cut_across, lengths_and_directions, mapped
+from grader.scan.pixels import BoolArray, Flat, Float32Array, cut_across, lengths_and_directions
 from grader.scan.strokes.centreline import Fitted
 from grader.scan.strokes.regions import near_pairs
 
@@ -228,6 +228,8 @@ def _runs(level: FloatArray) -> list[tuple[int, int]]:
     usual = float(np.partition(level, int(_DARK_QUANTILE * (n - 1)))[int(_DARK_QUANTILE * (n - 1))])
     dark = level >= _LIGHT * usual
     least = round(_LEAST_LIGHT_MM / _STEP_MM)
+    if dark[:least].any() and dark[-least:].any():
+        return [(0, n)]
     first, last = int(np.argmax(dark)), n - int(np.argmax(dark[::-1]))
     first = first if first >= least else 0
     last = last if n - last >= least else n
@@ -289,12 +291,12 @@ class Strip:
 
     Attributes
     ----------
-    ink : (31, t) contrast over that of the band's own stroke, 0..1.5
+    ink : (31, t) contrast over that of the band's own stroke, 0..1.5, in single precision
     band : (t,) which stroke each column is of
     along : (t,) mm from that stroke's first end
     """
 
-    ink: FloatArray
+    ink: Float32Array
     band: IntArray
     along: FloatArray
 
@@ -306,14 +308,16 @@ def strip_of(flat: Flat, ends: FloatArray, darkness: FloatArray, mm_to_px: Float
     band = np.repeat(np.arange(len(ends)), count + GAP)
     first = np.concatenate([[0], np.cumsum(count + GAP)[:-1]])
     along = (np.arange(len(band)) - first[band]) * STEP_MM - BEYOND_MM
+    middle = ends[band, 0] + along[:, None] * unit[band]
     aside = np.arange(-HALF, HALF + 1) * STEP_MM
-    x = (ends[band, 0, 0] + along * unit[band, 0])[:, None] + aside * unit[band, 1, None]
-    y = (ends[band, 0, 1] + along * unit[band, 1])[:, None] - aside * unit[band, 0, None]
-    px = mapped(mm_to_px, np.stack([x, y], axis=-1))
-    contrast = flat.contrast(px[..., 0], px[..., 1])
-    own = FULL_INK * np.maximum(darkness, LEAST_DARK)
-    contrast[along >= length[band] + BEYOND_MM] = 0.0
-    return Strip(np.clip(contrast / own[band, None], 0.0, MOST_INK).T, band, along)
+    # In homogeneous coordinates a line goes on in even steps.
+    start = middle @ mm_to_px[:, :2].T + mm_to_px[:, 2]
+    step = unit[band, ::-1] @ (mm_to_px[:, :2] * (1.0, -1.0)).T
+    x, y, w = (start[:, axis, None] + step[:, axis, None] * aside for axis in range(3))
+    ink = flat.contrast(x / w, y / w)
+    ink /= (FULL_INK * np.maximum(darkness, LEAST_DARK)).astype(np.float32)[band, None]
+    ink[along >= length[band] + BEYOND_MM] = 0.0
+    return Strip(np.minimum(ink, np.float32(MOST_INK)).T, band, along)
 
 
 @cache
@@ -321,12 +325,12 @@ def _network() -> cv2.dnn.Net:
     return cv2.dnn.readNetFromONNX(str(Path(__file__).with_name("tips.onnx")))
 
 
-def answers(ink: FloatArray) -> FloatArray:
+def answers(ink: Float32Array) -> Float32Array:
     """(8, t/2): for each kind the log odds of a tip at a cell, then how far it is from there, mm."""
     wide = ink.shape[1]
     useful = STRIP - 2 * APART
     result = np.empty((2 * KINDS, wide // CELL), dtype=np.float32)
-    padded = np.pad(ink.astype(np.float32), ((0, 0), (APART, STRIP)))
+    padded = np.pad(ink, ((0, 0), (APART, STRIP)))
     for start in range(0, wide, useful):
         network = _network()
         network.setInput(np.ascontiguousarray(padded[None, None, :, start : start + STRIP]))
@@ -336,7 +340,7 @@ def answers(ink: FloatArray) -> FloatArray:
     return result
 
 
-def _peaks(strip: Strip, scores: FloatArray, rows: IntArray) -> Tips:
+def _peaks(strip: Strip, scores: Float32Array, rows: IntArray) -> Tips:
     """Cells likelier than their neighbours on the same band."""
     odds = CERTAINTY[0] * scores[:KINDS] + CERTAINTY[1]
     sure = np.minimum(1.0 / (1.0 + np.exp(-np.clip(odds, -30.0, 30.0))), MOST_SURE)

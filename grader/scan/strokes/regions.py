@@ -36,8 +36,8 @@ PROBES = 13
 """Places along a segment at which its distance from another is taken."""
 _SLACK_PX = 1.0
 """Callers compare in single precision: pairs at the limit are in."""
-_NEIGHBOURHOOD = 256
-"""Pairs of samples around one segment, at most as a rule."""
+_NEIGHBOURHOOD = 2048
+"""Pairs of samples around one segment, and segments that may be near it, at most as a rule."""
 
 Rows = NDArray[np.intp]
 
@@ -49,20 +49,22 @@ def near_pairs(ends: FloatArray, others: FloatArray, reach_px: float) -> tuple[R
     """Rows of all pairs of a segment (k, 2, 2) and another (t, 2, 2) within `reach_px` of each other.
 
     Returns (n,) rows of `ends`, in order, and (n,) rows of `others`, in order for each segment. Pairs up
-    to two and a half times as far apart may be among them: the caller's own formula decides.
+    to three and a half times as far apart may be among them: the caller's own formula decides.
     """
-    step = reach_px + _SLACK_PX
-    count = len(others)
+    step = 2.0 * (reach_px + _SLACK_PX)
     at, row = _samples(others, step)
     tree = scipy.spatial.KDTree(at)
-    pairs = [np.zeros(0, dtype=np.intp)]
+    pairs = [np.zeros((2, 0), dtype=np.intp)]
     for part in parts(len(ends), _NEIGHBOURHOOD):
         own_at, own = _samples(ends[part], step)
         # No point of a segment is further than half a step from a sample.
         own_tree = scipy.spatial.KDTree(own_at)
         close = own_tree.sparse_distance_matrix(tree, reach_px + step, output_type="ndarray")
-        pairs.append(np.unique((part.start + own[close["i"]]) * count + row[close["j"]]))
-    first, second = np.divmod(np.concatenate(pairs), max(count, 1))
+        are_near = np.zeros((len(ends[part]), len(others)), dtype=bool)
+        are_near[own[close["i"]], row[close["j"]]] = True
+        rows, beside = are_near.nonzero()
+        pairs.append(np.stack([part.start + rows, beside]))
+    first, second = np.concatenate(pairs, axis=1)
     return first, second
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grader.records import FloatArray, GreyImage
-from grader.scan.pixels import lengths_and_directions, parts
+from grader.scan.pixels import lengths_and_directions
 
 PX_PER_MM = 6.0
 """Resolution at which ink is looked for; strokes of 0.3 mm are two pixels wide."""
@@ -150,19 +150,21 @@ def _band_width(mask: GreyImage, edges: FloatArray) -> tuple[FloatArray, FloatAr
     direction = lengths_and_directions(edges)[1]
     normal = np.column_stack([direction[:, 1], -direction[:, 0]])
     points = edges[:, None, 0] + share[None, :, None] * (edges[:, None, 1] - edges[:, None, 0])
-    depth = np.arange(1.0, _WIDEST_PX + 1.0)
-    inner = np.empty((len(edges), len(share)))
-    for part in parts(len(edges), 2 * len(share) * len(depth)):
-        inner[part] = _run(mask, points[part], normal[part], depth)
-    return normal, np.median(inner, axis=1) + 1.0
+    return normal, np.median(_run(mask, points, normal), axis=1) + 1.0
 
 
-def _run(mask: GreyImage, points: FloatArray, normal: FloatArray, depth: FloatArray) -> FloatArray:
-    """How many pixels of ink follow each border point along its normal."""
-    at = points[:, :, None, :] + depth[None, None, :, None] * normal[:, None, None, :]
-    column = np.clip(np.rint(at[..., 0]), 0, mask.shape[1] - 1).astype(int)
-    row = np.clip(np.rint(at[..., 1]), 0, mask.shape[0] - 1).astype(int)
-    return np.asarray(np.minimum.accumulate(mask[row, column], axis=2).sum(axis=2), dtype=np.float64)
+def _run(mask: GreyImage, points: FloatArray, normal: FloatArray) -> NDArray[np.intp]:
+    """(n, m) how many pixels of ink follow each border point (n, m, 2) along its normal (n, 2)."""
+    count, each = points.shape[:2]
+    run, border = np.zeros(count * each, dtype=np.intp), np.arange(count * each)
+    at, step = points.reshape(-1, 2).T.copy(), np.repeat(normal.T, each, axis=1)
+    last = np.array(mask.shape[::-1])[:, None] - 1
+    for depth in range(1, _WIDEST_PX + 1):
+        column, row = np.clip(np.rint(at + depth * step).astype(np.intp), 0, last)
+        inked = mask[row, column].view(bool)
+        border, at, step = border[inked], at[:, inked], step[:, inked]
+        run[border] += 1
+    return run.reshape(count, each)
 
 
 def _usual(width: FloatArray, weight: FloatArray) -> float:

@@ -143,7 +143,8 @@ def _meeting_points(seeds: Seeds, where: BoolArray) -> FloatArray:
     votes = np.asarray(cv2.boxFilter(counted.astype(np.float32), -1, (3, 3), normalize=False))
     full = 2.0 * 2.0 * np.pi * _RADIUS_MM[0] * PX_PER_MM * 3.0 * _CELL_PX / _EVERY
     peak = np.asarray(cv2.dilate(votes, np.ones((5, 5), np.uint8)))
-    at = np.argwhere((votes == peak) & (votes > _VOTES * full))
+    at = np.argwhere(votes > _VOTES * full)
+    at = at[votes[at[:, 0], at[:, 1]] == peak[at[:, 0], at[:, 1]]]
     at = at[np.argsort(-votes[at[:, 0], at[:, 1]])][:_MOST]
     return np.asarray((at[:, ::-1] + 0.5) * _CELL_PX, dtype=np.float64)
 
@@ -192,10 +193,11 @@ def _darkest(polar: FloatArray) -> FloatArray:
 def _polar(flat: Flat, centres: FloatArray, radial: FloatArray) -> FloatArray:
     """(g, angles, radii) contrast around each centre."""
     angle = np.arange(_ANGLES) * (2.0 * np.pi / _ANGLES)
-    x = centres[:, 0, None, None] + np.cos(angle)[None, :, None] * radial[None, None, :]
-    y = centres[:, 1, None, None] + np.sin(angle)[None, :, None] * radial[None, None, :]
-    shape = x.shape
-    return flat.contrast(x.reshape(-1, len(radial)), y.reshape(-1, len(radial))).reshape(shape)
+    x, y = (
+        (centres[:, axis, None, None] + turned[:, None] * radial).astype(np.float32)
+        for axis, turned in enumerate((np.cos(angle), np.sin(angle)))
+    )
+    return flat.contrast(x.reshape(-1, len(radial)), y.reshape(-1, len(radial))).reshape(x.shape)
 
 
 def _best_ring(ring: FloatArray) -> np.ndarray:

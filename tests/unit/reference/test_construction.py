@@ -74,6 +74,16 @@ def test_a_given_node_hides_its_own_makers():
     np.testing.assert_allclose(both["d"], drawn["d"], atol=1e-10)
 
 
+def test_what_a_given_node_is_made_from_is_not_drawn():
+    plan = plan_of("pump")
+    drawn = evaluate(plan.construction, plan.drawing.parameters)
+    joints = {step.node: drawn[step.node] for step in plan.construction.figures["mechanism"]}
+    given = {**joints, "b": drawn["b"]}
+    part = evaluate(plan.construction, plan.drawing.parameters, given=given, wanted=["b"])
+    assert set(part) == {"b"}
+    np.testing.assert_array_equal(part["b"], drawn["b"])
+
+
 @pytest.mark.parametrize("wanted", [["v"], ["d"], ["b'"], ["n_B", "C"]])
 def test_only_what_is_asked_for_and_its_ancestors_are_drawn(wanted):
     plan = plan_of("pump")

@@ -10,7 +10,6 @@ from grader.scan.register.hypotheses import (
     Resolution,
     _is_possible,
     _may_be_as_large,
-    _sides,
 )
 from reference.drawing.canvas import MM_PER_INCH
 
@@ -23,10 +22,10 @@ def test_every_map_of_a_possible_scale_has_sides_that_are_looked_at():
     for _ in range(300):
         scales = USUAL + rng.uniform(-1.5, 1.5, 2) * _SCANNED_WITHIN
         params = np.array([*scales, rng.uniform(-np.pi, np.pi), 2480.0, 1754.0])
-        sides = _sides(mapped(affine_of(params), PAPER.corners()))
-        assert _may_be_as_large(sides, PAPER, KNOWN) or not _is_possible(params, KNOWN)
+        corners = mapped(affine_of(params), PAPER.corners())
+        assert _may_be_as_large(corners[None], PAPER, KNOWN).all() or not _is_possible(params, KNOWN)
 
 
 def test_lines_of_a_drawing_that_are_no_frame_are_passed_over():
     inner = np.array([[100.0, 50.0], [300.0, 50.0], [300.0, 250.0], [100.0, 250.0]])
-    assert not _may_be_as_large(_sides(inner * np.exp(USUAL)), PAPER, KNOWN)
+    assert not _may_be_as_large(inner[None] * np.exp(USUAL), PAPER, KNOWN).any()
