@@ -540,10 +540,11 @@ class LintFindingDocument(Document):
 
 
 class LintLeast(Document):
-    """The least of several figures, and whose it is."""
+    """The least of several figures, whose it is, and the page of the answer sheets that it is on, if any."""
 
     value: float
     at: str
+    page: int | None = None
 
 
 class LintVariant(VariantDocument):

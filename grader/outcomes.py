@@ -1,6 +1,6 @@
 """The results of judging a submission, as data without text in any language.
 
-`grader.comparison` makes an `Outcome` per rubric criterion, `grader.marking.diagnosis` a `NamedMistake`
+`grader.comparison` makes an `Outcome` per rubric criterion, `grader.marking.naming` a `NamedMistake`
 per mistake, `grader.marking.mark` the points; `grader.feedback` turns the `Reason`s into sentences in the
 student's language.
 

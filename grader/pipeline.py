@@ -9,12 +9,9 @@ hand: they are a reading, too. Only this module knows the order of the stages. A
 becomes a problem of its page or report, never an error.
 """
 
-import time
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from hashlib import blake2b
 
 from grader.comparison.evidence import Submission
 from grader.comparison.scales import Declarations, Source, declarations
@@ -40,30 +37,17 @@ from grader.reading import page_scale
 from grader.reading.corrected import corrected
 from grader.reading.read import read_figures
 from grader.reading.sketch import drawings
-from grader.records import PageRef, Reading, Reason, ScannedPage, Sheet, Unread, Value
+from grader.records import PageRef, Reading, Reason, ScannedPage, Value
 from grader.rubric import Asked, RubricFile
-from grader.scan.decode.pages import decode, is_blank
-from grader.scan.handwriting.captions import (
-    NUMBER_WORDS,
-    POSITION_WORDS,
-    Spotter,
-    captioned_scales,
-    spotters,
-    surer,
-    written_number,
-)
-from grader.scan.handwriting.fields import writing, written_lengths, written_scales
-from grader.scan.handwriting.letters import STAND_UPRIGHT, find_letters, upright_nats
-from grader.scan.quality import flaws
-from grader.scan.register.distortion import straighten
-from grader.scan.register.registration import register
-from grader.scan.strokes.ink import find_ink
+from grader.scan.handwriting import captions
+from grader.scan.handwriting.fields import written_lengths
+from grader.scan.page import open_page, timed, turned, writing_on
 from grader.scan.strokes.nodes import node_places
 from grader.texts.spoken import of_error
-from reference.authored.assignment import SCALE_NAMES, Assignment, Scales, Variant
+from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.construction.graph import Construction
 from reference.construction.mistakes import Drawing
-from reference.errors import InputFileError, MechanismError
+from reference.errors import MechanismError
 
 # One page: pixels to strokes ----------------------------------------------------------------------
 
@@ -78,71 +62,6 @@ def scan(ref: PageRef, asked: Asked) -> ScannedPage:
         cells = cells_of(asked.assignment, tuple(page.sheet.zones), asked.entries)
         reading = replace(reading, lengths=written_lengths(page.image, page.sheet, cells))
     return replace(page, image=None, reading=reading, backdrop=backdrop(page.image, page.sheet))
-
-
-def open_page(
-    ref: PageRef, figures: Collection[str] = (), units: Mapping[str, str] | None = None
-) -> ScannedPage:
-    """A page decoded, registered, and its strokes found; `problems` say where the way ended.
-
-    Arguments: of a printed sheet, only the zones of these `figures` are looked at; all of it by default.
-    `units` are those of scales in its boxes that are bare numbers, by scale.
-    """
-    if ref.problem is not None:
-        return ScannedPage(ref, problems=(ref.problem,))
-    timing: dict[str, float] = {}
-    try:
-        with _timed(timing, "decode"):
-            image = decode(ref)
-    except InputFileError as error:
-        page = _refused(ScannedPage(ref, timing_ms=timing), of_error(error))
-        return replace(page, ref=replace(ref, problem=page.problems[0]))
-    if ref.turn_deg is not None:
-        image = replace(image, turn_deg=ref.turn_deg, turn_is_sure=True)
-    ref = replace(ref, content=blake2b(image.grey.tobytes(), digest_size=8).hexdigest())
-    page = ScannedPage(ref, image, timing_ms=timing)
-    # Rows that a decoder has filled with white are not blank.
-    if not image.damage and is_blank(image):
-        page = replace(page, ref=replace(ref, blank=True))
-        return _refused(page, Reason("page_blank"))
-    with _timed(timing, "sheet"):
-        sheet, identity = register(image, ref.corners_px)
-        page = replace(page, ref=replace(ref, identity=identity))
-        if isinstance(sheet, Sheet) and not image.damage:
-            image, sheet = straighten(image, sheet)
-        page = replace(page, flaws=flaws(image, sheet if isinstance(sheet, Sheet) else None))
-    if image.damage:
-        first, last = image.damage
-        return _refused(page, Reason("image_damaged_rows", {"first": first, "last": last}))
-    if not isinstance(sheet, Sheet):
-        return _refused(page, sheet.reason)
-    problems = tuple(replace(problem, file=ref.file) for problem in sheet.problems)
-    boxes = sheet.boxes_of(figures)
-    page = replace(page, image=image, sheet=sheet, problems=problems)
-    with _timed(timing, "ink"):
-        if boxes is None or boxes:
-            ink = find_ink(image, sheet, boxes)
-            if isinstance(ink, Unread):
-                return _refused(page, ink.reason)
-            problems += tuple(replace(problem, file=ref.file) for problem in ink.problems)
-            page = replace(page, ink=replace(ink, letters=find_letters(ink, boxes)), problems=problems)
-        reading = Reading({}, written=written_scales(image, sheet, units))
-    page = replace(page, reading=reading, narrowed=boxes is not None)
-    return page if sheet.zones or image.turn_is_sure else _as_letters_stand(page)
-
-
-def _as_letters_stand(page: ScannedPage) -> ScannedPage:
-    """A plain page the way up that its letters stand; as it is where they do not tell."""
-    if (nats := upright_nats(page.ink)) is None:
-        return page
-    other = page if nats > STAND_UPRIGHT else _turned(page)
-    is_told = other is page or (upright_nats(other.ink) or nats) > nats + STAND_UPRIGHT
-    return page_scale.surely_upright(other) if is_told else page
-
-
-def _refused(page: ScannedPage, why: Reason) -> ScannedPage:
-    where = {"page": page.ref.page} if page.ref.pages > 1 else {}
-    return replace(page, problems=(Reason(why.code, {**where, **why.parameters}, page.ref.file),))
 
 
 # One student's pages: strokes to named vectors ------------------------------------------------------
@@ -169,10 +88,10 @@ def _with_number_compared(page: ScannedPage, variant: Variant | None, assignment
         return page
     if not page_scale.is_drawn_otherwise(page.reading, drawings(assignment, [variant], None)[0]):
         return page
-    for which, words in (("n", NUMBER_WORDS), ("position", POSITION_WORDS)):
+    for which, words in (("n", captions.NUMBER_WORDS), ("position", captions.POSITION_WORDS)):
         numbers = {getattr(other, which) for other in assignment.variants()} - {None}
         for closely in (False, True) if len(numbers) > 1 else ():
-            read = written_number(writing_on(page, closely=closely), sorted(numbers), words)
+            read = captions.written_number(writing_on(page, closely=closely), sorted(numbers), words)
             if read is None or read.confidence < SURE:
                 continue
             if read.text != str(getattr(variant, which)):
@@ -189,34 +108,17 @@ def missing_scales(submission: StudentSubmission) -> tuple[str, ...]:
     return tuple(name for name in SCALE_NAMES if name not in submission.declared and name not in measured)
 
 
-def writing_on(page: ScannedPage, *, closely: bool = False) -> list[Spotter]:
-    """The lines of writing on a plain page; none on a printed sheet, which has boxes, and on one refused.
-
-    Arguments: `closely` decodes the page again, if its pixels were left behind; else its ink map must do.
-    """
-    sheet = page.sheet
-    if page.ink is None or sheet is None or sheet.zones:
-        return []
-    if not closely:
-        return spotters(page.ink.where)
-    try:
-        image = page.image or straighten(decode(page.ref), sheet)[0]
-    except InputFileError:
-        return []
-    return spotters(page.ink.where, lambda box: writing(image, sheet, box, 0.0))
-
-
 def _with_captions(page: ScannedPage, assignment: Assignment, names: Collection[str]) -> ScannedPage:
     """A plain page with those of these scales that stand on it; looked at closely where in doubt."""
     units: Mapping[str, str] = dict(assignment.file.scales.bare_units.items())
     lines = writing_on(page) if names else []
     if not lines:
         return page
-    written = captioned_scales(lines, names, units)
+    written = captions.captioned_scales(lines, names, units)
     doubtful = [name for name in names if name not in written or written[name].confidence < SURE]
     if doubtful:
-        closer = captioned_scales(writing_on(page, closely=True), doubtful, units)
-        read = {name: surer(written.get(name), closer.get(name)) for name in doubtful}
+        closer = captions.captioned_scales(writing_on(page, closely=True), doubtful, units)
+        read = {name: captions.surer(written.get(name), closer.get(name)) for name in doubtful}
         written |= {name: one for name, one in read.items() if one is not None}
     return replace(page, reading=replace(page.reading, written=written))
 
@@ -229,16 +131,22 @@ def read_pages(
     wanted: Collection[str],
 ) -> list[ScannedPage]:
     """A student's pages with what was drawn on each; nothing on those that were refused."""
+
+    def readings_of(pages: Sequence[ScannedPage]) -> list[Reading]:
+        drawn = [(page.ink, page.sheet) for page in pages if page.ink is not None and page.sheet is not None]
+        found = iter(read_figures(drawn, assignment, variant, scales, wanted, node_places) if drawn else ())
+        return [Reading({}) if page.ink is None else next(found) for page in pages]
+
     timing: dict[str, float] = {}
-    with _timed(timing, "reading"):
+    with timed(timing, "reading"):
         known = {**sure_texts([page.reading.written for page in pages if page.ink is not None]), **declared}
         scales = None if variant is None else declared_scales(assignment, variant, known)
-        readings = _readings(pages, assignment, variant, scales, wanted)
+        readings = readings_of(pages)
         right = None if variant is None else drawings(assignment, [variant], scales)[0]
         sure: Collection[str] = () if variant is None else understood_scales(assignment, variant, known)
         for at_drawing in (_upright, partial(page_scale.at_drawn_scales, declared=sure)):
             if (placed := at_drawing(pages, readings, right)) is not None:
-                pages, readings = placed, _readings(placed, assignment, variant, scales, wanted)
+                pages, readings = placed, readings_of(placed)
     drawn = sum(page.ink is not None for page in pages)
     read = []
     for page, reading in zip(pages, readings, strict=True):
@@ -253,43 +161,29 @@ def _upright(
     pages: Sequence[ScannedPage], readings: Sequence[Reading], right: Drawing | None
 ) -> list[ScannedPage] | None:
     """The pages, the other way up where nothing but a drawing says so; None where none is."""
-    turned = [
+    upright = [
         _turned(page) if page_scale.turn_doubts(page) and page_scale.is_upside_down(reading, right) else page
         for page, reading in zip(pages, readings, strict=True)
     ]
-    return turned if any(one is not page for one, page in zip(turned, pages, strict=True)) else None
+    return upright if any(one is not page for one, page in zip(upright, pages, strict=True)) else None
 
 
 def _turned(page: ScannedPage) -> ScannedPage:
-    """A page opened the other way up, as letters are read upright only; itself where nothing is found so."""
-    if page.sheet is None:
+    """A page opened the other way up, with the doubt about that; itself where nothing is found so."""
+    other = turned(page)
+    if other is page or other.image is None:
         return page
-    turn_deg = (90 * round(page.sheet.rotation_deg / 90.0) + 180) % 360
-    turned = open_page(replace(page.ref, turn_deg=turn_deg))
-    if turned.image is None or turned.sheet is None:
-        return page
-    behind = backdrop(turned.image, turned.sheet) if page.backdrop is not None else None
-    problems = (*turned.problems, *page_scale.turn_doubts(page))
-    return replace(turned, image=page.image and turned.image, backdrop=behind, problems=problems)
-
-
-def _readings(
-    pages: Sequence[ScannedPage],
-    assignment: Assignment,
-    variant: Variant | None,
-    scales: Scales | None,
-    wanted: Collection[str],
-) -> list[Reading]:
-    """What is drawn on each page; nothing on those that were refused."""
-    drawn = [(page.ink, page.sheet) for page in pages if page.ink is not None and page.sheet is not None]
-    readings = iter(read_figures(drawn, assignment, variant, scales, wanted, node_places) if drawn else ())
-    return [Reading({}) if page.ink is None else next(readings) for page in pages]
+    behind = backdrop(other.image, other.sheet) if page.backdrop is not None else None
+    problems = (*other.problems, *page_scale.turn_doubts(page))
+    return replace(other, image=page.image and other.image, backdrop=behind, problems=problems)
 
 
 # One student's mark ---------------------------------------------------------------------------------
 
 _SURELY = 0.9
 """Confidence from which a vector is not told to be doubtful."""
+Painter = Callable[[Level], tuple[Picture, ...]]
+"""Paints the pages, at level `full` with expected vectors beside wrong ones; that takes most of the time."""
 
 
 def mark(
@@ -298,46 +192,14 @@ def mark(
     assignment: Assignment,
     rubric: RubricFile,
     level: Level = "full",
-    *,
-    with_ghosts: bool = True,
-) -> tuple[ReportDocument, tuple[Picture, ...]]:
-    """The report of a submission whose pages were read, and a picture of each page.
-
-    Arguments: pictures show expected vectors beside wrong ones at level `full`, unless without `with_ghosts`.
-    """
-    report, painted = _marked(submission, pages, assignment, rubric, level)
-    return report, painted(with_ghosts and level == "full")
-
-
-def report_on(
-    submission: StudentSubmission,
-    pages: Sequence[ScannedPage],
-    assignment: Assignment,
-    rubric: RubricFile,
-    level: Level = "full",
-) -> ReportDocument:
-    """The report alone, as of `mark`: pictures take most of its time."""
-    return _marked(submission, pages, assignment, rubric, level)[0]
-
-
-def _marked(
-    submission: StudentSubmission,
-    pages: Sequence[ScannedPage],
-    assignment: Assignment,
-    rubric: RubricFile,
-    level: Level,
-) -> tuple[ReportDocument, Callable[[bool], tuple[Picture, ...]]]:
-    """The report, and what paints the pages, with expected vectors or without."""
+) -> tuple[ReportDocument, Painter]:
+    """The report of a submission whose pages were read, and what paints a picture of each page."""
     pages = [page.asked_only(rubric.vectors) for page in pages]
     pages, astray = with_nodes(pages, submission, assignment)
     sheets = [reading_document(page, submission.student_id) for page in pages]
     problems = (*submission.problems, *(problem for page in pages for problem in page.problems), *astray)
-    problems += tuple(
-        replace(flaw, file=page.ref.file)
-        for page in pages
-        if _is_doubtful(page.reading)
-        for flaw in page.flaws
-    )
+    doubtful = [page for page in pages if _is_doubtful(page.reading)]
+    problems += tuple(replace(flaw, file=page.ref.file) for page in doubtful for flaw in page.flaws)
     answer = judged(submission, assignment, rubric, [page.reading for page in pages])
     if isinstance(answer, Reason):
         is_there = submission.pages or submission.measured or submission.has_unusable
@@ -347,10 +209,9 @@ def _marked(
         )  # fmt: skip
         plain = [(page.backdrop, page.reading) for page in pages if page.backdrop]
         report = with_decisions(report, submission)
-        return report, lambda _ghosts: tuple(overlay(scan, reading, {}, {}) for scan, reading in plain)
+        return report, lambda _level: tuple(overlay(scan, reading, {}, {}) for scan, reading in plain)
     task, own, declared = answer
-    learnt = answers_of(task, own, pages, submission.decided)
-    judgement = own
+    learnt, judgement = answers_of(task, own, pages, submission.decided), own
     if learnt:
         pages = corrected(pages, learnt.places, task.construction)[0]
         sheets = [reading_document(page, submission.student_id) for page in pages]
@@ -369,8 +230,8 @@ def _marked(
     report = with_mistakes_explained(report, judgement, assignment, task.variant, lang, level)
     report = with_said(report, own, {row.criterion for row in submission.decided})
     report = with_decisions(report, submission, own, task.construction)
-    return report, lambda ghosts: pictures_of(
-        pages, measured, task.construction, judgement, show_expected=ghosts
+    return report, lambda shown: pictures_of(
+        pages, measured, task.construction, judgement, show_expected=shown == "full"
     )
 
 
@@ -398,9 +259,7 @@ def judged(
     if is_empty and not any(row.kind == "verdict" for row in submission.decided):
         if submission.has_unusable:
             return Reason("nothing_usable")
-        if not submission.pages:
-            return Reason("nothing_handed_in")
-        return Reason("nothing_read")
+        return Reason("nothing_read") if submission.pages else Reason("nothing_handed_in")
     try:
         task = task_of(assignment, rubric, submission.variant)
     except MechanismError as error:
@@ -426,22 +285,12 @@ def pictures_of(
     """Each page with what was judged on it; without pages, the plans as the measurements draw them."""
     outcomes = {outcome.name: outcome for outcome in judgement.outcomes}
     vectors, links = construction.vectors, construction.links
-    pictures = [
-        overlay(page.backdrop, page.reading, vectors, outcomes, links, show_expected=show_expected)
-        for page in pages
-        if page.backdrop is not None
-    ]
-    if not pictures:
+    shown = [(page.backdrop, page.reading) for page in pages if page.backdrop is not None]
+    if not shown:
         source, reading = measured.source, measured.reading
         drawn = measured_picture(source, reading, construction, outcomes, show_expected=show_expected)
-        pictures = [] if drawn is None else [drawn]
-    return tuple(pictures)
-
-
-@contextmanager
-def _timed(timing_ms: dict[str, float], stage: str) -> Iterator[None]:
-    start = time.perf_counter()
-    try:
-        yield
-    finally:
-        timing_ms[stage] = 1000.0 * (time.perf_counter() - start)
+        return () if drawn is None else (drawn,)
+    return tuple(
+        overlay(scan, reading, vectors, outcomes, links, show_expected=show_expected)
+        for scan, reading in shown
+    )

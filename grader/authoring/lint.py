@@ -148,13 +148,13 @@ def _rows(
         name: np.where(asked.is_zero[row], np.inf, asked.length_mm[row])
         for row, name in enumerate(asked.names)
     }
-    zones = {
-        f"{figure.replace('_', ' ')} on page {index + 1}": room
-        for index, page in rooms.items()
-        for figure, room in page.zones.items()
-    }
+    zones, pages = {}, {}
+    for index, page in rooms.items():
+        for figure, room in page.zones.items():
+            name = f"{figure.replace('_', ' ')} on page {index + 1}"
+            zones[name], pages[name] = room, index + 1
     transmission, crossing = _least(conditions.transmission, count), _least(conditions.crossing_deg, count)
-    shortest, room = _least(lengths, count), _least(zones, count)
+    shortest, least_room = _least(lengths, count), _least(zones, count, pages)
     short = asked.short(WELL_READ_MM).sum(axis=0) if asked.names else np.zeros(count, dtype=int)
     return [
         _row(
@@ -163,22 +163,29 @@ def _rows(
             crossing_deg=crossing[index],
             shortest_mm=shortest[index],
             under_8_mm=int(short[index]),
-            room=room[index],
+            room=least_room[index],
             predicted_error=float(conditions.error[index]),
         )
         for index, variant in enumerate(plan.variants)
     ]
 
 
-def _least(figures: Mapping[str, FloatArray], count: int) -> list[LintLeast | None]:
-    """The least of several arrays for each variant; None where there is none that is finite."""
+def _least(
+    figures: Mapping[str, FloatArray], count: int, pages: Mapping[str, int] | None = None
+) -> list[LintLeast | None]:
+    """The least of several arrays for each variant; None where there is none that is finite.
+
+    Arguments: `pages` are the pages of figures of answer sheets, by name, from 1.
+    """
     if not figures:
         return [None] * count
     names, values = list(figures), np.stack([np.broadcast_to(each, (count,)) for each in figures.values()])
     which = np.argmin(values, axis=0)
     least = values[which, np.arange(count)]
     return [
-        LintLeast(value=float(value), at=names[index]) if np.isfinite(value) else None
+        LintLeast(value=float(value), at=names[index], page=(pages or {}).get(names[index]))
+        if np.isfinite(value)
+        else None
         for value, index in zip(least, which, strict=True)
     ]
 

@@ -176,12 +176,12 @@ def _write_page(
 
     page, lang = cast("Path", options.page), options.lang
     submission = StudentSubmission(entered.student_id or "", variant, measured=entered, lang=lang)
-    report, pictures = mark(submission, (), assignment, rubric_of(assignment), options.level)
+    report, painted = mark(submission, (), assignment, rubric_of(assignment), options.level)
     problems = [*entered.problems, *entered.reading.problems]
     told = [*problem_documents(problems)]
     about = About(assignment.file.title.in_language(lang), "", assignment.file.names)
     report = report.model_copy(update={"problems": told})
-    write_whole(page, check_page(report, pictures, lines, mistakes, lang, about))
+    write_whole(page, check_page(report, painted(options.level), lines, mistakes, lang, about))
 
 
 def _variant(

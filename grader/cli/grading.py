@@ -29,10 +29,11 @@ from grader.folder.workers import Limits, Workers, result_of
 from grader.language import ROOT_LANGUAGE, tongue
 from grader.marking.report import reading_document
 from grader.options import ClassOptions, GradeOptions, taken
-from grader.pipeline import open_page, read_pages
+from grader.pipeline import read_pages
 from grader.records import PageRef, ScannedPage
 from grader.rubric import Asked, rubric_of
 from grader.scan.decode.pages import count_pages
+from grader.scan.page import open_page
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, InputFileError
 

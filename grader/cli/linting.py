@@ -115,8 +115,7 @@ def _room_of(figures: Sequence[LintLeast | None]) -> str:
     if not known:
         return "-"
     least = min(known, key=lambda figure: figure.value)
-    where = least.at.partition(" on ")[2]
-    return f"{least.value:.2f} {where}" if least.value < 1.0 else f"{least.value:.2f}"
+    return f"{least.value:.2f} page {least.page}" if least.value < 1.0 else f"{least.value:.2f}"
 
 
 def _scales_table(scales: Sequence[LintScales]) -> Table:

@@ -79,7 +79,7 @@ class Evidence:
     has_sheets : whether any sheet was handed in
     has_sketch : whether the mechanism was read on any
     refused : what was entered by hand for a vector, angular quantity or scale and cannot be used, by name
-    written : lengths that stand in the sheets' cells, mm, and the probability that they do, by vector
+    remarks : what to say where the length in the sheets' cells is another, by vector
     verdicts : what a person decided of what waited, by name
     """
 
@@ -90,7 +90,7 @@ class Evidence:
     unread: Mapping[str, Reason]
     has_sheets: bool
     values: Mapping[str, float]
-    written: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    remarks: Mapping[str, tuple[Reason, ...]] = field(default_factory=dict)
     se_mm: Mapping[str, float] = field(default_factory=dict)
     sketches: Mapping[str, Mapping[str, complex]] = field(default_factory=dict)
     has_sketch: bool = False
@@ -112,9 +112,10 @@ def gather(task: Task, submission: Submission) -> Evidence:
     own = sheets.nodes if submission.readings else _nodes_from(task, measured)
     written = {name: one for reading in submission.readings for name, one in reading.lengths.items()}
     least = task.rubric.least_confidence
-    drawn = {}
+    drawn, remarks = {}, {}
     for name, one in sheets.drawn.items():
-        sure, _ = held_against_cells(one, written.get(name), task.rubric.tolerance_of(name), least)
+        table = task.rubric.tolerance_of(name)
+        sure, remarks[name] = held_against_cells(one, written.get(name), table, least)
         drawn[name] = replace(one, confidence=sure, others=one.others if sure >= one.confidence else ())
     return Evidence(
         drawn=drawn,
@@ -125,7 +126,7 @@ def gather(task: Task, submission: Submission) -> Evidence:
         has_sheets=bool(submission.readings),
         values=submission.values,
         verdicts=submission.verdicts,
-        written=written,
+        remarks=remarks,
         se_mm=sheets.se_mm,
         sketches=sheets.sketches,
         has_sketch=any(MECHANISM in reading.figures for reading in submission.readings),

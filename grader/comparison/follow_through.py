@@ -8,15 +8,17 @@ drawing follows.
 
 import cmath
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from typing import cast
 
 import numpy as np
 
 from grader.comparison.evidence import Evidence
 from grader.comparison.own import Nodes, PlanBasis, known, other_mechanism, own_nodes
 from grader.comparison.scales import Scale
-from grader.comparison.task import Task, TaskSegment
+from grader.comparison.task import Made, Task, TaskSegment
+from grader.comparison.verdicts import NO_SPREAD, Expectation
 from grader.records import MECHANISM
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.elements import Coriolis, Normal
@@ -28,32 +30,8 @@ from reference.geometry import ComplexArray
 from reference.numbers import dot
 from reference.replay.replay import Replay
 
-NO_SPREAD = EndSpread(0.0, 0.0)
 _MOST_SHARE = 1e6
 """Past this share of the right one a computed value gives no vector that fits; its square may overflow."""
-
-
-@dataclass(frozen=True, slots=True)
-class Expectation:
-    """A vector that follows rightly from the student's own values.
-
-    Attributes
-    ----------
-    vector : complex millimetres
-    what, of : ``nodes``, ``scale``, ``vector`` or ``value``, and its name, for the reason `follows`
-    relies_on : the student's nodes, scales and computed angular velocities from which it follows
-    causes : nodes and scales among them that are wrong for certain, whatever their own residuals
-    uncertainty : its propagated drafting error, the rubric's number of standard deviations, millimetres
-    se : its standard errors, from the reading of its sources
-    """
-
-    vector: complex
-    what: str
-    of: str
-    relies_on: frozenset[str]
-    uncertainty: EndSpread = NO_SPREAD
-    se: EndSpread = NO_SPREAD
-    causes: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,10 +69,9 @@ class FollowThrough:
 
     Attributes
     ----------
-    explanation : the result of the search for what was done, once it was needed
-    instead : the other construction by which the plans were drawn
-    own_cache, trace_cache : by scales and basis
-    turned_cache : by the driven link's vector, the plan as it is turned as a whole
+    explain : searches for what was done; it is asked once, when it is needed
+    found : what it has found
+    cache : by scales and basis the own nodes and the traced drawing, turned plans, causes of nodes
     """
 
     task: Task
@@ -102,11 +79,68 @@ class FollowThrough:
     used: Mapping[str, float]
     followed: Mapping[str, float]
     explain: Callable[[], ReplayResult]
-    explanation: ReplayResult | None = None
-    instead: PlanBasis | None = None
-    own_cache: dict[tuple[object, ...], Nodes] = field(default_factory=dict)
-    trace_cache: dict[tuple[object, ...], TracedDrawing] = field(default_factory=dict)
-    turned_cache: dict[str, PlanBasis | None] = field(default_factory=dict)
+    found: ReplayResult | None = None
+    cache: dict[tuple[object, ...], object] = field(default_factory=dict)
+
+    def _cached(self, key: tuple[object, ...], make: Callable[[], Made]) -> Made:
+        if key not in self.cache:
+            self.cache[key] = make()
+        return cast("Made", self.cache[key])
+
+    @property
+    def explanation(self) -> ReplayResult:
+        """The result of the search for what was done."""
+        if self.found is None:
+            self.found = self.explain()
+        return self.found
+
+    @property
+    def instead(self) -> PlanBasis | None:
+        """The basis of the plans: by the search for what was done, else by counting vectors; or None."""
+        scales = (self.used, self.followed)
+        return self.explanation.basis or self._cached(
+            ("instead",), lambda: other_mechanism(self.task, self.evidence, scales)
+        )
+
+    # A criterion's expectations -------------------------------------------------------------------
+
+    def expectations(
+        self, segment: TaskSegment, wrong: Collection[str] = (), *, follows_through: bool
+    ) -> Iterator[Expectation]:
+        """What may be expected of a vector or link, each made when it is asked for.
+
+        As given; as it follows from the student's own earlier values; as each explanation predicts.
+
+        Arguments: `wrong` are nodes whose wrong line has been charged to another vector, or is in doubt.
+        """
+        exact, others = segment.drawn(self.used), self.wrong_scales
+        yield Expectation(exact)
+        yield Expectation(exact, uncertainty=self.uncertainty_of(segment, exact))
+        if not follows_through:
+            return
+        if segment.scale in others:
+            at_scale, name = segment.drawn(self.followed), segment.scale
+            yield Expectation(at_scale, "scale", name, others, self.uncertainty_of(segment, at_scale))
+        own = self.from_nodes(segment, self.used)
+        if own.relies_on:
+            yield replace(own, may_add_up=True)
+        if segment.scale == "kL":
+            return
+        if segment.head in wrong:
+            yield from filter(None, (self.on_own_line(segment), self.between_own_nodes(segment)))
+        yield from self.turned_plan(segment)
+        if segment.head in self.task.construction.images:
+            # Of a wrong base, lines and similarity give different images of a plate's point.
+            yield self.from_nodes(segment, self.followed, by_similarity=True)
+        yield from self.from_vectors(segment, self.used)
+        basis = self.instead
+        if basis is not None and not basis.blames(segment.name, segment.head):
+            one = self.from_nodes(segment, self.followed, basis)
+            yield replace(one, causes=others | self.causes_of(segment.head, basis))
+        if others:
+            yield replace(self.from_nodes(segment, self.followed), causes=others)
+            for one in self.from_vectors(segment, self.followed):
+                yield replace(one, causes=others)
 
     @property
     def wrong_scales(self) -> frozenset[str]:
@@ -131,10 +165,8 @@ class FollowThrough:
 
     def own(self, scales: Mapping[str, float], basis: PlanBasis | None = None) -> Nodes:
         """The student's own nodes, by figure; measured ones as they lie in plans drawn by the basis."""
-        key = (*(scales[name] for name in SCALE_NAMES), "" if basis is None else basis.name)
-        if key not in self.own_cache:
-            self.own_cache[key] = own_nodes(self.task, self.evidence, basis or self.right(scales))
-        return self.own_cache[key]
+        key = "own", basis and basis.name, *(scales[name] for name in SCALE_NAMES)
+        return self._cached(key, lambda: own_nodes(self.task, self.evidence, basis or self.right(scales)))
 
     def right(self, scales: Mapping[str, float]) -> PlanBasis:
         """The right construction, with the mechanism at the scale that the sketch follows."""
@@ -145,15 +177,17 @@ class FollowThrough:
         self, scales: Mapping[str, float], basis: PlanBasis | None = None, *, by_similarity: bool = False
     ) -> TracedDrawing:
         """The drawing traced from the student's own nodes; with plates' images by similarity if asked."""
-        key = (*(scales[name] for name in SCALE_NAMES), "" if basis is None else basis.name, by_similarity)
-        if key not in self.trace_cache:
-            own, drawn = self.own(scales, basis), basis or self.right(scales)
-            construction = self.task.by_similarity if by_similarity else drawn.construction
-            if own or basis is not None:
-                self.trace_cache[key] = trace(construction, drawn.parameters, self.task.skill, own)
-            else:
-                self.trace_cache[key] = self.task.traced(scales)
-        return self.trace_cache[key]
+        own, task = self.own(scales, basis), self.task
+        if not own and basis is None:
+            return task.traced(scales)
+
+        def traced() -> TracedDrawing:
+            drawn = basis or self.right(scales)
+            construction = task.by_similarity if by_similarity else drawn.construction
+            return trace(construction, drawn.parameters, task.skill, own)
+
+        key = "traced", basis and basis.name, by_similarity, *(scales[name] for name in SCALE_NAMES)
+        return self._cached(key, traced)
 
     def from_nodes(
         self,
@@ -165,10 +199,8 @@ class FollowThrough:
     ) -> Expectation:
         """The vector constructed from the student's own nodes upstream; the exact one without any."""
         found, own = self.traced(scales, basis, by_similarity=by_similarity), self.own(scales, basis)
-        upstream = self.task.construction.upstream(segment.head) | self.task.construction.upstream(
-            segment.tail
-        )
-        relies_on = (known(own) & upstream) - {segment.head}
+        upstream = self.task.construction.upstream
+        relies_on = (known(own) & (upstream(segment.head) | upstream(segment.tail))) - {segment.head}
         if not relies_on and basis is None:
             exact = segment.drawn(scales)
             return Expectation(exact, "nodes", "", relies_on, self.uncertainty_of(segment, exact))
@@ -185,76 +217,24 @@ class FollowThrough:
         """
         if not cmath.isfinite(along):
             return NO_SPREAD, NO_SPREAD
-        sigmas = self.task.rubric.hand.sigmas
-        if self.evidence.has_sheets:
-            return scaled(spread(shifts[:drafting_count], along), sigmas), spread(
-                shifts[drafting_count:], along
-            )
-        return scaled(self.with_ruler(spread(shifts, along), along), sigmas), NO_SPREAD
+        if not self.evidence.has_sheets:
+            return self.by_hand(spread(shifts, along), along), NO_SPREAD
+        drafting, reading = shifts[:drafting_count], shifts[drafting_count:]
+        return self.by_hand(spread(drafting, along), along), spread(reading, along)
 
-    def with_ruler(self, end: EndSpread, along: complex) -> EndSpread:
-        """A spread with the errors of measuring the vector itself by hand."""
+    def by_hand(self, end: EndSpread, along: complex) -> EndSpread:
+        """The rubric's number of a spread; off a sheet, with the errors of measuring the vector by hand."""
         hand = self.task.rubric.hand
-        turned = abs(along) * math.radians(hand.protractor_deg)
-        return EndSpread(math.hypot(end.along, hand.ruler_mm), math.hypot(end.across, turned))
+        if not self.evidence.has_sheets:
+            turned = abs(along) * math.radians(hand.protractor_deg)
+            end = EndSpread(math.hypot(end.along, hand.ruler_mm), math.hypot(end.across, turned))
+        return EndSpread(hand.sigmas * end.along, hand.sigmas * end.across)
 
     # From lengths and values ----------------------------------------------------------------------
 
-    def at_followed_scale(self, segment: TaskSegment) -> Expectation | None:
-        """The exact vector at the scale that the drawing follows; None where that is the one used."""
-        wrong = self.wrong_scales
-        if segment.scale not in wrong:
-            return None
-        exact = segment.drawn(self.followed)
-        return Expectation(exact, "scale", segment.scale, wrong, self.uncertainty_of(segment, exact))
-
-    def expectations(self, segment: TaskSegment) -> Iterator[Expectation]:
-        """The expectations from a turned plan, other scales, a wrong mechanism, own lengths and values."""
-        wrong = self.wrong_scales
-        if segment.scale != "kL":
-            yield from self.turned_plan(segment)
-            if segment.head in self.task.construction.images:
-                # Of a wrong base, lines and similarity give different images of a plate's point.
-                yield self.from_nodes(segment, self.followed, by_similarity=True)
-            yield from self.from_vectors(segment, self.used)
-            basis = self.drawn_instead()
-            if basis is not None and not basis.blames(segment.name, segment.head):
-                one = self.from_nodes(segment, self.followed, basis)
-                yield replace(one, causes=wrong | self.causes_of(segment.head, basis))
-            if wrong:
-                for one in (
-                    self.from_nodes(segment, self.followed),
-                    *self.from_vectors(segment, self.followed),
-                ):
-                    yield replace(one, causes=wrong)
-
-    def drawn_instead(self) -> PlanBasis | None:
-        """The basis of the plans: by the search for what was done, else by counting vectors; or None."""
-        self._explanation()
-        return self.instead
-
-    def is_blamed(self, vector: str) -> bool:
-        """Whether the search for what was done finds a mistake in a vector, nearly certainly."""
-        return vector in self._explanation().blamed
-
-    def explained(self) -> frozenset[str]:
-        """The nodes at which the search for what was done finds a mistake, nearly certainly."""
-        return self._explanation().explained
-
-    def is_left_out(self, node: str) -> bool:
-        """Whether the search for what was done finds the component to a node left out, nearly certainly."""
-        return node in self._explanation().left_out
-
-    def _explanation(self) -> ReplayResult:
-        if self.explanation is None:
-            self.explanation = self.explain()
-            scales = (self.used, self.followed)
-            self.instead = self.explanation.basis or other_mechanism(self.task, self.evidence, scales)
-        return self.explanation
-
     def nodes_instead(self) -> Mapping[str, complex]:
         """The nodes by another mechanism that was certainly drawn, and whose sketch was not handed in."""
-        basis = None if self.evidence.has_sketch else self.drawn_instead()
+        basis = None if self.evidence.has_sketch else self.instead
         if basis is None or MECHANISM not in basis.wrong:
             return {}
         return {name: node.at for name, node in self.traced(self.followed, basis).made.items()}
@@ -282,9 +262,7 @@ class FollowThrough:
     def turned_basis(self, name: str) -> PlanBasis | None:
         """A vector's plan turned as a whole as the driven link's vector is; None where that is not turned."""
         crank = self.task.driven_vector(name)
-        if crank not in self.turned_cache:
-            self.turned_cache[crank] = self._turned_basis(crank)
-        return self.turned_cache[crank]
+        return self._cached(("turned", crank), lambda: self._turned_basis(crank))
 
     def _turned_basis(self, crank: str) -> PlanBasis | None:
         task, own = self.task, self.evidence.vector(crank)
@@ -352,10 +330,14 @@ class FollowThrough:
         Arguments: with `only_sense` a step leads there that lays the node off to the same side.
         """
         makes = self._lays_off if only_sense else self._makes
-        for causes, scales, basis, by_similarity in self._ways(node):
-            if makes(node, self.traced(scales, basis, by_similarity=by_similarity)):
-                return causes
-        return frozenset({node})
+
+        def found() -> frozenset[str]:
+            for causes, scales, basis, by_similarity in self._ways(node):
+                if makes(node, self.traced(scales, basis, by_similarity=by_similarity)):
+                    return causes
+            return frozenset({node})
+
+        return self._cached(("causes", node, only_sense), found)
 
     def _ways(
         self, node: str
@@ -372,7 +354,7 @@ class FollowThrough:
             turned = self.turned_basis(construction.vectors_of(figure)[0].name)
             if turned is not None and node not in turned.wrong:
                 yield turned.wrong | wrong, self.followed, turned, False
-            basis = self.drawn_instead()
+            basis = self.instead
             if basis is not None and node not in basis.wrong:
                 yield self.causes_of(node, basis) | wrong, self.followed, basis, False
 
@@ -404,10 +386,8 @@ class FollowThrough:
 
     def _uncertainty_of(self, segment: TaskSegment, along: complex) -> EndSpread:
         shifts = self.task.traced(self.used).shifts(segment.tail, segment.head)
-        found = spread(shifts * np.exp(1j * (cmath.phase(along) - cmath.phase(segment.real))), along)
-        if not self.evidence.has_sheets:
-            found = self.with_ruler(found, along)
-        return scaled(found, self.task.rubric.hand.sigmas)
+        turned = shifts * np.exp(1j * (cmath.phase(along) - cmath.phase(segment.real)))
+        return self.by_hand(spread(turned, along), along)
 
     def from_vectors(self, segment: TaskSegment, scales: Mapping[str, float]) -> Iterator[Expectation]:
         """A vector that depends on one or two others alone, whose lengths are enough."""
@@ -487,8 +467,3 @@ class FollowThrough:
         ends = {tail, head}
         vectors = self.task.construction.vectors.values()
         return next((v.name for v in vectors if {v.tail, v.head} == ends), None)
-
-
-def scaled(end: EndSpread, by: float) -> EndSpread:
-    """A spread times a factor."""
-    return EndSpread(by * end.along, by * end.across)

@@ -14,7 +14,7 @@ from grader.records import MECHANISM
 from grader.rubric import ToleranceTable
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.elements import Coriolis, Normal, Parameters, View
-from reference.construction.graph import Construction, Vector, evaluate
+from reference.construction.graph import AngularRate, Construction, Vector, evaluate
 from reference.construction.steps import ArcAndLine, Given, Step, TwoArcs
 from reference.construction.uncertainty import OwnNode
 from reference.geometry import ComplexArray, FloatArray
@@ -333,6 +333,53 @@ def _crossing(
     across = np.where(is_flat, 0.0, across)
     base = np.where(gap_mm > GAP_MM, np.nan, base)
     return p + base * (along + 1j * across), p + base * (along - 1j * across), sine
+
+
+# A link's own angular rate -------------------------------------------------------------------------
+
+
+def own_length(task: Task, evidence: Evidence, rate: AngularRate) -> float:
+    """The real length of a rate's link, m: on the student's own sketch where it must be measured there.
+
+    That is the distance of a slotted link's point; all other links' lengths are among the data.
+    """
+    tail, head = (evidence.nodes.get(joint) for joint in rate.link)
+    lengths = (step.length for step in task.construction.steps if isinstance(step, Given))
+    is_given = not any(isinstance(one, Normal) and one.measured == rate.link for one in lengths)
+    if is_given or tail is None or head is None or task.yardstick is None or evidence.yardstick_mm is None:
+        return task.lengths_m[rate.name]
+    return abs(head - tail) * task.yardstick.length_m / evidence.yardstick_mm[0]
+
+
+def own_rate(
+    task: Task, evidence: Evidence, rate: AngularRate, scale: float, instead: Mapping[str, complex]
+) -> float | None:
+    """The angular rate that the student's own vector gives; None without one, or a trivial one.
+
+    It turns its link as that was drawn, where it was read. Where the vector's direction is not known, the
+    sense is the right one's, or that of another mechanism.
+
+    Arguments: `scale` is the vector's, real units per drawn millimetre; `instead` are the nodes of another
+    mechanism that was certainly drawn and not handed in.
+    """
+    own, along = evidence.vector(rate.vector), task.real[rate.vector]
+    if own is None or own.length_mm < task.rubric.tolerance_of(rate.vector).least_mm:
+        return None
+    vector, direction, right = (
+        task.construction.vectors[rate.vector],
+        own.direction_rad,
+        task.rates[rate.name],
+    )
+    joints = instead or evidence.sketches.get(task.construction.figure_of(vector.head), evidence.nodes)
+    tail, head = (joints.get(joint) for joint in rate.link)
+    if direction is None and instead:
+        direction = cmath.phase(instead[vector.head] - instead[vector.tail])
+    sense = right
+    if direction is not None and tail is not None and head is not None:
+        sense = math.sin(direction - cmath.phase(head - tail))
+    elif direction is not None and along:
+        sense = math.copysign(1.0, right) * math.cos(direction - cmath.phase(along))
+    return math.copysign(own.length_mm * scale / own_length(task, evidence, rate), sense)
 
 
 # Another mechanism that the vectors fit ------------------------------------------------------------

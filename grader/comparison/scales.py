@@ -8,7 +8,7 @@ from typing import Literal, cast
 
 from grader.comparison.evidence import DrawnVector, Evidence, Submission, gather
 from grader.comparison.task import Task, Yardstick
-from grader.comparison.verdicts import EVEN, FULL, NONE, Limit, MarkRange, by_rule, mark
+from grader.comparison.verdicts import ALL_RIGHT, EVEN, FULL, NONE, Limit, MarkRange, by_rule, mark
 from grader.inputs.scale_text import (
     EXAMPLES,
     SURE,
@@ -46,6 +46,11 @@ class Scale:
     mark: MarkRange | None
     reasons: tuple[Reason, ...] = ()
 
+    @property
+    def followed(self) -> float:
+        """The scale that the drawing follows."""
+        return self.other or self.used.used
+
 
 def settle(task: Task, evidence: Evidence, declared: Mapping[str, str]) -> dict[str, Scale]:
     """The three scales, in the order in which each may follow from those before."""
@@ -61,19 +66,9 @@ def _as_decided(scale: Scale, verdict: str) -> Scale:
     used = scale.used
     if verdict == "full":
         right = scale.other if used.assumed and scale.other else used.used
-        return Scale(replace(used, used=right, assumed=False), None, mark([]))
+        return Scale(replace(used, used=right, assumed=False), None, ALL_RIGHT)
     off = () if scale.mark is None else tuple(one for one in scale.mark.reasons if one.code != "unread")
     return Scale(replace(used, assumed=False), scale.other, MarkRange(NONE, NONE, NONE, off))
-
-
-def used_scales(settled: Mapping[str, Scale]) -> dict[str, float]:
-    """The scales used for marking."""
-    return {name: scale.used.used for name, scale in settled.items()}
-
-
-def followed_scales(settled: Mapping[str, Scale]) -> dict[str, float]:
-    """The scales that the drawing follows."""
-    return {name: scale.other or scale.used.used for name, scale in settled.items()}
 
 
 def _settled_scale(
@@ -91,7 +86,8 @@ def _settled_scale(
         open_mark = MarkRange(NONE, NONE, FULL, (reason,), EVEN)
         return Scale(used, _contradiction(task, evidence, name, rule), open_mark)
     if isinstance(parsed, ByRule):
-        value = parsed.per_mm({"omega": task.omega or 0.0, **followed_scales(before)})
+        followed = {each: scale.followed for each, scale in before.items()}
+        value = parsed.per_mm({"omega": task.omega or 0.0, **followed})
     else:
         value = parsed.per_mm
     return _hold_declared(task, evidence, name, UsedScale(text, value, value, assumed=False), rule)
@@ -118,7 +114,7 @@ def _assumed(name: str, rule: float) -> Reason:
 
 def _by_rule(task: Task, evidence: Evidence, name: str, before: Mapping[str, Scale]) -> float:
     """The scale by the assignment's rule; a length scale by the drawn yardstick where that was read."""
-    known = followed_scales(before)
+    known = {each: scale.followed for each, scale in before.items()}
     if name == "kL":
         shown = _evidence_of(task, evidence, name)
         if shown is not None:
@@ -208,13 +204,13 @@ def _hold_declared(task: Task, evidence: Evidence, name: str, scale: UsedScale, 
         doubtful = _evidence_of(task, evidence, name, however_doubtful=True)
         if doubtful is not None and _is_confirmed(task, evidence, name, scale.used, doubtful):
             # A stroke that was misread would have its very length by chance alone, and few scales are wrong.
-            return Scale(scale, None, mark([]))
+            return Scale(scale, None, ALL_RIGHT)
         if _is_unseen(task, evidence, name, scale.used):
             return _unseen(task, evidence, name, scale, doubtful)
-        return Scale(scale, None, mark([]) if is_rule else None)
+        return Scale(scale, None, ALL_RIGHT if is_rule else None)
     other = _followed_instead(task, evidence, name, scale.used, None if is_rule else rule)
     if other is None:
-        return Scale(scale, None, mark([]))
+        return Scale(scale, None, ALL_RIGHT)
     real, drawn_mm, se_mm = shown
     params: dict[str, float | str] = {"declared": scale.used, "expected": other, "unit": unit_of(name)}
     limit = Limit(

@@ -1,22 +1,49 @@
-"""One value compared with one expectation: residual, tolerance, mark, verdict."""
+"""One value held against one expectation: residual, tolerance, mark."""
 
 import cmath
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import cast
+from typing import Protocol, cast
 
 from grader.comparison.evidence import DrawnVector
-from grader.documents import Quantity, Tolerance, Verdict
-from grader.outcomes import Outcome
+from grader.documents import Tolerance
 from grader.records import Reason
-from grader.rubric import CriterionTable, ToleranceTable
+from grader.rubric import CriterionTable, RubricFile, ToleranceTable
 from reference.construction.uncertainty import EndSpread
 from reference.quantities import unit_of
 
 FULL, NONE = 1.0, 0.0
 ROUNDING = 1e-9
 """Relative excess over a tolerance that still counts as within it."""
+
+
+NO_SPREAD = EndSpread(0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Expectation:
+    """A vector as it is given, or as it follows rightly from the student's own values.
+
+    Attributes
+    ----------
+    vector : complex millimetres
+    what, of : ``given``, ``nodes``, ``scale``, ``vector`` or ``value``, and its name, for `follows`
+    relies_on : the student's nodes, scales and computed angular velocities from which it follows
+    causes : nodes and scales among them that are wrong for certain, whatever their own residuals
+    uncertainty : its propagated drafting error, the rubric's number of standard deviations, millimetres
+    se : its standard errors, from the reading of its sources
+    may_add_up : made by the right steps at the scales used: small errors of its sources may add up in it
+    """
+
+    vector: complex
+    what: str = "given"
+    of: str = ""
+    relies_on: frozenset[str] = frozenset()
+    uncertainty: EndSpread = NO_SPREAD
+    se: EndSpread = NO_SPREAD
+    causes: frozenset[str] = frozenset()
+    may_add_up: bool = False
 
 
 # Limits and marks ----------------------------------------------------------------------------------
@@ -108,9 +135,7 @@ ALL_RIGHT = MarkRange(FULL, FULL, FULL)
 
 
 def mark(limits: Sequence[Limit], remarks: tuple[Reason, ...] = ()) -> MarkRange:
-    """The mark that several limits give; full where there are none."""
-    if not limits:
-        return MarkRange(FULL, FULL, FULL, remarks)
+    """The mark that limits give, at least one."""
     by_loss = sorted(limits, key=lambda limit: limit.share)
     losses = tuple(limit.reason for limit in by_loss if limit.share != FULL)
     near = tuple(
@@ -192,13 +217,6 @@ def _decided(near: Reason, rule: str) -> Reason:
     return Reason(COUNTED[rule], {**known, "beyond": abs(_beyond(near))})
 
 
-def left_open(first: MarkRange, by_hand: MarkRange) -> MarkRange:
-    """A mark, open where drafting errors beyond `at_most` explain the loss; `by_hand` allows all of them."""
-    if by_hand.best <= first.best:
-        return first
-    return open_between(first.worst, by_hand.best, first, Reason("hand_may_miss"))
-
-
 def the_better(first: MarkRange, other: MarkRange, *reasons: Reason) -> MarkRange:
     """The better of two marks; its reasons are `reasons`, then the losses of `other`."""
     return MarkRange(
@@ -267,14 +285,104 @@ REVERSED_WITHIN_DEG = 20.0
 """A direction this near the opposite one is called reversed, not turned by so much."""
 
 
-def tolerances(tolerance: ToleranceTable, expected_mm: float, *, with_direction: bool) -> Tolerance:
-    """Both tolerances as the rubric states them."""
-    turn = tolerance.direction_at(expected_mm) if with_direction else None
-    return Tolerance(length_mm=tolerance.length_at(expected_mm), direction_deg=turn)
+class Held(Protocol):
+    """Something drawn or computed that can be held against expectations."""
+
+    def against(self, one: Expectation) -> MarkRange:
+        """The mark against one expectation."""
+
+
+BOUNDLESS_MM, BOUNDLESS_SHARE = 20.0, 0.5
+"""Propagated uncertainty larger than this, and than this share of the vector: the linear propagation no
+longer holds, and the error may be anything."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeldVector:
+    """A drawn vector, held by the rubric; `remarks` are told wherever it is not right."""
+
+    rubric: RubricFile
+    criterion: CriterionTable
+    drawn: DrawnVector
+    remarks: tuple[Reason, ...] = ()
+
+    def allowed(self, one: Expectation, at_most: float | None = None) -> Tolerance:
+        """What full marks allow on paper.
+
+        Arguments: `at_most` bounds it to a multiple of the plain tolerance, by default the rubric's.
+        """
+        with_direction = self.criterion.direction and self.drawn.direction_rad is not None
+        table, most = self.rubric.tolerance_of(self.criterion), at_most or self.rubric.hand.at_most
+        return widened(table, most, one, with_direction=with_direction)
+
+    def against(self, one: Expectation) -> MarkRange:
+        """The mark by tolerance, decision rule and confidence."""
+        mark, confidence = self._mark_of(self.drawn, one), self.drawn.confidence
+        for other in self.drawn.if_others():
+            # Whichever of them was drawn, the verdict is the same: their probabilities count together.
+            same = self._mark_of(other, one)
+            if not mark.is_certain or (same.worst, same.best) != (mark.worst, mark.best):
+                break
+            confidence = max(confidence, other.confidence)
+        mark = with_confidence(mark, confidence, self.rubric.doubt.settle, abs(one.vector))
+        return mark if mark.is_full else replace(mark, reasons=(*self.remarks, *mark.reasons))
+
+    def _mark_of(self, drawn: DrawnVector, one: Expectation) -> MarkRange:
+        """The mark as if this were drawn; open where drafting errors beyond `at_most` explain the loss."""
+        table, rule = self.rubric.tolerance_of(self.criterion), self.rubric.doubt.in_doubt
+        size, spread = abs(one.vector), one.uncertainty
+        mark = by_rule(mark_vector(drawn, one, self.allowed(one), table), rule)
+        is_left_out = size >= SHORT_MM and drawn.length_mm <= table.length_mm / 2.0
+        if mark.is_full or is_left_out or spread == NO_SPREAD:
+            return mark
+        by_hand = by_rule(mark_vector(drawn, one, self.allowed(one, math.inf), table), rule).best
+        if max(spread.along, spread.across) > max(BOUNDLESS_MM, BOUNDLESS_SHARE * size):
+            by_hand = FULL
+        if by_hand <= mark.best:
+            return mark
+        return open_between(mark.worst, by_hand, mark, Reason("hand_may_miss"))
+
+
+@dataclass(frozen=True, slots=True)
+class HeldValue:
+    """A computed value, SI, held by the rubric; `per_mm` is worth a millimetre of its vector.
+
+    A vector's value has no sign, an angular quantity's has: the real part of an expectation is its value.
+    """
+
+    rubric: RubricFile
+    criterion: CriterionTable
+    value: float
+    per_mm: float
+
+    def allowed(self, one: Expectation) -> Tolerance:
+        """What full marks allow: the tolerance of the length that the value stands for."""
+        table, most = self.rubric.tolerance_of(self.criterion), self.rubric.hand.at_most
+        on_paper = widened(table, most, one, with_direction=False)
+        return Tolerance(value=(on_paper.length_mm or 0.0) * self.per_mm, widened=on_paper.widened)
+
+    def against(self, one: Expectation) -> MarkRange:
+        """The mark by the tolerance alone."""
+        table, allowed = self.rubric.tolerance_of(self.criterion), self.allowed(one).value or 0.0
+        in_mm = one.vector.real if self.criterion.angular else abs(one.vector)
+        value, expected = self.value, in_mm * self.per_mm
+        residual = abs(value - expected)
+        if residual <= allowed:
+            return ALL_RIGHT
+        params: dict[str, float | str]
+        params = {"measured": value, "expected": expected, "unit": unit_of(self.criterion.name)}
+        if value * expected < 0.0:
+            reason = Reason("value_reversed", params)
+        else:
+            params |= {"off": residual, "tolerance": allowed}
+            large = abs(value) > abs(expected)
+            reason = Reason("value_too_large" if large else "value_too_small", params)
+        plain = table.length_at(abs(one.vector)) * self.per_mm
+        return mark([Limit("value", residual, allowed, plain, 0.0, table, reason)])
 
 
 def widened(
-    plain: Tolerance, expected_mm: float, uncertainty: EndSpread, at_most: float = math.inf
+    table: ToleranceTable, at_most: float, one: Expectation, *, with_direction: bool = True
 ) -> Tolerance:
     """The tolerance of a vector, widened to its propagated drafting error (mm) where that is more.
 
@@ -282,25 +390,21 @@ def widened(
 
     Arguments: `at_most` bounds it to a multiple of the plain one.
     """
-    plain_mm, plain_deg = plain.length_mm or 0.0, plain.direction_deg
-    length_mm = math.hypot(expected_mm + uncertainty.along, uncertainty.across) - expected_mm
+    size, spread = abs(one.vector), one.uncertainty
+    plain_mm = table.length_at(size)
+    length_mm = math.hypot(size + spread.along, spread.across) - size
     length_mm = max(plain_mm, min(length_mm, at_most * plain_mm))
-    direction = plain_deg
+    plain_deg = direction = table.direction_at(size) if with_direction else None
     if plain_deg is not None:
-        turned = math.degrees(math.atan2(uncertainty.across, expected_mm))
+        turned = math.degrees(math.atan2(spread.across, size))
         direction = max(plain_deg, min(turned, at_most * plain_deg))
     is_wider = length_mm > plain_mm or direction != plain_deg
     return Tolerance(length_mm=length_mm, direction_deg=direction, widened=is_wider)
 
 
-def mark_vector(
-    drawn: DrawnVector, expected: complex, allowed: Tolerance, table: ToleranceTable, se: EndSpread
-) -> MarkRange:
-    """The mark of a drawn vector against the expected one, both in millimetres.
-
-    Arguments: `allowed` has a direction where one is judged; `se` are standard errors of what is expected.
-    """
-    expected_mm = abs(expected)
+def mark_vector(drawn: DrawnVector, one: Expectation, allowed: Tolerance, table: ToleranceTable) -> MarkRange:
+    """The mark of a drawn vector against an expectation; `allowed` has a direction where one is judged."""
+    expected, se, expected_mm = one.vector, one.se, abs(one.vector)
     residual_mm = drawn.length_mm - expected_mm
     se_mm = math.hypot(drawn.se_mm, se.along)
     is_asked = allowed.direction_deg is not None and drawn.direction_rad is not None
@@ -319,13 +423,12 @@ def mark_vector(
         and abs(residual_deg) + margin * se_deg <= direction_deg
     ):
         return ALL_RIGHT
-    plain = tolerances(table, expected_mm, with_direction=True)
+    plain_mm, plain_deg = table.length_at(expected_mm), table.direction_at(expected_mm) or direction_deg
     reason = _length_reason(drawn, expected_mm, length_mm)
-    limits = [Limit("length", abs(residual_mm), length_mm, plain.length_mm or 0.0, se_mm, table, reason)]
+    limits = [Limit("length", abs(residual_mm), length_mm, plain_mm, se_mm, table, reason)]
     remarks: tuple[Reason, ...] = ()
     if is_judged:
         reason = _direction_reason(drawn, expected, residual_deg, direction_deg)
-        plain_deg = plain.direction_deg or direction_deg
         limits.append(Limit("direction", abs(residual_deg), direction_deg, plain_deg, se_deg, table, reason))
     elif drawn.direction_rad is not None and min(expected_mm, drawn.length_mm) < table.least_mm:
         shorter = min(expected_mm, drawn.length_mm)
@@ -359,167 +462,3 @@ def _direction_reason(
 def degrees(angle_rad: float) -> float:
     """Degrees from 0 up to, not including, 360."""
     return math.degrees(angle_rad) % 360.0 % 360.0
-
-
-def mark_value(
-    value: float, expected: float, allowed: float, plain: float, table: ToleranceTable, unit: str
-) -> MarkRange:
-    """The mark of a computed value against the expected one, SI, with its sign.
-
-    Arguments: `plain` is the tolerance before it was widened.
-    """
-    residual = abs(value - expected)
-    if residual <= allowed:
-        return ALL_RIGHT
-    params: dict[str, float | str] = {"measured": value, "expected": expected, "unit": unit}
-    if value * expected < 0.0:
-        reason = Reason("value_reversed", params)
-    else:
-        params |= {"off": residual, "tolerance": allowed}
-        large = abs(value) > abs(expected)
-        reason = Reason("value_too_large" if large else "value_too_small", params)
-    return mark([Limit("value", residual, allowed, plain, 0.0, table, reason)])
-
-
-# Outcomes ------------------------------------------------------------------------------------------
-
-RANKS: dict[Verdict, int] = {"none": 0, "partial": 1, "follow_through": 2, "full": 2}
-
-
-def quantity(name: str, length_mm: float, direction_rad: float | None, value: float) -> Quantity:
-    """The quantity of a vector; `direction_rad` on the sheet."""
-    direction = None if direction_rad is None else degrees(direction_rad)
-    return Quantity(length_mm=length_mm, direction_deg=direction, value=value, unit=unit_of(name))
-
-
-def expected_quantity(name: str, expected: complex, scale: float, turn_rad: float) -> Quantity:
-    """The quantity of an expected vector (complex mm); a zero vector has no direction."""
-    direction = cmath.phase(expected) + turn_rad if abs(expected) > 1e-9 else None
-    return quantity(name, abs(expected), direction, abs(expected) * scale)
-
-
-def verdict_of(share: float, *, followed: bool) -> Verdict:
-    """The verdict for a share of the points."""
-    if share == FULL:
-        return "follow_through" if followed else "full"
-    return "none" if share == NONE else "partial"
-
-
-def outcome(  # noqa: PLR0913 - one argument per field of the record
-    criterion: CriterionTable,
-    mark: MarkRange,
-    measured: Quantity,
-    expected: Quantity,
-    tolerance: Tolerance,
-    *,
-    confidence: float = 1.0,
-    followed: bool = False,
-    mistake: str | None = None,
-) -> Outcome:
-    """The outcome of a marked criterion: under review where its mark is not certain."""
-    lost = mark.share != FULL or not mark.is_certain or followed
-    likely, probability = mark.share, mark.sure
-    if not mark.is_certain and probability < EVEN:
-        # Most probably misread: what is off as read is right, and the other way round.
-        likely, probability = (mark.worst if likely == mark.best else mark.best), 1.0 - probability
-    return Outcome(
-        criterion=criterion.id,
-        name=criterion.name,
-        verdict=verdict_of(mark.share, followed=followed) if mark.is_certain else "review",
-        measured=measured,
-        expected=expected,
-        tolerance=tolerance,
-        confidence=confidence,
-        reasons=mark.reasons if lost else (Reason("right"), *mark.reasons),
-        possible=(verdict_of(mark.worst, followed=followed), verdict_of(mark.best, followed=followed)),
-        shares=(mark.worst, mark.best),
-        mistake=mistake,
-        probability=probability,
-        proposed=likely,
-    )
-
-
-def unjudged(
-    criterion: CriterionTable,
-    verdict: Verdict,
-    reasons: tuple[Reason, ...],
-    *,
-    expected: Quantity,
-    sure: float | None = None,
-) -> Outcome:
-    """The outcome of a criterion for which nothing was handed in, or nothing could be read."""
-    is_open = verdict == "review"
-    likely = EVEN if is_open else 1.0
-    return Outcome(
-        criterion=criterion.id,
-        name=criterion.name,
-        verdict=verdict,
-        measured=Quantity(),
-        expected=expected,
-        tolerance=Tolerance(),
-        confidence=0.0 if is_open else 1.0,
-        reasons=reasons,
-        possible=("none", "full") if is_open else (verdict, verdict),
-        shares=(NONE, FULL if is_open else NONE),
-        probability=likely if sure is None else sure,
-    )
-
-
-def without_drawing(judged: Outcome) -> Outcome:
-    """The outcome of a value without the drawn vector that is asked for: no points, right or wrong."""
-    return replace(
-        judged,
-        verdict="none",
-        possible=("none", "none"),
-        shares=(NONE, NONE),
-        proposed=NONE,
-        probability=1.0,
-        reasons=(Reason("value_alone"), *judged.reasons),
-    )
-
-
-def entry_refused(judged: Outcome, entries: tuple[str, ...]) -> Outcome:
-    """The outcome left to a person, because the `entries` for it cannot be used."""
-    reasons = [reason for reason in judged.reasons if reason.code != "right"]
-    if judged.measured == Quantity():
-        # The refused entry is the reason why nothing was judged.
-        reasons = []
-    return replace(
-        judged,
-        verdict="review",
-        possible=("none", "full"),
-        shares=(NONE, FULL),
-        confidence=0.0,
-        probability=EVEN,
-        reasons=(Reason("entry_refused", {"entries": entries}), *reasons),
-        mistake=None,
-    )
-
-
-def both(first: Outcome, second: Outcome, allowed_mm: float) -> Outcome:
-    """The outcome of a vector with scan and measurement: for review where they differ in the verdict.
-
-    Where one of them shows nothing to judge, the other is the outcome.
-    """
-    for one, other in ((first, second), (second, first)):
-        if one.verdict == "not_judged":
-            return other
-    lengths = first.measured.length_mm or 0.0, second.measured.length_mm or 0.0
-    params: dict[str, float | str] = {"first": lengths[0], "second": lengths[1], "unit": "mm"}
-    differ = Reason("readings_disagree", params)
-    if (first.verdict, first.possible, first.shares) == (second.verdict, second.possible, second.shares):
-        if abs(lengths[0] - lengths[1]) <= allowed_mm:
-            return first
-        return replace(first, reasons=(*first.reasons, differ))
-    ends = (*first.possible, *second.possible)
-    low, high = min(ends, key=RANKS.__getitem__), max(ends, key=RANKS.__getitem__)
-    shares = (*first.shares, *second.shares)
-    return replace(
-        first,
-        verdict="review",
-        possible=(low, high),
-        shares=(min(shares), max(shares)),
-        reasons=(differ, *first.reasons),
-        confidence=0.5,
-        probability=EVEN,
-    )

@@ -510,9 +510,8 @@ def _mark_one(batch: Batch, cache: PageCache, job: Job) -> ReportDocument:
     """Mark one submission and write its files; its key last, so that it stands for all of them."""
     submission, where = job.submission, batch.out / job.folder
     pages = pages_read(batch, cache, job)
-    report, pictures = mark(
-        submission, pages, batch.assignment, batch.rubric, batch.level, with_ghosts=batch.with_ghosts
-    )
+    report, painted = mark(submission, pages, batch.assignment, batch.rubric, batch.level)
+    pictures = painted(batch.level if batch.with_ghosts else "hint")
     write_feedback(report, pictures, where, submission.lang, batch.level, _about(batch, submission))
     write_whole(where / "report.json", report.model_dump_json(indent=2))
     if not any(problem.code == _PASSING for problem in report.problems):

@@ -38,7 +38,7 @@ SCAN_STAGE = (
     "grader.scan.decode.pages", "grader.scan.register.registration", "grader.scan.strokes.ink",
     "grader.scan.handwriting.letters", "grader.scan.handwriting.fields", "grader.overlay.backdrop",
 )  # fmt: skip
-"""What `grader.pipeline.scan` calls."""
+"""What `grader.scan.page` and `grader.pipeline.scan` call."""
 READ_STAGE = (
     "grader.reading.read", "grader.inputs.scale_text", "grader.scan.handwriting.captions",
     "grader.scan.strokes.nodes",
@@ -46,7 +46,7 @@ READ_STAGE = (
 """What `grader.pipeline.read_submission` calls beside them."""
 MARK_STAGE = ("grader.folder.batch",)
 """What marks and writes, with all that it rests on."""
-ORDER = ("grader.pipeline",)
+ORDER = ("grader.pipeline", "grader.scan.page")
 """The order of all stages: each depends on its text, none on all that it imports."""
 _PACKAGES = ("grader", "reference")
 _IMPORT = re.compile(

@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from grader.comparison.outcomes import CREDITED
 from grader.comparison.task import Task
 from grader.documents import Quantity
 from grader.inputs.decisions import Decision
@@ -24,7 +25,6 @@ OFF_AS_READ = frozenset(
 """Reasons of what is off as it was read."""
 OF_READING = frozenset({"doubtful", "unread"})
 """Reasons of doubt that knowing where a node lies removes."""
-CREDITED = frozenset({"full", "follow_through"})
 NONE_DECIDED: Mapping[str, str] = {}
 
 

@@ -3,9 +3,8 @@
 `reference.replay.replay` gives explanations of the drawing, each with its mistakes. First the drawing is
 replayed step by step. Only where that leaves residuals, mistakes of the whole drawing are tried as well
 (a plan turned as a whole, letters swapped) and mistakes at steps without an
-observation. The confidence in a mistake is its share of the probability of all explanations; a mistake
-that the evidence does not distinguish from it is its rival. The size of drafting errors is estimated on
-the drawing itself, so that a right drawing has no mistake named.
+observation. The size of drafting errors is estimated on the drawing itself, so that a right drawing has no
+mistake named.
 """
 
 import math
@@ -15,13 +14,11 @@ from itertools import combinations
 
 import numpy as np
 
-from grader.outcomes import NamedMistake
 from grader.records import MECHANISM
-from reference.authored.assignment import SCALE_NAMES
-from reference.construction.elements import Along, Line, Nodes, Scaled
-from reference.construction.graph import Construction, evaluate
-from reference.construction.mistakes import RPM_FACTOR, Drawing, Mistake, affected, commit
-from reference.construction.steps import Given, Step, TwoLines
+from reference.construction.elements import Nodes, Scaled
+from reference.construction.graph import evaluate
+from reference.construction.mistakes import Drawing, Mistake, commit
+from reference.construction.steps import Given
 from reference.construction.uncertainty import Skill
 from reference.quantities import kind_of
 from reference.replay.explanations import RARITY, SLIP, Observations
@@ -29,6 +26,12 @@ from reference.replay.nothing import with_nothing
 from reference.replay.replay import Replay, Root, replay
 
 OF_THE_WHOLE = frozenset({"labels_swapped", "figure_rotated"})
+Key = tuple[str, str]
+
+
+def key_of(mistake: Mistake) -> Key:
+    """What tells a mistake from others: its code and its place."""
+    return mistake.code, mistake.at
 
 
 # The explanations of a drawing ---------------------------------------------------------------------
@@ -153,9 +156,9 @@ def _with_a_guess(
 
     Both together cost so much before anything is observed that a search from all roots drops them.
     """
-    keys = {_key(one) for one in best.made}
-    swap = next((one for one in swaps if _key(one) in keys), None)
-    beside = [root for root in roots if root.made and keys >= {_key(one) for one in root.made}]
+    keys = {key_of(one) for one in best.made}
+    swap = next((one for one in swaps if key_of(one) in keys), None)
+    beside = [root for root in roots if root.made and keys >= {key_of(one) for one in root.made}]
     if (swap is None and not beside) or (len(best.made) == 1 and not best.unexplained):
         return []
     root = max(beside, key=lambda one: len(one.made), default=Root())
@@ -181,8 +184,8 @@ def _with_another_guess(
     drawing = case.drawing
     for one in first:
         drawing = commit(one, drawing)
-    of_the_whole = {_key(one) for one in best.made} & {_key(one) for root in roots for one in root.made}
-    start = next(root for root in roots if {_key(one) for one in root.made} == of_the_whole)
+    of_the_whole = {key_of(one) for one in best.made} & {key_of(one) for root in roots for one in root.made}
+    start = next(root for root in roots if {key_of(one) for one in root.made} == of_the_whole)
     guessed = Root(tuple(first), cost=sum(RARITY[one.code] for one in first))
     return replay(drawing, case.observations, [_both(start, guessed)], case.skill, cares=cares, blind=True)
 
@@ -374,253 +377,3 @@ def _renamed(observations: Observations, pair: tuple[str, ...]) -> Observations:
         for one in observations.entries
     )
     return replace(observations, entries=tuple(entries))
-
-
-# What was drawn by mistake, where that is certain --------------------------------------------------
-
-CERTAIN = 0.9
-"""From this confidence on what follows from a mistake that nothing else shows is credited."""
-NO_STEPS = frozenset({"scale_wrong", "labels_swapped"})
-"""Mistakes that change no step: scales and letters already say what follows from them."""
-
-
-def drawn_instead(explanations: Sequence[Replay], case: Case) -> tuple[Drawing, frozenset[str]]:
-    """The drawing with those mistakes in it that are certain, and the nodes at which it is wrong.
-
-    A wrong mechanism counts as a whole (`MECHANISM`); the right drawing has no wrong nodes.
-    """
-    joints = {step.node for step in case.drawing.construction.figures[MECHANISM]}
-    certain = [one for one in sure_of(explanations, CERTAIN) if one.code not in NO_STEPS]
-    drawing = case.drawing
-    for one in certain:
-        drawing = commit(one, drawing)
-    return drawing, frozenset(MECHANISM if one.at in joints else one.at for one in certain)
-
-
-# The mistakes that are named -----------------------------------------------------------------------
-
-LEAST_CONFIDENCE = 0.6
-"""A mistake less certain than this is not named."""
-SURE_TOGETHER = 0.8
-"""A mistake is named with its rivals where their probability together is at least this."""
-LEAST_RIVAL = 0.1
-"""A rival less likely than this is not named."""
-MOST_RIVALS = 3
-ALL_THOUGHT_OF, ALL_THOUGHT_OF_BY_LENGTHS = 0.94, 0.89
-"""Probability that the mistakes made are among those tried, where one mistake does not explain a drawing."""
-EVEN = 0.5
-"""A plan that is likelier than this to follow no construction goes to a person."""
-MOST_SLIPS = 2
-"""Where more computed lengths do not fit, it is no slip in each, but something else."""
-SUSPICIOUS, GROSS = 2.0, 3.0
-"""RMS misfits of a step in standard deviations of this drawing's errors: between the two a mistake is too
-slight to be named. (Below the first the mistake shows elsewhere.)"""
-Key = tuple[str, str]
-
-
-@dataclass(frozen=True, slots=True)
-class Lost:
-    """The criteria that lost points, or may lose some, by vector, link and scale."""
-
-    vectors: Mapping[str, str]
-    scales: Mapping[str, str]
-
-
-def named(
-    explanations: Sequence[Replay], construction: Construction, lost: Lost, *, has_directions: bool
-) -> tuple[NamedMistake, ...]:
-    """The mistakes of the likeliest explanation that are sure enough, in the order of construction."""
-    if not explanations:
-        return ()
-    best, shares = explanations[0], _Shares(explanations)
-    all_thought_of = ALL_THOUGHT_OF if has_directions else ALL_THOUGHT_OF_BY_LENGTHS
-    known = all_thought_of if len(best.made) > 1 else 1.0
-    slips = sum(one.code == SLIP for one in best.made)
-    explains, mistakes = _losses_explained(best, construction, lost), []
-    for mistake in _in_order(best.made, construction):
-        key, share = _key(mistake), shares.of(_key(mistake))
-        rivals = shares.rivals(key, {_key(one) for one in best.made})
-        together = share + sum(shares.instead(key, _key(one)) for one in rivals)
-        is_sure = share >= LEAST_CONFIDENCE or (together >= SURE_TOGETHER and rivals)
-        is_shown = explains[mistake] and (mistake.code != SLIP or slips <= MOST_SLIPS)
-        if is_shown and is_sure and not _is_slight(mistake, best):
-            others = tuple(
-                _record(one, construction, (), known * shares.instead(key, _key(one))) for one in rivals
-            )
-            mistakes.append(_record(mistake, construction, tuple(explains[mistake]), known * share, others))
-    return tuple(mistakes)
-
-
-def sure_of(explanations: Sequence[Replay], least: float) -> list[Mistake]:
-    """The mistakes of the likeliest explanation that are this sure, unless they are slight.
-
-    Mistakes of one line, or of one vector laid off, are one here: all of them explain what was drawn there.
-    """
-    if not explanations:
-        return []
-    shares = _Shares(explanations)
-    return [
-        one
-        for one in explanations[0].made
-        if shares.made_at(one) >= least and not _is_slight(one, explanations[0])
-    ]
-
-
-def not_explained(explanations: Sequence[Replay]) -> frozenset[str]:
-    """The figures in which, more likely than not, nothing belongs together."""
-    whole = _Shares(explanations) if explanations else None
-    figures = {figure for one in explanations for figure in one.not_explained}
-    return frozenset(one for one in figures if whole is not None and whole.of_nothing(one) > EVEN)
-
-
-def _key(mistake: Mistake) -> Key:
-    return mistake.code, mistake.at
-
-
-def _is_slight(mistake: Mistake, explanation: Replay) -> bool:
-    """Whether the residual at the mistake's step is small enough for drafting errors."""
-    if mistake.code in OF_THE_WHOLE:
-        return False
-    return SUSPICIOUS < explanation.right.get(mistake.at, 0.0) < GROSS
-
-
-class _Shares:
-    """The share of the probability that explanations with a mistake have."""
-
-    def __init__(self, explanations: Sequence[Replay]) -> None:
-        least = explanations[0].cost
-        weights = [math.exp((least - explanation.cost) / 2.0) for explanation in explanations]
-        whole = sum(weights)
-        self._weights = [
-            ({_key(one): one for one in explanation.made}, weight / whole)
-            for explanation, weight in zip(explanations, weights, strict=True)
-        ]
-        self._nothing = [explanation.not_explained for explanation in explanations]
-
-    def of_nothing(self, figure: str) -> float:
-        """The share of the explanations in which nothing belongs together in a figure."""
-        found = zip(self._weights, self._nothing, strict=True)
-        return sum(weight for (_, weight), figures in found if figure in figures)
-
-    def of(self, key: Key) -> float:
-        """The share of the explanations with a mistake."""
-        return sum(weight for made, weight in self._weights if key in made)
-
-    def made_at(self, mistake: Mistake) -> float:
-        """The share of the explanations with some mistake where one was made."""
-        if mistake.code in OF_THE_WHOLE | NO_STEPS:
-            return self.of(_key(mistake))
-        place = mistake.at, mistake.slot
-        return sum(
-            weight
-            for made, weight in self._weights
-            if any(
-                (one.at, one.slot) == place and one.code not in OF_THE_WHOLE | NO_STEPS
-                for one in made.values()
-            )
-        )
-
-    def instead(self, key: Key, other: Key) -> float:
-        """The share of the explanations with another mistake and without the first."""
-        return sum(weight for made, weight in self._weights if other in made and key not in made)
-
-    def rivals(self, key: Key, best: set[Key]) -> list[Mistake]:
-        """The mistakes of explanations without a mistake, the likeliest first."""
-        others = {name: one for made, _ in self._weights if key not in made for name, one in made.items()}
-        likely = [name for name in others if name not in best and self.instead(key, name) >= LEAST_RIVAL]
-        likely.sort(key=lambda name: -self.instead(key, name))
-        return [others[name] for name in likely[:MOST_RIVALS]]
-
-
-def _in_order(made: Sequence[Mistake], construction: Construction) -> list[Mistake]:
-    """Mistakes of the whole first, then step by step."""
-    order = [step.node for step in construction.steps]
-    return sorted(made, key=lambda one: order.index(one.at) if one.at in order else -1)
-
-
-def _losses_explained(
-    explanation: Replay, construction: Construction, lost: Lost
-) -> dict[Mistake, list[str]]:
-    """The lost criteria that each mistake explains: each is given to the last mistake upstream.
-
-    A mistake for which that leaves nothing has all that it touches, together with later ones.
-    """
-    made = _in_order(explanation.made, construction)
-    explains: dict[Mistake, list[str]] = {
-        mistake: [name for scale, name in lost.scales.items() if mistake.at == scale] for mistake in made
-    }
-    reach = {mistake: affected(mistake, construction) for mistake in made}
-    touched: dict[Mistake, list[str]] = {mistake: [] for mistake in made}
-    for name, criterion in lost.vectors.items():
-        scale, tail, head = _ends_of(name, construction)
-        if head in explanation.unexplained:
-            continue
-        touching = [one for one in made if _touches(one, scale, {tail, head}, reach[one])]
-        own = [one for one in touching if one.at == head]
-        for mistake in (own or touching)[-1:]:
-            explains[mistake].append(criterion)
-        for mistake in touching:
-            touched[mistake].append(criterion)
-    return {mistake: explains[mistake] or touched[mistake] for mistake in made}
-
-
-def _ends_of(name: str, construction: Construction) -> tuple[str, str, str]:
-    """The scale of a vector or link, its tail and its head."""
-    if name in construction.vectors:
-        vector = construction.vectors[name]
-        return vector.scale, vector.tail, vector.head
-    return ("kL", *construction.links[name])
-
-
-def _touches(mistake: Mistake, scale: str, ends: set[str], reach: frozenset[str]) -> bool:
-    if mistake.at in SCALE_NAMES:
-        return mistake.at in {scale, "kL"}
-    if mistake.code == "labels_swapped":
-        return bool(ends & set(mistake.other))
-    return bool(ends & reach)
-
-
-SPEED_FACTORS = (RPM_FACTOR, 60.0, 0.5 / math.pi)
-"""omega = n; 2 pi n, the minute's seconds forgotten; n / 60, the full turn's 2 pi forgotten."""
-RPM_WITHIN = 0.03
-"""Relative: a scale wrong by such a factor (squared for accelerations) this nearly was computed from it."""
-LINE_MISTAKES = frozenset({"parallel_for_perpendicular", "wrong_link", "wrong_intersection"})
-
-
-def _record(
-    mistake: Mistake,
-    construction: Construction,
-    explains: tuple[str, ...],
-    confidence: float,
-    rivals: tuple[NamedMistake, ...] = (),
-) -> NamedMistake:
-    if mistake.code == "scale_wrong":
-        mistake = replace(mistake, code=_code_of_scale(mistake.at, mistake.factor))
-    is_line = mistake.code in LINE_MISTAKES
-    line = _line_of(construction.step(mistake.at), mistake.slot) if is_line else {}
-    return NamedMistake(mistake, explains, min(confidence, 1.0), line, rivals)
-
-
-def _line_of(step: Step, slot: int) -> dict[str, str]:
-    """The parameters that describe a step's line: ``from`` a node, its ``link``, ``line`` of which kind."""
-    if isinstance(step, Given) and isinstance(step.along, Along):
-        across = step.along.quarters % 2
-        return {"line": "driven across" if across else "driven along"}
-    line = (step.first, step.second)[slot] if isinstance(step, TwoLines) else None
-    if not isinstance(line, Line):
-        return {}
-    params = {"from": line.through}
-    if line.along.quarters % 2 == 0:
-        # Perpendiculars belong to turning links, all other lines are along guides.
-        params["line"] = "guide"
-    if isinstance(line.along, Along):
-        params["link"] = line.along.tail + line.along.head
-    return params
-
-
-def _code_of_scale(name: str, factor: float) -> str:
-    power = {"kv": 1, "ka": 2}.get(name)
-    if power is None:
-        return "scale_wrong"
-    is_speed = any(abs(factor / one**power - 1.0) <= RPM_WITHIN for one in SPEED_FACTORS)
-    return "rpm_not_converted" if is_speed else "scale_wrong"

@@ -12,7 +12,8 @@ from grader.comparison.own import PlanBasis
 from grader.comparison.scales import Scale
 from grader.comparison.task import Task
 from grader.given_data.owner import Owner
-from grader.marking.diagnosis import CERTAIN, LINE_MISTAKES, Case, drawn_instead, explained, sure_of
+from grader.marking.diagnosis import Case, explained
+from grader.marking.naming import CERTAIN, LINE_MISTAKES, drawn_instead, sure_of
 from grader.records import MECHANISM
 from reference.construction.elements import Coriolis, Normal, Parameters
 from reference.construction.graph import Construction, Vector

@@ -9,8 +9,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from grader.comparison.evidence import Submission
+from grader.comparison.outcomes import CREDITED, left_open, verdict_of
 from grader.comparison.task import Task
-from grader.comparison.verdicts import FULL, NONE, OPENING, verdict_of
+from grader.comparison.verdicts import FULL, NONE, OPENING
 from grader.marking.settling import settled
 from grader.outcomes import NamedMistake, Outcome
 from grader.records import Figure, Reading, ReadNode, ReadVector, Reason
@@ -19,7 +20,6 @@ from reference.construction.mistakes import Mistake
 
 CERTAIN = 0.9
 """From this confidence on lines are judged under the right letters; below it each vector as it is named."""
-CREDITED = frozenset({"full", "follow_through"})
 Pair = tuple[str, str]
 
 
@@ -145,17 +145,10 @@ def letters_charged(
 def _open(lettered: Outcome, named: Outcome, probability: float, reason: Reason) -> Outcome:
     """A vector that pays with this probability, shown as lettered; else it is worth what its lines say."""
     share = named.shares[-1]
-    return replace(
-        lettered,
-        verdict="review",
-        possible=("none", verdict_of(share, followed=named.verdict == "follow_through")),
-        shares=(NONE, share),
-        proposed=NONE,
-        probability=probability,
-        reasons=(reason, *(other for other in lettered.reasons if other.code not in {"right", *OPENING})),
-        mistake=None,
-        cause=None,
-    )
+    reasons = (reason, *(other for other in lettered.reasons if other.code not in {"right", *OPENING}))
+    best = verdict_of(share, followed=named.verdict == "follow_through")
+    opened = left_open(lettered, best, share, reasons, probability)
+    return replace(opened, proposed=NONE, mistake=None, cause=None)
 
 
 def _in_order(task: Task, outcomes: Sequence[Outcome]) -> Iterator[int]:

@@ -1,33 +1,35 @@
 """Judging one submission: comparison, diagnosis and points, in their order."""
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
 from grader.comparison.criteria import NOT_DRAWN, Comparison, compare
 from grader.comparison.evidence import DrawnVector, Submission, gather
+from grader.comparison.outcomes import CREDITED
 from grader.comparison.scales import Scale
 from grader.comparison.task import Task
-from grader.comparison.verdicts import NONE
-from grader.documents import Verdict
+from grader.comparison.verdicts import FULL, NONE
 from grader.given_data.owner import Owner, owner_of
-from grader.marking.diagnosis import LEAST_CONFIDENCE, Lost, drawn_instead, named, not_explained
 from grader.marking.drawn import case_of, explain
 from grader.marking.lettering import exchanged_pair, letters_charged, with_letters_exchanged
+from grader.marking.naming import LEAST_CONFIDENCE, Lost, drawn_instead, named, not_explained
 from grader.marking.settling import at_stake, is_of, of_another, of_nothing, settled
 from grader.marking.units import EXCHANGED, Undone, undone, with_scales_exchanged
 from grader.outcomes import Judgement, NamedMistake, Outcome, Score
-from grader.records import Figure
+from grader.records import Figure, FloatArray, ReadNode, ReadVector
 from grader.rubric import CriterionTable, RubricFile
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.graph import evaluate
 from reference.construction.mistakes import Mistake
 from reference.replay.replay import Replay
 
+Read = TypeVar("Read", ReadNode, ReadVector)
 CHARGED = frozenset({"none", "partial"})
-CREDITED = frozenset({"full", "follow_through"})
 LOST = CHARGED | {"follow_through", "review"}
 """Verdicts for which the diagnosis seeks a cause, also where a person has still to decide."""
 AGREES, BY_CHANCE = 0.95, 0.03
@@ -315,48 +317,39 @@ def score(rubric: RubricFile, outcomes: Sequence[Outcome]) -> Score:
     nothing and everything.
     """
     criteria, worth = {one.id: one for one in rubric.criterion}, rubric.points
-    weighted = {section for section in rubric.sections if getattr(rubric.weights, section) is not None}
     points: dict[str, float | None] = {}
-    totals: dict[str, _Total] = {}
+    wholes: dict[str, float] = defaultdict(float)
+    # By section: the points that were judged, those at worst, at best, and in the mean.
+    sums: dict[str, FloatArray] = defaultdict(lambda: np.zeros(4))
     for outcome in outcomes:
-        criterion = criteria[outcome.criterion]
-        section = criterion.section if criterion.section in weighted else ""
-        total = totals.setdefault(section, _Total(is_weighted=bool(section)))
-        total.whole += worth[criterion.id]
+        criterion, most = criteria[outcome.criterion], worth[outcome.criterion]
+        section = criterion.section if rubric.weight_of(criterion.section) is not None else ""
+        wholes[section] += most
         points[criterion.id] = None
         if outcome.verdict != "not_judged":
             worst, best = _shares(rubric, criterion, outcome)
-            given = total.add(worth[criterion.id], worst, best, _expected_share(outcome, worst, best))
-            points[criterion.id] = None if outcome.verdict == "review" else given
+            sums[section] += most * np.array([1.0, worst, best, _expected_share(outcome, worst, best)])
+            if outcome.verdict != "review":
+                points[criterion.id] = round(worst * most, DECIMALS)
     maximum = rubric.max_score
-    judged = sum(total.in_full for total in totals.values())
-    if judged == 0.0:
+    if not sums:
         return Score(points, None, 0.0, maximum, maximum)
-    low, high, expected = (
-        round(sum(ends) * maximum / judged, DECIMALS)
-        for ends in zip(*(total.ends for total in totals.values()), strict=True)
-    )
+    kept = [each * (wholes[section] / each[0] if section else 1.0) for section, each in sums.items()]
+    judged, *ends = np.sum(kept, axis=0).tolist()
+    low, high, expected = (round(end * maximum / judged, DECIMALS) for end in ends)
     is_open = any(outcome.verdict == "review" for outcome in outcomes)
     return Score(points, None if is_open else low, low, high, maximum, expected)
 
 
-def share_of(rubric: RubricFile, criterion: CriterionTable, verdict: Verdict) -> float:
-    """The share of a criterion's points that a verdict gives: of a partial one, that of the nearest band."""
-    bands = rubric.tolerance_of(criterion).all_bands
-    shares: Mapping[str, float] = {
-        "full": 1.0,
-        "follow_through": 1.0,
-        "partial": bands[0][1] if bands else 0.0,
-        "none": 0.0,
-    }
-    return shares[verdict]
-
-
 def _shares(rubric: RubricFile, criterion: CriterionTable, outcome: Outcome) -> tuple[float, float]:
-    """The shares of a criterion's points that its verdict leaves, at worst and at best."""
-    if outcome.shares:
-        return outcome.shares[0], outcome.shares[-1]
-    worst, best = (share_of(rubric, criterion, end) for end in outcome.possible)
+    """The shares of a criterion's points that its verdict leaves, at worst and at best.
+
+    Where the verdict alone says it, a partial one gives that of the nearest band.
+    """
+    bands = rubric.tolerance_of(criterion).all_bands
+    partial_share = bands[0][1] if bands else NONE
+    of: Mapping[str, float] = {"full": FULL, "follow_through": FULL, "partial": partial_share, "none": NONE}
+    worst, best = outcome.shares or (of[end] for end in outcome.possible)
     return worst, best
 
 
@@ -367,40 +360,6 @@ def _expected_share(outcome: Outcome, worst: float, best: float) -> float:
     low, high = (worst, best) if is_open else (0.0, 1.0)
     otherwise = min(max(low + high - proposed, 0.0), 1.0)
     return outcome.probability * proposed + (1.0 - outcome.probability) * otherwise
-
-
-@dataclass(slots=True)
-class _Total:
-    """The points of a section with a weight of its own, or of all that have none."""
-
-    low: float = 0.0
-    high: float = 0.0
-    expected: float = 0.0
-    judged: float = 0.0
-    whole: float = 0.0
-    is_weighted: bool = False
-
-    def add(self, worth: float, worst: float, best: float, expected: float) -> float:
-        """Count one criterion; returns its points at worst."""
-        self.low, self.high = self.low + worst * worth, self.high + best * worth
-        self.expected += expected * worth
-        self.judged += worth
-        return round(worst * worth, DECIMALS)
-
-    @property
-    def scale(self) -> float:
-        """The factor that makes up for the criteria that were not judged."""
-        return self.whole / self.judged if self.is_weighted and self.judged else 1.0
-
-    @property
-    def in_full(self) -> float:
-        """The points it could give."""
-        return self.judged * self.scale
-
-    @property
-    def ends(self) -> tuple[float, float, float]:
-        """The points it gives at worst, at best, and in the mean."""
-        return self.low * self.scale, self.high * self.scale, self.expected * self.scale
 
 
 # Vectors read in doubt that the explanation of the drawing predicts --------------------------------
@@ -435,20 +394,22 @@ def _confirmed(task: Task, submission: Submission, comparison: Comparison) -> Su
                 surer[name] = right / (right + (1.0 - drawn.confidence) * BY_CHANCE)
     if not surer:
         return None
-    ends = {
-        node: max(sure for name, sure in surer.items() if node in _ends(task, name))
-        for node in {end for name in surer for end in _ends(task, name)}
-    }
+    ends: dict[str, float] = defaultdict(float)
+    for name, sure in surer.items():
+        vector = task.construction.vectors[name]
+        for node in (vector.tail, vector.head):
+            ends[node] = max(ends[node], sure)
     readings = tuple(
-        replace(one, figures={plan: _surer(figure, surer, ends) for plan, figure in one.figures.items()})
+        replace(
+            one,
+            figures={
+                plan: Figure(_at_least(figure.nodes, ends), _at_least(figure.vectors, surer))
+                for plan, figure in one.figures.items()
+            },
+        )
         for one in submission.readings
     )
     return replace(submission, readings=readings)
-
-
-def _ends(task: Task, name: str) -> tuple[str, str]:
-    vector = task.construction.vectors[name]
-    return vector.tail, vector.head
 
 
 def _lies_there(task: Task, name: str, drawn: DrawnVector, predicted: complex) -> bool:
@@ -458,14 +419,8 @@ def _lies_there(task: Task, name: str, drawn: DrawnVector, predicted: complex) -
     return at is not None and is_long and abs(at - predicted) <= 2.0 * tolerance.length_at(abs(predicted))
 
 
-def _surer(figure: Figure, surer: Mapping[str, float], ends: Mapping[str, float]) -> Figure:
-    """A figure whose vectors and nodes have at least these confidences."""
-    vectors = {
-        name: replace(one, confidence=max(one.confidence, surer.get(name, 0.0)))
-        for name, one in figure.vectors.items()
+def _at_least(read: Mapping[str, Read], sure: Mapping[str, float]) -> dict[str, Read]:
+    """Nodes or vectors with at least these confidences."""
+    return {
+        name: replace(one, confidence=max(one.confidence, sure.get(name, 0.0))) for name, one in read.items()
     }
-    nodes = {
-        name: replace(one, confidence=max(one.confidence, ends.get(name, 0.0)))
-        for name, one in figure.nodes.items()
-    }
-    return Figure(nodes, vectors)

@@ -7,8 +7,9 @@ the rubric's `stake`. Another student's data are never marked without saying so.
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from grader.comparison.outcomes import left_open, settled_as, verdict_of
 from grader.comparison.task import Task
-from grader.comparison.verdicts import EVEN, FULL, NONE, OPENING, verdict_of
+from grader.comparison.verdicts import FULL, NONE, OPENING
 from grader.given_data.owner import Owner
 from grader.marking.drawn import NEARLY_CERTAIN
 from grader.outcomes import NamedMistake, Outcome, Unfit
@@ -20,17 +21,9 @@ from reference.authored.assignment import SCALE_NAMES
 def settled(outcome: Outcome, share: float, sure: float, *reasons: Reason) -> Outcome:
     """An outcome that is open, with the verdict of a share of its points."""
     followed = outcome.possible[1] == "follow_through" and share == FULL
-    verdict = verdict_of(share, followed=followed)
     kept = outcome.reasons if share != FULL else ()
-    return replace(
-        outcome,
-        verdict=verdict,
-        possible=(verdict, verdict),
-        shares=(share, share),
-        proposed=share,
-        probability=sure,
-        reasons=(*reasons, *(one for one in kept if one.code not in OPENING)),
-    )
+    told = (*reasons, *(one for one in kept if one.code not in OPENING))
+    return settled_as(outcome, verdict_of(share, followed=followed), share, told, sure)
 
 
 # Another student's data ----------------------------------------------------------------------------
@@ -46,13 +39,13 @@ def of_another(task: Task, outcomes: Sequence[Outcome], owner: Owner | None) -> 
     named = owner.named
     is_sure = named is not None and named.code == "other_variant" and owner.not_own >= NEARLY_CERTAIN
     earns_none = is_sure and task.rubric.doubt.other_variant == "none"
-    touched = {one.criterion for one in outcomes if is_of(task, one.name, owner.part)}
-    if named is None:
-        return tuple(_unclear(one, owner) if one.criterion in touched else one for one in outcomes)
-    return tuple(
-        _of_another(one, named, earns_none=earns_none) if one.criterion in touched else one
-        for one in outcomes
-    )
+
+    def asked(one: Outcome) -> Outcome:
+        if one.verdict == "not_judged" or not is_of(task, one.name, owner.part):
+            return one
+        return _unclear(one, owner) if named is None else _of_another(one, named, earns_none=earns_none)
+
+    return tuple(map(asked, outcomes))
 
 
 def is_of(task: Task, name: str, part: str) -> bool:
@@ -63,41 +56,24 @@ def is_of(task: Task, name: str, part: str) -> bool:
 
 
 def _of_another(outcome: Outcome, named: NamedMistake, *, earns_none: bool) -> Outcome:
-    if outcome.verdict == "not_judged":
-        return outcome
     whose = Reason(named.code, {"whose": _whose(named)})
     if earns_none:
         lost = settled(outcome, NONE, named.confidence, whose)
         return replace(lost, mistake=named.code, cause=named)
-    return _asked(outcome, whose, EVEN)
+    return left_open(outcome, outcome.possible[1], outcome.shares[-1], (whose, *outcome.reasons))
 
 
 def _unclear(outcome: Outcome, owner: Owner) -> Outcome:
     """An outcome that a person decides, as likely as the data are the own."""
-    if outcome.verdict == "not_judged":
-        return outcome
     each = "; ".join(_whose(one) for one in (owner.likeliest, *owner.likeliest.rivals))
     why = Reason("data_unclear", {"whose": each, "confidence": owner.not_own})
-    return _asked(outcome, why, outcome.probability * (1.0 - owner.not_own))
+    sure = outcome.probability * (1.0 - owner.not_own)
+    return left_open(outcome, outcome.possible[1], outcome.shares[-1], (why, *outcome.reasons), sure)
 
 
 def _whose(mistake: NamedMistake) -> str:
     """The number of another student, or the angle at which the crank stands."""
     return ", ".join(f"{key} = {value}" for key, value in mistake.detail.items() if key != "part")
-
-
-def _asked(outcome: Outcome, why: Reason, probability: float) -> Outcome:
-    """An outcome that a person decides, between nothing and what it was worth."""
-    best = outcome.shares[-1] if outcome.shares else FULL
-    return replace(
-        outcome,
-        verdict="review",
-        possible=("none", outcome.possible[1]),
-        shares=(NONE, best),
-        proposed=outcome.shares[0] if outcome.verdict != "review" else outcome.proposed,
-        probability=probability,
-        reasons=(why, *outcome.reasons),
-    )
 
 
 # Nothing fits --------------------------------------------------------------------------------------
@@ -128,7 +104,7 @@ def of_nothing(
     if not lost or not unfit.vectors:
         return tuple(outcomes), None
     reason = Reason("not_explained", {"unfit": str(unfit.vectors), "of": str(unfit.of)})
-    return tuple(_waiting(one, NONE, reason) if one in lost else one for one in outcomes), unfit
+    return tuple(_waiting(one, reason) if one in lost else one for one in outcomes), unfit
 
 
 def _is_in(task: Task, name: str, figures: frozenset[str]) -> bool:
@@ -141,17 +117,11 @@ def _is_in(task: Task, name: str, figures: frozenset[str]) -> bool:
     return name in construction.vectors and construction.figure_of(construction.vectors[name].head) in figures
 
 
-def _waiting(outcome: Outcome, worst: float, reason: Reason) -> Outcome:
-    """An outcome that a person decides, between the worst share and all points; it follows from nothing."""
-    best = outcome.shares[-1] if outcome.shares else FULL
-    return replace(
-        outcome,
-        verdict="review",
-        possible=("none", outcome.possible[1] if outcome.verdict != "none" else "full"),
-        shares=(worst, max(best, FULL)),
-        proposed=outcome.shares[0] if outcome.verdict != "review" and outcome.shares else outcome.proposed,
-        probability=EVEN,
-        reasons=(reason, *(one for one in outcome.reasons if one.code != "follows")),
+def _waiting(outcome: Outcome, reason: Reason) -> Outcome:
+    """An outcome that a person decides, between nothing and all points; it follows from nothing."""
+    best = outcome.possible[1] if outcome.verdict != "none" else "full"
+    return left_open(
+        outcome, best, FULL, (reason, *(one for one in outcome.reasons if one.code != "follows"))
     )
 
 

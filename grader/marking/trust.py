@@ -19,7 +19,8 @@ from typing import Literal, get_args
 import numpy as np
 import scipy
 
-from grader.comparison.verdicts import EVEN, FULL, NONE
+from grader.comparison.outcomes import left_open
+from grader.comparison.verdicts import FULL
 from grader.documents import (
     CriterionDocument,
     LikeDocument,
@@ -33,7 +34,7 @@ from grader.documents import (
 )
 from grader.inputs.decision_texts import audit_answer
 from grader.marking.decided import FOR_THE_STUDENT
-from grader.marking.mark import score, share_of
+from grader.marking.mark import score
 from grader.outcomes import Judgement, Outcome
 from grader.records import FloatArray, Reason
 from grader.rubric import RubricFile
@@ -308,12 +309,8 @@ def _reliability(
 
 def opened_by_audit(judgement: Judgement, rubric: RubricFile, likes: Sequence[LikeDocument]) -> Judgement:
     """The judgement in which what an audit no longer trusts waits for a person."""
-    criteria = {one.id: one for one in rubric.criterion}
     outcomes = tuple(
-        _open(one, share_of(rubric, criteria[one.criterion], one.verdict))
-        if any(_is_opened(one, like) for like in likes)
-        else one
-        for one in judgement.outcomes
+        _open(one) if any(_is_opened(one, like) for like in likes) else one for one in judgement.outcomes
     )
     if outcomes == judgement.outcomes:
         return judgement
@@ -337,16 +334,8 @@ def said_by(outcome: Outcome) -> SaidDocument | None:
     )
 
 
-def _open(outcome: Outcome, share: float) -> Outcome:
+def _open(outcome: Outcome) -> Outcome:
     """A settled outcome, open between nothing and all points: a wrong one may be wrong in any way."""
     best: Verdict = "follow_through" if outcome.verdict == "follow_through" else "full"
-    return replace(
-        outcome,
-        verdict="review",
-        possible=("none", best),
-        shares=(NONE, FULL),
-        proposed=outcome.shares[0] if outcome.shares else share,
-        probability=EVEN,
-        confidence=0.0,
-        reasons=(Reason(OPENED), *(one for one in outcome.reasons if one.code not in NO_LONGER_SAID)),
-    )
+    reasons = (Reason(OPENED), *(one for one in outcome.reasons if one.code not in NO_LONGER_SAID))
+    return replace(left_open(outcome, best, FULL, reasons), confidence=0.0)

@@ -152,11 +152,6 @@ class _Entries:
         """Some of the entries."""
         return _Entries(*(getattr(self, name)[which] for name in self.__slots__))
 
-    @property
-    def shows_both_plans(self) -> bool:
-        """Whether enough of the entries are in each plan."""
-        return bool(min(np.sum(self.plan == 0.0), np.sum(self.plan == 1.0)) >= LEAST_ENTRIES)
-
     def turned_by(self, convention: "_Convention") -> FloatArray:
         """Residuals (rad) of the directions entered by a convention; half a turn where they cannot be."""
         turned = (
@@ -164,13 +159,25 @@ class _Entries:
         )
         return np.where(np.isfinite(turned), turned, math.pi)
 
-    def fit_better(self, one: FloatArray, other: FloatArray, sigmas: FloatArray, anywhere: float) -> bool:
-        """Whether residuals are likelier than others in each plan: one plan alone has another mistake."""
-        plans = [self.plan == index for index in (0.0, 1.0)]
-        return all(
-            _cost(one[plan], sigmas[plan], anywhere) < _cost(other[plan], sigmas[plan], anywhere)
-            for plan in plans
-        )
+    def slip(
+        self, residuals: Sequence[FloatArray], prices: Sequence[float], sigmas: FloatArray, anywhere: float
+    ) -> tuple[int, float] | None:
+        """The likeliest way in which all was entered, and its probability; None for the first, the right one.
+
+        It must be likelier in each plan, as one plan alone has another mistake, and most must not fit as they
+        stand. Arguments: of each way residuals and price; standard errors, and the range of any entry.
+        """
+        if min(np.sum(self.plan == 0.0), np.sum(self.plan == 1.0)) < LEAST_ENTRIES:
+            return None
+        costs = [_cost(one, sigmas, anywhere) + price for one, price in zip(residuals, prices, strict=True)]
+        best, probability = _chosen(costs, 2.0 * math.log(anywhere) * len(self.plan))
+        if best == 0 or probability < SURE or _share(residuals[0], sigmas) > MOST_FIT:
+            return None
+        for plan in (self.plan == 0.0, self.plan == 1.0):
+            found, right = (_cost(residuals[way][plan], sigmas[plan], anywhere) for way in (best, 0))
+            if found >= right:
+                return None
+        return best, probability
 
 
 def _cost(residuals: FloatArray, sigmas: FloatArray, anywhere: float) -> float:
@@ -255,18 +262,15 @@ CONVENTIONS = tuple(_Convention(*one) for one in product((False, True), (False, 
 def _directions(entries: _Entries) -> _Found | None:
     """The slips in all directions, if any."""
     entries = entries.only(np.isfinite(entries.drawn_rad))
-    if not entries.shows_both_plans:
+    found = entries.slip(
+        [entries.turned_by(one) for one in CONVENTIONS],
+        [PRICE * len([*one.mistakes]) for one in CONVENTIONS],
+        entries.sigma_rad,
+        math.tau,
+    )
+    if found is None:
         return None
-    residuals = [entries.turned_by(one) for one in CONVENTIONS]
-    costs = [
-        _cost(turned, entries.sigma_rad, math.tau) + PRICE * len([*one.mistakes])
-        for one, turned in zip(CONVENTIONS, residuals, strict=True)
-    ]
-    best, probability = _chosen(costs, 2.0 * math.log(math.tau) * len(entries.plan))
-    convention = CONVENTIONS[best]
-    is_found = best > 0 and probability >= SURE and _share(residuals[0], entries.sigma_rad) <= MOST_FIT
-    if not is_found or not entries.fit_better(residuals[best], residuals[0], entries.sigma_rad, math.tau):
-        return None
+    convention, probability = CONVENTIONS[found[0]], found[1]
 
     def change(vector: ReadVector) -> ReadVector:
         if vector.direction_deg is None:
@@ -288,22 +292,18 @@ PAPER_MM = 420.0
 
 def _lengths(entries: _Entries) -> _Found | None:
     """The unit of all lengths, where that is not millimetres."""
-    if not entries.shows_both_plans:
-        return None
     factors = {"mm": 1.0}
-    if float(entries.exact_mm.max()) <= PAPER_MM:
+    if entries.exact_mm.max(initial=0.0) <= PAPER_MM:
         factors |= LENGTH_UNITS
-    residuals = {unit: entries.drawn_mm * factor - entries.exact_mm for unit, factor in factors.items()}
-    costs = [
-        _cost(one, entries.sigma_mm, AREA_MM) + (0.0 if unit == "mm" else PRICE)
-        for unit, one in residuals.items()
-    ]
-    best, probability = _chosen(costs, 2.0 * math.log(AREA_MM) * len(entries.plan))
-    unit = [*factors][best]
-    is_found = unit != "mm" and probability >= SURE and _share(residuals["mm"], entries.sigma_mm) <= MOST_FIT
-    if not is_found or not entries.fit_better(residuals[unit], residuals["mm"], entries.sigma_mm, AREA_MM):
+    found = entries.slip(
+        [entries.drawn_mm * factor - entries.exact_mm for factor in factors.values()],
+        [0.0 if unit == "mm" else PRICE for unit in factors],
+        entries.sigma_mm,
+        AREA_MM,
+    )
+    if found is None:
         return None
-    factor = factors[unit]
+    (unit, factor), probability = [*factors.items()][found[0]], found[1]
 
     def change(vector: ReadVector) -> ReadVector:
         return vector if vector.length_mm is None else replace(vector, length_mm=vector.length_mm * factor)

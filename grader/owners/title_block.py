@@ -23,7 +23,6 @@ from grader.inputs.roster import Roster, RosterRow
 from grader.inputs.scale_text import SURE
 from grader.owners.draft_roster import CLEAR, LIKE_MM, figure_similarity
 from grader.owners.pages import Unmatched
-from grader.pipeline import writing_on
 from grader.records import FloatArray, PageRef, Reason, ScannedPage, Value, Written
 from grader.scan.handwriting.captions import (
     NUMBER_WORDS,
@@ -32,6 +31,7 @@ from grader.scan.handwriting.captions import (
     written_name,
     written_number,
 )
+from grader.scan.page import writing_on
 from reference.authored.assignment import Assignment, Variant
 
 

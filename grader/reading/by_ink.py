@@ -12,13 +12,11 @@ from grader.records import FloatArray, NodePlaces, NodeView
 Look = Callable[[Sequence[NodeView]], NodePlaces]
 """Tells of views where their nodes lie, as `grader.scan.strokes.nodes.node_places` does of a sheet's ink."""
 
-ROUNDS = 2
-"""The second look is from where the first one moved the nodes."""
 ANYWHERE = 1.0 / 64.0
 """Density per mm2 of a node that may lie anywhere in a window of 8 mm."""
 UNSEEN = 1e-4
 """Density per mm2 that is left to other places than the network's, however sure it is."""
-WIDER = 1.35
+WIDER = 1.2
 """Factor of standard errors: strokes and windows show the same ink."""
 
 
@@ -30,21 +28,19 @@ def held_against_ink(fit: NodeFit, edges: Sequence[Edge], look: Look) -> NodeFit
     """
     ends = np.array([(edge.tail, edge.head) for edge in edges]).reshape(-1, 2)
     nodes = np.unique(ends)
-    at, cov = fit.at, fit.cov
-    for _ in range(ROUNDS):
-        places = look([NodeView(complex(at[node]), at[ends]) for node in nodes])
-        precision = np.linalg.inv(fit.cov)
-        pull = precision @ xy(fit.at)
-        for row, node in enumerate(nodes.tolist()):
-            # Nodes at one point are seen in one window: it counts once.
-            if np.abs(at[nodes[:row]] - at[node]).min(initial=np.inf) > TIED_MM:
-                block = slice(2 * node, 2 * node + 2)
-                added, towards = _site(xy(fit.at[[node]]), fit.cov[block, block], places.take(row))
-                precision[block, block] += added
-                pull[block] += towards
-        cov = np.asarray(np.linalg.inv(precision))
-        state = cov @ pull
-        at = state[0::2] + 1j * state[1::2]
+    places = look([NodeView(complex(fit.at[node]), fit.at[ends]) for node in nodes])
+    precision = np.linalg.inv(fit.cov)
+    pull = precision @ xy(fit.at)
+    for row, node in enumerate(nodes.tolist()):
+        # Nodes at one point are seen in one window: it counts once.
+        if np.abs(fit.at[nodes[:row]] - fit.at[node]).min(initial=np.inf) > TIED_MM:
+            block = slice(2 * node, 2 * node + 2)
+            added, towards = _site(xy(fit.at[[node]]), fit.cov[block, block], places.take(row))
+            precision[block, block] += added
+            pull[block] += towards
+    cov = np.asarray(np.linalg.inv(precision))
+    state = cov @ pull
+    at = state[0::2] + 1j * state[1::2]
     return replace(fit, at=at, cov=WIDER**2 * cov)
 
 

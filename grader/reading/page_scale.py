@@ -76,11 +76,6 @@ def turn_doubts(page: ScannedPage) -> tuple[Reason, ...]:
     return tuple(problem for problem in page.problems if problem.code == UPRIGHT_UNSURE)
 
 
-def surely_upright(page: ScannedPage) -> ScannedPage:
-    """The page without such a doubt."""
-    return replace(page, problems=tuple(one for one in page.problems if one.code != UPRIGHT_UNSURE))
-
-
 def no_surer_than_turn(reading: Reading, page: ScannedPage) -> Reading:
     """A page's reading, with nothing asserted where its plans alone told which way up the page is."""
     if page.ref.turn_deg is None or not turn_doubts(page):

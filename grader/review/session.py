@@ -28,7 +28,7 @@ from grader.inputs.decisions import ClashError, Decision, DecisionFile, Key
 from grader.inputs.measurements import StudentSubmission
 from grader.marking.trust import opened_in, trust_of
 from grader.overlay.scene import Arrow, Ghost, Scene, expected_vector, ghost_of, on_paper, scene_of
-from grader.pipeline import report_on
+from grader.pipeline import mark
 from grader.reading.corrected import snapped
 from grader.records import MECHANISM, PageRef, ScannedPage
 from grader.review.doubts import Doubt, doubts_of, figures_read, in_order, reading_of
@@ -445,12 +445,12 @@ class Session:
     def _with_questions(self, student: Student, submission: StudentSubmission) -> ReportDocument:
         """The report; of a submission of which nothing could be read, as if a person began to settle it."""
         batch, pages = self.batch, self.pages_of(student)
-        report = report_on(submission, pages, batch.assignment, batch.rubric, batch.level)
+        report, _ = mark(submission, pages, batch.assignment, batch.rubric, batch.level)
         if report.status != "unreadable" or report.criteria or submission.variant is None:
             return report
         first = batch.rubric.criterion[0].id
         begun = Decision(submission.student_id, submission.position, first, "not_judged")
-        opened = report_on(
+        opened, _ = mark(
             replace(submission, decided=(*submission.decided, begun)),
             pages, batch.assignment, batch.rubric, batch.level,
         )  # fmt: skip

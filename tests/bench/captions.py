@@ -23,7 +23,6 @@ from grader.folder.batch import Batch, graded
 from grader.inputs.roster import read_roster
 from grader.inputs.scale_text import Declared, parse_scale
 from grader.owners.title_block import SURELY, names_of
-from grader.pipeline import open_page, writing_on
 from grader.records import PageRef, ScannedPage
 from grader.scan.handwriting.captions import (
     NUMBER_WORDS,
@@ -31,6 +30,7 @@ from grader.scan.handwriting.captions import (
     written_name,
     written_number,
 )
+from grader.scan.page import open_page, writing_on
 from reference.authored.assignment import SCALE_NAMES, Variant
 from samples.simulation import CAREFUL, SLOPPY, TYPICAL, SimulatedSheet, any_settings, simulate
 from tests.bench.plain_text import Table, as_text

@@ -16,8 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from grader.pipeline import open_page, read_pages
+from grader.pipeline import read_pages
 from grader.records import HEAD_AHEAD, TAIL_AHEAD, FloatArray, PageRef, ScannedPage, Strokes, Tips
+from grader.scan.page import open_page
 from grader.scan.pixels import lengths_and_directions
 from reference.construction.derive import construction_of
 from tests.bench.plain_text import as_text

@@ -23,9 +23,10 @@ from grader.documents import Quantity
 from grader.folder.batch import Batch, grade
 from grader.inputs.measurements import names_of, read_measurements
 from grader.marking.mark import judge
-from grader.pipeline import open_page, read_pages
+from grader.pipeline import read_pages
 from grader.records import PageRef, Reading
 from grader.rubric import RubricFile
+from grader.scan.page import open_page
 from reference.authored.assignment import Assignment
 from samples.simulation import Settings, SimulatedSheet, any_settings, simulate
 from samples.simulation.student import drawn_by

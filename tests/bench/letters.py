@@ -17,7 +17,6 @@ from typing import Any
 import cv2
 import numpy as np
 
-from grader.pipeline import open_page
 from grader.reading.lettering import COMPONENTS, lettered
 from grader.records import (
     MECHANISM,
@@ -30,6 +29,7 @@ from grader.records import (
     Sheet,
 )
 from grader.scan.handwriting.letters import find_letters
+from grader.scan.page import open_page
 from grader.scan.pixels import mapped
 from reference.construction.derive import construction_of
 from tests.bench.plain_text import NOTHING, as_text

@@ -27,10 +27,11 @@ import numpy as np
 
 from grader.authoring.lint import lint
 from grader.inputs.roster import RosterRow
-from grader.pipeline import open_page, read_pages
+from grader.pipeline import read_pages
 from grader.printed.answer_sheet import make_sheets
 from grader.records import PageRef
 from grader.rubric import load_rubric
+from grader.scan.page import open_page
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.authored.formula import parse
 from samples.simulation import any_settings, simulate

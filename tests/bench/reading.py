@@ -20,10 +20,11 @@ from matplotlib.figure import Figure
 from grader.feedback.student_page import About, write_feedback
 from grader.inputs.measurements import StudentSubmission
 from grader.overlay.backdrop import backdrop
-from grader.pipeline import mark, open_page, read_pages, report_on
+from grader.pipeline import mark, read_pages
 from grader.reading import expected
 from grader.records import PageRef, ScannedPage
 from grader.rubric import asked_of
+from grader.scan.page import open_page
 from reference.construction.derive import construction_of
 from tests.bench.lines import LinesFigures, measure_lines
 from tests.bench.plain_text import Table
@@ -133,13 +134,14 @@ def _marking_ms(work: SceneWork, pages: Sequence[ScannedPage], out: Path) -> dic
     refs = tuple(page.ref for page in pages)
     submission = StudentSubmission("s01", work.variant, refs, work.declared)
     clock = [time.perf_counter()]
-    report_on(submission, pages, work.assignment, work.rubric)
+    mark(submission, pages, work.assignment, work.rubric)
     clock.append(time.perf_counter())
     shown = [
         page if page.image is None else replace(page, backdrop=backdrop(page.image, page.sheet))
         for page in pages
     ]
-    report, pictures = mark(submission, shown, work.assignment, work.rubric)
+    report, painted = mark(submission, shown, work.assignment, work.rubric)
+    pictures = painted("full")
     clock.append(time.perf_counter())
     about = About(work.assignment.file.title.in_language("en"), "s01", work.assignment.file.names)
     write_feedback(report, pictures, out, "en", "full", about)

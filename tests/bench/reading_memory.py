@@ -11,9 +11,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from grader.pipeline import open_page, read_pages
+from grader.pipeline import read_pages
 from grader.records import PageRef
 from grader.rubric import load_rubric
+from grader.scan.page import open_page
 from reference.authored.assignment import Variant, load_assignment
 
 

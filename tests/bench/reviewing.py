@@ -30,7 +30,7 @@ from grader.comparison.task import Task, task_of
 from grader.documents import ReportDocument
 from grader.inputs.decisions import Decision
 from grader.inputs.measurements import StudentSubmission
-from grader.pipeline import report_on
+from grader.pipeline import mark
 from grader.records import Figure, PageRef, ReadNode, ReadVector, ScannedPage
 from tests.bench.judging_handed_in import submission
 from tests.bench.judging_scans import SHEET_KINDS, ReadWork, read_works
@@ -66,7 +66,7 @@ class Review:
     def report(self) -> ReportDocument:
         """The report with what is decided so far."""
         task, student = self.task, replace(self.student, decided=tuple(self.rows))
-        return report_on(student, self.pages, task.assignment, task.rubric)
+        return mark(student, self.pages, task.assignment, task.rubric)[0]
 
     def answer(self, rows: Sequence[tuple[str, str]]) -> None:
         """Decide; a row on the same criterion replaces the one before."""

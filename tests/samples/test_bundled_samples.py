@@ -14,10 +14,11 @@ import pytest
 
 from grader.inputs.measurements import names_of, read_measurements
 from grader.inputs.roster import read_roster
-from grader.pipeline import open_page, read_pages
+from grader.pipeline import read_pages
 from grader.records import PageRef
 from grader.rubric import load_rubric
 from grader.scan.decode.pages import is_blank, page_of
+from grader.scan.page import open_page
 from reference.authored.assignment import load_assignment
 from tests.samples.counting import counted
 

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from grader.pipeline import open_page, read_pages
+from grader.pipeline import read_pages
 from grader.records import PageRef
+from grader.scan.page import open_page
 from tests.bench import reading_scenes
 
 REAL = Path(__file__).resolve().parents[3] / "shared" / "real"

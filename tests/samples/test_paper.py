@@ -7,8 +7,8 @@ tests/samples/test_real_drawings.py.
 
 import pytest
 
-from grader.pipeline import open_page
 from grader.records import PageRef
+from grader.scan.page import open_page
 from reference.construction.derive import construction_of
 from tests.bench.reading import read_all
 from tests.bench.reading_scenes import PAPER_SCENES, scene_named, work

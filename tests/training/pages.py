@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from grader.pipeline import open_page
 from grader.records import PageRef, ScannedPage
+from grader.scan.page import open_page
 from reference.authored.assignment import load_assignment
 from samples.simulation import any_settings, simulate
 

@@ -14,9 +14,9 @@ from unittest import mock
 import cv2
 import numpy as np
 
-from grader.pipeline import open_page
 from grader.records import PageRef
 from grader.scan.handwriting.letters import DETECTED, PX_PER_MM
+from grader.scan.page import open_page
 from reference.authored.assignment import load_assignment
 from samples.simulation import any_settings, simulate
 from samples.simulation.lettering import WrittenText, write

@@ -63,6 +63,8 @@ def test_a_vector_of_true_length_zero_is_a_hint_and_no_scale_is_blamed():
 def test_a_figure_larger_than_its_zone_is_told_and_would_fit_at_the_size_told(tmp_path):
     told = [one for one in findings_of("press", "does_not_fit") if "mechanism" in one.message]
     assert {one.path for one in told} == {"$.page[0]", "$.page[1]"}
+    rooms = [row.room for row in linted("press").rows]
+    assert all(one.at.endswith(f" on page {one.page}") for one in rooms)
     assert not findings_of("engine", "does_not_fit")
     # Drawn with a crank of 45 * 0.31 mm the sketch of page 1 fits.
     smaller = edited(tmp_path, "press", "assignment", "crank_mm = 45", "crank_mm = 13.5")

@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from grader.comparison.criteria import compare, own_length
+from grader.comparison.criteria import compare
 from grader.comparison.evidence import Submission
+from grader.comparison.own import own_length
 from grader.inputs.measurements import names_of
 from grader.marking.mark import judge
 from grader.records import Figure, Reading

@@ -8,8 +8,8 @@ import pytest
 
 from grader.comparison.criteria import compare
 from grader.comparison.evidence import Submission
+from grader.comparison.outcomes import both
 from grader.comparison.task import task_of
-from grader.comparison.verdicts import both
 from grader.documents import Quantity
 from grader.marking.mark import judge
 from grader.records import Figure, ReadVector, Reason, Unread

@@ -8,6 +8,7 @@ from grader.comparison.task import task_of
 from grader.rubric import load_rubric
 from reference.authored.assignment import library, load_assignment
 from tests.hands import changed, drawn_nodes, measured, rule_scales, sheet, task_for, without
+from tests.unit.comparison.rubrics import with_rubric
 
 TASK = task_for("pump", 7)
 RULE = rule_scales(TASK)
@@ -234,3 +235,14 @@ def test_others_that_fit_the_scale_of_a_doubtful_stroke_speak_for_it():
     assert (outcome.verdict, outcome.proposed_verdict) == ("review", "none")
     assert outcome.probability > 0.9
     assert codes(outcome)[0] == "scale_seems_off"
+
+
+@pytest.mark.parametrize(("name", "larger_by"), [("kL", -0.07), ("kv", -0.05)])
+def test_what_follows_from_a_scale_that_waits_for_a_person_waits_too(name, larger_by):
+    task = with_rubric(TASK, doubt=TASK.rubric.doubt.model_copy(update={"in_doubt": "person"}))
+    drawn = sheet(task, {**RULE, name: RULE[name] * (1.0 + larger_by)}, se_mm=1.0)
+    comparison = compare(task, Submission(readings=(drawn,), declared=declared()))
+    assert outcome_of(comparison, name).verdict == "review"
+    at_that_scale = [one for one in comparison.outcomes if one.name in {"O2B", "v_B"}]
+    assert {one.verdict for one in at_that_scale} == {"review"}
+    assert all(one.shares[-1] == 1.0 for one in at_that_scale)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import grader
+import grader.scan.page as page_module
 from grader import pipeline
 from grader.files import samples_folder
 from grader.folder import batch as batch_module
@@ -192,9 +193,9 @@ def test_a_file_with_other_content_is_read_again_and_one_only_touched_is_not(cla
 def test_each_page_is_decoded_registered_and_tested_for_blankness_once(class_folder, tmp_path, monkeypatch):
     calls = []
     for name in ("decode", "is_blank", "register"):
-        function = getattr(pipeline, name)
+        function = getattr(page_module, name)
         monkeypatch.setattr(
-            pipeline,
+            page_module,
             name,
             lambda *given, name=name, function=function: calls.append(name) or function(*given),
         )
@@ -355,6 +356,7 @@ def digests(top):
         ("grader/scan/decode/pictures.py", {"scan", "mark"}),
         ("grader/records.py", {"scan", "read", "mark"}),
         ("grader/pipeline.py", {"scan", "read", "mark"}),
+        ("grader/scan/page.py", {"scan", "read", "mark"}),
         ("grader/reading/plans.py", {"read", "mark"}),
         ("grader/marking/mark.py", {"mark"}),
         ("grader/feedback/templates/feedback.html", {"mark"}),
@@ -378,11 +380,11 @@ def test_what_a_change_makes_stale(sources, file, stale):
 
 
 def test_every_module_that_the_order_of_work_calls_is_in_a_stage():
-    """The scan and the reading are all that `grader.pipeline` does before it marks."""
+    """The scan and the reading are all that `grader.pipeline` and `grader.scan.page` do before marking."""
     assert stage_digest(MARK_STAGE) != stage_digest(READ_STAGE)
     modules = kept_module._closure([*SCAN_STAGE, *READ_STAGE], TOP)
     for name in SCANS_AND_READS:
-        assert getattr(pipeline, name).__module__ in modules
+        assert {**vars(page_module), **vars(pipeline)}[name].__module__ in modules
 
 
 SCANS_AND_READS = (

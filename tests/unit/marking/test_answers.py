@@ -6,7 +6,7 @@ import pytest
 
 from grader.inputs.decisions import Decision
 from grader.inputs.measurements import StudentSubmission
-from grader.pipeline import report_on
+from grader.pipeline import mark
 from grader.records import Figure, PageRef, ScannedPage
 from reference.construction.mistakes import Mistake
 from samples.simulation.wording import declared_texts
@@ -37,7 +37,7 @@ def report(reading, scales=SCALES, **decided):
     rows = tuple(Decision("s01", None, name, verdict) for name, verdict in names.items())
     submission = StudentSubmission("s01", PUMP.variant, (), declared_texts(scales), decided=rows)
     page = ScannedPage(PageRef("s01.jpg"), reading=reading)
-    return report_on(submission, [page], PUMP.assignment, PUMP.rubric)
+    return mark(submission, [page], PUMP.assignment, PUMP.rubric)[0]
 
 
 def waiting(found):

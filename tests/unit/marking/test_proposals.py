@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from grader.inputs.measurements import StudentSubmission
-from grader.pipeline import report_on
+from grader.pipeline import mark
 from grader.records import Figure, PageRef, ScannedPage
 from samples.simulation.wording import declared_texts
 from tests.bench.contradictions import contradictions
@@ -39,7 +39,7 @@ def report(task, reading, scales):
     """The report of a sheet on which this was read."""
     submission = StudentSubmission("s01", task.variant, (), declared_texts(scales))
     page = ScannedPage(PageRef("s01.jpg"), reading=reading)
-    return report_on(submission, [page], task.assignment, task.rubric)
+    return mark(submission, [page], task.assignment, task.rubric)[0]
 
 
 def reports(name):

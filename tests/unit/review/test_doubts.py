@@ -7,7 +7,7 @@ import pytest
 from grader.inputs.decisions import Decision
 from grader.inputs.measurements import StudentSubmission
 from grader.marking.answers import along_of
-from grader.pipeline import report_on
+from grader.pipeline import mark
 from grader.records import MECHANISM, Figure, PageRef, Reason, ScannedPage, Unread
 from grader.review.doubts import doubts_of, figures_read
 from reference.construction.mistakes import Mistake
@@ -42,7 +42,7 @@ def reviewed(task, reading, **decided):
     told = declared_texts(rule_scales(task))
     submission = StudentSubmission("s01", task.variant, (), told, decided=rows)
     pages = [ScannedPage(PageRef("s01.jpg"), reading=reading)]
-    report = report_on(submission, pages, task.assignment, task.rubric)
+    report = mark(submission, pages, task.assignment, task.rubric)[0]
     return report, doubts_of(task, report, figures_read(report, pages))
 
 

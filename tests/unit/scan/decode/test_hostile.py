@@ -17,12 +17,12 @@ from PIL import Image
 
 from grader.folder.cache import PageCache
 from grader.folder.inventory import take_inventory
-from grader.pipeline import open_page
 from grader.records import Page, PageRef
 from grader.scan.decode import limits, pictures
 from grader.scan.decode.limits import MAX_FILE_BYTES, InputFile, load
 from grader.scan.decode.pages import count_pages, is_blank, page_of, pages_of
 from grader.scan.decode.tiff import Coding, damaged_row
+from grader.scan.page import open_page
 from grader.scan.register.registration import register
 from reference.errors import InputFileError
 from tests import hostile

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from grader.pipeline import open_page
 from grader.reading.page_scale import UPRIGHT_UNSURE
 from grader.records import Page, PageRef, Sheet
 from grader.scan.handwriting.letters import (
@@ -18,6 +17,7 @@ from grader.scan.handwriting.letters import (
     upright_nats,
 )
 from grader.scan.handwriting.model import COLUMN, JUNK, SIGNS, TWINS, normalised, recognise
+from grader.scan.page import open_page
 from grader.scan.register.registration import rectify
 from grader.scan.strokes.ink import find_ink
 from reference.authored.assignment import load_assignment
