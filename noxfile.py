@@ -17,7 +17,7 @@ def lint(session: nox.Session) -> None:
     session.run("lint-imports")
 
 
-QUICK = ("comparison", "cycle", "given_data", "inputs", "language", "lms", "older", "printed", "reference")
+QUICK = ("comparison", "cycle", "given_data", "language", "lms", "older", "printed", "reference", "tables")
 """Rooms that need no pictures: 1,900 tests in under a minute."""
 
 

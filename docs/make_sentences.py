@@ -75,6 +75,7 @@ EXAMPLES: Mapping[str, str] = {
     "readings": "1:5, 1:4", "rival": "2\u00a0%", "roster": "1:5", "rows": "30", "said": "0.036",
     "scan": "class.pdf#3", "scans": "400", "sign": "$", "size": "97\u00a0%", "strokes": "9000",
     "suffix": ".png", "unpacked": "1600", "values": "60 (a.csv), 65 (b.csv)", "wanted": "9",
+    "row": "2", "lines": "3", "source": "class.pdf", "fault": "line 2, v_A: '6O' is no number",
     "wide": "@90 mm", "zone_high": "@120 mm", "zone_wide": "@180 mm",
 }  # fmt: skip
 """Parameters by name: after ``@`` a number with its unit; other texts of the catalogues are translated."""

@@ -31,14 +31,6 @@ UNITS = (
 SIDES = {"left": N_("on the left"), "right": N_("on the right"), "ahead": N_("ahead"), "behind": N_("behind")}
 """Where a joint lies, as a datum of a variant."""
 
-ID_RULES = {
-    "id_letters": N_("letters A-Z a-z, digits, '.', '_' and '-', at most 64, are allowed"),
-    "id_dot": N_("it cannot name a folder: it begins or ends with a dot"),
-    "id_device": N_("it cannot name a folder: Windows has a device of that name"),
-    "id_result": N_("it cannot name a folder: a file of the results has that name"),
-}
-"""Why a text cannot be a student's id, which names the student's folder of results."""
-
 _LANGUAGE_NAMES = {"en": "English", "ro": "română", "ru": "русский"}
 
 

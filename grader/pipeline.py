@@ -19,8 +19,6 @@ from grader.comparison.task import Task, task_of
 from grader.documents import ReportDocument
 from grader.feedback.redo_steps import with_mistakes_explained
 from grader.feedback.sentences import criterion_feedback
-from grader.inputs.measurements import NOTHING_MEASURED, Measurements, StudentSubmission
-from grader.inputs.scale_text import SURE, declared_scales, sure_texts, understood_scales
 from grader.marking.answers import NONE_DECIDED, answers_of
 from grader.marking.decided import decide, open_again, with_decisions, with_nodes
 from grader.marking.mark import judge
@@ -43,6 +41,8 @@ from grader.scan.handwriting import captions
 from grader.scan.handwriting.fields import written_lengths
 from grader.scan.page import open_page, timed, turned, writing_on
 from grader.scan.strokes.nodes import node_places
+from grader.tables.measurements import NOTHING_MEASURED, Measurements, StudentSubmission
+from grader.tables.scale_text import SURE, declared_scales, sure_texts, understood_scales
 from grader.texts.spoken import of_error
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.construction.graph import Construction

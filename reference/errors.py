@@ -33,7 +33,7 @@ class PlanmarkError(Exception):
 
     exit_status = 2
 
-    def __init__(self, code: str, message: str, **parameters: float | str) -> None:
+    def __init__(self, code: str, message: str, **parameters: float | str | tuple[str, ...]) -> None:
         # A file's name may hold bytes that are no text; told as they are, no report could be written.
         self.message = message.encode("utf-8", "backslashreplace").decode()
         super().__init__(self.message)

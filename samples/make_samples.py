@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from grader.inputs.roster import RosterRow
 from grader.printed.answer_sheet import make_sheets
+from grader.tables.roster import RosterRow
 from reference.authored.assignment import Assignment, load_assignment
 from samples.simulation import (
     CAREFUL,

@@ -20,11 +20,11 @@ from rich.console import Console
 from grader.cli import terminal
 from grader.cli.app import new_table, progress
 from grader.files import samples_folder
-from grader.inputs.roster import read_roster
 from grader.pipeline import read_pages
 from grader.records import PageRef, Reading
 from grader.rubric import rubric_of
 from grader.scan.page import open_page
+from grader.tables.roster import read_roster
 from reference.authored.assignment import built_in, load_assignment
 from reference.construction.graph import evaluate
 from reference.kinematics.motion import move

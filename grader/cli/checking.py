@@ -15,13 +15,14 @@ from grader.cli.app import check_language
 from grader.documents import Quantity
 from grader.feedback.sentences import mistake_feedback
 from grader.files import shown_text, write_whole
-from grader.inputs.measurements import Measurements, columns_of, names_of, read_measurements
 from grader.language import N_, Tongue, tongue
 from grader.options import CheckOptions, Level, VariantOptions
 from grader.rubric import RubricFile, rubric_of
 from grader.self_check.advice import RESULTS, CheckedLine
 from grader.self_check.results import LEVELS, likely_mistakes
 from grader.self_check.values import check_values
+from grader.tables.measurements import Measurements, columns_of, names_of, read_measurements
+from grader.tables.reader import TableError
 from grader.texts.spoken import message, of_error, problem_documents, sentence
 from reference.authored.assignment import Assignment, Variant, built_in, load_assignment
 from reference.errors import CallError, MechanismError
@@ -71,7 +72,10 @@ def check_measured(name: str, options: CheckOptions) -> bool:
             raise _refused(speaker, "measured_needed", NO_MEASUREMENTS)
         return False
     all_right = True
-    students = read_measurements(file, names_of(assignment), lang=lang, is_own=True)
+    try:
+        students = read_measurements(file, names_of(assignment), is_own=True)
+    except TableError as error:
+        raise error.told(speaker) from error
     if page is not None and len(students) != 1:
         raise _refused(speaker, "page_students", PAGE_STUDENTS, file=file, count=len(students))
     if not students:
@@ -170,9 +174,9 @@ def _write_page(
 ) -> None:
     """The same as a page, with the plans drawn as measured."""
     from grader.feedback.student_page import About
-    from grader.inputs.measurements import StudentSubmission
     from grader.pipeline import mark
     from grader.self_check.page import check_page
+    from grader.tables.measurements import StudentSubmission
 
     page, lang = cast("Path", options.page), options.lang
     submission = StudentSubmission(entered.student_id or "", variant, measured=entered, lang=lang)

@@ -10,7 +10,7 @@ import typer
 from grader.cli.terminal import note
 
 if TYPE_CHECKING:
-    from grader.inputs.class_file import ClassSettings
+    from grader.tables.class_file import ClassSettings
 
 SETTINGS = "planmark.class_settings"
 """Where a command's context holds the settings that it found."""
@@ -60,8 +60,8 @@ def _settings(context: typer.Context, places: Iterable[Path]) -> "ClassSettings 
     file = next((place / "planmark.toml" for place in places if (place / "planmark.toml").is_file()), None)
     if file is None:
         return None
-    from grader.inputs.class_file import read_class_file
     from grader.lms.export import TARGETS
+    from grader.tables.class_file import read_class_file
 
     settings = read_class_file(file, TARGETS)
     values = dict(settings.values)

@@ -16,8 +16,6 @@ from grader.files import write_whole
 from grader.folder.cache import PageCache
 from grader.folder.inventory import submissions, take_inventory
 from grader.folder.workers import Limits, Workers, result_of
-from grader.inputs.measurements import names_of
-from grader.inputs.roster import RosterRow, read_roster
 from grader.owners.draft_roster import SURE, contact_sheet, draft_csv, suggest, thumbnail
 from grader.printed.answer_sheet import make_calibration, make_sheets
 from grader.printed.handout import make_handout
@@ -25,6 +23,8 @@ from grader.records import FloatArray, PageRef, Reason, Unread
 from grader.rubric import rubric_of
 from grader.scan.decode.pages import count_pages
 from grader.scan.register.calibration import ALL_IS_WELL, calibrate, residual_map
+from grader.tables.measurements import names_of
+from grader.tables.roster import RosterRow, read_roster
 from grader.texts.spoken import message
 from reference.authored.assignment import Variant, load_assignment
 from reference.errors import CallError, InputFileError

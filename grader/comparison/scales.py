@@ -9,7 +9,10 @@ from typing import Literal, cast
 from grader.comparison.evidence import DrawnVector, Evidence, Submission, gather
 from grader.comparison.task import Task, Yardstick
 from grader.comparison.verdicts import ALL_RIGHT, EVEN, FULL, NONE, Limit, MarkRange, by_rule, mark
-from grader.inputs.scale_text import (
+from grader.outcomes import UsedScale
+from grader.records import Reading, Reason, Unread, Value, Written
+from grader.rubric import ToleranceTable
+from grader.tables.scale_text import (
     EXAMPLES,
     SURE,
     ByRule,
@@ -18,9 +21,6 @@ from grader.inputs.scale_text import (
     Refused,
     parse_scale,
 )
-from grader.outcomes import UsedScale
-from grader.records import Reading, Reason, Unread, Value, Written
-from grader.rubric import ToleranceTable
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.uncertainty import spread
 from reference.quantities import unit_of

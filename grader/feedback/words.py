@@ -152,5 +152,5 @@ def _text_of(problem: Coded, message: str, file: str, speaker: Tongue, *, brief:
     # The message is in English, and an error's own words are more precise than a summary.
     if speaker.lang == ROOT_LANGUAGE and message:
         return ProblemText(message, "", file)
-    is_all_said = problem.parameters.keys() - {"detail", "page", "line"}
+    is_all_said = problem.parameters.keys() - {"detail", "page", "line"} and "more" not in problem.parameters
     return ProblemText(told, "" if is_all_said else str(problem.parameters.get("detail", "")), file)

@@ -49,8 +49,6 @@ from grader.folder.inventory import FileContent, Progress, natural_key, submissi
 from grader.folder.lock import only_run
 from grader.folder.submissions import Unusable, submissions_of
 from grader.folder.workers import ENDED, Limits, Pool, Whole, Workers
-from grader.inputs.measurements import StudentSubmission, names_of
-from grader.inputs.roster import Roster, read_roster
 from grader.lms.table import write_summary
 from grader.marking.report import unjudged_report
 from grader.marking.trust import opened_in, trust_of
@@ -62,6 +60,8 @@ from grader.records import PageRef, Reason, ScannedPage
 from grader.rubric import RubricFile, asked_of, rubric_of
 from grader.similarity.groups import by_chance, compared_together, find_similar
 from grader.similarity.submission import compared_submission
+from grader.tables.measurements import StudentSubmission, names_of
+from grader.tables.roster import Roster, read_roster
 from grader.texts.spoken import unmatched_document
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, PlanmarkError

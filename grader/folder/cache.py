@@ -40,7 +40,7 @@ SCAN_STAGE = (
 )  # fmt: skip
 """What `grader.scan.page` and `grader.pipeline.scan` call."""
 READ_STAGE = (
-    "grader.reading.read", "grader.inputs.scale_text", "grader.scan.handwriting.captions",
+    "grader.reading.read", "grader.tables.scale_text", "grader.scan.handwriting.captions",
     "grader.scan.strokes.nodes",
 )  # fmt: skip
 """What `grader.pipeline.read_submission` calls beside them."""

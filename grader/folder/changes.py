@@ -23,8 +23,8 @@ from grader.documents import (
     Verdict,
 )
 from grader.files import Stamp, stamp_of, write_whole
-from grader.inputs.measurements import StudentSubmission
 from grader.options import ClassOptions
+from grader.tables.measurements import StudentSubmission
 from reference.errors import CallError
 
 Key = tuple[str, int | None]

@@ -43,9 +43,9 @@ from grader.folder.batch import Job
 from grader.folder.cache import MARK_STAGE, PageCache, digest_of, stage_digest
 from grader.folder.changes import CACHE_FOLDER
 from grader.folder.workers import Limits, Workers
-from grader.inputs.decisions import FILE_NAME as DECISIONS
 from grader.records import PageRef, Reason
 from grader.scan.decode.limits import MAX_FILE_BYTES
+from grader.tables.decisions import FILE_NAME as DECISIONS
 from grader.texts.spoken import message
 from reference.errors import CallError, PlanmarkError
 

@@ -5,7 +5,6 @@ on which to look at them, and `pages.csv` with an empty column. The second gives
 as they were seen. Pages stand in random order, under numbers. No student, date, file name or path is told.
 """
 
-import csv
 import io
 import json
 import zipfile
@@ -19,23 +18,25 @@ import numpy as np
 
 from grader.documents import CriterionDocument, ReportDocument, SaidDocument
 from grader.feedback.words import environment
-from grader.files import guarded, make_folder, write_whole
+from grader.files import guarded, make_folder, unguarded, write_whole
 from grader.folder.batch import Batch, Graded, files_of, pages_read
 from grader.folder.cache import digest_of
 from grader.folder.inventory import shown_names
-from grader.inputs.decision_texts import audit_answer
 from grader.marking.trust import said_of
 from grader.overlay.covered import Keep, bare_png, covered, painted, reopened, upright_pixels
-from grader.records import MECHANISM, ZONE_SLACK_MM, Box, FloatArray, ScannedPage, Sheet
+from grader.records import MECHANISM, ZONE_SLACK_MM, Box, FloatArray, Reason, ScannedPage, Sheet
 from grader.scan.decode.pages import decode
 from grader.scan.handwriting.lines import find_lines
 from grader.scan.pixels import TITLE_BLOCK_MM, mapped
+from grader.tables.decision_texts import audit_answer
+from grader.tables.reader import TableKind, check_rows, short, written
 from reference.construction.graph import Construction
 from reference.errors import CallError
 from reference.plan import construction_for
 
 PAGES, TRUTH, STATE, LOOK = "pages.csv", "truth.jsonl", "state.txt", "index.html"
 COLUMNS = ("page", "give_away", "cover")
+_ANSWERS = TableKind("answers_wrong", COLUMNS, COLUMNS[:2], 20_000_000, 200_000)
 YES, NO = frozenset({"yes", "da", "да"}), frozenset({"no", "nu", "нет"})
 USUAL_BLOCK_MM = (200.0, 70.0)
 """ISO 7200 and GOST 2.104: 180 to 185 by 55 mm at most, 10 mm from the paper's edges."""
@@ -144,18 +145,13 @@ def _make(preview: Path, known: Sequence[Known], state: str, lang: str) -> Colle
 
 def _ask(preview: Path, cells: Sequence[tuple[str, str, str]], lang: str) -> None:
     """Write the page on which a person looks, and the table of the answers so far."""
-    write_whole(preview / PAGES, _table(cells))
+    rows = [COLUMNS, *cells]
+    write_whole(preview / PAGES, written(map(guarded, row) for row in rows))
     write_whole(preview / LOOK, environment(lang).get_template("collect.html").render(pages=cells))
 
 
 def _lines(rows: Sequence[Row]) -> str:
     return "".join(f"{json.dumps(row)}\n" for row in rows)
-
-
-def _table(cells: Sequence[tuple[str, str, str]]) -> str:
-    buffer = io.StringIO()
-    csv.writer(buffer, lineterminator="\r\n").writerows(map(guarded, row) for row in [COLUMNS, *cells])
-    return buffer.getvalue()
 
 
 def _anonymous(page: ScannedPage, construction: Construction, row: Row) -> tuple[bytes, FloatArray] | None:
@@ -319,35 +315,22 @@ def _give(preview: Path, file: Path, lang: str) -> Collected:
 def read_answers(preview: Path, pages: Sequence[str]) -> dict[str, tuple[bool | None, list[Box]]]:
     """What a person said of each page: whether it is given away (None: nothing yet), and boxes to paint.
 
-    Raises CallError with all that cannot be understood.
+    Raises TableError with all that cannot be understood.
     """
     path = preview / PAGES
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise CallError(
-            "answers_wrong", f"{path}: cannot be read ({error}); remove {preview}, begin again"
-        ) from error
-    table = list(csv.DictReader(io.StringIO(text), delimiter=";" if ";" in text.partition("\n")[0] else ","))
+    rows = _ANSWERS.table(_ANSWERS.text(path, str(path)), str(path)).rows
     found: dict[str, tuple[bool | None, list[Box]]] = {}
-    faults = []
-    for line, row in enumerate(table, 2):
-        cell = {name: (row.get(name) or "").strip() for name in COLUMNS}
-        said, boxes = cell["give_away"].lower(), _boxes(cell["cover"])
-        if cell["page"] not in pages or cell["page"] in found:
-            faults.append(f"line {line}: '{cell['page'][:40]}' is no page of this preview, or is there twice")
+    for row in rows:
+        page, said, boxes = unguarded(row["page"]), row["give_away"].lower(), _boxes(row["cover"])
+        if page not in pages or page in found:
+            row.fault("page", Reason("no_preview_page", {"text": short(page)}))
         elif said not in {"", *YES, *NO}:
-            faults.append(f"line {line}: give_away '{said[:40]}': write yes or no")
-        elif boxes is None:
-            faults.append(
-                f"line {line}: cover: write x y width height in pixels of the picture, several with ; between"
-            )
-        else:
-            found[cell["page"]] = (None if not said else said in YES), boxes
-    faults += [f"{name} is missing" for name in pages if name not in found] if not faults else []
-    if faults:
-        more = f"\n... and {len(faults) - 5} more" if len(faults) > 5 else ""
-        raise CallError("answers_wrong", f"{path}:\n" + "\n".join(faults[:5]) + more)
+            row.fault("give_away", Reason("yes_or_no", {"text": short(said)}))
+        if boxes is None:
+            row.fault("cover", Reason("no_boxes"))
+        found[page] = (None if not said else said in YES), boxes or []
+    missing = [Reason("page_left_out", {"text": name}) for name in pages if name not in found]
+    check_rows(_ANSWERS, str(path), rows, missing)
     return found
 
 

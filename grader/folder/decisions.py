@@ -14,18 +14,17 @@ import numpy as np
 
 from grader.documents import ReportDocument, StaleDecisionDocument, UnmatchedDocument
 from grader.folder.cache import digest_of
-from grader.inputs.decisions import FILE_NAME, Decision, read_table
-from grader.inputs.measurements import StudentSubmission
-from grader.inputs.roster import Roster, RosterRow
 from grader.marking.decided import NOT_APPLIED, why_not
 from grader.printed.layout import PAGE_MM
-from grader.records import PageRef, Reason
+from grader.records import PageRef, Reason, Value
 from grader.rubric import RubricFile
+from grader.tables.decisions import FILE_NAME, Decision, read_table
+from grader.tables.measurements import StudentSubmission
+from grader.tables.reader import at, near
+from grader.tables.roster import Roster, RosterRow
 from grader.texts.spoken import ENGLISH, clause, unmatched_document
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.construction.derive import construction_of
-from reference.construction.graph import Construction
-from reference.errors import Finding, near_names
 
 _DIGITS = 8
 """Of each digest: two of a class are the same by chance once in 10^5 classes."""
@@ -125,7 +124,7 @@ class ClassDecisions:
 
     file: str
     rows: Sequence[Decision] = ()
-    faults: list[Finding] = field(default_factory=list)
+    faults: list[Reason] = field(default_factory=list)
     stale: list[StaleDecisionDocument] = field(default_factory=list)
     pages: dict[PageKey, Decision] = field(default_factory=dict)
     """What was decided of each page, as far as it applies."""
@@ -133,8 +132,8 @@ class ClassDecisions:
     def problems(self) -> list[UnmatchedDocument]:
         """The faults, by their lines."""
         return [
-            unmatched_document(Reason("decision_fault", {"line": one.line, "detail": str(one)}, self.file))
-            for one in sorted(self.faults, key=lambda fault: fault.line)
+            unmatched_document(Reason("decision_fault", {"why": one.code, **one.parameters}, self.file))
+            for one in sorted(self.faults, key=lambda fault: int(str(fault.parameters["line"])))
         ]
 
     # Pages -----------------------------------------------------------------------------------
@@ -148,11 +147,9 @@ class ClassDecisions:
             if page is None and row.basis:
                 self._out_of_date(row, "page_gone")
             elif page is None:
-                self._fault(row, "criterion", f"there is no page {key[1]} of {key[0]} in the folder")
+                self._fault("page_not_there", row, "criterion", source=key[0], wanted=key[1])
             elif row.scan.page is None and page.pages > 1:
-                self._fault(
-                    row, "criterion", f"{page.file} has {page.pages} pages: write which, page:{page.file}#1"
-                )
+                self._fault("page_open", row, "criterion", source=page.file, pages=page.pages)
             elif (why := _why_stale(row.basis, page_basis(page))) is not None:
                 self._out_of_date(row, why)
             else:
@@ -180,11 +177,10 @@ class ClassDecisions:
             if len(fitting) == 1:
                 owners[key] = fitting[0]
             elif listed:
-                self._fault(row, "position", f"{student} has the positions {_positions(listed)}: write which")
+                self._fault("position_open", row, "position", student=student, **_positions(listed))
             else:
-                self._fault(
-                    row, "verdict", f"{student} is not on the roster{_meant(student, roster.student_ids)}"
-                )
+                meant = near(student, roster.student_ids)
+                self._fault("student_not_listed", row, "verdict", student=student, **meant)
         return owners
 
     # Submissions -----------------------------------------------------------------------------
@@ -208,12 +204,10 @@ class ClassDecisions:
         for index, row in found:
             fault = check.fault_of(row)
             if twice[index, row.criterion] > 1:
-                fault = (
-                    "position",
-                    f"{row.criterion} of {row.student_id} is decided on another line too; leave one",
-                )
+                known = {"criterion": row.criterion, "student": row.student_id}
+                fault = "position", Reason("decided_twice", known)
             if fault is not None:
-                self._fault(row, *fault)
+                self.faults.append(at(fault[1], row.line, fault[0]))
                 continue
             asked = _asked(students[index], rubric, row.criterion)
             why = _why_stale(row.basis, _basis([*about[index], asked])) if row.basis else None
@@ -238,11 +232,11 @@ class ClassDecisions:
         if len(fitting) == 1:
             return fitting[0]
         if own:
-            places = _positions(one for _, one in own)
-            self._fault(row, "position", f"{row.student_id} has the positions {places}: write which")
+            known = _positions([one for _, one in own])
+            self._fault("position_open", row, "position", student=row.student_id, **known)
         else:
-            near = _meant(row.student_id, [one.student_id for one in students])
-            self._fault(row, "student_id", f"{row.student_id} is nobody in this class{near}")
+            meant = near(row.student_id, [one.student_id for one in students])
+            self._fault("student_nobody", row, "student_id", student=row.student_id, **meant)
         return None
 
     def note_failures(self, reports: Iterable[ReportDocument]) -> None:
@@ -256,12 +250,12 @@ class ClassDecisions:
                 keys = [(report.student_id, position, criterion) for position in (report.position, None)]
                 row = next((lines[key] for key in keys if key in lines), None)
                 if row is not None:
-                    self._fault(row, "criterion", problem.message)
+                    self._fault(str(problem.parameters["why"]), row, "criterion")
 
     # Both ------------------------------------------------------------------------------------
 
-    def _fault(self, row: Decision, column: str, why: str) -> None:
-        self.faults.append(Finding(f"line {row.line}, {column}", why, line=row.line))
+    def _fault(self, code: str, row: Decision, column: str, **known: Value) -> None:
+        self.faults.append(at(Reason(code, known), row.line, column))
 
     def _out_of_date(self, row: Decision, code: str) -> None:
         """Note a decision to be made again; an answer of an audit is no decision, and just stops counting."""
@@ -286,18 +280,14 @@ def decided(
 
 
 def class_decisions(path: Path) -> ClassDecisions:
-    """The decisions in a file, none where there is none. Raises InputFileError for a fault of all of it."""
+    """The decisions in a file, none where there is none. Raises TableError for a fault of all of it."""
     table = read_table(path)
     return ClassDecisions(path.name, table.rows, list(table.faults))
 
 
-def _positions(rows: Iterable[RosterRow | StudentSubmission]) -> str:
-    return ", ".join("none" if row.position is None else str(row.position) for row in rows)
-
-
-def _meant(name: str, known: Iterable[str]) -> str:
-    near = near_names(name, known, most=1)
-    return f"; is {near[0]} meant?" if near else ""
+def _positions(rows: Sequence[RosterRow | StudentSubmission]) -> dict[str, Value]:
+    positions = tuple(str(row.position) for row in rows if row.position is not None)
+    return {"positions": positions} if positions else {}
 
 
 @dataclass(frozen=True)
@@ -308,17 +298,13 @@ class _Check:
     rubric: RubricFile
 
     @cached_property
-    def construction(self) -> Construction:
-        """Of any variant: all have the same nodes."""
-        mechanism = self.assignment.mechanism(self.assignment.variants()[:1])
-        return construction_of(mechanism, accelerations=self.rubric.needs_accelerations)
-
-    @cached_property
     def nodes(self) -> Mapping[str, list[str]]:
-        """The nodes of each figure."""
-        return {figure: [step.node for step in steps] for figure, steps in self.construction.figures.items()}
+        """The nodes of each figure, the same of all variants."""
+        mechanism = self.assignment.mechanism(self.assignment.variants()[:1])
+        construction = construction_of(mechanism, accelerations=self.rubric.needs_accelerations)
+        return {figure: [step.node for step in steps] for figure, steps in construction.figures.items()}
 
-    def fault_of(self, row: Decision) -> tuple[str, str] | None:
+    def fault_of(self, row: Decision) -> tuple[str, Reason] | None:
         """The column that is wrong, and why; None for a decision that fits."""
         if row.kind == "node":
             return self._node(row)
@@ -327,19 +313,22 @@ class _Check:
         criteria = {one.id: one for one in self.rubric.criterion}
         asked = row.criterion.removeprefix("audit:")
         if asked not in criteria:
-            return "criterion", f"'{asked}' is not in this rubric{_meant(asked, criteria)}"
+            return "criterion", Reason("criterion_unknown", {"text": asked, **near(asked, criteria)})
         if row.kind == "audit":
             return None
         why = why_not(row, criteria[row.criterion], self.rubric)
         return None if why is None else ("points", why)
 
-    def _node(self, row: Decision) -> tuple[str, str] | None:
+    def _node(self, row: Decision) -> tuple[str, Reason] | None:
         figure, node = row.node
         if figure not in self.nodes:
-            return "criterion", f"'{figure}' is no figure here: {', '.join(self.nodes)}"
+            return "criterion", Reason("figure_unknown", {"text": figure, "names": tuple(self.nodes)})
         if node not in self.nodes[figure]:
-            return "criterion", f"'{node}' is no node of {figure}: {', '.join(self.nodes[figure])}"
-        x, y = row.place
-        if not (0.0 <= x <= PAGE_MM[0] and 0.0 <= y <= PAGE_MM[1]):
-            return "verdict", f"{x:g},{y:g} lies beside the sheet of {PAGE_MM[0]:g} x {PAGE_MM[1]:g} mm"
+            known: dict[str, Value] = {"text": node, "figure": figure, "names": tuple(self.nodes[figure])}
+            return "criterion", Reason("node_unknown", known)
+        (x, y), (wide, high) = row.place, PAGE_MM
+        if not (0.0 <= x <= wide and 0.0 <= y <= high):
+            return "verdict", Reason(
+                "place_outside", {"text": row.verdict, "wide_mm": int(wide), "high_mm": int(high)}
+            )
         return None

@@ -18,11 +18,12 @@ from pathlib import PurePath
 from typing import Any
 
 from grader.documents import UnmatchedDocument
-from grader.inputs.measurements import Measurements, StudentSubmission, combined
-from grader.inputs.roster import Roster, RosterRow, why_no_id
 from grader.owners.pages import How, Owned, PageOwners, student_of_name
 from grader.records import Reason, Value
-from grader.texts.spoken import message, of_error, unmatched_document
+from grader.tables.measurements import Measurements, StudentSubmission, combined
+from grader.tables.reader import why_no_id
+from grader.tables.roster import Roster, RosterRow
+from grader.texts.spoken import of_error, unmatched_document
 from reference.authored.assignment import Assignment, Variant
 from reference.errors import CallError
 
@@ -88,8 +89,9 @@ class _Submissions:
             return Unusable((problem,), (str(named), student), entered.position)
         student = named if student is None and entered.line is None else student
         if student is None:
-            why = "; ".join(map(message, entered.problems))
-            return Unusable((_unmatched(entered, {"detail": why} if why else {}),))
+            first, *others = entered.problems or [Reason("")]
+            more: dict[str, Value] = {"more": len(others)} if others else {}
+            return Unusable((_unmatched(entered, {**first.parameters, **more}),))
         if not entered.is_usable:
             return Unusable(entered.problems, (student,), entered.position)
         key = self.key_of(student, entered)

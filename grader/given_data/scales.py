@@ -8,7 +8,7 @@ import numpy as np
 from grader.comparison.evidence import DrawnVector
 from grader.comparison.task import Task
 from grader.given_data.sets import ExactDrawings
-from grader.inputs.scale_text import Declared, parse_scale
+from grader.tables.scale_text import Declared, parse_scale
 from reference.geometry import FloatArray
 from reference.quantities import kind_of
 

@@ -8,8 +8,9 @@ from types import MappingProxyType
 
 from grader.documents import ReportDocument, ResultsDocument
 from grader.files import result_folders
-from grader.inputs.roster import read_roster, why_no_id
 from grader.options import ExportOptions
+from grader.tables.reader import why_no_id
+from grader.tables.roster import read_roster
 from reference.errors import CallError, InputFileError, lines_of
 
 Content = Mapping[str, bytes | Path]

@@ -369,8 +369,8 @@ PlatformEntry = tuple[str, str, float | None]
 def _criteria_of(path: Path) -> list[PlatformEntry]:
     """The criteria in a table ``criterion,id`` or in a platform's answer."""
     if path.suffix.lower() == ".csv":
-        rows = read_table(path, CRITERION_COLUMNS)
-        return [(row["id"], row["criterion"], None) for _, row in rows if row.get("id")]
+        _, rows = read_table(path, CRITERION_COLUMNS)
+        return [(row["id"], row["criterion"], None) for row in rows if row["id"]]
     known = list(criteria_in(read_answer(path)))
     if not known:
         raise InputFileError(

@@ -17,8 +17,10 @@ from typing import ClassVar, Self
 from grader.documents import CriterionDocument, ReportDocument, ResultsDocument
 from grader.files import OutputError, guarded, write_whole
 from grader.lms.grades import Delivery, Grade, Options, Person, in_a_row, ready
+from grader.records import Reason
+from grader.tables.reader import Row, TableKind, check_rows, short
 from reference.authored.variant_table import delimiter_of
-from reference.errors import CallError, InputFileError, lines_of
+from reference.errors import CallError, InputFileError
 
 Cell = str | int | float | None
 
@@ -134,58 +136,46 @@ STUDENT_COLUMNS = ("student_id", "id", "username", "participant")
 def with_ids(people: Mapping[str, Person], path: Path) -> dict[str, Person]:
     """People with the platform's numbers: ``student_id``, and ``id``, ``username`` or ``participant``.
 
-    Raises InputFileError with every fault of the table.
+    Raises TableError with every fault of the table.
     """
-    rows = read_table(path, STUDENT_COLUMNS)
-    faults = []
+    kind, rows = read_table(path, STUDENT_COLUMNS)
     line_of: dict[tuple[str, str], int] = {}
     joined = dict(people)
-    for line, row in rows:
-        for column, cell in row.items():
-            before = line_of.setdefault((column, cell.casefold()), line)
-            if cell and before != line:
-                faults.append(f"line {line}: the same {column} '{cell}' as in line {before}")
-    for line, row in rows:
-        participant = row.get("participant", "")
-        if participant and not (participant.isascii() and participant.isdigit()):
-            faults.append(f"line {line}: '{participant}' is no participant's number")
-            continue
+    for row in rows:
+        for column, cell in row.text.items():
+            first = line_of.setdefault((column, cell.casefold()), row.line)
+            if cell and first != row.line:
+                row.fault(column, Reason("value_twice", {"text": short(cell), "first": first}))
+        participant = row["participant"]
+        is_number = participant.isascii() and participant.isdigit()
+        if participant and not is_number:
+            row.fault("participant", Reason("no_participant", {"text": short(participant)}))
         person = joined.get(row["student_id"], Person())
         joined[row["student_id"]] = replace(
             person,
-            platform_id=row.get("id", ""),
-            username=row.get("username", "") or person.username,
-            participant=int(participant) if participant else None,
+            platform_id=row["id"],
+            username=row["username"] or person.username,
+            participant=int(participant) if is_number else None,
         )
-    if faults:
-        raise InputFileError("ids", f"{path}: is no table of the platform's numbers\n{lines_of(faults)}")
+    check_rows(kind, str(path), rows)
     return joined
 
 
-def read_table(path: Path, columns: Sequence[str]) -> list[tuple[int, dict[str, str]]]:
-    """Rows of a small table, with their lines; blank lines are passed over, the first column is required.
+def read_table(path: Path, columns: tuple[str, ...]) -> tuple[TableKind, Sequence[Row]]:
+    """Rows of a small table, and how it must be; a field for each column, the first one filled in.
 
-    Raises InputFileError with the file's faults.
+    Raises TableError with the file's faults.
     """
-    table = parse(bytes_of(path, "ids"), str(path), delimiter=None)
-    lines = [
-        (row + 1, [table.value(row, column).strip() for column in range(len(cells))])
-        for row, cells in enumerate(table.rows)
-    ]
-    lines = [(line, cells) for line, cells in lines if any(cells)]
-    header, key = lines[0][1] if lines else [], columns[0]
-    is_wrong = any(name not in columns or header.count(name) > 1 for name in header)
-    if key not in header or is_wrong or len(lines) < 2:
-        raise InputFileError(
-            "ids",
-            f"{path}: the first line must name columns out of {', '.join(columns)}, {key} among them, and a"
-            f" row follow for each (found: {', '.join(header) or 'nothing'}; rows: {max(len(lines) - 1, 0)})",
-        )
-    faults = [f"line {line}: has {len(cells)} cells" for line, cells in lines if len(cells) != len(header)]
-    faults += [f"line {line}: no {key}" for line, cells in lines if not cells[header.index(key)]]
-    if faults:
-        raise InputFileError("ids", f"{path}: {len(header)} columns are named\n{lines_of(faults)}")
-    return [(line, dict(zip(header, cells, strict=True))) for line, cells in lines[1:]]
+    kind = TableKind("ids", columns, columns[:1], 5_000_000, 20_000, is_strict=True)
+    table = kind.table(kind.text(path, str(path)), str(path))
+    for row in table.rows:
+        count, wide = len(row.cells), len(row.header)
+        if count != wide:
+            row.fault("", Reason("fields_missing", {"fields": count, "columns": wide}))
+        elif not row[columns[0]]:
+            row.fault(columns[0], Reason("cell_empty"))
+    check_rows(kind, str(path), table.rows)
+    return kind, table.rows
 
 
 def bytes_of(path: Path, code: str) -> bytes:

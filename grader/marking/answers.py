@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from grader.comparison.outcomes import CREDITED
 from grader.comparison.task import Task
 from grader.documents import Quantity
-from grader.inputs.decisions import Decision
 from grader.outcomes import Judgement, Outcome
 from grader.records import Figure, ReadNode, ScannedPage
+from grader.tables.decisions import Decision
 
 Places = dict[tuple[str, str], tuple[float, float]]
 """Places of nodes, mm on the sheet, y down, by figure and node."""

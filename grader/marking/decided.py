@@ -16,14 +16,14 @@ from grader.documents import (
     Tolerance,
     Verdict,
 )
-from grader.inputs.decisions import Decision
-from grader.inputs.measurements import StudentSubmission
 from grader.marking.mark import CHARGED, DECIMALS, score, with_mistake
 from grader.marking.settling import at_stake
 from grader.outcomes import Judgement, NamedMistake, Outcome
 from grader.reading.corrected import corrected
-from grader.records import Reason, ScannedPage
+from grader.records import Reason, ScannedPage, Value
 from grader.rubric import CriterionTable, RubricFile
+from grader.tables.decisions import Decision
+from grader.tables.measurements import StudentSubmission
 from grader.texts.spoken import problem_documents
 from reference.authored.assignment import Assignment
 from reference.construction.derive import construction_of
@@ -33,20 +33,19 @@ NOT_APPLIED = "decision_not_applied"
 """The problem of a decision that does not fit what was read; its parameter names the criterion."""
 
 
-def why_not(row: Decision, criterion: CriterionTable, rubric: RubricFile) -> str | None:
+def why_not(row: Decision, criterion: CriterionTable, rubric: RubricFile) -> Reason | None:
     """Why the points of a decision contradict its verdict or the rubric; None where they do not."""
     maximum, points = rubric.points[criterion.id], row.points
     if points is None:
         return None
     if points > maximum and not math.isclose(points, maximum, abs_tol=1e-6):
-        return f"{points:g} points are more than the {maximum:g} of {criterion.id}"
+        known: dict[str, Value] = {"given_points": points, "most_points": maximum, "criterion": criterion.id}
+        return Reason("points_above", known)
     right: Mapping[str, float] = {"full": maximum, "none": 0.0}
     if row.verdict in right and not math.isclose(points, right[row.verdict], abs_tol=1e-6):
-        gives = f"{row.verdict} gives {right[row.verdict]:g} points, not {points:g}"
-        return f"{gives}; leave them blank, or write partial"
-    if row.verdict == "not_judged":
-        return "what is not judged has no points; leave them blank"
-    return None
+        known = {"verdict": row.verdict, "most_points": right[row.verdict], "given_points": points}
+        return Reason("points_contradict", known)
+    return Reason("points_contradict") if row.verdict == "not_judged" else None
 
 
 def decide(judgement: Judgement, rubric: RubricFile, rows: Sequence[Decision]) -> Judgement:

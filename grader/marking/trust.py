@@ -32,12 +32,12 @@ from grader.documents import (
     TrustDocument,
     Verdict,
 )
-from grader.inputs.decision_texts import audit_answer
 from grader.marking.decided import FOR_THE_STUDENT
 from grader.marking.mark import score
 from grader.outcomes import Judgement, Outcome
 from grader.records import FloatArray, Reason
 from grader.rubric import RubricFile
+from grader.tables.decision_texts import audit_answer
 from reference.drawing.canvas import A3_MM
 
 CONFIDENCE = 0.95

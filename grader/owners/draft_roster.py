@@ -12,22 +12,22 @@ Students who made mistakes match their own variant less well.
 
 import base64
 import contextlib
-import csv
 import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from html import escape
 
 import numpy as np
 from PIL import Image
 
+from grader.feedback.words import environment
 from grader.files import guarded
-from grader.inputs.roster import COLUMNS, DRAFT_COLUMNS, Roster, RosterRow
-from grader.language import N_, Tongue, tongue
-from grader.owners.pages import How, Owned, assign_pages
+from grader.language import Tongue, tongue
+from grader.owners.pages import How, Owned, assign_pages, who
 from grader.records import FloatArray, GreyImage, PageRef, Reason
 from grader.scan.pixels import shrink
-from grader.texts.spoken import unmatched_document
+from grader.tables.reader import written
+from grader.tables.roster import COLUMNS, DRAFT_COLUMNS, Roster, RosterRow
+from grader.texts.spoken import ENGLISH, clause, clauses, sentence
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.construction.graph import Construction, bars, evaluate, parameters_of
 from reference.errors import CallError
@@ -52,14 +52,14 @@ class Suggestion:
     Attributes
     ----------
     row : None where nothing suggests one
-    why : the evidence, a sentence
+    why : the evidence
     sure : a source that decides says so, not similarity
     among : rows between which similarity leaves the choice
     """
 
     source: PageRef
     row: RosterRow | None
-    why: str
+    why: tuple[Reason, ...]
     sure: bool
     among: tuple[RosterRow, ...] = ()
 
@@ -102,8 +102,7 @@ def suggest(
         if (first is None or not first.sure) and not contested and strokes_of is not None and variants:
             first = _by_similarity(page, strokes_of(page), assignment, variants, first) or first
         if first is None:
-            why = unmatched_document(reasons[page], page.page).message
-            first = Suggestion(page, None, why, sure=False)
+            first = Suggestion(page, None, (reasons[page],), sure=False)
         suggestions.append(first)
     return RosterDraft(tuple(_in_order(suggestions, roster)), known.problems)
 
@@ -113,7 +112,7 @@ def _certain(owned: Owned, roster: Roster) -> Suggestion:
         (row for row in roster.rows_of(owned.student_id) if row.position in (None, owned.position)), None
     )
     sure = owned.how[0] in {How.CODE, How.SCANS, How.NAME}
-    return Suggestion(owned.source, row, ", ".join(how.value for how in owned.how), sure)
+    return Suggestion(owned.source, row, tuple(Reason(how.value) for how in owned.how), sure)
 
 
 def _variants(roster: Roster, assignment: Assignment) -> dict[Variant, list[RosterRow]]:
@@ -142,15 +141,16 @@ def _by_similarity(
         variant for variant, score in zip(variants, matched, strict=True) if score > CLEAR * matched.max()
     ]
     rows = [row for variant in near for row in variants[variant]]
-    names = ", ".join(_who(row) for row in rows[:_NAMED]) + (", ..." if len(rows) > _NAMED else "")
-    why = f"the drawing looks like the variant of {names}"
+    names = tuple(who(row) for row in rows[:_NAMED]) + (("...",) if len(rows) > _NAMED else ())
+    why = (Reason("looks_like", {"students": names}),)
     if before is None or before.row is None:
         return Suggestion(page, rows[0] if len(rows) == 1 else None, why, sure=False, among=tuple(rows))
     if before.row in rows:
-        return replace(before, why=f"{before.why}; {why}")
+        return replace(before, why=before.why + why)
     # What is drawn speaks louder than an order that one missing sheet shifts.
     row = rows[0] if len(rows) == 1 else None
-    return Suggestion(page, row, f"{why}; by {before.why}: {_who(before.row)}", sure=False)
+    others = tuple(Reason(how.code, {"claim": who(before.row)}) for how in before.why)
+    return Suggestion(page, row, why + others, sure=False)
 
 
 def _by_likely_order(
@@ -180,7 +180,7 @@ def _in_order(suggestions: list[Suggestion], roster: Roster) -> list[Suggestion]
         if row is None and suggestion.among:
             row = next((row for row in suggestion.among if place[id(row)] >= reached), None)
             if row is not None:
-                why = f"{suggestion.why}; by the roster's order {_who(row)}"
+                why = (*suggestion.why, Reason(How.ORDER.value, {"claim": who(row)}))
                 suggestion = replace(suggestion, row=row, why=why)  # noqa: PLW2901
         if row is not None:
             if place[id(row)] < reached:
@@ -190,23 +190,17 @@ def _in_order(suggestions: list[Suggestion], roster: Roster) -> list[Suggestion]
     return settled
 
 
-def _who(row: RosterRow) -> str:
-    return row.student_id if row.position is None else f"{row.student_id} (position {row.position})"
-
-
 def draft_csv(roster: Roster, draft: RosterDraft) -> str:
     """The roster with `scans` suggested, and the columns `why` and `sure` (`yes` or `check`).
 
     Pages that nobody is suggested for stand on the contact sheet alone: a line without a student
     would be no roster.
     """
-    text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*COLUMNS, *DRAFT_COLUMNS])
+    rows = [[*COLUMNS, *DRAFT_COLUMNS]]
     for row in roster.rows:
         mine = [suggestion for suggestion in draft.suggestions if suggestion.row is row]
-        writer.writerow(map(guarded, [*_cells(row), *_judged(row, mine)]))
-    return text.getvalue()
+        rows.append([*_cells(row), *_judged(row, mine)])
+    return written((map(guarded, row) for row in rows), end="\n")
 
 
 def _cells(row: RosterRow) -> list[str]:
@@ -227,9 +221,15 @@ def _judged(row: RosterRow, mine: list[Suggestion]) -> list[str]:
     pages = list(dict.fromkeys([*map(str, row.scans), *(str(suggestion.source) for suggestion in mine)]))
     whole = {ref.file for ref in row.scans if ref.page is None}
     pages = [page for page in pages if page in whole or page.rpartition("#")[0] not in whole]
-    why = "; ".join(dict.fromkeys(suggestion.why for suggestion in mine)) or "no page was found"
+    why = said([one for suggestion in mine for one in suggestion.why] or [Reason("no_page_found")], ENGLISH)
     sure = SURE if mine and all(suggestion.sure for suggestion in mine) else CHECK
     return [";".join(pages), why, sure]
+
+
+def said(why: Sequence[Reason], speaker: Tongue) -> str:
+    """The evidence in words."""
+    told = (clause(one, speaker) if clauses(one.code) else sentence(one, speaker) for one in why)
+    return "; ".join(dict.fromkeys(told))
 
 
 # Similarity of strokes and figures ------------------------------------------------------------------
@@ -352,15 +352,6 @@ def _on_strokes(tail: FloatArray, head: FloatArray, strokes: FloatArray) -> Floa
 _THUMBNAIL_PX = 640
 _QUALITY = 60
 
-_STYLE = """
-body{font:15px/1.35 system-ui,sans-serif;margin:1.5rem;color:#222;background:#fafafa}
-main{display:grid;grid-template-columns:repeat(auto-fill,minmax(22rem,1fr));gap:1rem}
-figure{margin:0;padding:.6rem;background:#fff;border:1px solid #ccc;border-left:.5rem solid #c47f00}
-figure.sure{border-left-color:#2a7d2a}
-img{width:100%;height:auto;display:block}
-figcaption b{font-size:1.1em}
-"""
-
 
 def thumbnail(grey: GreyImage) -> bytes:
     """A page reduced, as JPEG."""
@@ -372,35 +363,8 @@ def thumbnail(grey: GreyImage) -> bytes:
 
 def contact_sheet(entries: Sequence[tuple[Suggestion, bytes]], lang: str = "en") -> str:
     """A self-contained HTML page: every page's picture, its file, the student suggested, and why."""
-    words = tongue(lang)
-    title = escape(words.gettext(N_("Whose page is whose")))
-    advice = escape(
-        words.gettext(
-            N_("Check the pages with an orange edge, correct the draft, and hand it in as the roster.")
-        )
-    )
-    figures = "\n".join(_figure(suggestion, picture, words) for suggestion, picture in entries)
-    return (
-        f'<!doctype html>\n<html lang="{words.lang}"><head><meta charset="utf-8"><title>{title}</title>'
-        f"<style>{_STYLE}</style></head>\n<body><h1>{title}</h1><p>{advice}</p>\n<main>\n{figures}\n</main></body></html>\n"
-    )
-
-
-def _figure(suggestion: Suggestion, picture: bytes, words: Tongue) -> str:
-    image = base64.b64encode(picture).decode("ascii")
-    row = suggestion.row
-    if row is None:
-        who = words.gettext(N_("nobody is suggested"))
-    else:
-        variant = [
-            f"{label} = {value}"
-            for label, value in (("n", row.n), (words.gettext(N_("position")), row.position))
-            if value is not None
-        ]
-        who = ", ".join([row.student_id, row.name, *variant])
-    kind = "sure" if suggestion.sure else "check"
-    source = escape(str(suggestion.source))
-    return (
-        f'<figure class="{kind}"><img alt="{source}" src="data:image/jpeg;base64,{image}">'
-        f"<figcaption><b>{escape(who)}</b><br>{source}<br><small>{escape(suggestion.why)}</small></figcaption></figure>"
-    )
+    shown = [
+        (suggestion, said(suggestion.why, tongue(lang)), base64.b64encode(picture).decode("ascii"))
+        for suggestion, picture in entries
+    ]
+    return environment(lang).get_template("contact_sheet.html").render(entries=shown)

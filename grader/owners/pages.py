@@ -17,7 +17,6 @@ Codes of the problems:
 | scan_missing | the roster names a file, or a page, that is not there |
 """
 
-import difflib
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -25,19 +24,24 @@ from pathlib import PurePath
 from types import MappingProxyType
 from typing import TypeVar
 
-from grader.inputs.roster import Roster, RosterRow, ScanRef, why_no_id
 from grader.records import Identity, PageRef, Reason, Value
+from grader.tables.reader import why_no_id
+from grader.tables.roster import Roster, RosterRow, ScanRef
+from reference.errors import near_names
+
+_ALMOST = 0.8
+"""Similarity from which a name of a file is taken for another one, misspelt."""
 
 
 class How(Enum):
-    """What says whose a page is, in the order in which they decide."""
+    """What says whose a page is, in the order in which they decide: codes of clauses."""
 
-    PERSON = "a person"
-    CODE = "QR code"
-    SCANS = "roster's scans"
-    ORDER = "roster's order"
-    NAME = "file name"
-    WRITTEN = "name on the sheet"
+    PERSON = "by_person"
+    CODE = "by_code"
+    SCANS = "by_scans"
+    ORDER = "by_order"
+    NAME = "by_name"
+    WRITTEN = "by_writing"
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,16 +91,7 @@ class _Claim:
     @property
     def parameter(self) -> dict[str, Value]:
         """What it says, by the name of a problem's parameter."""
-        return {_CLAIMED[self.how]: self.text}
-
-
-_CLAIMED = {
-    How.CODE: "by_code",
-    How.SCANS: "by_scans",
-    How.ORDER: "by_order",
-    How.NAME: "by_name",
-    How.WRITTEN: "by_writing",
-}
+        return {self.how.value: self.text}
 
 
 def assign_pages(  # noqa: PLR0913 - a source of owners each
@@ -201,7 +196,7 @@ def _certain_claims(page: PageRef, roster: Roster) -> list[_Claim]:
         if any(ref.covers(page.file, page.page) for ref in row.scans)
     )
     if rows:
-        lines = " and ".join(_who(row) for row in rows)
+        lines = " / ".join(who(row) for row in rows)
         claims.append(_Claim(How.SCANS, rows, lines))
     student = student_of_name(page.file, roster.by_student)
     if student is not None:
@@ -256,7 +251,7 @@ def _order_claims(
     )
     if isinstance(dealt, Reason):
         return {}, {file: dealt}
-    claims_by_index = {indices[place]: _Claim(How.ORDER, (row,), _who(row)) for place, row in dealt.items()}
+    claims_by_index = {indices[place]: _Claim(How.ORDER, (row,), who(row)) for place, row in dealt.items()}
     for index, claim in claims_by_index.items():
         for other in certain[index]:
             if not pages[index].blank and not _common([claim, other]):
@@ -318,7 +313,8 @@ def _owned(
     return Owned(page, row.student_id, n, position, tuple(claim.how for claim in claims))
 
 
-def _who(row: RosterRow) -> str:
+def who(row: RosterRow) -> str:
+    """A student, and the position where there are some."""
     return row.student_id if row.position is None else f"{row.student_id}, position {row.position}"
 
 
@@ -327,8 +323,12 @@ def _near(file: str, roster: Roster) -> dict[str, Value]:
     stem = PurePath(file).stem
     by_lower = {student.lower(): student for student in roster.student_ids}
     student = student_of_name(f"{stem.lower()}.x", by_lower)
-    near = [student] if student else difflib.get_close_matches(stem.lower(), by_lower, n=1, cutoff=0.8)
-    return {"near": by_lower[near[0]]} if near else {}
+    return {"near": by_lower[student]} if student else _nearest(stem, roster.student_ids)
+
+
+def _nearest(name: str, known: Iterable[str]) -> dict[str, Value]:
+    found = near_names(name, known, most=1, cutoff=_ALMOST)
+    return {"near": found[0]} if found else {}
 
 
 def _missing_scans(pages: Sequence[PageRef], roster: Roster) -> Iterable[Reason]:
@@ -337,16 +337,14 @@ def _missing_scans(pages: Sequence[PageRef], roster: Roster) -> Iterable[Reason]
         for ref in row.scans:
             missing = _missing_parts(ref, there)
             if missing is not None:
-                known: dict[str, Value] = {"line": row.line, "student": _who(row), "scan": str(ref)}
+                known: dict[str, Value] = {"line": row.line, "student": who(row), "scan": str(ref)}
                 yield Reason("scan_missing", {**known, **missing}, roster.file)
 
 
 def _missing_parts(ref: ScanRef, there: Mapping[str, int]) -> dict[str, Value] | None:
     """What is there in the place of a scan: a file of nearly this name, or fewer pages; None for the scan."""
     if ref.file not in there:
-        near = [name for name in there if name.lower() == ref.file.lower()]
-        near = near or difflib.get_close_matches(ref.file, there, n=1, cutoff=0.8)
-        return {"near": near[0]} if near else {}
+        return _nearest(ref.file, there)
     if ref.page is not None and ref.page > there[ref.file]:
         return {"pages": there[ref.file]}
     return None

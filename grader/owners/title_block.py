@@ -18,9 +18,6 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from grader.inputs.measurements import StudentSubmission
-from grader.inputs.roster import Roster, RosterRow
-from grader.inputs.scale_text import SURE
 from grader.owners.draft_roster import CLEAR, LIKE_MM, figure_similarity
 from grader.owners.pages import Unmatched
 from grader.records import FloatArray, PageRef, Reason, ScannedPage, Value, Written
@@ -32,6 +29,9 @@ from grader.scan.handwriting.captions import (
     written_number,
 )
 from grader.scan.page import writing_on
+from grader.tables.measurements import StudentSubmission
+from grader.tables.roster import Roster, RosterRow
+from grader.tables.scale_text import SURE
 from reference.authored.assignment import Assignment, Variant
 
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 import segno
 from reportlab.lib.units import mm
 
-from grader.inputs.roster import RosterRow
 from grader.language import N_, SIDES, Tongue, tongue
 from grader.printed.layout import (
     CALIBRATION,
@@ -41,6 +40,7 @@ from grader.printed.pdf import (
     wrap,
 )
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, Identity, Reason, Value
+from grader.tables.roster import RosterRow
 from reference.authored.assignment import Assignment, PageKind, PageTable, Variant
 from reference.drawing.canvas import Piece, pieces_of, scale_pieces
 from reference.errors import AuthoredFileError, CallError, Finding

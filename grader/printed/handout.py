@@ -11,11 +11,11 @@ from reportlab.lib.styles import ParagraphStyle
 from reportlab.lib.units import mm
 from reportlab.platypus import Flowable, PageBreak, Paragraph, SimpleDocTemplate, Spacer, Table
 
-from grader.inputs.roster import RosterRow
 from grader.language import N_, Tongue, tongue
 from grader.printed.answer_sheet import given_data, variants_of
 from grader.printed.pdf import BOLD, REGULAR, embed_fonts, number, put_shapes
 from grader.rubric import RubricFile
+from grader.tables.roster import RosterRow
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.drawing.canvas import Piece, bounds, pieces_of, scale_pieces
 from reference.drawing.sketch import scheme

@@ -7,12 +7,12 @@ from typing import Any
 
 from grader.feedback.class_page import audit_sentence
 from grader.feedback.words import VERDICTS
-from grader.inputs.decision_texts import ANSWERS, AuditAnswer
 from grader.language import N_, Tongue
 from grader.marking.trust import Checkable, checkable, next_to_check, sample, trust_of
 from grader.overlay.scene import MARKS
 from grader.review import questions
 from grader.review.session import Answer, Said, Session, Student, mark_of
+from grader.tables.decision_texts import ANSWERS, AuditAnswer
 from reference.errors import CallError
 
 SHORT = 24

@@ -16,9 +16,9 @@ import numpy as np
 from grader.comparison.task import Task
 from grader.comparison.verdicts import EVEN
 from grader.documents import CriterionDocument, ReadingDocument, ReportDocument
-from grader.inputs.decision_texts import place_text
 from grader.marking.answers import OFF_AS_READ, along_of, on_sheet
 from grader.records import MECHANISM, Figure, Reading, ReadNode, ReadVector, ScannedPage
+from grader.tables.decision_texts import place_text
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.graph import Vector
 

@@ -10,7 +10,6 @@ from grader.documents import CriterionDocument, Quantity
 from grader.feedback.numbers import quantity_cells, score_text, tolerance_cells
 from grader.feedback.sentences import feedback_again
 from grader.feedback.words import VERDICTS, problem_sentence, symbols, unmatched_sentence
-from grader.inputs.decisions import Decision
 from grader.language import N_, Tongue
 from grader.overlay.closeup import look
 from grader.overlay.scene import MARKS
@@ -18,6 +17,7 @@ from grader.records import MECHANISM, Box, Reason
 from grader.review.doubts import SURE, known_probability
 from grader.review.session import OPEN, Session, Standing, Student, mark_of, page_criterion
 from grader.rubric import RubricFile
+from grader.tables.decisions import Decision
 from grader.texts.spoken import clause
 
 Facts = dict[str, Any]

@@ -25,8 +25,6 @@ from starlette.responses import FileResponse, JSONResponse, RedirectResponse, Re
 from starlette.routing import Route
 
 from grader.feedback.words import VERDICTS, environment
-from grader.inputs.decision_texts import PageDecision, place_text
-from grader.inputs.decisions import Decision
 from grader.language import N_, Tongue, tongue
 from grader.lms.export import export, usual_name
 from grader.lms.grades import Options
@@ -42,6 +40,9 @@ from grader.review.session import (
     Whole,
     page_criterion,
 )
+from grader.tables.decision_texts import PageDecision, place_text
+from grader.tables.decisions import Decision
+from grader.tables.reader import TableError
 from reference.errors import CallError, PlanmarkError
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
@@ -470,6 +471,8 @@ def _told(review: Review, act: Callable[[], Response]) -> Response:
         who = there.by or speaker.gettext(questions.SOMEBODY)
         message = speaker.gettext(questions.CLASH) % {"who": who, "verdict": verdict}
         return JSONResponse({"message": message, "clash": True}, 409)
+    except TableError as error:
+        return JSONResponse({"message": error.told(speaker).message, "code": error.code}, 400)
     except PlanmarkError as error:
         return JSONResponse({"message": error.message, "code": error.code}, 400)
 

@@ -24,8 +24,6 @@ from grader.documents import (
 from grader.folder.batch import Batch, Graded, Job, graded, pages_read
 from grader.folder.decisions import basis_of, decided, page_basis
 from grader.folder.workers import Pool
-from grader.inputs.decisions import ClashError, Decision, DecisionFile, Key
-from grader.inputs.measurements import StudentSubmission
 from grader.marking.trust import opened_in, trust_of
 from grader.overlay.scene import Arrow, Ghost, Scene, expected_vector, ghost_of, on_paper, scene_of
 from grader.pipeline import mark
@@ -33,6 +31,8 @@ from grader.reading.corrected import snapped
 from grader.records import MECHANISM, PageRef, ScannedPage
 from grader.review.doubts import Doubt, doubts_of, figures_read, in_order, reading_of
 from grader.review.scans import Scans
+from grader.tables.decisions import ClashError, Decision, DecisionFile, Key
+from grader.tables.measurements import StudentSubmission
 from reference.construction.graph import Construction
 from reference.errors import CallError, PlanmarkError
 

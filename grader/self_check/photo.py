@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from grader.files import shown_text
-from grader.inputs.measurements import NOTHING_MEASURED, StudentSubmission
 from grader.language import N_, Tongue, tongue
 from grader.options import Level
 from grader.overlay.picture import overlay
@@ -14,6 +13,7 @@ from grader.rubric import RubricFile, asked_of
 from grader.scan.decode.pages import count_pages
 from grader.self_check.advice import checked_lines
 from grader.self_check.values import SelfCheck
+from grader.tables.measurements import NOTHING_MEASURED, StudentSubmission
 from grader.texts.spoken import message, sentence
 from reference.authored.assignment import Assignment, Variant
 from reference.errors import InputFileError

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
-from grader.inputs.measurements import Measurements
 from grader.language import Tongue
 from grader.marking.mark import judge
 from grader.options import Level
 from grader.outcomes import Judgement
 from grader.rubric import rubric_of
 from grader.self_check.advice import CheckedLine, checked_lines
+from grader.tables.measurements import Measurements
 from grader.texts.spoken import message
 from reference.authored.assignment import Assignment, Variant
 

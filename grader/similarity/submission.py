@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from grader.documents import ReportDocument
-from grader.inputs.measurements import Measurements
 from grader.records import FloatArray
+from grader.tables.measurements import Measurements
 from reference.authored.assignment import Assignment, Scales, Variant
 from reference.construction.uncertainty import Skill
 from reference.geometry import ComplexArray

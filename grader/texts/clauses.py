@@ -3,7 +3,7 @@
 By the code that the parameter ``why`` or ``advice`` of a reason has.
 """
 
-from grader.language import ID_RULES, N_
+from grader.language import N_
 
 READING: dict[str, str] = {
     "no_stroke": N_("no stroke between %(start)s and %(end)s could be told apart"),
@@ -91,6 +91,8 @@ SCALES: dict[str, str] = {
 """Why a declared scale could not be understood, or was not used."""
 
 OWNERS: dict[str, str] = {
+    "looks_like": N_("the drawing looks like the variant of %(students)s"),
+    "no_page_found": N_("no page was found"),
     "drawn_like_it": N_("the drawing looks like it"),
     "drawn_unclear": N_("the drawing shows no variant for certain"),
     "several_files": N_("one class file is expected, and there are %(count)s: %(files)s"),
@@ -99,7 +101,10 @@ OWNERS: dict[str, str] = {
         " name the pages in the roster's scans, `planmark match` makes a draft"
     ),
     "disproved": N_("page %(at)s disproves it: %(claims)s"),
-    **ID_RULES,
+    "id_letters": N_("letters A-Z a-z, digits, '.', '_' and '-', at most 64, are allowed"),
+    "id_dot": N_("it cannot name a folder: it begins or ends with a dot"),
+    "id_device": N_("it cannot name a folder: Windows has a device of that name"),
+    "id_result": N_("it cannot name a folder: a file of the results has that name"),
     "killed": N_("the process that worked on it was killed"),
     "workers_lost": N_("every worker that worked on it was lost"),
     "no_page_has_figure": N_("none of the student's pages has this figure; decide the verdicts in its place"),
@@ -115,13 +120,14 @@ OWNERS: dict[str, str] = {
 
 CLAUSES: dict[str, str] = {**READING, **PLACING, **SCALES, **OWNERS}
 
-CLAIMS: dict[str, str] = {
-    "by_code": N_("the QR code: %(claim)s"),
-    "by_scans": N_("the roster's scans: %(claim)s"),
-    "by_name": N_("the file's name: %(claim)s"),
-    "by_writing": N_("the name on the sheet: %(claim)s"),
-    "by_order": N_("the roster's order: %(claim)s"),
-    "by_roster": N_("the roster: %(claim)s"),
-    "by_content": N_("the file's content: %(claim)s"),
+CLAIMS: dict[str, tuple[str, str]] = {
+    "by_person": (N_("a person: %(claim)s"), N_("a person")),
+    "by_code": (N_("the QR code: %(claim)s"), N_("the QR code")),
+    "by_scans": (N_("the roster's scans: %(claim)s"), N_("the roster's scans")),
+    "by_name": (N_("the file's name: %(claim)s"), N_("the file's name")),
+    "by_writing": (N_("the name on the sheet: %(claim)s"), N_("the name on the sheet")),
+    "by_order": (N_("the roster's order: %(claim)s"), N_("the roster's order")),
+    "by_roster": (N_("the roster: %(claim)s"), N_("the roster")),
+    "by_content": (N_("the file's content: %(claim)s"), N_("the file's content")),
 }
-"""What a source says of an owner, by the name of the parameter."""
+"""What a source says of an owner, by the name of the parameter; and the source alone."""

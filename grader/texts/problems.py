@@ -215,10 +215,18 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
         N_("The printed markers are up to %(off)s off one plane: the sheet was not flat."),
         N_("The sheet was not flat when it was photographed or scanned."),
     ),
-    "measurements": (N_("The file of measurements has faults."),),
+    "measurements": (
+        N_("The file of measurements cannot be used: %(fault)s, and %(more)s more faults."),
+        N_("The file of measurements cannot be used: %(fault)s."),
+        N_("The file of measurements has faults."),
+    ),
     "measurements_encoding": (N_("The file of measurements is not UTF-8 text."),),
-    "measurements_unreadable": (N_("The file of measurements could not be read."),),
+    "measurements_unreadable": (
+        N_("The file of measurements cannot be used: %(fault)s."),
+        N_("The file of measurements could not be read."),
+    ),
     "measurement_fault": (
+        "%(fault)s",
         N_("... and %(more)s more faults"),
         N_("A measured value could not be used."),
     ),
@@ -282,6 +290,8 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
     "measurements_unmatched": (
         N_("%(student)s differs in case only from %(other)s, and the two would share a folder."),
         N_("%(student)s is not on the roster."),
+        N_("Nothing says whose measurements these are: %(fault)s, and %(more)s more faults."),
+        N_("Nothing says whose measurements these are: %(fault)s."),
         N_("Nothing says whose measurements these are."),
     ),
     "not_explained": (
@@ -319,7 +329,7 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
         N_("%(student)s has %(scan)s among the scans, which is not in the folder."),
         N_("A scan that the roster names is not there."),
     ),
-    "decision_fault": (N_("A line of the decisions cannot be used."),),
+    "decision_fault": ("%(fault)s", N_("A line of the decisions cannot be used.")),
     "decision_not_applied": (
         N_("%(criterion)s is not applied: %(why)s."),
         N_("A person's decision could not be applied."),

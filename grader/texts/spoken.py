@@ -7,6 +7,7 @@ from grader.documents import ProblemDocument, UnmatchedDocument, UnreadDocument
 from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
 from grader.records import Reason, Unread, Value
 from grader.texts.clauses import CLAIMS, CLAUSES
+from grader.texts.faults import FAULTS, ON_LINE
 from grader.texts.problems import PROBLEMS
 from reference.errors import PlanmarkError
 
@@ -78,7 +79,7 @@ def spoken(
     for key, value in parameters.items():
         stem, _, suffix = key.rpartition("_")
         if isinstance(value, str):
-            said[key] = place(value, speaker, names)
+            said[key] = value if key == "text" else place(value, speaker, names)  # as it was written
         elif not isinstance(value, int | float):
             words = _NOUNS.get(key, PLACES)
             said[key] = ", ".join(
@@ -92,13 +93,8 @@ def spoken(
             said[key] = str(value)
         else:
             said[key] = _real(speaker, value, unit)
-    for key in {"why", "advice"} & parameters.keys():
-        clause = CLAUSES.get(str(parameters[key]))
-        if clause is not None and (told := filled([clause], said, speaker)):
-            said[key] = told
-        elif clause is not None:
-            del said[key]
-    claims = [speaker.gettext(CLAIMS[key]) % {"claim": said[key]} for key in parameters if key in CLAIMS]
+    _say_clauses(parameters, said, speaker)
+    claims = [speaker.gettext(CLAIMS[key][0]) % {"claim": said[key]} for key in parameters if key in CLAIMS]
     if claims:
         said["claims"] = "; ".join(claims)
     if {"declared", "expected"} <= parameters.keys():
@@ -115,6 +111,30 @@ def filled(texts: Sequence[str], said: Mapping[str, str], speaker: Tongue) -> st
         except KeyError:
             continue
     return ""
+
+
+def _say_clauses(parameters: Mapping[str, object], said: dict[str, str], speaker: Tongue) -> None:
+    """Put clauses in the place of their codes; of a fault of a file also what is said behind its place."""
+    for key in ("advice", "why"):
+        texts = clauses(str(parameters.get(key, "")))
+        if texts and (told := filled(texts, said, speaker)):
+            said[key] = told
+        elif texts:
+            del said[key]
+    if "why" in said and ("cell" in said or parameters["why"] in FAULTS):
+        said["fault"] = _placed(said["why"], said, speaker)
+        said.pop("line", None)
+
+
+def clauses(code: str) -> Sequence[str]:
+    """The texts of a clause, the most precise first; none for what is the code of no clause."""
+    return FAULTS.get(code) or CLAIMS.get(code) or ([CLAUSES[code]] if code in CLAUSES else ())
+
+
+def _placed(text: str, said: Mapping[str, str], speaker: Tongue) -> str:
+    """What is wrong behind its place: a path in a document, or a line, a column of it, or both."""
+    line = speaker.gettext(ON_LINE) % {"number": said["line"]} if "line" in said else ""
+    return ": ".join(filter(None, (", ".join(filter(None, (line, said.get("cell", "")))), text)))
 
 
 TOO_LARGE, TOO_SMALL = N_("%(times)s times too large"), N_("%(times)s times too small")
@@ -152,6 +172,7 @@ _UNIT_WRITERS: dict[str, Callable[[Tongue, float], str]] = {
     "deg": lambda speaker, value: f"{speaker.number(value, 1)}°",
     "percent": _with_unit("%"),
     "dpi": _with_unit("dpi"),
+    "points": lambda speaker, value: speaker.trimmed(value, 6),
     "s": lambda speaker, value: f"{speaker.trimmed(value, 1)}\N{NO-BREAK SPACE}{speaker.unit('s')}",
 }
 
@@ -181,8 +202,12 @@ def sentence(
 
 def clause(reason: Coded, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES) -> str:
     """Why something is not read or understood, as a part of a sentence; the code of one without words."""
-    said = spoken(reason.parameters, speaker, names)
-    return filled([CLAUSES[reason.code]], said, speaker) if reason.code in CLAUSES else reason.code
+    return filled(clauses(reason.code), spoken(reason.parameters, speaker, names), speaker) or reason.code
+
+
+def fault(reason: Coded, speaker: Tongue = ENGLISH) -> str:
+    """What is wrong in a file that people wrote, behind its place: `line` and `cell` say which it is."""
+    return _placed(clause(reason, speaker), spoken(reason.parameters, speaker), speaker)
 
 
 def message(reason: Coded, speaker: Tongue = ENGLISH) -> str:

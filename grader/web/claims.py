@@ -11,8 +11,8 @@ from typing import Any
 from fastapi import APIRouter
 from sqlalchemy import select, update
 
-from grader.inputs.roster import RosterRow, read_roster
 from grader.language import N_
+from grader.tables.roster import RosterRow, read_roster
 from grader.web.guard import RefusedError, missing
 from grader.web.launch import Message
 from grader.web.service import Call, Called, Key, Route, Row

@@ -12,10 +12,11 @@ from sqlalchemy.orm import Session
 from grader.documents import ResultsDocument
 from grader.files import result_folders, write_whole
 from grader.folder.changes import CACHE_FOLDER, RUN_NOTE
-from grader.inputs.decisions import DecisionFile
-from grader.inputs.measurements import students_in
-from grader.inputs.roster import read_roster
 from grader.lms.export import read_results
+from grader.tables.decisions import DecisionFile
+from grader.tables.measurements import students_in
+from grader.tables.reader import MARK, decoded
+from grader.tables.roster import read_roster
 from grader.web.places import Places
 from grader.web.store import Attempt, Audit, Job, Link, LtiClaim, Publication, Regrading, Sheet, digest_of
 from reference.authored.variant_table import delimiter_of
@@ -96,7 +97,7 @@ def _without(word: str, student: str, students: Iterable[str]) -> str:
 def _erase_rows(places: Places, student: str) -> None:
     """Take the student's lines out of the roster and of the decisions."""
     if places.roster.is_file():
-        text = places.roster.read_bytes().decode("utf-8-sig")
+        text = decoded(places.roster.read_bytes()).removeprefix(MARK)
         lines = list(io.StringIO(text, newline=""))
         gone = {row.line for row in read_roster(places.roster).rows_of(student)}
         kept, begin = list[str](), 0

@@ -18,10 +18,10 @@ from sqlalchemy.orm import Session
 from grader.authoring.lint import lint, lint_document
 from grader.documents import LintDocument
 from grader.folder.workers import result_of
-from grader.inputs.roster import read_roster
 from grader.lms.export import TARGETS, export, read_results, usual_name
 from grader.lms.grades import Options, people_of
 from grader.rubric import rubric_of
+from grader.tables.roster import read_roster
 from grader.web.erase import erase_student
 from grader.web.guard import RefusedError, missing
 from grader.web.places import (

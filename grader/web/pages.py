@@ -11,10 +11,10 @@ from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from jinja2 import Environment, PackageLoader
 
 from grader.feedback.words import STATES, environment
-from grader.inputs.roster import read_roster
 from grader.language import LANGUAGES, N_, tongue
 from grader.lms.export import TARGETS
 from grader.review.server import page_file
+from grader.tables.roster import read_roster
 from grader.web import accounts, claims, instructors, lti, students
 from grader.web.guard import HEADERS, missing
 from grader.web.places import assignment_of

@@ -16,8 +16,8 @@ from pathlib import Path, PurePath
 from grader.files import shown_text, write_whole
 from grader.folder.batch import Batch
 from grader.folder.inventory import is_tool_file
-from grader.inputs.roster import why_no_id
 from grader.rubric import rubric_of
+from grader.tables.reader import why_no_id
 from grader.web.store import Publication
 from reference.authored.assignment import Assignment, built_in, load_assignment
 from reference.authored.toml_file import MAX_BYTES

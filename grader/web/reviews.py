@@ -15,10 +15,10 @@ from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.types import Receive, Scope, Send
 
 from grader.feedback.words import VERDICTS
-from grader.inputs.decisions import DecisionFile
 from grader.language import tongue
 from grader.review.server import application
 from grader.review.session import Request, Session
+from grader.tables.decisions import DecisionFile
 from grader.web.guard import RefusedError
 from grader.web.instructors import last_job
 from grader.web.places import batch_of

@@ -11,12 +11,6 @@ from typing import Any
 from grader.comparison.task import task_of
 from grader.feedback.student_page import AS_MEASURED, SHEET
 from grader.feedback.words import symbols
-from grader.inputs.measurements import (
-    NOTHING_MEASURED,
-    columns_of,
-    measurements_in,
-    names_of,
-)
 from grader.language import N_, Tongue, tongue
 from grader.options import Level
 from grader.overlay.closeup import page_views, scan_element, svg
@@ -25,6 +19,12 @@ from grader.overlay.scene import Picture
 from grader.rubric import rubric_of
 from grader.self_check.advice import RESULTS, CheckedLine
 from grader.self_check.values import check_values
+from grader.tables.measurements import (
+    NOTHING_MEASURED,
+    columns_of,
+    measurements_in,
+    names_of,
+)
 from grader.texts.spoken import PLACES
 from grader.web.guard import RefusedError
 from reference.authored.assignment import Assignment, Variant, load_assignment

@@ -8,7 +8,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 from pathlib import Path
@@ -186,23 +186,14 @@ def delimiter_of(text: str) -> str:
     return max(",;\t", key=first.count) if any(sign in first for sign in ",;\t") else ";"
 
 
-AT_LINE = "line %(number)s"
-TOO_MANY = "more than %(most)s lines are no table"
-NO_CSV = "is no CSV: %(error)s; check its quotes"
-
-
-def table_lines(
-    text: str, delimiter: str, most: int, say: Callable[[str], str] = str
-) -> tuple[list[tuple[int, list[str]]], list[Finding]]:
+def table_lines(text: str, delimiter: str, most: int) -> tuple[list[tuple[int, list[str]]], list[Finding]]:
     """Lines of a CSV text that are not blank, and the fault that ends them before the text does.
 
     A record of several lines has the number of its first, from 1. More than `most` lines are a fault.
-
-    Arguments: `say` translates `AT_LINE`, `TOO_MANY` and `NO_CSV`.
     """
 
-    def fault(why: str, **known: object) -> list[Finding]:
-        return [Finding(say(AT_LINE) % {"number": number}, say(why) % known)]
+    def fault(code: str, why: str) -> list[Finding]:
+        return [Finding(f"line {number}", why, code, number)]
 
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
     lines: list[tuple[int, list[str]]] = []
@@ -210,12 +201,12 @@ def table_lines(
     try:
         for cells in reader:
             if number > most:
-                return lines, fault(TOO_MANY, most=most)
+                return lines, fault("too_many_lines", f"more than {most} lines are no table")
             if any(cell.strip() for cell in cells):
                 lines.append((number, cells))
             number = reader.line_num + 1
     except csv.Error as error:
-        return lines, fault(NO_CSV, error=error)
+        return lines, fault("no_csv", f"is no CSV: {error}; check its quotes")
     return lines, []
 
 

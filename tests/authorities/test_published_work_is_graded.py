@@ -15,8 +15,8 @@ import pytest
 
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
-from grader.inputs.measurements import Names, reading_of
 from grader.marking.mark import judge
+from grader.tables.measurements import Names, reading_of
 from reference.authored.assignment import Assignment, AssignmentFile
 from reference.authored.toml_file import validate
 from tests.whole_rubric import rubric_for

@@ -20,8 +20,6 @@ import numpy as np
 
 from grader.documents import ReportDocument
 from grader.folder.batch import Batch, graded
-from grader.inputs.roster import read_roster
-from grader.inputs.scale_text import Declared, parse_scale
 from grader.owners.title_block import SURELY, names_of
 from grader.records import PageRef, ScannedPage
 from grader.scan.handwriting.captions import (
@@ -31,6 +29,8 @@ from grader.scan.handwriting.captions import (
     written_number,
 )
 from grader.scan.page import open_page, writing_on
+from grader.tables.roster import read_roster
+from grader.tables.scale_text import Declared, parse_scale
 from reference.authored.assignment import SCALE_NAMES, Variant
 from samples.simulation import CAREFUL, SLOPPY, TYPICAL, SimulatedSheet, any_settings, simulate
 from tests.bench.plain_text import Table, as_text

@@ -22,12 +22,12 @@ from typing import Literal, get_args
 
 from grader.comparison.evidence import Submission
 from grader.comparison.task import Task, task_of
-from grader.inputs.measurements import StudentSubmission
 from grader.marking.mark import judge
 from grader.outcomes import Judgement
 from grader.pipeline import read_submission, scan
 from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, PageRef, Reading
 from grader.rubric import asked_of
+from grader.tables.measurements import StudentSubmission
 from reference.authored.assignment import Assignment, Variant
 from samples.simulation import SimulatedSheet
 from samples.simulation.hand import draw

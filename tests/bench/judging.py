@@ -21,12 +21,12 @@ from grader.comparison.evidence import Submission
 from grader.comparison.task import Task, task_of
 from grader.documents import Quantity
 from grader.folder.batch import Batch, grade
-from grader.inputs.measurements import names_of, read_measurements
 from grader.marking.mark import judge
 from grader.pipeline import read_pages
 from grader.records import PageRef, Reading
 from grader.rubric import RubricFile
 from grader.scan.page import open_page
+from grader.tables.measurements import names_of, read_measurements
 from reference.authored.assignment import Assignment
 from samples.simulation import Settings, SimulatedSheet, any_settings, simulate
 from samples.simulation.student import drawn_by

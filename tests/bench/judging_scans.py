@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from grader.inputs.measurements import StudentSubmission
 from grader.pipeline import read_submission, scan
 from grader.records import PageRef, Reading
 from grader.rubric import asked_of
+from grader.tables.measurements import StudentSubmission
 from reference.construction.graph import Vector
 from samples.simulation import SimulatedSheet, any_settings, simulate
 from samples.simulation.mixture import Device

@@ -26,12 +26,12 @@ import cv2
 import numpy as np
 
 from grader.authoring.lint import lint
-from grader.inputs.roster import RosterRow
 from grader.pipeline import read_pages
 from grader.printed.answer_sheet import make_sheets
 from grader.records import PageRef
 from grader.rubric import load_rubric
 from grader.scan.page import open_page
+from grader.tables.roster import RosterRow
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.authored.formula import parse
 from samples.simulation import any_settings, simulate

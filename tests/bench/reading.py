@@ -18,13 +18,13 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from grader.feedback.student_page import About, write_feedback
-from grader.inputs.measurements import StudentSubmission
 from grader.overlay.backdrop import backdrop
 from grader.pipeline import mark, read_pages
 from grader.reading import expected
 from grader.records import PageRef, ScannedPage
 from grader.rubric import asked_of
 from grader.scan.page import open_page
+from grader.tables.measurements import StudentSubmission
 from reference.construction.derive import construction_of
 from tests.bench.lines import LinesFigures, measure_lines
 from tests.bench.plain_text import Table

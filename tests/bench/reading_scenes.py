@@ -12,12 +12,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from grader.inputs.roster import RosterRow
 from grader.pipeline import read_pages
 from grader.printed.answer_sheet import make_sheets
 from grader.records import PageRef, ScannedPage
 from grader.rubric import RubricFile, load_rubric
 from grader.scan.page import open_page
+from grader.tables.roster import RosterRow
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from samples.simulation import (
     CAREFUL,

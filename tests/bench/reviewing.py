@@ -28,10 +28,10 @@ import numpy as np
 
 from grader.comparison.task import Task, task_of
 from grader.documents import ReportDocument
-from grader.inputs.decisions import Decision
-from grader.inputs.measurements import StudentSubmission
 from grader.pipeline import mark
 from grader.records import Figure, PageRef, ReadNode, ReadVector, ScannedPage
+from grader.tables.decisions import Decision
+from grader.tables.measurements import StudentSubmission
 from tests.bench.judging_handed_in import submission
 from tests.bench.judging_scans import SHEET_KINDS, ReadWork, read_works
 from tests.bench.judging_students import StudentWork

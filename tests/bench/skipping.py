@@ -18,11 +18,11 @@ import numpy as np
 
 from grader.folder import batch
 from grader.folder.batch import Batch, grade
-from grader.inputs.decision_texts import place_text
-from grader.inputs.roster import RosterRow
 from grader.printed.answer_sheet import make_sheets
 from grader.review.session import Answer, Session, mark_of
 from grader.rubric import Asked, load_rubric
+from grader.tables.decision_texts import place_text
+from grader.tables.roster import RosterRow
 from reference.authored.assignment import load_assignment
 from samples.simulation import any_settings, simulate
 from samples.simulation.printing import printed_sheets

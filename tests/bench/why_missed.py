@@ -28,11 +28,11 @@ from typing import Any
 import cv2
 import numpy as np
 
-from grader.inputs.roster import read_roster
 from grader.pipeline import read_pages
 from grader.records import Figure, PageRef, Reading, ScannedPage
 from grader.rubric import load_rubric
 from grader.scan.page import open_page
+from grader.tables.roster import read_roster
 from grader.texts.spoken import message
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.construction.derive import construction_of

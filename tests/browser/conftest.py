@@ -15,11 +15,11 @@ import uvicorn
 
 from grader.files import samples_folder
 from grader.folder.batch import Batch, grade
-from grader.inputs.decisions import read_table
 from grader.review.server import application
 from grader.review.session import Session
 from grader.rubric import load_rubric
 from grader.solution.document import plan_document
+from grader.tables.decisions import read_table
 from reference.authored.assignment import Variant, load_assignment
 from reference.plan import exact_plan
 from tests.inline import Inline

@@ -12,13 +12,13 @@ import pytest
 
 from grader.folder.batch import Batch, graded
 from grader.folder.decisions import basis_of, page_basis
-from grader.inputs.decision_texts import PageDecision, place_text
-from grader.inputs.decisions import Decision, DecisionFile
 from grader.records import PageRef
 from grader.rubric import rubric_of
 from grader.scan.page import open_page
 from grader.scan.pixels import mapped
 from grader.scan.register.homography import PAPER
+from grader.tables.decision_texts import PageDecision, place_text
+from grader.tables.decisions import Decision, DecisionFile
 from reference.authored.assignment import library, load_assignment
 from tests.inline import Inline
 

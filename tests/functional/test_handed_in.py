@@ -110,7 +110,7 @@ def test_a_file_that_claims_another_student_is_told_to_both_and_used_for_neither
         ("s09", "v_A", "v_A_deg: '720'"),
         ("s10", "v_B", "v_B: 58 / 63"),
         ("s11", "kv", "'0.2 (m/s)/mm' / '0.267035 (m/s)/mm'"),
-        ("s12", "v_A", "v_A: '1.5 and 60.0'"),
+        ("s12", "v_A", "v_A: '1.5 / 60.0'"),
     ],
 )
 def test_what_was_refused_or_is_disputed_waits_alone(results, student, criterion, entry):

@@ -129,4 +129,4 @@ def test_a_pipe_with_the_name_of_measurements_is_told_and_not_waited_for(tmp_pat
     os.mkfifo(folder / "class.csv")
     run = graded(folder, tmp_path / "out")
     assert run.returncode == 1
-    assert "class.csv: it is a folder or a pipe, not a file" in run.stdout
+    assert "class.csv: cannot be read: it is a folder or a pipe, not a file" in run.stdout

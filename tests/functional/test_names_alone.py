@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from grader.folder.batch import Batch, graded
-from grader.inputs.scale_text import Declared, parse_scale
 from grader.rubric import rubric_of
+from grader.tables.scale_text import Declared, parse_scale
 from reference.authored.assignment import Variant, load_assignment
 from samples.simulation import CAREFUL, CLEAN_SCAN, PageStyle, Settings, simulate
 

@@ -18,8 +18,8 @@ HEAVY = frozenset(
 SCANS = frozenset("scipy cv2 PIL pikepdf pypdfium2 tifffile imagecodecs simplejpeg zxingcpp".split())
 PAGES = frozenset({"jinja2", "reportlab"})
 JUDGING = (
-    "cli comparison documents feedback files given_data inputs language marking options outcomes records"
-    " rubric self_check texts"
+    "cli comparison documents feedback files given_data language marking options outcomes records"
+    " rubric self_check tables texts"
 )
 """The rooms of the program that entered measurements pass through."""
 
@@ -115,7 +115,7 @@ for module in pkgutil.walk_packages(grader.scan.__path__, "grader.scan."):
     importlib.import_module(module.name)
 print(*sys.modules)
 """
-SCANNED = "documents files inputs.scale_text printed.layout records scan"
+SCANNED = "documents files printed.layout records scan tables.scale_text"
 """What of the program a scan may rest on: of what is printed, where it stands, not how it is written."""
 
 
@@ -132,7 +132,7 @@ def test_the_scanner_loads_where_things_are_printed_and_not_the_pdf_writer():
     assert not {"reportlab", "segno", "jinja2", "skimage", "typer", "rich"} & modules
     rooms = {name.removeprefix("grader.") for name in modules if name.startswith("grader.")}
     allowed = set(SCANNED.split())
-    assert {name for name in rooms if not name.startswith("scan.")} == allowed | {"inputs", "printed"}
+    assert {name for name in rooms if not name.startswith("scan.")} == allowed | {"printed", "tables"}
 
 
 def test_who_marks_or_serves_loads_scipy_with_the_first_scan_alone():

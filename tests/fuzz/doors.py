@@ -22,11 +22,6 @@ from pathlib import Path
 
 from grader.folder.changes import earlier
 from grader.folder.workers import Limits, Workers
-from grader.inputs.class_file import read_class_file
-from grader.inputs.decisions import Decision, DecisionFile
-from grader.inputs.measurements import names_of, read_measurements
-from grader.inputs.roster import read_roster
-from grader.inputs.scale_text import parse_scale
 from grader.lms.export import KINDS, TARGETS, draft, read_results
 from grader.lms.gradebooks import LAYOUTS
 from grader.lms.grades import Options, Person, grades_of
@@ -35,6 +30,11 @@ from grader.records import Reason
 from grader.rubric import load_rubric
 from grader.scan.decode.pages import count_pages, is_blank, page_of
 from grader.scan.register.registration import register
+from grader.tables.class_file import read_class_file
+from grader.tables.decisions import Decision, DecisionFile
+from grader.tables.measurements import names_of, read_measurements
+from grader.tables.roster import read_roster
+from grader.tables.scale_text import parse_scale
 from grader.texts.spoken import message
 from reference.authored.assignment import load_assignment
 from reference.authored.variant_table import DataTable, read_rows

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.inputs.measurements import names_of, read_measurements, students_in
-from grader.inputs.roster import why_no_id
+from grader.tables.measurements import names_of, read_measurements, students_in
+from grader.tables.reader import why_no_id
 from grader.texts.spoken import message
 from reference.authored.assignment import load_assignment
 from reference.errors import InputFileError

@@ -6,9 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.files import shown_text
-from grader.inputs.roster import Roster, RosterRow, ScanRef, parse_roster, parse_scan, read_roster
 from grader.owners.draft_roster import RosterDraft, draft_csv
-from reference.errors import AuthoredFileError, Finding
+from grader.records import Reason
+from grader.tables.reader import TableError
+from grader.tables.roster import Roster, RosterRow, ScanRef, parse_roster, parse_scan, read_roster
 
 HEADER = st.lists(
     st.sampled_from(["student_id", "name", "n", "position", "scans", "lang", "kv", "what", ""]), max_size=8
@@ -20,21 +21,21 @@ CELLS = st.text(alphabet='s1;,#"\n\r\t\x00 .-é7', max_size=8)
 def test_any_bytes_are_a_roster_or_its_faults(tmp_path_factory, data):
     path = tmp_path_factory.mktemp("roster") / "roster.csv"
     path.write_bytes(b"student_id,name\n" + data)
-    with contextlib.suppress(AuthoredFileError):
+    with contextlib.suppress(TableError):
         assert read_roster(path).rows
 
 
 @given(HEADER, st.lists(st.lists(CELLS, max_size=8), max_size=4), st.sampled_from(",;"))
 def test_any_table_is_a_roster_or_its_faults(header, rows, delimiter):
     text = "\n".join(delimiter.join(cells) for cells in [header, *rows])
-    findings: tuple[Finding, ...] = ()
+    faults: tuple[Reason, ...] = ()
     roster = Roster("", ())
     try:
         roster = parse_roster(text)
-    except AuthoredFileError as error:
-        findings = error.findings
-    assert bool(findings) != bool(roster.rows)
-    assert all(finding.path.startswith("line ") for finding in findings)
+    except TableError as error:
+        faults = error.faults
+    assert bool(faults) != bool(roster.rows)
+    assert all(fault.parameters["line"] for fault in faults)
     assert all(set(row.student_id) <= set("s1.-7") for row in roster.rows)
 
 
@@ -46,7 +47,7 @@ def test_any_text_is_a_scan_or_a_sentence(text):
 
 names = st.text(alphabet=st.characters(exclude_categories=["Cs", "Cc"]), max_size=12).map(str.strip)
 files = st.text(alphabet="ab_#., -7", min_size=1, max_size=8).map(str.strip).filter(
-    lambda name: name and not isinstance(parse_scan(name), str) and parse_scan(name).page is None
+    lambda name: name and isinstance(parse_scan(name), ScanRef) and parse_scan(name).page is None
 )  # fmt: skip
 
 

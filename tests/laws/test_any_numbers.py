@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.inputs.measurements import StudentSubmission, measurements_in, names_of
 from grader.pipeline import mark
 from grader.rubric import RubricFile, rubric_of
+from grader.tables.measurements import StudentSubmission, measurements_in, names_of
 from grader.web.self_check import checked_values
 from reference.authored.assignment import Assignment, Variant, built_in, load_assignment
 from reference.construction.mistakes import Drawing, single_mistakes

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from grader.comparison.evidence import Submission
 from grader.comparison.task import Task, task_of
-from grader.inputs.measurements import names_of
 from grader.marking.mark import judge
 from grader.rubric import RubricFile
+from grader.tables.measurements import names_of
 from reference.authored.assignment import Assignment, AssignmentFile, Variant
 from reference.authored.toml_file import validate
 from reference.construction.mistakes import Drawing, Mistake, single_mistakes

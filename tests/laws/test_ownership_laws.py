@@ -3,9 +3,9 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.inputs.roster import Roster, RosterRow, ScanRef
 from grader.owners.pages import assign_pages
 from grader.records import Identity, PageRef
+from grader.tables.roster import Roster, RosterRow, ScanRef
 from grader.texts.spoken import ENGLISH, sentence
 
 STUDENTS = ("s1", "s2", "s_3", "s")

@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from grader.inputs.measurements import names_of, read_measurements
-from grader.inputs.roster import read_roster
 from grader.pipeline import read_pages
 from grader.records import PageRef
 from grader.rubric import load_rubric
 from grader.scan.decode.pages import is_blank, page_of
 from grader.scan.page import open_page
+from grader.tables.measurements import names_of, read_measurements
+from grader.tables.roster import read_roster
 from reference.authored.assignment import load_assignment
 from tests.samples.counting import counted
 

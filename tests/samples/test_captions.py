@@ -2,13 +2,13 @@
 
 import pytest
 
-from grader.inputs.measurements import StudentSubmission
-from grader.inputs.scale_text import SURE, Declared, parse_scale
 from grader.pipeline import missing_scales, read_submission
 from grader.records import PageRef
 from grader.rubric import Asked
 from grader.scan.handwriting.captions import NUMBER_WORDS, captioned_scales, written_number
 from grader.scan.page import open_page, writing_on
+from grader.tables.measurements import StudentSubmission
+from grader.tables.scale_text import SURE, Declared, parse_scale
 from reference.authored.assignment import SCALE_NAMES, load_assignment
 from tests.bench.captions import plain_class
 

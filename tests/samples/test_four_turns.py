@@ -16,12 +16,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from grader.inputs.roster import RosterRow
 from grader.pipeline import read_pages
 from grader.printed.answer_sheet import make_sheets
 from grader.records import PageRef
 from grader.rubric import rubric_of
 from grader.scan.page import open_page
+from grader.tables.roster import RosterRow
 from reference.authored.assignment import load_assignment
 from samples.simulation import CAREFUL, Scan, Settings, simulate
 from samples.simulation.printing import printed_sheets

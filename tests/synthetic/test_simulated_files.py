@@ -7,8 +7,8 @@ import pikepdf
 import pytest
 from PIL import Image
 
-from grader.inputs.roster import RosterRow
 from grader.printed.answer_sheet import make_sheets
+from grader.tables.roster import RosterRow
 from reference.authored.assignment import load_assignment
 from samples.simulation import Scan, Settings, Student, blank_back, simulate, write_pdf, write_truth
 from samples.simulation.printing import printed_sheets

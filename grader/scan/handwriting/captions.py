@@ -10,11 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from grader.inputs.scale_text import parse_scale
 from grader.records import InkMap, Written
 from grader.scan.handwriting.fields import meaning_of, placed, read_scale
 from grader.scan.handwriting.lines import Line, Look, find_lines
 from grader.scan.handwriting.model import COLUMN, JUNK, Lattice
+from grader.tables.scale_text import parse_scale
 
 _STRANGE = 3e-4
 """Probability that a sign is written in a way that the recogniser does not know, for each sign."""

@@ -8,7 +8,6 @@ from itertools import product
 import cv2
 import numpy as np
 
-from grader.inputs.scale_text import ByRule, Declared, ParsedScale, parse_scale
 from grader.printed.layout import SCALE_BOXES
 from grader.records import Box, FloatArray, GreyImage, Page, Sheet, Written
 from grader.scan.handwriting.model import (
@@ -22,6 +21,7 @@ from grader.scan.handwriting.model import (
     recognise,
 )
 from grader.scan.pixels import cut_out
+from grader.tables.scale_text import ByRule, Declared, ParsedScale, parse_scale
 from reference.quantities import SCALE_OF
 
 # What may stand in a scale's box, sign by sign ----------------------------------------------------

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from grader.authoring.variant_table import class_csv, class_pages, numbered, sections_of, table_pages
-from grader.inputs.measurements import names_of
 from grader.language import tongue
 from grader.solution.document import plan_document, plan_documents
+from grader.tables.measurements import names_of
 from reference.authored.assignment import built_in, load_assignment
 from reference.drawing.canvas import A3_MM, Label, bounds
 from reference.plan import exact_plan

@@ -8,7 +8,6 @@ from typer.main import get_command
 from grader.cli.commands import app
 from grader.folder.batch import Batch
 from grader.folder.changes import RunNote, earlier_run, note_run
-from grader.inputs.class_file import ClassFile
 from grader.lms.grades import Options
 from grader.options import (
     CheckOptions,
@@ -23,6 +22,7 @@ from grader.options import (
     offered,
     taken,
 )
+from grader.tables.class_file import ClassFile
 
 RECORDS = {
     "plan": PlanOptions, "cycle": CycleOptions, "check": CheckOptions, "grade": GradeOptions,

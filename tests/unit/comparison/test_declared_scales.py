@@ -6,9 +6,9 @@ import pytest
 from grader.comparison.scales import BEYOND_DOUBT, declarations
 from grader.comparison.scales import LIKELY as LEAST
 from grader.comparison.task import task_of
-from grader.inputs.scale_text import SURE, sure_texts
 from grader.records import MECHANISM, Figure, Reading, ReadNode, Written
 from grader.rubric import load_rubric
+from grader.tables.scale_text import SURE, sure_texts
 from grader.texts.spoken import message
 from reference.authored.assignment import load_assignment
 

@@ -9,10 +9,10 @@ import pytest
 from grader.comparison.criteria import compare
 from grader.comparison.evidence import Submission
 from grader.comparison.own import own_length
-from grader.inputs.measurements import names_of
 from grader.marking.mark import judge
 from grader.records import Figure, Reading
 from grader.rubric import DoubtTable
+from grader.tables.measurements import names_of
 from reference.authored.assignment import load_assignment
 from reference.construction.graph import evaluate
 from reference.construction.mistakes import Mistake

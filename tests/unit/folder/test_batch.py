@@ -4,11 +4,12 @@ import pytest
 
 from grader.files import OutputError, result_folders
 from grader.folder.batch import Batch, grade, needs_person
-from grader.inputs.measurements import StudentSubmission
 from grader.rubric import load_rubric
 from grader.solution.document import plan_document
+from grader.tables.measurements import StudentSubmission
+from grader.tables.reader import TableError
 from reference.authored.assignment import Variant, load_assignment
-from reference.errors import AuthoredFileError, CallError
+from reference.errors import CallError
 from reference.plan import exact_plan
 from tests.inline import Inline
 
@@ -111,7 +112,7 @@ def test_a_folder_that_is_not_there_or_empty_is_told(tmp_path):
 
 def test_a_roster_with_faults_stops_before_anything_is_written(class_folder, tmp_path):
     (class_folder / "roster.csv").write_text("student_id,name,n\ns 1,Ana,4\n")
-    with pytest.raises(AuthoredFileError, match="line 2"):
+    with pytest.raises(TableError, match="line 2"):
         run(class_folder, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

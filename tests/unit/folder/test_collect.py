@@ -14,8 +14,9 @@ from PIL import Image, ImageDraw, ImageFont
 from grader.files import samples_folder
 from grader.folder.batch import Batch, graded
 from grader.folder.collect import check_scans, check_target, collect, preview_of, vouched
-from grader.inputs.decisions import Decision, DecisionFile
 from grader.rubric import rubric_of
+from grader.tables.decisions import Decision, DecisionFile
+from grader.tables.reader import TableError
 from reference.authored.assignment import load_assignment
 from reference.errors import CallError
 from reference.plan import construction_for
@@ -232,17 +233,20 @@ def test_a_page_that_was_painted_on_must_be_looked_at_again(known, preview):
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        ("0001.png,perhaps,\n0002.png,yes,", "line 2: give_away 'perhaps'"),
-        ("0001.png,yes,1 2 3\n0002.png,yes,", "line 2: cover"),
-        ("0001.png,yes,\n0003.png,yes,", "line 3: '0003.png' is no page"),
-        ("0001.png,yes,\n0001.png,no,", "line 3: '0001.png' is no page of this preview, or is there twice"),
-        ("0001.png,yes,", "0002.png is missing"),
+        ("0001.png,perhaps,\n0002.png,yes,", "line 2, give_away: 'perhaps'"),
+        ("0001.png,yes,1 2 3\n0002.png,yes,", "line 2, cover: write x y"),
+        ("0001.png,yes,\n0003.png,yes,", "line 3, page: '0003.png' is no page"),
+        (
+            "0001.png,yes,\n0001.png,no,",
+            "line 3, page: '0001.png' is no page of this preview",
+        ),
+        ("0001.png,yes,", "'0002.png' is missing"),
     ],
 )
 def test_answers_that_cannot_be_understood_are_told(known, preview, text, why):
     file, made = preview
     (made.preview / "pages.csv").write_text(f"page,give_away,cover\n{text}\n", encoding="utf-8")
-    with pytest.raises(CallError, match=re.escape(why)):
+    with pytest.raises(TableError, match=re.escape(why)):
         collect(*known, file)
     assert not file.exists()
 

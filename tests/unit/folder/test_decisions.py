@@ -7,14 +7,14 @@ import pytest
 
 from grader.folder.batch import Batch, grade, graded, needs_person
 from grader.folder.decisions import ClassDecisions, basis_of, decided, page_basis
-from grader.inputs.decisions import COLUMNS, Decision, DecisionFile
-from grader.inputs.measurements import StudentSubmission
-from grader.inputs.roster import Roster, RosterRow
 from grader.lms.grades import Grade, Person
 from grader.lms.marks import marks_of
 from grader.records import PageRef
 from grader.rubric import load_rubric, rubric_of
 from grader.solution.document import plan_document
+from grader.tables.decisions import COLUMNS, Decision, DecisionFile
+from grader.tables.measurements import StudentSubmission
+from grader.tables.roster import Roster, RosterRow
 from reference.authored.assignment import Variant, load_assignment
 from reference.errors import InputFileError
 from reference.plan import exact_plan
@@ -178,7 +178,7 @@ def test_a_second_run_marks_nothing_again_whatever_line_a_decision_is_on(folder)
     [
         (row("v_DD", "full"), "line 2, criterion", "is v_D meant?"),
         (row("v_D", "full", student="s11"), "line 2, student_id", "is s1 meant?"),
-        (replace(row("v_D", "full"), position=3), "line 2, position", "positions none"),
+        (replace(row("v_D", "full"), position=3), "line 2, position", "has no positions"),
         (row("v_D", "full", points=99.0), "line 2, points", "99 points are more"),
         (row("v_D", "full", points=0.5), "line 2, points", "write partial"),
         (row("v_D", "none", points=0.5), "line 2, points", "gives 0 points"),

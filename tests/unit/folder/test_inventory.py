@@ -11,9 +11,9 @@ from grader.folder.inventory import (
     submissions,
     take_inventory,
 )
-from grader.inputs.roster import parse_roster
 from grader.owners.pages import assign_pages
 from grader.records import PageRef
+from grader.tables.roster import parse_roster
 from tests.inline import Inline
 
 

@@ -3,10 +3,10 @@ from dataclasses import replace
 import pytest
 
 from grader.folder.submissions import Unusable, submissions_of
-from grader.inputs.measurements import Measurements
-from grader.inputs.roster import Roster, RosterRow
 from grader.owners.pages import How, Owned, PageOwners, Unmatched
 from grader.records import PageRef, Reading, Reason
+from grader.tables.measurements import Measurements
+from grader.tables.roster import Roster, RosterRow
 from reference.authored.assignment import Variant, load_assignment
 
 PUMP = load_assignment("pump")

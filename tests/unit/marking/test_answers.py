@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from grader.inputs.decisions import Decision
-from grader.inputs.measurements import StudentSubmission
 from grader.pipeline import mark
 from grader.records import Figure, PageRef, ScannedPage
+from grader.tables.decisions import Decision
+from grader.tables.measurements import StudentSubmission
 from reference.construction.mistakes import Mistake
 from samples.simulation.wording import declared_texts
 from tests.hands import rule_scales, sheet, task_for

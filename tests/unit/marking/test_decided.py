@@ -5,12 +5,12 @@ from dataclasses import replace
 import pytest
 
 from grader.documents import Quantity, Tolerance
-from grader.inputs.decisions import Decision
 from grader.marking.decided import decide
 from grader.marking.mark import score
 from grader.outcomes import Judgement, NamedMistake, Outcome
 from grader.records import Reason
 from grader.rubric import load_rubric
+from grader.tables.decisions import Decision
 from reference.construction.mistakes import Mistake
 
 RUBRIC = load_rubric("pump-velocity")

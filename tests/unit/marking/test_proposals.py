@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from grader.inputs.measurements import StudentSubmission
 from grader.pipeline import mark
 from grader.records import Figure, PageRef, ScannedPage
+from grader.tables.measurements import StudentSubmission
 from samples.simulation.wording import declared_texts
 from tests.bench.contradictions import contradictions
 from tests.examples import slow

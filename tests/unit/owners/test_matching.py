@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from grader.inputs.roster import parse_roster
-from grader.owners.draft_roster import contact_sheet, draft_csv, figure_similarity, suggest, thumbnail
+from grader.owners.draft_roster import contact_sheet, draft_csv, figure_similarity, said, suggest, thumbnail
 from grader.records import Identity, PageRef
+from grader.tables.roster import parse_roster
+from grader.texts.spoken import ENGLISH
 from reference.authored.assignment import load_assignment
 from reference.construction.derive import construction_of
 from reference.construction.graph import evaluate, parameters_of
@@ -79,7 +80,7 @@ def test_a_drawing_of_one_students_variant_suggests_that_student(n):
     (suggestion,) = suggest([sheet], ROSTER, PUMP, strokes_of=lambda _: drawn(n)).suggestions
     assert suggestion.row.n == n
     assert not suggestion.sure
-    assert suggestion.row.student_id in suggestion.why
+    assert suggestion.row.student_id in said(suggestion.why, ENGLISH)
 
 
 def test_likeness_tells_neighbours_apart_by_two_degrees():
@@ -92,7 +93,7 @@ def test_likeness_tells_neighbours_apart_by_two_degrees():
 def test_a_drawing_that_looks_like_nobodys_variant_suggests_nobody(strokes):
     (suggestion,) = suggest([PageRef("x.jpg", 1, 1)], ROSTER, PUMP, strokes_of=lambda _: strokes).suggestions
     assert suggestion.row is None
-    assert "looks like" not in suggestion.why
+    assert "looks like" not in said(suggestion.why, ENGLISH)
 
 
 def test_students_of_one_variant_are_all_named_and_only_an_order_chooses():
@@ -106,7 +107,7 @@ def test_students_of_one_variant_are_all_named_and_only_an_order_chooses():
         [page(1), page(2), page(3, 3)], roster, PUMP, strokes_of=lambda s: drawn((16, 5, 16)[s.page - 1])
     )
     assert backwards.suggestions[1].row is None
-    assert "s1, s3" in backwards.suggestions[1].why
+    assert "s1, s3" in said(backwards.suggestions[1].why, ENGLISH)
 
 
 def test_a_choice_between_students_of_one_variant_follows_the_rosters_order_where_all_pages_do():
@@ -138,8 +139,8 @@ def test_a_drawing_that_speaks_against_the_order_is_believed_and_both_are_told()
         "class.pdf#2": ("s1", False),
         "class.pdf#3": ("s3", False),
     }
-    assert "by roster's order: s1" in draft.suggestions[0].why
-    assert "roster's order; the drawing looks like" in draft.suggestions[2].why
+    assert "the roster's order: s1" in said(draft.suggestions[0].why, ENGLISH)
+    assert "roster's order; the drawing looks like" in said(draft.suggestions[2].why, ENGLISH)
 
 
 def test_pages_that_come_out_even_are_suggested_in_order_to_be_checked():
@@ -158,8 +159,8 @@ def test_sources_that_disagree_are_left_to_the_person_whatever_is_drawn():
     contested = PageRef("s1.jpg", 1, 1, identity=code("s2", 10))
     (suggestion,) = suggest([contested], ROSTER, PUMP, strokes_of=lambda _: drawn(1)).suggestions
     assert suggestion.row is None
-    assert "s1" in suggestion.why
-    assert "s2" in suggestion.why
+    assert "s1" in said(suggestion.why, ENGLISH)
+    assert "s2" in said(suggestion.why, ENGLISH)
 
 
 def test_the_draft_is_a_roster_again_with_the_scans_filled_in():
@@ -196,8 +197,9 @@ def test_the_contact_sheet_shows_every_page_with_its_reason_and_nothing_from_out
     html = contact_sheet([(suggestion, picture) for suggestion in draft.suggestions])
     assert html.count("data:image/jpeg;base64,") == 2
     assert "s2, Ion, n = 10" in html
+    assert "codul QR" in contact_sheet([(draft.suggestions[0], picture)], "ro")
     assert "<img src=x" not in html
-    assert "http" not in html
+    assert "://" not in html
 
 
 def test_a_thumbnail_is_a_small_picture_of_the_whole_page():

@@ -1,8 +1,8 @@
 import pytest
 
-from grader.inputs.roster import parse_roster
 from grader.owners.pages import How, assign_pages, student_of_name
 from grader.records import Identity, PageRef
+from grader.tables.roster import parse_roster
 from grader.texts.spoken import message
 
 THREE = parse_roster("student_id,name,n\ns1,A,1\ns2,B,2\ns_3,C,3\n")

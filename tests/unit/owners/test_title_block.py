@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from grader.inputs.roster import Roster, RosterRow
 from grader.owners.draft_roster import LIKE_MM
 from grader.owners.pages import How, assign_pages
 from grader.owners.title_block import chosen_variant, names_of
 from grader.records import PageRef
+from grader.tables.roster import Roster, RosterRow
 from grader.texts.spoken import message
 from reference.authored.assignment import Variant
 

@@ -6,10 +6,10 @@ import numpy as np
 import pypdfium2
 import pytest
 
-from grader.inputs.roster import RosterRow
 from grader.printed import handout
 from grader.printed.handout import make_handout
 from grader.rubric import rubric_of
+from grader.tables.roster import RosterRow
 from reference.authored.assignment import Variant, built_in, load_assignment
 from reference.errors import AuthoredFileError
 from reference.plan import exact_plan

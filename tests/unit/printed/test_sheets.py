@@ -6,7 +6,6 @@ import numpy as np
 import pypdfium2
 import pytest
 
-from grader.inputs.roster import RosterRow
 from grader.language import tongue
 from grader.printed import answer_sheet
 from grader.printed.answer_sheet import make_calibration, make_sheets
@@ -30,6 +29,7 @@ from grader.printed.pdf import number, width_mm, wrap
 from grader.records import Page, Sheet
 from grader.scan.register.registration import rectify
 from grader.scan.strokes.ink import find_ink
+from grader.tables.roster import RosterRow
 from grader.texts.spoken import message
 from reference.authored.assignment import built_in, load_assignment
 from reference.drawing.canvas import pieces_of

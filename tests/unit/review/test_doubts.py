@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import pytest
 
-from grader.inputs.decisions import Decision
-from grader.inputs.measurements import StudentSubmission
 from grader.marking.answers import along_of
 from grader.pipeline import mark
 from grader.records import MECHANISM, Figure, PageRef, Reason, ScannedPage, Unread
 from grader.review.doubts import doubts_of, figures_read
+from grader.tables.decisions import Decision
+from grader.tables.measurements import StudentSubmission
 from reference.construction.mistakes import Mistake
 from samples.simulation.wording import declared_texts
 from tests.hands import changed, rule_scales, sheet, task_for, without

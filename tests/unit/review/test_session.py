@@ -9,9 +9,9 @@ import pytest
 from PIL import Image
 
 from grader.folder.decisions import basis_of
-from grader.inputs.decisions import Decision, DecisionFile
 from grader.review.server import application
 from grader.review.session import mark_of
+from grader.tables.decisions import Decision, DecisionFile
 from tests.examples import slow
 from tests.unit.review.conftest import PUMP, Page, silent
 

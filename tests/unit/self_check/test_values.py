@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 import grader
-from grader.inputs.measurements import NOTHING_MEASURED, measurements_in, names_of
 from grader.language import tongue
 from grader.self_check.values import check_values
+from grader.tables.measurements import NOTHING_MEASURED, measurements_in, names_of
 from reference.authored.assignment import Variant, load_assignment
 
 PUMP = load_assignment("pump")

@@ -10,9 +10,10 @@ import pytest
 from grader.language import LANGUAGES, tongue
 from grader.records import Reason, Unread
 from grader.texts.clauses import CLAIMS, CLAUSES
+from grader.texts.faults import FAULTS
 from grader.texts.problems import PROBLEMS
 from grader.texts.reasons import FOLLOWS, FULL, HINTS, reason_sentence
-from grader.texts.spoken import ENGLISH, clause, message, of_error, sentence, unread_document
+from grader.texts.spoken import ENGLISH, clause, fault, message, of_error, sentence, unread_document
 from reference.errors import InputFileError
 
 ROOT = Path(__file__).parents[3]
@@ -23,7 +24,7 @@ APART = {
     "removesuffix", "find", "index",
 }  # fmt: skip
 SEARCHES = {"match", "fullmatch", "search", "findall", "finditer", "sub"}
-MAKERS = {"Reason", "_why", "_no_order", "_NotUnderstoodError"}
+MAKERS = {"Reason", "_why", "_no_order", "TextError", "_at", "refused"}
 """What makes a reason: the codes stand in its arguments."""
 PLACEHOLDER = re.compile(r"%\((\w+)\)s")
 
@@ -98,9 +99,9 @@ def codes_made() -> Iterator[tuple[str, str]]:
 
 
 def test_every_code_that_is_made_has_its_sentence() -> None:
-    known = {*PROBLEMS, *HINTS, *CLAUSES, *FOLLOWS}
+    known = {*PROBLEMS, *HINTS, *CLAUSES, *FOLLOWS, *FAULTS}
     found = dict(codes_made())
-    assert len(found) > 100
+    assert len(found) > 160
     assert {code: where for code, where in found.items() if code not in known} == {}
 
 
@@ -114,7 +115,8 @@ def test_every_code_has_a_sentence_in_every_language(lang: str) -> None:
         assert not PLACEHOLDER.search(told), code
     for code in HINTS:
         assert reason_sentence(Reason(code), speaker, "full") not in {"", code}
-    for text in (*CLAUSES.values(), *CLAIMS.values(), *FULL.values()):
+    several = [text for texts in (*FAULTS.values(), *CLAIMS.values()) for text in texts]
+    for text in (*several, *CLAUSES.values(), *FULL.values()):
         assert lang == "en" or not PLACEHOLDER.sub("", text).strip() or speaker.gettext(text) != text
 
 
@@ -136,6 +138,14 @@ def test_of_a_problems_sentences_the_last_one_needs_nothing(code: str) -> None:
 def test_numbers_and_clauses_are_said_in_the_readers_language(lang: str, told: str) -> None:
     refused = Reason("sheet_refused", {"why": "part_in_picture", "share_percent": 63})
     assert sentence(refused, tongue(lang)) == told
+
+
+def test_a_fault_of_a_file_stands_behind_its_place_and_quotes_what_was_written() -> None:
+    found = Reason("no_number", {"line": 3, "cell": "v_A", "text": "values"})
+    assert fault(found) == "line 3, v_A: 'values' is no number"
+    told = Reason("measurement_fault", {"why": found.code, **found.parameters}, "a.csv")
+    assert message(told) == fault(found)
+    assert sentence(told, tongue("ru")) == "строка 3, v_A: «values»: не число"
 
 
 def test_without_its_parameters_a_problem_is_told_by_the_sentence_that_needs_none() -> None:

@@ -389,10 +389,11 @@ def test_new_cookies_do_not_make_a_new_visitor_of_an_address(graded, app):
 # Deletion -----------------------------------------------------------------------------------------
 
 
-def test_deletion_leaves_students_of_similar_names(admin, settings):
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_deletion_leaves_students_of_similar_names(admin, settings, encoding):
     key = admin.publish()
     roster = 'student_id,name,n\ns1,"One\u2028\nOne",7\ns1_2,Two,8\ns10,\u2028Ten,9\nadmin,A,10\n'
-    admin.act("PUT", f"/publications/{key}/roster/files/roster.csv", content=roster.encode())
+    admin.act("PUT", f"/publications/{key}/roster/files/roster.csv", content=roster.encode(encoding))
     for name in ("s1.jpg", "s1_a.jpg", "s1_2.jpg", "s1_2_b.jpg", "s10.jpg"):
         admin.act("PUT", f"/publications/{key}/files/{name}", content=b"\xff\xd8\xff")
     assert admin.act("DELETE", f"/publications/{key}/students/s1").status_code == 200

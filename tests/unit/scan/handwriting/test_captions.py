@@ -4,7 +4,6 @@ import cv2
 import numpy as np
 import pytest
 
-from grader.inputs.scale_text import SURE, parse_scale
 from grader.records import InkMap, Page, Sheet
 from grader.scan.handwriting.captions import (
     NUMBER_WORDS,
@@ -15,6 +14,7 @@ from grader.scan.handwriting.captions import (
 )
 from grader.scan.handwriting.fields import writing
 from grader.scan.handwriting.lines import find_lines
+from grader.tables.scale_text import SURE, parse_scale
 from samples.simulation.lettering import Handwriting, write
 from samples.simulation.strokes import PenWidth
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from grader.inputs.roster import RosterRow
-from grader.inputs.scale_text import Refused, parse_scale
 from grader.printed.answer_sheet import make_sheets
 from grader.records import Page, Sheet, Written
 from grader.scan.handwriting.fields import moves, read_scale, start, written_scales
 from grader.scan.handwriting.model import lattice_of
 from grader.scan.register.registration import rectify
+from grader.tables.roster import RosterRow
+from grader.tables.scale_text import Refused, parse_scale
 from reference.authored.assignment import load_assignment
 from samples.simulation import CAREFUL, CLEAN_SCAN, PageStyle, Settings, simulate, wording
 from samples.simulation.printing import printed_sheets

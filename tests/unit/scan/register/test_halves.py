@@ -6,11 +6,11 @@ import numpy as np
 import pypdfium2
 import pytest
 
-from grader.inputs.roster import RosterRow
 from grader.printed.answer_sheet import make_sheets
 from grader.records import Page, Sheet
 from grader.scan.decode.pages import page_of
 from grader.scan.register.registration import rectify
+from grader.tables.roster import RosterRow
 from reference.authored.assignment import load_assignment
 from samples.simulation import any_settings, simulate
 

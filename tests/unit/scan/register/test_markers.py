@@ -8,7 +8,6 @@ import numpy as np
 import pypdfium2
 import pytest
 
-from grader.inputs.roster import RosterRow
 from grader.printed.answer_sheet import make_calibration, make_sheets
 from grader.printed.layout import MARKER_CORNERS, TEMPLATES
 from grader.records import Identity, Page
@@ -16,6 +15,7 @@ from grader.scan.decode.pages import pages_of
 from grader.scan.register.distortion import straighten
 from grader.scan.register.markers import register
 from grader.scan.register.registration import register as register_page
+from grader.tables.roster import RosterRow
 from reference.authored.assignment import load_assignment
 
 REAL = Path(__file__).resolve().parents[5] / "shared" / "real"

@@ -8,10 +8,10 @@ import os
 import pytest
 
 from grader.folder.batch import Batch, grade
-from grader.inputs.class_file import read_class_file
-from grader.inputs.decisions import DecisionFile
-from grader.inputs.roster import read_roster
 from grader.rubric import rubric_of
+from grader.tables.class_file import read_class_file
+from grader.tables.decisions import DecisionFile
+from grader.tables.roster import read_roster
 from reference.authored.assignment import load_assignment
 from reference.errors import PlanmarkError
 from tests.inline import Inline

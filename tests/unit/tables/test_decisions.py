@@ -9,9 +9,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from grader.inputs.decision_texts import PageDecision, page_decision, place, place_text
-from grader.inputs.decisions import COLUMNS, VERDICTS, ClashError, Decision, DecisionFile, read_table
-from reference.errors import CallError, InputFileError, PlanmarkError, lines_of
+from grader.tables.decision_texts import PageDecision, page_decision, place, place_text
+from grader.tables.decisions import COLUMNS, VERDICTS, ClashError, Decision, DecisionFile, read_table
+from grader.tables.reader import TableError
+from grader.texts.spoken import fault
+from reference.errors import InputFileError, PlanmarkError, lines_of
 from tests.examples import examples
 
 HEADER = ",".join(COLUMNS)
@@ -105,7 +107,7 @@ def test_a_spreadsheets_file_has_semicolons_decimal_commas_and_blank_lines(path,
 def test_a_line_that_cannot_be_used_is_told_and_the_others_are_read(path, line, where, what):
     written(path, f"{HEADER}\n{line}\ns01,,v_B,none,,,,,\n")
     table = read_table(path)
-    assert re.search(rf"(?s){where}: .*{what}", lines_of(table.faults))
+    assert re.search(rf"(?s){where}: .*{what}", lines_of([fault(one) for one in table.faults]))
     assert [row.student_id for row in table.rows] == ["s01"]
 
 
@@ -124,22 +126,17 @@ def test_a_fault_of_the_whole_file_says_what_to_do(path, text, what):
         DecisionFile(written(path, text)).all()
 
 
-def test_text_that_is_not_utf_8_is_refused(path):
-    with pytest.raises(InputFileError, match="UTF-8"):
-        read_decisions(written(path, f"{HEADER}\ns07,,comment,,,așa e,,,", "iso8859-16"))
-
-
 def test_a_cell_beside_the_named_columns_is_told(path):
     written(path, "student_id,criterion,verdict,\ns07,a_D,full,but late\ns07,a_B,full,\n")
     table = DecisionFile(path).table()
     assert [row.criterion for row in table.rows] == ["a_B"]
-    assert "line 2: 'but late' stands in a column without a name" in str(table.faults[0])
+    assert "line 2: 'but late' stands in a column without a name" in fault(table.faults[0])
 
 
 def test_the_same_decided_twice_is_not_guessed(path):
     written(path, f"{HEADER}\ns07,,a_D,full,,,,,\ns07,,a_D,none,,,,,\ns07,1,a_D,none,,,,,\n")
     table = DecisionFile(path).table()
-    assert [str(fault) for fault in table.faults] == [
+    assert [fault(one) for one in table.faults] == [
         "line 2, criterion: a_D is decided on line 3 too; leave one line of them",
         "line 3, criterion: a_D is decided on line 2 too; leave one line of them",
     ]
@@ -231,8 +228,9 @@ def test_a_row_taken_back_by_somebody_else_is_a_clash(path):
     file.add(ROW)
     seen = file.all()
     file.remove(ROW)
-    with pytest.raises(ClashError, match="taken back"):
+    with pytest.raises(ClashError) as clash:
         file.add(replace(ROW, verdict="full"), expected=seen)
+    assert clash.value.rows == ()
 
 
 def test_what_could_not_be_read_again_is_not_written(path):
@@ -242,7 +240,7 @@ def test_what_could_not_be_read_again_is_not_written(path):
         replace(ROW, comment="\x00"),
         replace(ROW, points=float("nan")),
     ):
-        with pytest.raises(CallError):
+        with pytest.raises(TableError, match="a_D: "):
             file.add(replace(ROW, criterion="a_B"), bad)
     assert not path.exists()
 

@@ -12,12 +12,10 @@ a semicolon-separated file `points` has a decimal comma. `criterion` says what a
 | `total` | blank | added, or taken away with a minus |
 | `comment` | blank | blank |
 
-A fault of the whole file raises InputFileError. A line that cannot be used costs that line alone: it is told,
+A fault of the whole file raises TableError. A line that cannot be used costs that line alone: it is told,
 and kept as it stands when the file is written.
 """
 
-import csv
-import io
 import math
 import re
 from collections import defaultdict
@@ -29,7 +27,8 @@ from pathlib import Path
 from typing import Literal
 
 from grader.files import OutputError, guarded, make_folder, sync_folder, unguarded, write_whole
-from grader.inputs.decision_texts import (
+from grader.records import Reason, Value
+from grader.tables.decision_texts import (
     LARGEST,
     AuditAnswer,
     PageDecision,
@@ -37,30 +36,33 @@ from grader.inputs.decision_texts import (
     page_decision,
     place,
 )
-from grader.inputs.roster import (
-    ScanRef,
-    parse_scan,
+from grader.tables.reader import (
+    MARK,
+    Row,
+    TableError,
+    TableKind,
+    at,
+    real_number,
+    refused_id,
     short,
-    surplus_of,
     whole_number,
-    why_no_id,
+    written,
 )
-from grader.language import ID_RULES
-from reference.authored.variant_table import delimiter_of, table_lines
-from reference.errors import CallError, Finding, InputFileError, PlanmarkError, lines_of, near_names
+from grader.tables.roster import ScanRef, parse_scan
+from grader.tables.scale_text import TextError
+from reference.errors import PlanmarkError
 
 FILE_NAME = "decisions.csv"
 COLUMNS = ("student_id", "position", "criterion", "verdict", "points", "comment", "by", "at", "basis")
-_REQUIRED = ("student_id", "criterion", "verdict")
 VERDICTS = ("full", "partial", "none", "follow_through", "not_judged")
 Kind = Literal["verdict", "audit", "node", "page", "total", "comment"]
 Key = tuple[str, int | None, str]
 """What a row is about: student, position, criterion; of a page the page alone."""
 
-_MAX_BYTES = 50_000_000
-"""`_MAX_LINES` lines with a comment of 250 characters each."""
-_MAX_LINES = 200_000
-"""A thousand students with two hundred decisions each."""
+_TABLE = TableKind(
+    "decisions", COLUMNS, ("student_id", "criterion", "verdict"), 50_000_000, 200_000, is_strict=True
+)
+"""A thousand students with two hundred decisions each, and a comment of 250 characters at each."""
 _LONGEST = 4_000
 """Characters of a cell: two pages of a comment."""
 _REMEMBERED = 20_000
@@ -68,14 +70,13 @@ _REMEMBERED = 20_000
 _LOCK_S = 20.0
 """A write takes some milliseconds; one that waits longer than this waits for a process that hangs."""
 _NO_TEXT = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff]")
-_POINTS = re.compile(r"[+-]?(?:[0-9]+(?:[.][0-9]*)?|[.][0-9]+)")
 
 
 class ClashError(PlanmarkError):
     """Somebody else has decided the same in the meantime; `rows` are the rows that stand there now."""
 
-    def __init__(self, message: str, rows: "tuple[Decision, ...]" = ()) -> None:
-        super().__init__("decision_clash", message)
+    def __init__(self, rows: "tuple[Decision, ...]") -> None:
+        super().__init__("decision_clash", "decided by somebody else in the meantime; look again")
         self.rows = rows
 
 
@@ -123,37 +124,37 @@ class Decision:
         if self.kind != "page":
             return self.student_id, self.position, self.criterion
         ref = parse_scan(self.criterion.removeprefix("page:"))
-        return "", None, self.criterion if isinstance(ref, str) else f"page:{ref.file}#{ref.page or 1}"
+        return "", None, f"page:{ref.file}#{ref.page or 1}" if isinstance(ref, ScanRef) else self.criterion
 
     @property
     def scan(self) -> ScanRef:
-        """The page that it is about. Raises ValueError where it is about none."""
+        """The page that it is about. Raises TextError where it is about none."""
         ref = parse_scan(self.criterion.removeprefix("page:"))
-        if self.kind != "page" or isinstance(ref, str):
-            raise ValueError(f"{self.criterion} is no page")
+        if self.kind != "page" or not isinstance(ref, ScanRef):
+            raise TextError("no_scan", text=short(self.criterion.removeprefix("page:")))
         return ref
 
     @property
     def node(self) -> tuple[str, str]:
-        """The figure and the node that it is about. Raises ValueError where it is about none."""
+        """The figure and the node that it is about. Raises TextError where it is about none."""
         parts = self.criterion.split(":")
         if self.kind != "node" or len(parts) != 3 or not all(parts):
-            raise ValueError(f"{self.criterion} is no node")
+            raise TextError("no_node", text=short(self.criterion))
         return parts[1], parts[2]
 
     @property
     def place(self) -> tuple[float, float]:
-        """Where the node was put, x and y in mm of the sheet, y down. Raises ValueError."""
+        """Where the node was put, x and y in mm of the sheet, y down. Raises TextError."""
         return place(self.verdict)
 
     @property
     def audited(self) -> tuple[str, AuditAnswer]:
-        """The criterion whose settled verdict was audited, and the answer. Raises ValueError."""
+        """The criterion whose settled verdict was audited, and the answer. Raises TextError."""
         return self.criterion.partition(":")[2], audit_answer(self.verdict)
 
     @property
     def page(self) -> PageDecision:
-        """What was decided on the page. Raises ValueError."""
+        """What was decided on the page. Raises TextError."""
         return page_decision(self.verdict)
 
 
@@ -183,14 +184,13 @@ class DecisionTable:
     Attributes
     ----------
     lines : in the file's order
-    faults : of lines that cannot be used, each with its number
+    faults : of lines that cannot be used
     delimiter, has_mark : how the file is written: ``,`` or ``;``, and whether a byte order mark comes first
     """
 
     lines: tuple[Line, ...] = ()
-    faults: tuple[Finding, ...] = ()
+    faults: tuple[Reason, ...] = ()
     delimiter: str = ","
-    # Without the mark spreadsheets take letters with accents for others.
     has_mark: bool = True
 
     @property
@@ -200,189 +200,133 @@ class DecisionTable:
 
 
 def read_table(path: Path) -> DecisionTable:
-    """A file's content, empty where there is no file. Raises InputFileError for a fault of the whole file."""
-    try:
-        with path.open("rb") as stream:
-            content = stream.read(_MAX_BYTES + 1)
-    except FileNotFoundError:
-        return DecisionTable()
-    except OSError as error:
-        finding = Finding("$", f"cannot be read: {error.strerror or error}")
-        raise _refused(path.name, [finding]) from error
-    if len(content) > _MAX_BYTES:
-        raise _refused(path.name, [Finding("$", f"is larger than {_MAX_BYTES // 1_000_000} MB")])
-    try:
-        is_wide = content[:2] in {b"\xff\xfe", b"\xfe\xff"}
-        text = "\ufeff" + content.decode("utf-16") if is_wide else content.decode("utf-8")
-    except UnicodeDecodeError as error:
-        finding = Finding("$", "is not UTF-8 text; save it as CSV in UTF-8")
-        raise _refused(path.name, [finding]) from error
-    return parse_table(text, path.name)
+    """A file's content, empty where there is no file. Raises TableError for a fault of the whole file."""
+    return parse_table(_TABLE.text(path, path.name), path.name) if path.exists() else DecisionTable()
 
 
 def parse_table(text: str, file: str = FILE_NAME) -> DecisionTable:
     """The content of a file's text; raises as `read_table` does."""
-    has_mark, text = text.startswith("\ufeff"), text.removeprefix("\ufeff")
-    if not text.strip():
+    if not text.removeprefix(MARK).strip():
         return DecisionTable()
-    delimiter = delimiter_of(text)
-    lines, findings = table_lines(text, delimiter, _MAX_LINES)
-    header = [name.strip().lower() for name in lines[0][1]] if lines else []
-    findings = findings or list(_check_header(header))
-    if findings:
-        raise _refused(file, findings)
-    named = tuple(header)
-    table: list[Line] = []
-    faults: list[Finding] = []
-    for number, cells in lines[1:]:
-        line, found = _line(number, named, tuple(cells), delimiter)
-        table.append(line)
-        faults += [Finding(f"line {number}{where}", why, line=number) for where, why in found]
-    table, again = _without_repeated(table, delimiter)
-    ordered = sorted([*faults, *again], key=lambda fault: fault.line)
-    return DecisionTable(tuple(table), tuple(ordered), delimiter, has_mark)
-
-
-def _refused(file: str, findings: Sequence[Finding]) -> InputFileError:
-    return InputFileError("decisions", f"{file}: {len(findings)} fault(s)\n{lines_of(findings)}")
-
-
-def _check_header(header: Sequence[str]) -> Iterator[Finding]:
-    for name in _REQUIRED:
-        if name not in header:
-            yield Finding("line 1", f"column {name} is missing; the columns are {','.join(COLUMNS)}")
-    for name in dict.fromkeys(filter(None, header)):
-        if header.count(name) > 1:
-            yield Finding("line 1", f"column {short(name)} is there {header.count(name)} times; leave one")
-        elif name not in COLUMNS:
-            near = near_names(name, COLUMNS, most=1)
-            advice = f"did you mean {near[0]}?" if near else "remove it, or move what it says to comment"
-            yield Finding("line 1", f"column '{short(name)}' is not known; {advice}")
+    table = _TABLE.table(text, file)
+    read = [_line(row.line, row.header, row.cells, row.delimiter) for row in table.rows]
+    lines, again = _without_repeated([line for line, _ in read], table.delimiter)
+    faults = [*(one for _, found in read for one in found), *again]
+    in_order = sorted(faults, key=lambda one: int(str(one.parameters["line"])))
+    return DecisionTable(tuple(lines), tuple(in_order), table.delimiter, table.has_mark)
 
 
 @lru_cache(_REMEMBERED)
 def _line(
     number: int, header: tuple[str, ...], cells: tuple[str, ...], delimiter: str
-) -> tuple[Line, list[tuple[str, str]]]:
-    """A line, and what is wrong with it: where in the line, and why."""
-    given = dict(zip(header, cells, strict=False))
-    text = {name: given.get(name, "").strip() for name in COLUMNS}
-    position, points = whole_number(text["position"], delimiter), _points(text["points"], delimiter)
+) -> tuple[Line, list[Reason]]:
+    """A line, and what is wrong with it."""
+    given = Row(number, cells, header, delimiter)
+    position, points = (read(given[name], delimiter) for read, name in _NUMBERS)
     row = Decision(
-        student_id=text["student_id"],
-        position=position,
-        criterion=text["criterion"],
-        verdict=text["verdict"],
-        points=points,
-        comment=unguarded(text["comment"]),
-        by=unguarded(text["by"]),
-        at=text["at"],
-        basis=text["basis"],
+        student_id=given["student_id"],
+        position=position if isinstance(position, int) else None,
+        criterion=given["criterion"],
+        verdict=given["verdict"],
+        points=points if isinstance(points, float) else None,
+        comment=unguarded(given["comment"]),
+        by=unguarded(given["by"]),
+        at=given["at"],
+        basis=given["basis"],
         line=number,
     )
     if row.kind == "verdict":
         row = replace(row, verdict=re.sub(r"[\s-]+", "_", row.verdict.lower()))
     faults = dict(faults_of(row))
-    if text["points"] and points is None:
-        mark = "comma" if delimiter == ";" else "point"
-        faults["points"] = f"'{short(text['points'])}' is no number; write it with a decimal {mark}"
-    key: Key | None = row.key
-    if text["position"] and position is None:
-        key = None
-        faults["position"] = f"'{short(text['position'])}' is no whole number"
-    told = [(f", {column}", why) for column, why in faults.items()]
+    for (_, name), found in zip(_NUMBERS, (position, points), strict=True):
+        if given[name] and isinstance(found, Reason):
+            faults[name] = found
+    key = None if given["position"] and "position" in faults else row.key
     strangers = [cell for name, cell in zip(header, cells, strict=False) if not name and cell.strip()]
-    surplus = surplus_of(header, cells, delimiter)
-    if strangers and surplus is None:
-        surplus = f"'{short(strangers[0].strip())}' stands in a column without a name; move it to comment"
-    if surplus is not None:
-        key, told = None, [("", surplus)]
-    as_it_stands = (*(given.get(name, "") for name in COLUMNS), *strangers, *cells[len(header) :])
-    return Line(row, key, as_it_stands if told else ()), told
+    if given.is_too_wide():
+        key = None
+    elif strangers:
+        key, text = None, short(strangers[0].strip())
+        given.fault("", Reason("field_without_column", {"text": text}))
+    else:
+        given.faults = [at(why, number, column) for column, why in faults.items()]
+    raw = dict(zip(header, cells, strict=False))
+    as_it_stands = (*(raw.get(name, "") for name in COLUMNS), *strangers, *cells[len(header) :])
+    return Line(row, key, as_it_stands if given.faults else ()), given.faults
 
 
-def _without_repeated(lines: Sequence[Line], delimiter: str) -> tuple[list[Line], list[Finding]]:
+_NUMBERS = ((whole_number, "position"), (real_number, "points"))
+
+
+def _without_repeated(lines: Sequence[Line], delimiter: str) -> tuple[list[Line], list[Reason]]:
     """The lines, those that decide the same as others not to be used, and what is wrong with these."""
     numbers: dict[Key, list[int]] = defaultdict(list)
     for line in lines:
         if line.key is not None and not line.cells:
             numbers[line.key].append(line.row.line)
-    faults: list[Finding] = []
+    faults: list[Reason] = []
     kept: list[Line] = []
     for line in lines:
         same = [] if line.key is None or line.cells else numbers[line.key]
-        others = [str(number) for number in same if number != line.row.line]
+        others = tuple(str(number) for number in same if number != line.row.line)
         if others:
-            why = (
-                f"{line.row.criterion} is decided on line {', '.join(others[:3])} too; leave one line of them"
-            )
-            number = line.row.line
-            faults.append(Finding(f"line {number}, criterion", why, line=number))
+            known: dict[str, Value] = {"criterion": line.row.criterion, "lines": others[:3]}
+            faults.append(at(Reason("decided_twice", known), line.row.line, "criterion"))
             line = replace(line, cells=_cells(line.row, delimiter))  # noqa: PLW2901 - as it is kept
         kept.append(line)
     return kept, faults
 
 
-def _points(text: str, delimiter: str) -> float | None:
-    plain = text.replace("\N{MINUS SIGN}", "-")
-    plain = plain.replace(",", ".", 1) if delimiter == ";" else plain
-    return float(plain) if len(plain) < 20 and _POINTS.fullmatch(plain) else None
-
-
-def faults_of(row: Decision) -> Iterator[tuple[str, str]]:
+def faults_of(row: Decision) -> Iterator[tuple[str, Reason]]:
     """The columns of a decision whose text cannot be used whatever the class, and why."""
-    why = why_no_id(row.student_id)
     if not row.student_id and row.kind != "page":
-        yield "student_id", "is empty: say whose submission was decided"
-    elif row.student_id and why is not None:
-        yield "student_id", f"'{short(row.student_id)}' is refused: {ID_RULES[why.code]}"
+        yield "student_id", Reason("student_empty")
+    elif row.student_id and (why := refused_id(row.student_id)) is not None:
+        yield "student_id", why
     for column in COLUMNS:
         text = str(getattr(row, column) or "")
         if len(text) > _LONGEST:
-            yield column, f"has more than {_LONGEST} characters"
+            yield column, Reason("too_long", {"most": _LONGEST})
         elif _NO_TEXT.search(text):
-            yield column, "has signs that are no text"
+            yield column, Reason("signs_no_text")
     yield from _faults_of_kind(row)
     if row.points is not None and not abs(row.points) <= LARGEST:
-        yield "points", "is no number of points"
+        yield "points", Reason("no_points")
     elif row.points is not None and row.kind in {"audit", "node", "page", "comment"}:
-        yield "points", f"must be empty for {row.criterion.partition(':')[0]}"
+        yield "points", Reason("not_blank", {"kind": row.kind})
     elif row.points is not None and row.kind == "verdict" and row.points < 0.0:
-        yield "points", "are below 0; points are taken away in a row `total`"
+        yield "points", Reason("points_negative")
 
 
-def _faults_of_kind(row: Decision) -> Iterator[tuple[str, str]]:
+def _faults_of_kind(row: Decision) -> Iterator[tuple[str, Reason]]:
     match row.kind:
         case "verdict":
             if not row.criterion:
-                yield "criterion", "is empty: write a criterion's id, total, comment, node:... or page:..."
+                yield "criterion", Reason("criterion_empty")
             if row.verdict not in VERDICTS:
-                yield "verdict", f"'{short(row.verdict)}' is none of {', '.join(VERDICTS)}"
+                yield "verdict", Reason("verdict_unknown", {"text": short(row.verdict), "names": VERDICTS})
         case "audit":
             yield from _fault("verdict", lambda: row.audited)
         case "node":
-            yield from _fault("criterion", lambda: row.node, "; node:FIGURE:NODE is right")
+            yield from _fault("criterion", lambda: row.node)
             yield from _fault("verdict", lambda: row.place)
         case "page":
-            yield from _fault("criterion", lambda: row.scan, "; page:FILE#NUMBER is right, from 1")
+            yield from _fault("criterion", lambda: row.scan)
             yield from _fault("verdict", lambda: row.page)
-        case "total":
-            if row.points is None:
-                yield "points", "is empty: write the points to add, or to take away with a minus"
+        case kind:
+            if kind == "total" and row.points is None:
+                yield "points", Reason("points_empty")
+            if kind == "comment" and not row.comment:
+                yield "comment", Reason("comment_empty")
             if row.verdict:
-                yield "verdict", "must be empty for total"
-        case "comment":
-            if not row.comment:
-                yield "comment", "is empty: write it there, or remove the line"
-            if row.verdict:
-                yield "verdict", "must be empty for comment"
+                yield "verdict", Reason("not_blank", {"kind": kind})
 
 
-def _fault(column: str, read: Callable[[], object], advice: str = "") -> Iterator[tuple[str, str]]:
+def _fault(column: str, read: Callable[[], object]) -> Iterator[tuple[str, Reason]]:
     try:
         read()
-    except ValueError as error:
-        yield column, f"{error}{advice}"
+    except TextError as error:
+        yield column, error.reason
 
 
 # Writing ------------------------------------------------------------------------------------------
@@ -400,12 +344,12 @@ class DecisionFile:
     def all(self) -> list[Decision]:
         """The decisions as they stand in the file now; `table` also tells of lines that cannot be used.
 
-        Raises InputFileError for a fault of the whole file.
+        Raises TableError for a fault of the whole file.
         """
         return self.table().rows
 
     def table(self) -> DecisionTable:
-        """The file's content now. Raises InputFileError for a fault of the whole file."""
+        """The file's content now. Raises TableError for a fault of the whole file."""
         return read_table(self.path)
 
     def add(self, *decisions: Decision, expected: Iterable[Decision] | None = None) -> list[Decision]:
@@ -414,19 +358,19 @@ class DecisionFile:
         Arguments: `expected` are rows that the caller has read, all of them if you like. What they say
         about the same must still stand in the file, and where they say nothing, nothing may.
 
-        Raises ClashError, with nothing written, where that is not so; CallError for a decision that could not
-        be read again; InputFileError for a fault of the whole file; OutputError where it cannot be written.
+        Raises ClashError, with nothing written, where that is not so; TableError for a decision that could
+        not be read again, and for a fault of the whole file; OutputError where it cannot be written.
         """
         rows = [_clean(row) for row in decisions]
-        for row in rows:
-            faults = [Finding(column, why) for column, why in faults_of(row)]
-            if faults:
-                raise CallError(
-                    "decision_refused", f"{row.criterion}: cannot be decided so\n{lines_of(faults)}"
-                )
         keys = [row.key for row in rows]
-        if len(set(keys)) < len(keys):
-            raise CallError("decision_refused", "the same is decided twice in one call")
+        for row in rows:
+            faults = [at(why, None, column) for column, why in faults_of(row)]
+            if keys.count(row.key) > 1:
+                faults.append(
+                    Reason("decided_twice", {"criterion": row.criterion, "student": row.student_id})
+                )
+            if faults:
+                raise TableError("decision_refused", row.criterion, faults)
         with self._open() as table:
             there = {row.key: row for row in table.rows}
             if expected is not None:
@@ -479,9 +423,8 @@ class DecisionFile:
             elif line.key in waiting:
                 cells.append(_cells(waiting.pop(line.key), table.delimiter))
         cells += [_cells(row, table.delimiter) for row in waiting.values()]
-        buffer = io.StringIO()
-        csv.writer(buffer, delimiter=table.delimiter, lineterminator="\r\n").writerows([COLUMNS, *cells])
-        write_whole(self.path, ("\ufeff" if table.has_mark else "") + buffer.getvalue())
+        text = written([COLUMNS, *cells], table.delimiter)
+        write_whole(self.path, (MARK if table.has_mark else "") + text)
         sync_folder(self.path.parent)
 
 
@@ -489,11 +432,7 @@ def _check_unchanged(pairs: Sequence[tuple[Decision | None, Decision | None]]) -
     """Raise ClashError where what was read and what stands there are not the same."""
     now = [there for read, there in pairs if read != there]
     if now:
-        rows = tuple(row for row in now if row is not None)
-        what = "; ".join(f"{row.criterion}: {row.verdict} by {row.by or 'somebody'}" for row in rows[:3])
-        raise ClashError(
-            f"decided by somebody else in the meantime ({what or 'taken back'}); look again", rows
-        )
+        raise ClashError(tuple(row for row in now if row is not None))
 
 
 def _clean(row: Decision) -> Decision:

@@ -6,18 +6,14 @@ quantities counter-clockwise positive). Semicolon-separated files have decimal c
 not measured; a line that begins with ``#`` is a comment. JSON for one student:
 `grader.documents.MeasurementsDocument`.
 
-A fault of the whole file (no student_id, no CSV at all) raises InputFileError with all of them. A value
+A fault of the whole file (no student_id, no CSV at all) raises TableError with all of them. A value
 that is refused costs that value alone, and so does a column that is not known: it is a problem of that
 student, and `Reading.unread` names what it was entered for, so that no criterion is judged without it.
 """
 
-import csv
-import io
 import json
 import math
 import re
-import stat
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -25,9 +21,7 @@ from typing import TYPE_CHECKING, TypeGuard
 
 from grader.documents import LikeDocument, MeasurementsDocument
 from grader.files import shown_text
-from grader.inputs.roster import MAX_LINES, short, surplus_of, whole_number, why_no_id
-from grader.inputs.scale_text import MAX_LENGTH as LONGEST_SCALE
-from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
+from grader.language import tongue
 from grader.records import (
     Figure,
     PageRef,
@@ -38,22 +32,41 @@ from grader.records import (
     Value,
 )
 from grader.rubric import RubricFile
-from grader.texts.spoken import clause
+from grader.tables.reader import (
+    MARK,
+    Row,
+    TableError,
+    TableKind,
+    at,
+    decoded,
+    near,
+    real_number,
+    refused_id,
+    short,
+    why_no_id,
+)
+from grader.tables.scale_text import MAX_LENGTH as LONGEST_SCALE
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
-from reference.authored.variant_table import delimiter_of, table_lines
+from reference.authored.variant_table import delimiter_of
 from reference.construction.derive import construction_of
 from reference.construction.graph import Construction, coincident
-from reference.errors import MOST_FINDINGS, Finding, InputFileError, lines_of, near_names
+from reference.errors import MOST_FINDINGS
 from reference.quantities import SCALE_UNITS, kind_of, unit_of
 
 if TYPE_CHECKING:
-    from grader.inputs.decisions import Decision
+    from grader.tables.decisions import Decision
 
 KEYS = ("student_id", "n", "position")
 TABLES = {"segments_mm": "", "directions_deg": "_deg", "values": "_value"}
 """The tables of a JSON file, and what a CSV file's columns add to the names in them."""
 MAX_BYTES = 1_000_000
 """A class of a thousand with every length, direction and value writes half of it."""
+CLASS_TABLE = TableKind(
+    "measurements", (*KEYS, *SCALE_NAMES, "v_A", "v_A_deg", "v_A_value"), ("student_id",), MAX_BYTES, 20_000,
+    has_comments=True, unreadable="measurements_unreadable", encoding="measurements_encoding",
+)  # fmt: skip
+OWN_TABLE = replace(CLASS_TABLE, required=())
+"""One student's own, who need not be named in it."""
 MAX_LENGTH_MM = 2000.0
 """Longer than any sheet: a length in other units, or a slip of the pen."""
 NO_SIZE = 1e-12
@@ -90,8 +103,8 @@ class Measurements:
 
     @property
     def place(self) -> str:
-        """Where they stand: the file, and the line of one that has lines."""
-        return self.source if self.line is None else f"{self.source}, line {self.line}"
+        """Where they stand: the file, and behind a colon the line of one that has lines."""
+        return self.source if self.line is None else f"{self.source}:{self.line}"
 
     @property
     def numbers(self) -> dict[str, float]:
@@ -186,94 +199,38 @@ def columns_of(rubric: RubricFile) -> dict[str, str]:
     return columns
 
 
-@dataclass(frozen=True, slots=True)
-class _Source:
-    """The file that is read, and how its faults are told.
-
-    Attributes
-    ----------
-    file : the name that the user knows it by
-    is_own : whether it is one student's own, who need not be named in it
-    """
-
-    file: str
-    names: Names
-    speaker: Tongue
-    is_own: bool
-
-    def say(self, text: str, /, **known: object) -> str:
-        """A sentence in the reader's language."""
-        return self.speaker.gettext(text) % known if known else self.speaker.gettext(text)
-
-    def line(self, number: int) -> str:
-        """A line of the file, as a place of a fault."""
-        return self.say(N_("line %(number)s"), number=number)
-
-    def refuse(self, findings: Sequence[Finding]) -> InputFileError:
-        """The error that says everything that is wrong with the file as a whole."""
-        head = self.say(N_("%(file)s: cannot be used"), file=self.file)
-        return InputFileError("measurements", f"{head}\n{lines_of(findings)}")
-
-
 def read_measurements(
-    path: Path | str,
-    names: Names,
-    file: str | None = None,
-    *,
-    lang: str = ROOT_LANGUAGE,
-    is_own: bool = False,
+    path: Path | str, names: Names, file: str | None = None, *, is_own: bool = False
 ) -> tuple[Measurements, ...]:
     """Read a CSV file of a class, or a JSON file of one student.
 
     Arguments
     ---------
     file : the name that the user knows it by, if that is not the path's own
-    lang : of all that is told of its faults
     is_own : whether it is one student's own file: a CSV file then needs no ``student_id``
 
-    Raises InputFileError with every fault of the file as a whole.
+    Raises TableError with every fault of the file as a whole.
     """
     path = Path(path)
-    source = _Source(file or shown_text(path.name), names, tongue(lang), is_own)
-    text = _text_of(path, source)
+    name, kind = file or shown_text(path.name), OWN_TABLE if is_own else CLASS_TABLE
+    text = kind.text(path, name)
     if path.suffix.lower() == ".json":
-        return (_parse_json(text, source),)
-    return tuple(_parse_csv(text, source))
+        return (_parse_json(text, name, names),)
+    columns = _columns(names)
+    table = kind.table(text, name, lambda header: _faults_of(header, columns))
+    meant = _unknown(table.header, columns)
+    return tuple(_line(row, meant, _Entries(name, names, columns, row), is_own=is_own) for row in table.rows)
 
 
 def measurements_in(cells: Mapping[str, str], names: Names, file: str, lang: str) -> Measurements:
     """What one student typed into a form: texts by columns of a CSV file, with decimal commas or points.
 
-    Arguments are those of `read_measurements`; raises as it does.
+    Raises TableError, in the language, where none of the columns is known.
     """
-    text = io.StringIO()
-    writer = csv.writer(text, delimiter=";", lineterminator="\n")
-    writer.writerows([list(cells), [value.strip() for value in cells.values()]])
-    source = _Source(file, names, tongue(lang), is_own=True)
-    return next(_parse_csv(text.getvalue(), source), replace(NOTHING_MEASURED, source=file))
-
-
-def _text_of(path: Path, source: _Source) -> str:
-    def unreadable(text: str, /, **known: object) -> InputFileError:
-        return InputFileError("measurements_unreadable", f"{source.file}: {source.say(text, **known)}")
-
-    try:
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise unreadable(N_("it is a folder or a pipe, not a file"))
-        with path.open("rb") as stream:
-            content = stream.read(MAX_BYTES + 1)
-    except FileNotFoundError as error:
-        raise unreadable(N_("there is no such file")) from error
-    except OSError as error:
-        raise unreadable(N_("cannot be read: %(why)s"), why=error.strerror or error) from error
-    if len(content) > MAX_BYTES:
-        most = MAX_BYTES // 1_000_000
-        raise unreadable(N_("is larger than %(most)s MB: these are no measurements"), most=most)
-    try:
-        return content.decode("utf-16" if content[:2] in {b"\xff\xfe", b"\xfe\xff"} else "utf-8-sig")
-    except UnicodeDecodeError as error:
-        why = source.say(N_("is not UTF-8 text; save it as CSV in UTF-8"))
-        raise InputFileError("measurements_encoding", f"{source.file}: {why}") from error
+    row, columns = Row(0, tuple(cells.values()), tuple(cells), ";"), _columns(names)
+    if faults := list(_faults_of(row.header, columns)):
+        raise TableError(CLASS_TABLE.code, file, faults, tongue(lang))
+    return _line(row, _unknown(row.header, columns), _Entries(file, names, columns, row), is_own=True)
 
 
 def students_in(path: Path) -> tuple[str, ...]:
@@ -282,13 +239,13 @@ def students_in(path: Path) -> tuple[str, ...]:
         if not path.is_file():
             return ()
         with path.open("rb") as stream:
-            text = stream.read(MAX_BYTES).decode(errors="replace").removeprefix("\ufeff")
+            text = decoded(stream.read(MAX_BYTES), "replace").removeprefix(MARK)
     except OSError:
         return ()
     if path.suffix.lower() == ".json":
         named = re.findall(r'"student_id"\s*:\s*"([^"\n]{1,64})"', text)
     else:
-        header, *lines = text.splitlines()[:MAX_LINES] or [""]
+        header, *lines = text.splitlines()[: CLASS_TABLE.most_lines] or [""]
         delimiter = delimiter_of(header)
         columns = [cell.strip(' "') for cell in header.split(delimiter)]
         column = columns.index("student_id") if "student_id" in columns else len(columns)
@@ -303,15 +260,17 @@ def _columns(names: Names) -> Mapping[str, tuple[str, str]]:
     return {f"{name}{end}": (table, name) for table, end in TABLES.items() for name in known[table]}
 
 
-@dataclass(frozen=True, slots=True)
-class _NoValue:
-    """What stands in a file in place of a value, and why it is none: a key of the catalogues."""
+def _faults_of(header: Sequence[str], columns: Mapping[str, object]) -> Iterator[Reason]:
+    if not {*SCALE_NAMES, *columns}.intersection(header):
+        yield Reason("no_measurements", {"line": 1, "names": tuple(columns)[:3]})
 
-    text: str
-    why: str
 
-    def __str__(self) -> str:
-        return self.text
+def _unknown(header: Sequence[str], columns: Mapping[str, object]) -> dict[str, tuple[str, ...]]:
+    """The columns that are not known, each with those it may be meant for that are not there."""
+    known, names = {"", *KEYS, *SCALE_NAMES, *columns}, sorted(columns)
+    unknown = [name for name in header if name not in known][:MOST_FINDINGS]
+    meant = {name: near(name, names, most=2).get("near", ()) for name in unknown}
+    return {name: tuple(one for one in near_it if one not in header) for name, near_it in meant.items()}
 
 
 def _entry(name: str, column: str, shown: str) -> Unread:
@@ -326,195 +285,101 @@ class _Entries:
     Attributes
     ----------
     columns : by a CSV file's columns, the table and the name in it
-    line : of a CSV file
+    row : the line of a CSV file, or one of no file at all for JSON, with what is wrong
     """
 
-    source: _Source
+    file: str
+    names: Names
     columns: Mapping[str, tuple[str, str]]
-    line: int | None = None
+    row: Row = field(default_factory=lambda: Row(0, (), (), ""))
     scales: dict[str, str] = field(default_factory=dict)
     tables: dict[str, dict[str, float]] = field(default_factory=lambda: {table: {} for table in TABLES})
-    faults: list[Finding] = field(default_factory=list)
     problems: list[Reason] = field(default_factory=list)
     unread: list[Unread] = field(default_factory=list)
 
-    def fault(self, path: str, why: str) -> None:
-        """Note what is wrong, where a path or a column says; the whole line for none."""
-        if self.line is not None:
-            line = self.source.line(self.line)
-            path = f"{line}, {path}" if path else line
-        self.faults.append(Finding(path, why))
-
-    def number(self, path: str, column: str, text: str, value: float | _NoValue) -> None:
+    def number(self, path: str, column: str, text: str, value: float | Reason) -> None:
         """Enter the number that a column or table has, or note why it is refused."""
-        say = self.source.say
-        why = say(value.why) if isinstance(value, _NoValue) else self._refusal(column, value)
-        if why is None and isinstance(value, float):
-            table, name = self.columns[column]
-            self.tables[table][name] = value if abs(value) >= NO_SIZE else 0.0
+        table, name = self.columns[column]
+        found = value if isinstance(value, Reason) else _checked(table, text, value)
+        if isinstance(found, Reason):
+            self.row.fault(path, found)
+            self.unread.append(_entry(name, column, f"'{text}'"))
         else:
-            self.fault(path, f"'{text}': {why}")
-            self.unread.append(_entry(self.columns[column][1], column, f"'{text}'"))
+            self.tables[table][name] = found
 
-    def _refusal(self, column: str, value: float) -> str | None:
-        """Why a number cannot be what it is entered for, or None."""
-        table, _ = self.columns[column]
-        if not math.isfinite(value):
-            return self.source.say(NOT_FINITE)
-        if table == "segments_mm" and not 0.0 <= value <= MAX_LENGTH_MM:
-            most = f"{MAX_LENGTH_MM:g}"
-            return self.source.say(N_("a drawn length is from 0 to %(most)s mm"), most=most)
-        if table == "directions_deg" and abs(value) > 360.0:
-            return self.source.say(N_("a direction is from -360 to 360 degrees"))
-        return None
-
-    def unknown(self, column: str, text: str, near: Sequence[str]) -> None:
+    def unknown(self, column: str, text: str, meant: tuple[str, ...]) -> None:
         """Tell that a column is not known; what it may be meant for is not judged without it."""
-        known = {"near": tuple(near)} if near else {}
+        known: dict[str, Value] = {"near": meant} if meant else {}
         self.problems.append(Reason("measurement_columns", {"column": short(column), **known}))
-        self.unread += [_entry(self.columns[meant][1], column, f"'{text}'") for meant in near]
+        self.unread += [_entry(self.columns[one][1], column, f"'{text}'") for one in meant]
 
-    def scale(self, path: str, name: str, text: str | _NoValue) -> None:
+    def scale(self, path: str, name: str, text: str | Reason) -> None:
         """Enter a scale as declared, or note why it is refused."""
+        found = text
         if isinstance(text, str) and len(text) > LONGEST_SCALE:
-            text = _NoValue(f"{text[:40]}...", TOO_LONG_A_SCALE)
-        if isinstance(text, str):
-            self.scales[name] = text
+            found = Reason("too_long", {"most": LONGEST_SCALE, "text": f"{text[:40]}..."})
+        if isinstance(found, Reason):
+            self.row.fault(path, found)
+            self.unread.append(_entry(name, name, f"'{found.parameters['text']}'"))
         else:
-            self.fault(path, f"'{text}': {self.source.say(text.why)}")
-            self.unread.append(_entry(name, name, f"'{text}'"))
+            self.scales[name] = found
 
     def measurements(
         self, student_id: str | None, n: int | None, position: int | None, *, is_usable: bool = True
     ) -> Measurements:
         """All that was entered, in the order of the construction."""
         lengths, directions, values = (self.tables[table] for table in TABLES)
-        names, file = self.source.names, self.source.file
-        reading = reading_of(names.vectors, lengths, directions)
-        problems = [
-            Reason("measurement_fault", {"detail": str(fault)}, file) for fault in self.faults[:MOST_FINDINGS]
-        ]
-        if len(self.faults) > MOST_FINDINGS:
-            problems.append(Reason("measurement_fault", {"more": len(self.faults) - MOST_FINDINGS}, file))
-        problems += [replace(problem, file=file) for problem in self.problems[:MOST_FINDINGS]]
+        faults, names = self.row.faults, self.names
+        shown = faults[:MOST_FINDINGS]
+        problems = [Reason("measurement_fault", {"why": one.code, **one.parameters}) for one in shown]
+        if len(faults) > MOST_FINDINGS:
+            problems.append(Reason("measurement_fault", {"more": len(faults) - MOST_FINDINGS}))
+        problems += self.problems[:MOST_FINDINGS]
         unused = sorted(names.unused.intersection({*lengths, *directions, *values}))
         if unused:
-            problems.append(Reason("measurement_not_used", {"columns": tuple(unused)}, file))
+            problems.append(Reason("measurement_not_used", {"columns": tuple(unused)}))
         return Measurements(
             student_id=student_id,
             n=n,
             position=position,
             scales=self.scales,
-            reading=replace(reading, unread=tuple(self.unread)),
+            reading=replace(reading_of(names.vectors, lengths, directions), unread=tuple(self.unread)),
             values={name: values[name] for name in names.values if name in values},
-            source=file,
-            line=self.line,
-            problems=tuple(problems),
+            source=self.file,
+            line=self.row.line or None,
+            problems=tuple(replace(problem, file=self.file) for problem in problems),
             is_usable=is_usable,
         )
 
 
-# CSV ----------------------------------------------------------------------------------------------
+def _checked(table: str, text: str, value: float) -> float | Reason:
+    """A number that may be entered in a table; or why it cannot be what it is entered for."""
+    if not math.isfinite(value):
+        return Reason("not_finite", {"text": text})
+    if table == "segments_mm" and not 0.0 <= value <= MAX_LENGTH_MM:
+        return Reason("length_range", {"text": text, "most_mm": int(MAX_LENGTH_MM)})
+    if table == "directions_deg" and abs(value) > 360.0:
+        return Reason("direction_range", {"text": text})
+    return value if abs(value) >= NO_SIZE else 0.0
 
 
-NOT_FINITE, NO_NUMBER = N_("is no finite number"), N_("is no number")
-TOO_LONG_A_SCALE = N_("is too long for a scale")
-NO_WHOLE_NUMBER = N_("'%(text)s' is no whole number")
-NO_ID = N_("'%(text)s' is refused: %(why)s")
-_COMMENT = re.compile(r'^[ \t]*"?#[^\n]*', re.MULTILINE)
-
-
-def _parse_csv(text: str, source: _Source) -> Iterator[Measurements]:
-    text = _COMMENT.sub("", text)
-    delimiter = delimiter_of(text)
-    lines, faults = table_lines(text, delimiter, MAX_LINES, source.speaker.gettext)
-    if not lines and not faults:
-        why = source.say(N_("the file is empty; its first line must name the columns"))
-        faults = [Finding(source.line(1), why)]
-    header = [cell.strip() for cell in lines[0][1]] if lines else []
-    columns = _columns(source.names)
-    faults = faults or list(_check_header(header, columns, source))
-    if faults:
-        raise source.refuse(faults)
-    known = frozenset((*KEYS, *SCALE_NAMES, *columns))
-    unknown = [name for name in header if name and name not in known][:MOST_FINDINGS]
-    near = {name: [one for one in near_names(name, sorted(columns)) if one not in header] for name in unknown}
-    for number, cells in lines[1:]:
-        yield _line(header, cells, delimiter, near, _Entries(source, columns, number))
-
-
-def _check_header(
-    header: list[str], columns: Mapping[str, tuple[str, str]], source: _Source
-) -> Iterator[Finding]:
-    line = source.line(1)
-    if "student_id" not in header and not source.is_own:
-        yield Finding(line, source.say(N_("column student_id is missing")))
-    if not {*SCALE_NAMES, *columns}.intersection(header):
-        example = ", ".join(list(columns)[:3])
-        why = N_("no column of measurements is known here; there are %(names)s, ...")
-        yield Finding(line, source.say(why, names=example))
-    for name, count in Counter(filter(None, header)).items():
-        if count > 1:
-            why = N_("column %(name)s is there %(count)s times")
-            yield Finding(line, source.say(why, name=short(name), count=count))
-
-
-DID_YOU_MEAN, OR = N_("did you mean %(names)s?"), N_("or")
-
-
-def _did_you_mean(near: Sequence[str], source: _Source) -> str:
-    either = f" {source.say(OR)} ".join(near)
-    return f"; {source.say(DID_YOU_MEAN, names=either)}" if near else ""
-
-
-def _line(
-    header: list[str],
-    cells: list[str],
-    delimiter: str,
-    near: Mapping[str, Sequence[str]],
-    entries: _Entries,
-) -> Measurements:
+def _line(row: Row, meant: Mapping[str, tuple[str, ...]], entries: _Entries, *, is_own: bool) -> Measurements:
     """What one line says; what is wrong in it is left out and reported."""
-    source = entries.source
-    known = {name: cell.strip() for name, cell in zip(header, cells, strict=False) if name and cell.strip()}
-    surplus = surplus_of(header, cells, delimiter, source.speaker)
-    if surplus is not None:
-        entries.fault("", source.say(N_("%(why)s; nothing of it is used"), why=surplus))
-        known = {"student_id": cells[0].strip()} if header[0] == "student_id" else {}
-    student = known.get("student_id", "")
-    why = None if source.is_own and not student else why_no_id(student)
-    if why is not None:
-        entries.fault("student_id", source.say(NO_ID, text=student[:40], why=clause(why, source.speaker)))
-    numbers = {name: whole_number(known[name], delimiter) for name in ("n", "position") if name in known}
-    for name, number in numbers.items():
-        if number is None:
-            entries.fault(name, source.say(NO_WHOLE_NUMBER, text=known[name][:40]))
+    if row.is_too_wide():
+        row.text = {"student_id": row["student_id"]} if row.header[0] == "student_id" else {}
+    student = row.student(may_be_blank=is_own)
+    n, position = row.whole("n"), row.whole("position")
     # Without its student, n and position nobody knows what it is held against.
-    is_usable = not entries.faults
-    for column, text in known.items():
-        if column in entries.columns:
-            entries.number(column, column, text[:40], _number(text, delimiter))
-        elif column in near:
-            entries.unknown(column, text[:40], near[column])
+    is_usable = not row.faults
+    for column, text in row.text.items():
+        if text and column in entries.columns:
+            entries.number(column, column, short(text), real_number(text, row.delimiter))
+        elif text and column in meant:
+            entries.unknown(column, short(text), meant[column])
     for scale in SCALE_NAMES:
-        if scale in known:
-            entries.scale(scale, scale, known[scale])
-    owner = None if why else student or None
-    return entries.measurements(owner, numbers.get("n"), numbers.get("position"), is_usable=is_usable)
-
-
-_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
-
-
-def _number(text: str, delimiter: str) -> float | _NoValue:
-    plain = text.replace("\N{MINUS SIGN}", "-")
-    if delimiter == ";":
-        plain = plain.replace(",", ".", 1)
-    if _NUMBER.fullmatch(plain) is not None:
-        return float(plain)
-    if "," in text and delimiter == ",":
-        return _NoValue(text, N_("is no number; write a decimal point, or separate fields by semicolons"))
-    return _NoValue(text, NO_NUMBER)
+        if row[scale]:
+            entries.scale(scale, scale, row[scale])
+    return entries.measurements(student, n, position, is_usable=is_usable)
 
 
 def reading_of(
@@ -587,7 +452,7 @@ def _object(pairs: Sequence[tuple[str, object]]) -> dict[str, object]:
         # A half of a surrogate pair can be written in JSON, and in no file of ours.
         name, read = _encodable(key), _encodable(value) if isinstance(value, str) else value
         if name in table:
-            read = _NoValue(f"{_shown(table[name])} and {_shown(read)}", N_("is there more than once"))
+            read = Reason("there_twice", {"text": f"{_shown(table[name])} / {_shown(read)}"})
         table[name] = read
     return table
 
@@ -597,7 +462,9 @@ def _encodable(text: str) -> str:
 
 
 def _shown(value: object) -> str:
-    return "a list or table" if isinstance(value, list | dict) else str(value)[:40]
+    if isinstance(value, Reason):
+        return str(value.parameters["text"])
+    return "[...]" if isinstance(value, list) else "{...}" if isinstance(value, dict) else short(str(value))
 
 
 MOST_DIGITS = 18
@@ -609,36 +476,33 @@ def _whole_number(digits: str) -> int | float:
     return int(digits) if len(digits) <= MOST_DIGITS else float(digits)
 
 
-def _parse_json(text: str, source: _Source) -> Measurements:
+def _parse_json(text: str, file: str, names: Names) -> Measurements:
     try:
         data = json.loads(
-            text,
+            text.removeprefix(MARK),
             object_pairs_hook=_object,
             parse_int=_whole_number,
-            parse_constant=lambda name: _NoValue(name, NOT_FINITE),
+            parse_constant=lambda name: Reason("not_finite", {"text": name}),
         )
     except (ValueError, RecursionError) as error:
-        line, column = getattr(error, "lineno", 1), getattr(error, "colno", 1)
-        why = source.say(
-            N_("is not JSON: look at line %(line)s, column %(column)s"), line=line, column=column
-        )
-        raise source.refuse([Finding("$", why)]) from error
+        known = {"row": getattr(error, "lineno", 1), "sign": getattr(error, "colno", 1)}
+        raise TableError(CLASS_TABLE.code, file, [Reason("no_json", known)]) from error
     if not isinstance(data, dict):
-        why = source.say(N_("is no table: a file of measurements begins with a brace"))
-        raise source.refuse([Finding("$", why)])
-    entries = _Entries(source, _columns(source.names))
+        raise TableError(CLASS_TABLE.code, file, [Reason("no_braces")])
+    entries = _Entries(file, names, _columns(names))
     for name, value in _take(data, "scales"):
+        path = f"$.scales.{name[:40]}"
         if name not in SCALE_NAMES:
-            known = source.say(N_("is not known here; there are %(names)s"), names=", ".join(SCALE_NAMES))
-            entries.fault(f"$.scales.{name[:40]}", known)
+            entries.row.fault(path, Reason("not_known", {"names": SCALE_NAMES}))
         else:
-            declared = str(value) if _is_number(value) else value
-            if not isinstance(declared, str | _NoValue):
-                declared = _NoValue(_shown(value), NO_NUMBER)
-            entries.scale(f"$.scales.{name}", name, declared)
+            entries.scale(path, name, str(value) if _is_number(value) else _text_or_fault(value))
     for table, end in TABLES.items():
         _enter(dict(_take(data, table)), table, end, entries)
-    return entries.measurements(*_about(data, source))
+    return entries.measurements(*_about(data, file))
+
+
+def _text_or_fault(value: object) -> str | Reason:
+    return value if isinstance(value, str | Reason) else Reason("no_number", {"text": _shown(value)})
 
 
 def _take(data: dict[str, object], key: str) -> list[tuple[str, object]]:
@@ -656,46 +520,31 @@ def _is_number(value: object) -> TypeGuard[int | float]:
 
 def _enter(given: Mapping[str, object], table: str, end: str, entries: _Entries) -> None:
     """Enter the numbers of a table."""
-    names = entries.source.names
-    known = names.values if table == "values" else tuple(names.vectors)
+    known = entries.names.values if table == "values" else tuple(entries.names.vectors)
     for name, value in given.items():
         path, shown = f"$.{table}.{name[:40]}", _shown(value)
         if name not in known:
-            near = near_names(name, known) if len(entries.faults) < MOST_FINDINGS else []
-            why = entries.source.say(NOT_KNOWN)
-            entries.fault(path, f"{why}{_did_you_mean(near, entries.source)}")
-            entries.unread += [_entry(meant, name, f"'{shown}'") for meant in near if meant not in given]
+            meant = near(name, known, most=2) if len(entries.row.faults) < MOST_FINDINGS else {}
+            entries.row.fault(path, Reason("not_known", meant))
+            entries.unread += [
+                _entry(one, name, f"'{shown}'") for one in meant.get("near", ()) if one not in given
+            ]
         elif _is_number(value):
             entries.number(path, f"{name}{end}", shown, float(value))
         else:
-            refused = value if isinstance(value, _NoValue) else _NoValue(shown, NO_NUMBER)
-            entries.number(path, f"{name}{end}", shown, refused)
+            why = value if isinstance(value, Reason) else Reason("no_number", {"text": shown})
+            entries.number(path, f"{name}{end}", shown, why)
 
 
-NOT_KNOWN = N_("is not known here")
-NO_TABLE = N_("must be a table in braces")
 KEYS_OF_DOCUMENT = tuple(MeasurementsDocument.model_fields)
 
 
-def _about(data: Mapping[str, object], source: _Source) -> tuple[str | None, int | None, int | None]:
-    """Whose they are, n and position. Raises InputFileError with all faults in what is left of the file."""
-    faults: list[Finding] = []
-    for key, value in data.items():
-        why = ""
-        if isinstance(value, _NoValue):
-            why = f"{source.say(value.why)}: {value}"
-        elif key not in KEYS_OF_DOCUMENT:
-            why = source.say(NOT_KNOWN) + _did_you_mean(near_names(key, KEYS_OF_DOCUMENT), source)
-        elif key in {"scales", *TABLES}:
-            why = source.say(NO_TABLE)
-        elif key == "schema_version":
-            why = "" if value == 1 else source.say(N_("must be 1"))
-        elif value is not None:
-            why = _misfit(key, value, source)
-        if why:
-            faults.append(Finding(f"$.{key[:40]}", why))
-    if faults:
-        raise source.refuse(faults)
+def _about(data: Mapping[str, object], file: str) -> tuple[str | None, int | None, int | None]:
+    """Whose they are, n and position. Raises TableError with all faults in what is left of the file."""
+    found = [(key, why) for key, value in data.items() if (why := _misfit(key, value)) is not None]
+    if found:
+        faults = [at(why, None, f"$.{key[:40]}") for key, why in found]
+        raise TableError(CLASS_TABLE.code, file, faults)
     student, n, position = (data.get(key) for key in KEYS)
     return (
         student if isinstance(student, str) else None,
@@ -704,12 +553,19 @@ def _about(data: Mapping[str, object], source: _Source) -> tuple[str | None, int
     )
 
 
-def _misfit(key: str, value: object, source: _Source) -> str:
-    """Why a value cannot be a student's id, n or position; empty where it can."""
+def _misfit(key: str, value: object) -> Reason | None:
+    """Why a key of a document, or its value, cannot be used; None where it can."""
+    if isinstance(value, Reason):
+        return value
+    if key not in KEYS_OF_DOCUMENT:
+        return Reason("not_known", near(key, KEYS_OF_DOCUMENT, most=2))
+    if key in {"scales", *TABLES}:
+        return Reason("no_braces_inside")
+    if key == "schema_version":
+        return None if value == 1 else Reason("must_be_one")
+    if value is None:
+        return None
     if key != "student_id":
         is_whole = isinstance(value, int) and not isinstance(value, bool)
-        return "" if is_whole else source.say(NO_WHOLE_NUMBER, text=_shown(value))
-    if not isinstance(value, str):
-        return source.say(N_("must be text in quotes"))
-    why = why_no_id(value)
-    return "" if why is None else source.say(NO_ID, text=_shown(value), why=clause(why, source.speaker))
+        return None if is_whole else Reason("no_whole_number", {"text": _shown(value)})
+    return refused_id(value) if isinstance(value, str) else Reason("no_quotes")

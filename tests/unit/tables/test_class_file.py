@@ -2,7 +2,7 @@
 
 import pytest
 
-from grader.inputs.class_file import read_class_file
+from grader.tables.class_file import read_class_file
 from reference.errors import AuthoredFileError
 
 PLATFORMS = ("csv", "moodle")

@@ -14,7 +14,7 @@ import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from grader.records import Reason, Written
+from grader.records import Reason, Value, Written
 from reference.authored.assignment import SCALE_NAMES, Assignment, Scales, Variant
 from reference.mechanism import Crank
 
@@ -90,12 +90,12 @@ class Refused:
 ParsedScale = Declared | ByRule | Refused
 
 
-class _NotUnderstoodError(ValueError):
-    """A part of the text that is no quantity: the code of a clause, and what was said."""
+class TextError(ValueError):
+    """A text that does not say what it must: the code of a clause, and what it names."""
 
-    def __init__(self, code: str, said: str = "", **more: str) -> None:
+    def __init__(self, code: str, said: str = "", **known: Value) -> None:
         super().__init__(code)
-        self.reason = Reason(code, {"said": said, **more})
+        self.reason = Reason(code, {**({"said": said} if said else {}), **known})
 
 
 def parse_scale(name: str, text: str | float, *, bare_unit: str | None = None) -> ParsedScale:
@@ -117,7 +117,7 @@ def parse_scale(name: str, text: str | float, *, bare_unit: str | None = None) -
         return _refused(name, Reason("beside_equals"))
     try:
         return _parse_chain(name, parts, bare_unit)
-    except _NotUnderstoodError as error:
+    except TextError as error:
         return _refused(name, error.reason)
     except OverflowError:
         return _refused(name, Reason("too_large_number"))
@@ -135,7 +135,7 @@ def _parse_chain(name: str, parts: list[str], bare_unit: str | None) -> ParsedSc
     if powers is not None:
         return ByRule(powers)
     if re.search(r"omega|ω", last):
-        raise _NotUnderstoodError("no_rule", last)
+        raise TextError("no_rule", last)
     if ":" in last:
         return Declared(_ratio(name, last))
     quantities = _quantities(last)
@@ -148,14 +148,14 @@ def _parse_chain(name: str, parts: list[str], bare_unit: str | None) -> ParsedSc
         paired = _correspondence(name, parts[-2], quantities)
         if paired is not None:
             return Declared(_positive(paired / PAPER_MM_PER_M, last))
-    raise _NotUnderstoodError("no_unit" if quantities[0].is_bare else _NO_SUCH[name], last)
+    raise TextError("no_unit" if quantities[0].is_bare else _NO_SUCH[name], last)
 
 
 def _positive(value: float, text: str) -> float:
     if not value > 0.0:
-        raise _NotUnderstoodError("not_positive", text)
+        raise TextError("not_positive", text)
     if not LEAST_PER_MM <= value <= MOST_PER_MM:
-        raise _NotUnderstoodError("undrawable", text)
+        raise TextError("undrawable", text)
     return value
 
 
@@ -243,7 +243,7 @@ class _Quantity:
 
     def times(self, other: "_Quantity", sign: int) -> "_Quantity":
         if sign < 0 and other.value == 0.0:
-            raise _NotUnderstoodError("division_by_zero")
+            raise TextError("division_by_zero")
         return _Quantity(
             self.value * other.value**sign,
             self.metres + sign * other.metres,
@@ -270,7 +270,7 @@ def _tokens(text: str) -> Iterator[str]:
     while place < len(text):
         token = _TOKEN.match(text, place)
         if token is None:
-            raise _NotUnderstoodError("not_understood", text, sign=text[place:].strip()[0])
+            raise TextError("not_understood", text, sign=text[place:].strip()[0])
         yield token[0].strip()
         place = token.end()
 
@@ -290,7 +290,7 @@ class _Reader:
     def read(self) -> _Quantity:
         quantity = self.product(depth=0)
         if self.tokens[self.place]:
-            raise _NotUnderstoodError("not_understood", self.text, sign=self.tokens[self.place])
+            raise TextError("not_understood", self.text, sign=self.tokens[self.place])
         return quantity
 
     def product(self, depth: int) -> _Quantity:
@@ -303,7 +303,7 @@ class _Reader:
                 if word == "/":
                     sign, divided = -1, True
             elif _is_number(word) and _is_number(self.tokens[self.place - 1]):
-                raise _NotUnderstoodError("two_numbers", self.text)
+                raise TextError("two_numbers", self.text)
             quantity = quantity.times(self.power(depth), sign)
         return quantity
 
@@ -314,7 +314,7 @@ class _Reader:
         if exponent == 1:
             return base
         if base.value == 0.0:
-            raise _NotUnderstoodError("zero_power", self.text)
+            raise TextError("zero_power", self.text)
         return _Quantity(base.value**exponent, base.metres * exponent, base.seconds * exponent, base.is_bare)
 
     def atom(self, depth: int) -> _Quantity:
@@ -323,7 +323,7 @@ class _Reader:
         if word == "(" and depth < MAX_DEPTH:
             inside = self.product(depth + 1)
             if self.tokens[self.place] != ")":
-                raise _NotUnderstoodError("open_bracket", self.text)
+                raise TextError("open_bracket", self.text)
             self.place += 1
             return inside
         if _is_number(word):
@@ -332,8 +332,8 @@ class _Reader:
             factor, metres, seconds = UNITS[word]
             return _Quantity(factor, metres, seconds, is_bare=False)
         if not word:
-            raise _NotUnderstoodError("unfinished", self.text)
-        raise _NotUnderstoodError("not_understood", self.text, sign=word)
+            raise TextError("unfinished", self.text)
+        raise TextError("not_understood", self.text, sign=word)
 
     def exponent(self, *, is_unit: bool) -> int:
         """``^2``, ``^-1``, ``^(-1)``; after a unit also ``s2`` and ``s-1``."""
@@ -347,11 +347,11 @@ class _Reader:
         small = digits.isdigit() and 1 <= int(digits) <= MAX_EXPONENT
         if not (small and (raised or is_unit)):
             if raised or sign:
-                raise _NotUnderstoodError("odd_power", self.text)
+                raise TextError("odd_power", self.text)
             return 1
         self.place += 1 + bool(sign)
         if bracket and self.tokens[self.place] != ")":
-            raise _NotUnderstoodError("open_bracket", self.text)
+            raise TextError("open_bracket", self.text)
         self.place += bracket
         return -int(digits) if sign == "-" else int(digits)
 
@@ -365,19 +365,19 @@ def _ratio(name: str, text: str) -> float:
     """Paper to real, ``1:5`` or ``1 cm : 5 cm``, per millimetre."""
     sides = [side.strip() for side in text.split(":")]
     if len(sides) != 2 or not all(sides):
-        raise _NotUnderstoodError("not_two_numbers", text)
+        raise TextError("not_two_numbers", text)
     paper, real = (_quantities(side)[0] for side in sides)
     if paper.is_bare and real.is_bare:
         if name != "kL":
-            raise _NotUnderstoodError("ratio_of_lengths", text)
+            raise TextError("ratio_of_lengths", text)
         if paper.value <= 0.0:
-            raise _NotUnderstoodError("not_positive", text)
+            raise TextError("not_positive", text)
         return _positive(real.value / paper.value / PAPER_MM_PER_M, text)
     is_one = re.fullmatch(r"1(?:\.0*)?\s*[^\W\d]+", sides[0]) is not None
     per_m = _correspondence(name, sides[0], [real]) if is_one else None
     if per_m is None:
         # "0.3 m : 60 mm" may be meant as a division: never guessed.
-        raise _NotUnderstoodError("not_one_unit", text)
+        raise TextError("not_one_unit", text)
     return _positive(per_m / PAPER_MM_PER_M, text)
 
 
@@ -385,7 +385,7 @@ def _correspondence(name: str, paper_text: str, real: list[_Quantity]) -> float 
     """``10 mm = 0.05 m``: real over paper, or None where it is no such pair."""
     try:
         paper = _quantities(paper_text)[0]
-    except _NotUnderstoodError:
+    except TextError:
         return None
     if (paper.metres, paper.seconds) != (1, 0) or paper.value <= 0.0:
         return None

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.inputs.scale_text import EXAMPLES, ByRule, Declared, Refused, parse_scale
+from grader.tables.scale_text import EXAMPLES, ByRule, Declared, Refused, parse_scale
 from grader.texts.spoken import ENGLISH, clause
 
 ROUNDING = 1e-12

@@ -3,8 +3,8 @@
 import re
 from dataclasses import dataclass
 
-from grader.inputs.roster import short, why_no_id
-from grader.language import ID_RULES
+from grader.tables.reader import short, why_no_id
+from grader.tables.scale_text import TextError
 
 TURNS = (0, 90, 180, 270)
 LARGEST = 100_000.0
@@ -39,48 +39,36 @@ class PageDecision:
 
 
 def page_decision(text: str) -> PageDecision:
-    """Owner, turn and corners as a row has them. Raises ValueError with what is wrong and what is right."""
+    """Owner, turn and corners as a row has them. Raises TextError."""
     said: dict[str, str] = {}
     for part in filter(None, (part.strip() for part in text.split(";"))):
         name, mark, value = (piece.strip() for piece in part.partition("="))
         if not mark or name not in {"owner", "turn", "corners"} or name in said:
-            raise ValueError(f"'{short(part)}': owner=, turn= and corners= are known, each once")
+            raise TextError("page_words", text=short(part))
         said[name] = value
     if not said:
-        raise ValueError("is empty: say owner=STUDENT, turn=90 or corners=x,y x,y x,y x,y")
-    return PageDecision(_owner(said.get("owner")), _turn(said.get("turn")), _corners(said.get("corners")))
+        raise TextError("page_nothing")
+    owner, turn, corners = (said.get(name) for name in ("owner", "turn", "corners"))
+    if owner is not None and (why := why_no_id(owner)) is not None:
+        raise TextError("id_refused", text=short(owner), advice=why.code)
+    if turn is not None and turn not in map(str, TURNS):
+        raise TextError("turn_unknown", text=short(turn), names=tuple(map(str, TURNS)))
+    return PageDecision(
+        owner, None if turn is None else int(turn), () if corners is None else _corners(corners)
+    )
 
 
-def _owner(text: str | None) -> str | None:
-    why = None if text is None else why_no_id(text)
-    if why is not None:
-        raise ValueError(f"owner '{short(text or '')}' is refused: {ID_RULES[why.code]}")
-    return text
-
-
-def _turn(text: str | None) -> int | None:
-    if text is None:
-        return None
-    if text not in {str(turn) for turn in TURNS}:
-        raise ValueError(f"turn '{short(text)}': one of {', '.join(map(str, TURNS))} is right")
-    return int(text)
-
-
-def _corners(text: str | None) -> tuple[tuple[float, float], ...]:
-    if text is None:
-        return ()
+def _corners(text: str) -> tuple[tuple[float, float], ...]:
     corners = tuple(place(each) for each in re.sub(r"\s*,\s*", ",", text).split())
     if len(corners) != 4:
-        raise ValueError(f"corners has {len(corners)} places x,y; four are right, parted by blanks")
+        raise TextError("corners_count", count=len(corners))
     edges = [
         complex(*there) - complex(*here)
         for here, there in zip(corners, corners[1:] + corners[:1], strict=True)
     ]
     turns = [(one.conjugate() * other).imag for one, other in zip(edges, edges[1:] + edges[:1], strict=True)]
     if min(turns) <= 0.0:
-        raise ValueError(
-            "corners: give the upright sheet's from the top left clockwise; no three may lie in a line"
-        )
+        raise TextError("corners_order")
     return corners
 
 
@@ -100,11 +88,11 @@ class AuditAnswer:
 
 
 def audit_answer(text: str) -> AuditAnswer:
-    """The answer that a row has. Raises ValueError with what is wrong and what is right."""
+    """The answer that a row has. Raises TextError."""
     answer, _, rest = (part.strip() for part in text.partition(";"))
     name, _, said = (part.strip() for part in rest.partition("="))
     if answer not in ANSWERS or name != "said" or not said:
-        raise ValueError(f"'{short(text)}': {', '.join(ANSWERS)} are known, then ; said=VERDICT")
+        raise TextError("audit_unknown", text=short(text), names=ANSWERS)
     return AuditAnswer(answer, said)
 
 
@@ -117,11 +105,11 @@ def place_text(x_mm: float, y_mm: float) -> str:
 
 
 def place(text: str) -> tuple[float, float]:
-    """The two numbers of a place x,y. Raises ValueError with what is wrong and what is right."""
+    """The two numbers of a place x,y. Raises TextError."""
     found = _PAIR.fullmatch(text.strip()) or _DECIMAL_COMMAS.fullmatch(text.strip())
     if found is None:
-        raise ValueError(f"'{short(text)}' is no place: two numbers x,y are right, such as 61.25,140.5")
+        raise TextError("no_place", text=short(text))
     x, y = (float(number.replace(",", ".")) for number in found.groups())
     if max(abs(x), abs(y)) > LARGEST:
-        raise ValueError(f"'{short(text)}' lies outside of every sheet")
+        raise TextError("place_outside", text=short(text))
     return x, y

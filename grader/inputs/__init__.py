@@ -1,1 +1,0 @@
-"""What people write: rosters, measurements, scales."""

@@ -1,0 +1,1 @@
+"""What people write: one reader of tables, rosters, measurements, decisions; scales; the class file."""

@@ -1,0 +1,135 @@
+"""What is wrong in a file that people wrote: the clauses behind the place of a fault.
+
+Each code has its texts, the most precise first: the first one is said whose parameters are all known.
+"""
+
+from grader.language import N_
+
+FAULTS: dict[str, tuple[str, ...]] = {
+    # Of a file or line as a whole.
+    "not_there": (
+        N_("there is no such file; check its path, or write a CSV table with the columns %(names)s"),
+    ),
+    "no_file": (N_("cannot be read: it is a folder or a pipe, not a file"),),
+    "not_readable": (N_("cannot be read: %(error)s"),),
+    "too_large": (N_("is larger than %(most)s MB, and no such table is; check which file it is"),),
+    "not_utf8": (N_("is not UTF-8 text; save it as CSV in UTF-8"),),
+    "too_many_lines": (N_("more than %(most)s lines are no table"),),
+    "no_csv": (N_("from here on it is no CSV; check its quotes: one is not closed, or text follows one"),),
+    "table_empty": (N_("the file is empty; its first line must name the columns"),),
+    "column_missing": (N_("column %(name)s is missing; the columns are %(names)s"),),
+    "column_twice": (N_("column %(name)s is there %(count)s times; leave one"),),
+    "column_unknown": (
+        N_("column '%(name)s' is not known; did you mean %(near)s?"),
+        N_("column '%(name)s' is not known; remove it"),
+    ),
+    "no_measurements": (N_("no column of measurements is known here; there are %(names)s, ..."),),
+    "fields_surplus": (
+        N_(
+            "has %(fields)s fields, the first line names %(columns)s columns; quote a field that holds"
+            " a '%(mark)s'"
+        ),
+    ),
+    "fields_missing": (N_("has %(fields)s fields, the first line names %(columns)s columns"),),
+    "field_without_column": (
+        N_("'%(text)s' stands in a column without a name; name the column, or move it to another"),
+    ),
+    "no_json": (N_("is not JSON: look at line %(row)s, sign %(sign)s"),),
+    "no_braces": (N_("is no table: a file of measurements begins with a brace"),),
+    # Of a cell, whatever its table, or of a key.
+    "cell_empty": (N_("is empty"),),
+    "id_refused": (N_("'%(text)s' is refused: %(advice)s"),),
+    "no_whole_number": (N_("'%(text)s' is no whole number"),),
+    "no_number": (N_("'%(text)s' is no number"),),
+    "no_decimal_point": (
+        N_("'%(text)s' is no number; write a decimal point, or separate fields by semicolons"),
+    ),
+    "not_finite": (N_("'%(text)s' is no finite number"),),
+    "length_range": (N_("'%(text)s': a drawn length is from 0 to %(most)s"),),
+    "direction_range": (N_("'%(text)s': a direction is from -360 to 360 degrees"),),
+    "too_long": (N_("has more than %(most)s characters"),),
+    "signs_no_text": (N_("has signs that are no text"),),
+    "there_twice": (N_("'%(text)s' is there more than once"),),
+    "not_known": (
+        N_("is not known here; did you mean %(near)s?"),
+        N_("is not known here; there are %(names)s"),
+        N_("is not known here"),
+    ),
+    "no_braces_inside": (N_("must be a table in braces"),),
+    "no_quotes": (N_("must be text in quotes"),),
+    "must_be_one": (N_("must be 1"),),
+    "lang_unknown": (N_("'%(text)s' is not known; there are %(names)s"),),
+    "no_scan": (N_("'%(text)s': a page is written FILE#NUMBER, from 1"),),
+    # Of lists of students, and of pages that are given away.
+    "no_rows": (N_("there are no rows below the line of column names"),),
+    "student_twice": (
+        N_("%(student)s in position %(position)s is on line %(first)s already"),
+        N_("%(student)s is on line %(first)s already"),
+    ),
+    "student_case": (
+        N_("%(student)s differs in case only from %(other)s on line %(first)s: the two would share a folder"),
+    ),
+    "position_missing": (N_("is empty, but %(student)s has other lines with positions"),),
+    "scan_twice": (N_("%(scan)s is named on line %(first)s already (%(other)s)"),),
+    "value_twice": (N_("'%(text)s' is on line %(first)s already"),),
+    "no_participant": (N_("'%(text)s' is no participant's number"),),
+    "no_preview_page": (N_("'%(text)s' is no page of this preview, or is there twice"),),
+    "page_left_out": (N_("the page '%(text)s' is missing"),),
+    "yes_or_no": (N_("'%(text)s': write yes or no"),),
+    "no_boxes": (N_("write x y width height in pixels of the picture, several with ; between"),),
+    # Of decisions.
+    "student_empty": (N_("is empty: say whose submission was decided"),),
+    "student_nobody": (
+        N_("%(student)s is nobody in this class; is %(near)s meant?"),
+        N_("%(student)s is nobody in this class"),
+    ),
+    "student_not_listed": (
+        N_("%(student)s is not on the roster; is %(near)s meant?"),
+        N_("%(student)s is not on the roster"),
+    ),
+    "position_open": (
+        N_("%(student)s has the positions %(positions)s: write which"),
+        N_("%(student)s has no positions: leave it blank"),
+    ),
+    "criterion_empty": (N_("is empty: write a criterion's id, total, comment, node:... or page:..."),),
+    "criterion_unknown": (
+        N_("'%(text)s' is not in this rubric; is %(near)s meant?"),
+        N_("'%(text)s' is not in this rubric"),
+    ),
+    "decided_twice": (
+        N_("%(criterion)s is decided on line %(lines)s too; leave one line of them"),
+        N_("%(criterion)s of %(student)s is decided on another line too; leave one"),
+    ),
+    "verdict_unknown": (N_("'%(text)s' is none of %(names)s"),),
+    "not_blank": (N_("must be empty for %(kind)s"),),
+    "comment_empty": (N_("is empty: write it there, or remove the line"),),
+    "points_empty": (N_("is empty: write the points to add, or to take away with a minus"),),
+    "no_points": (N_("is no number of points"),),
+    "points_negative": (N_("are below 0; points are taken away in a row `total`"),),
+    "points_above": (N_("%(given)s points are more than the %(most)s of %(criterion)s"),),
+    "points_contradict": (
+        N_("%(verdict)s gives %(most)s points, not %(given)s; leave them blank, or write partial"),
+        N_("what is not judged has no points; leave them blank"),
+    ),
+    "no_node": (N_("'%(text)s' is no node: write node:FIGURE:NODE"),),
+    "figure_unknown": (N_("'%(text)s' is no figure here: %(names)s"),),
+    "node_unknown": (N_("'%(text)s' is no node of %(figure)s: %(names)s"),),
+    "no_place": (N_("'%(text)s' is no place: two numbers x,y are right, such as 61.25,140.5"),),
+    "place_outside": (
+        N_("%(text)s lies beside the sheet of %(wide)s by %(high)s"),
+        N_("'%(text)s' lies outside of every sheet"),
+    ),
+    "page_not_there": (N_("there is no page %(wanted)s of %(source)s in the folder"),),
+    "page_open": (N_("%(source)s has %(pages)s pages: write which, page:%(source)s#1"),),
+    "page_nothing": (N_("is empty: say owner=STUDENT, turn=90 or corners=x,y x,y x,y x,y"),),
+    "page_words": (N_("'%(text)s': owner=, turn= and corners= are known, each once"),),
+    "turn_unknown": (N_("turn '%(text)s': one of %(names)s is right"),),
+    "corners_count": (N_("corners has %(count)s places x,y; four are right, parted by blanks"),),
+    "corners_order": (
+        N_("corners: give the upright sheet's from the top left clockwise; no three may lie in a line"),
+    ),
+    "audit_unknown": (N_("'%(text)s': %(names)s are known, then ; said=VERDICT"),),
+}
+
+ON_LINE = N_("line %(number)s")
+"""The place of a fault; a column follows behind a comma."""
