@@ -4,11 +4,9 @@ import contextlib
 import logging
 import os
 import re
-import secrets
 import unicodedata
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -34,7 +32,7 @@ def replacing(path: Path) -> Iterator[Path]:
     Missing folders are made. The temporary file lies beside the target, because a rename is atomic only
     within one file system. Raises OutputError with the system's reason; the target is then as it was.
     """
-    temporary = path.with_name(f".{path.name[:40]}.{secrets.token_hex(6)}.part")
+    temporary = path.with_name(f".{path.name[:40]}.{os.urandom(6).hex()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield temporary
@@ -235,8 +233,8 @@ def result_folders(results: Iterable[OfStudent]) -> list[str]:
 
 def samples_folder() -> Path:
     """The folder of samples. Raises CallError where an installation has none."""
-    installed = Path(str(files("grader"))) / "samples"
-    for folder in (installed, Path(__file__).resolve().parent.parent / "samples"):
+    here = Path(__file__).resolve().parent
+    for folder in (here / "samples", here.parent / "samples"):
         if folder.is_dir():
             return folder
     raise CallError("samples_missing", "the samples are not there; install planmark again")

@@ -334,6 +334,17 @@ def pdf_of_a_shading_by_a_mesh(patches=3000):
     )  # fmt: skip
 
 
+def pdf_of_endless_commands():
+    """PDF of 100 KB that unpacks to 39 MB of lines, each drawn."""
+    pdf = pikepdf.new()
+    page = pdf.add_blank_page(page_size=A4_PT)
+    packer = zlib.compressobj(9)
+    data = b"".join(packer.compress(b"0 0 m 1 1 l S " * 70_000) for _ in range(40)) + packer.flush()
+    lines = pikepdf.Stream(pdf, data, Filter=NAME.FlateDecode)
+    page.Contents = pdf.make_indirect(lines)
+    return pdf_bytes(pdf, compress_streams=False)
+
+
 def pdf_of_large_inline_images(count=40, side=30_000):
     """PDF of pictures of 900 million pixels each among its drawing commands, without their data."""
     pdf = pikepdf.new()
@@ -394,3 +405,11 @@ def pdf_object(saved, page):
     """Number of the object of a page, from 0."""
     with pikepdf.open(io.BytesIO(saved)) as pdf:
         return pdf.pages[page].obj.objgen[0]
+
+
+HEAVY = (
+    pdf_of_nested_forms, pdf_of_a_form_in_itself, pdf_of_a_narrow_pattern, pdf_of_a_heavy_stamp,
+    pdf_of_a_heavy_mask, pdf_of_many_shadings, pdf_of_a_shading_by_a_program, pdf_of_paints_by_a_shading,
+    pdf_of_a_shading_by_a_mesh, pdf_of_endless_commands, pdf_of_nested_groups,
+)  # fmt: skip
+"""Pages that take seconds or minutes to draw."""

@@ -49,7 +49,7 @@ def fit_of(rows: Rows, is_own: BoolArray) -> FloatArray:
         found[chosen] = np.logaddexp(found[chosen], fitted)
     # A mistake in another part leaves these as they are.
     found[is_like_own] = found[0]
-    for part in np.unique(rows.part):
+    for part in sorted(set(rows.part.tolist())):
         back = rows.reversed[:, rows.part == part].sum(axis=1)
         found -= np.minimum(BACKWARDS * back, BACKWARDS_TOGETHER)
     return found
@@ -57,7 +57,7 @@ def fit_of(rows: Rows, is_own: BoolArray) -> FloatArray:
 
 def _lies_straight(rows: Rows, residuals: FloatArray) -> bool:
     """Whether no sheet is turned, by the medians of the residuals of its directions against the own data."""
-    turned = (residuals[rows.is_angle & (rows.sheet == sheet)] for sheet in np.unique(rows.sheet))
+    turned = (residuals[rows.is_angle & (rows.sheet == sheet)] for sheet in set(rows.sheet.tolist()))
     return all(abs(np.median(one)) <= math.radians(STRAIGHT_DEG) for one in turned if len(one))
 
 
@@ -84,7 +84,7 @@ def _apart_from(rows: Rows, residuals: FloatArray) -> FloatArray:
     sigma = np.sqrt((2.0 * rows.drafting**2).sum(axis=1) + rows.reading**2)
     by_each = np.where(rows.is_angle, 1.0, rows.by_scale)
     found = np.zeros(len(residuals))
-    for part in np.unique(rows.part):
+    for part in sorted(set(rows.part.tolist())):
         for of_kind in (rows.is_angle, ~rows.is_angle):
             these = of_kind & (rows.part == part)
             if these.any():

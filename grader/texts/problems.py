@@ -61,12 +61,10 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
         N_("The PDF is damaged (%(error)s); export it again."),
         N_("The PDF is damaged; export it again."),
     ),
-    "pdf_too_heavy": (N_("The page has too many drawing commands; export it as an image."),),
     "page_missing": (
         N_("There is no page %(wanted)s; the file has %(pages)s."),
         N_("The file has no such page."),
     ),
-    "pages_none": (N_("The document has no pages."),),
     "pages_too_many": (
         N_("The document has %(pages)s pages, more than %(most)s: split it."),
         N_("The document has too many pages; split it."),

@@ -219,7 +219,7 @@ class _Branches:
     def _likeliest(self, costs: FloatArray) -> tuple[IntArray, IntArray]:
         """The alternatives and branches that go on, the likeliest first within each care."""
         chosen = []
-        for care in np.unique(self.care):
+        for care in sorted(set(self.care.tolist())):
             columns = np.flatnonzero(self.care == care)
             own = costs[:, columns]
             order = np.argsort(own, axis=None)[:MOST_BRANCHES]

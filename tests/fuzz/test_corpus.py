@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from grader.folder.workers import Limits, Workers
+from grader.folder.workers import ENDED, Limits, Workers
 from grader.records import Reason
 from tests import hostile
 from tests.fuzz.doors import DOORS, corpus, try_files
@@ -18,7 +18,8 @@ def made_to_break():
     """Files that were made to break a door, by their names."""
     for name, make in inspect.getmembers(hostile, inspect.isfunction):
         whole = all(one.default is not one.empty for one in inspect.signature(make).parameters.values())
-        if make.__module__ == hostile.__name__ and whole and isinstance(data := make(), bytes):
+        light = make.__module__ == hostile.__name__ and whole and make not in hostile.HEAVY
+        if light and isinstance(data := make(), bytes):
             yield "pictures", name, data
     head, row = seeds("measurements")[1].splitlines()[:2]
     wide = b"student_id," + b",".join(b"what_%d" % k for k in range(20_000))
@@ -59,3 +60,16 @@ def test_no_file_breaks_a_door(answers, index):
     assert not isinstance(answers[index], Reason), answers[index].message
     assert not answers[index].failures, answers[index].failures[0][0]
     assert len(answers[index].answers) == 1
+
+
+@pytest.mark.slow
+def test_a_page_that_takes_too_long_ends_its_worker_and_costs_no_other_file():
+    healthy = seeds("pictures")[0]
+    files = [healthy, *(make() for make in hostile.HEAVY), healthy]
+    with Workers(1, Limits(seconds=1.0, memory_mb=1500), try_files.__module__) as workers:
+        answers = dict(workers.run(try_files, [("pictures", [data]) for data in files]))
+    for index, make in enumerate(hostile.HEAVY, 1):
+        assert isinstance(answers[index], Reason), make.__name__
+        assert answers[index].code in ENDED
+    for index in (0, len(files) - 1):
+        assert not answers[index].failures

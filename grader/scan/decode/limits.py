@@ -1,7 +1,7 @@
 """Input files: read once, their kind known by their first bytes, their size and memory limited.
 
-All limits are checked before pixels are made. The memory of a page is that of the file, of the pixels as
-decoded, and of their grey.
+Sizes are checked before pixels are made. The memory of a page is that of the file, of the pixels as decoded,
+and of their grey. What still takes too long, such as a PDF page of endless drawing commands, ends its worker.
 
 Codes of `InputFileError` raised in this package:
 
@@ -17,9 +17,7 @@ Codes of `InputFileError` raised in this package:
 | image_too_large | more pixels, or more memory for them, than a sheet can need |
 | image_too_small | a page too small or too narrow to be a drawing |
 | pdf_encrypted | a PDF that asks for a password |
-| pdf_damaged | a PDF that cannot be opened, or a page of it that cannot be read |
-| pdf_too_heavy | a page whose drawing commands are more than a drawing can have |
-| pages_none | a document without pages |
+| pdf_damaged | a PDF that cannot be opened or has no pages, or a page of it that cannot be read |
 | pages_too_many | more pages than one class can need |
 """
 
@@ -54,7 +52,6 @@ _MAGIC = {
     b"II*\x00": "tiff",
     b"MM\x00*": "tiff",
     b"II+\x00": "tiff",
-    b"MM\x00+": "tiff",
 }
 _PDF_HEADER_WITHIN = 1024
 """Readers accept junk before `%PDF-`, so copiers that write some are let in."""
@@ -194,9 +191,7 @@ def check_memory(file: InputFile, page: int, pixels: int, decoded_bytes: int) ->
 
 
 def check_pages(file: InputFile, pages: int) -> None:
-    """Raise InputFileError for a document of no page or of too many."""
-    if pages < 1:
-        raise InputFileError("pages_none", f"{file.name}: the document has no pages; export it again")
+    """Raise InputFileError for a document of too many pages."""
     if pages > MAX_PAGES:
         raise InputFileError(
             "pages_too_many",

@@ -2,13 +2,12 @@
 
 import io
 import struct
-import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from PIL import Image
+from PIL import Image, PngImagePlugin
 
 from grader.records import GreyImage, Page
 from grader.scan.decode import jpeg
@@ -156,16 +155,16 @@ def tags_of(dpi: Dpi | None, orientation: int) -> Tags:
     return Tags(dpi, _TURN_CCW.get(orientation, 0), orientation in _MIRRORED)
 
 
-def tags_within(content: bytes) -> Tags:
-    """From JFIF, EXIF or pHYs of an image file; only its header is read."""
-    with Image.open(io.BytesIO(content)) as image:
-        return tags_of(plausible(image.info.get("dpi")), _orientation(image))
+def tags_within(image: Image.Image) -> Tags:
+    """From JFIF, EXIF or pHYs of an image that is opened; nothing is decoded."""
+    return tags_of(plausible(image.info.get("dpi")), _orientation(image))
 
 
 def _orientation(image: Image.Image) -> int:
     """As the EXIF says; 1 where there is none, or none that can be read."""
     try:
-        return int(image.getexif().get(_ORIENTATION_TAG, 1) or 1)
+        # That of PNG would decode the picture to look behind it.
+        return int(Image.Image.getexif(image).get(_ORIENTATION_TAG, 1) or 1)
     except (OSError, SyntaxError, ValueError, TypeError, KeyError, struct.error):
         return 1
 
@@ -180,7 +179,7 @@ _MAX_SCANS = 100
 """Progressive files of cameras and programs have about 10; each scan costs a pass over all blocks."""
 _PLANES = {"Gray": 1.0, "444": 3.0, "422": 2.0, "440": 2.0, "420": 1.5, "411": 1.5}
 """Coefficients for a pixel, of two bytes; held in memory where a file has more than one scan."""
-_FOUR_INKS = ("CMYK", "YCCK")
+FOUR_INKS = ("CMYK", "YCCK")
 _LEAST_BYTES = 600
 """A header with its tables is longer than this."""
 _CUT_OFF = ("remature end", "exhausted", "mpty input")
@@ -191,13 +190,10 @@ def _jpeg_page(file: InputFile, number: int) -> Page | None:
         return None
     if not file.data.rstrip(b"\0").endswith(_JPEG_END) and len(file.data) < _LEAST_BYTES:
         raise truncated(file, 1)
-    four_inks = check_header(file, 1, file.data) in _FOUR_INKS
-    tags = tags_within(file.data)
-    if four_inks:
-        with Image.open(io.BytesIO(file.data)) as image:
-            grey = from_pillow(image)
-    else:
-        grey = decode(file, 1, file.data)
+    four_inks = check_header(file, 1, file.data) in FOUR_INKS
+    with Image.open(io.BytesIO(file.data)) as image:
+        tags = tags_within(image)
+        grey = from_pillow(image) if four_inks else decode(file, 1, file.data)
     return Page(file.name, 1, tags.unmirrored(grey), tags.dpi, tags.turn_deg)
 
 
@@ -216,8 +212,8 @@ def check_header(file: InputFile, page: int, data: bytes, *, least: bool = True)
             scans=scans,
             most=_MAX_SCANS,
         )
-    planes = _PLANES.get(sampling, 3.0) if space not in _FOUR_INKS else 4.0
-    decoded = 9.0 if space in _FOUR_INKS else 0.0 if space == "Gray" else 3.0
+    planes = _PLANES.get(sampling, 3.0) if space not in FOUR_INKS else 4.0
+    decoded = 9.0 if space in FOUR_INKS else 0.0 if space == "Gray" else 3.0
     pixel_bytes = decoded + (2.0 * planes if scans > 1 else 0.0)
     check_memory(file, page, wide * high, int(wide * high * pixel_bytes))
     if least:
@@ -245,81 +241,30 @@ JPEG = Door(_jpeg_page)
 
 # PNG ----------------------------------------------------------------------------------------------
 
-_SIGNATURE = b"\x89PNG\r\n\x1a\n"
-_HEADER, _FRAME = struct.Struct(">IIBBxxx"), struct.Struct(">I4s")
-_PIXELS, _PNG_END = (b"IHDR", b"PLTE", b"tRNS", b"IDAT"), b"IEND"
-_DESCRIPTION = (b"pHYs", b"eXIf", b"tEXt", b"zTXt", b"iTXt")
-_MAX_DESCRIPTION = 8_000_000
-"""Bytes of resolution, EXIF and texts; a phone's EXIF with its thumbnail has 0.1 MB."""
-_MAX_CHUNKS = 200_000
-"""Some writers store 8 kB a chunk: a picture of 1 GB has 130,000."""
+PngImagePlugin.MAX_TEXT_CHUNK = 8_000_000
+"""Bytes that a profile or a text may unpack to; Pillow allows 1 MB, which profiles of printers reach."""
+_HEADER, _HEADER_AT, _PNG_END = struct.Struct(">IIBB"), 16, b"IEND\xaeB`\x82"
 _CHANNELS = {0: 1, 2: 3, 3: 4, 4: 4, 6: 4}
 """As decoded, by the type of colour: palettes and grey with alpha come as four."""
-_MAX_RATIO = 1040
-"""Deflation packs at most 1032 bytes in one; the rest is for headers."""
-
-Chunks = list[tuple[bytes, bytes]]
 
 
 def _png_page(file: InputFile, number: int) -> Page | None:
     if number > 1:
         return None
-    chunks = _chunks(file)
-    if not chunks or chunks[0][0] != b"IHDR" or len(chunks[0][1]) != _HEADER.size:
-        raise damaged(file, 1, "its header cannot be read")
-    wide, high, bits, colour = _HEADER.unpack(chunks[0][1])
-    if colour not in _CHANNELS or bits not in {1, 2, 4, 8, 16}:
+    if _PNG_END not in file.data:
+        raise truncated(file, 1)
+    wide, high, bits, colour = _HEADER.unpack_from(file.data, _HEADER_AT)
+    if colour not in _CHANNELS:
         raise damaged(file, 1, "its header cannot be read")
     check_memory(file, 1, wide * high, wide * high * _CHANNELS[colour] * max(bits // 8, 1))
     check_size(file, 1, wide, high)
-    packed = sum(len(data) for name, data in chunks if name == b"IDAT")
-    if wide * high * bits // 8 > packed * _MAX_RATIO:
-        raise truncated(file, 1)
-    tags = _tags(file, chunks)
-    # Profiles, texts and the frames of an animation never reach the decoder: they could unpack to anything.
-    stored = np.frombuffer(_written([chunk for chunk in chunks if chunk[0] in _PIXELS]), dtype=np.uint8)
-    pixels = cv2.imdecode(stored, cv2.IMREAD_UNCHANGED)
+    with PngImagePlugin.PngImageFile(io.BytesIO(file.data)) as image:
+        tags = tags_within(image)
+        image.verify()
+    pixels = cv2.imdecode(np.frombuffer(file.data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
     if pixels is None:
         raise damaged(file, 1, "it cannot be decoded")
     return Page(file.name, 1, tags.unmirrored(to_grey(pixels)), tags.dpi, tags.turn_deg)
-
-
-def _chunks(file: InputFile) -> Chunks:
-    """Names and contents up to the end; raises InputFileError where one is cut off or its sum is wrong."""
-    chunks: Chunks = []
-    view, at = memoryview(file.data), len(_SIGNATURE)
-    while len(chunks) < _MAX_CHUNKS:
-        if at + _FRAME.size + 4 > len(view):
-            raise truncated(file, 1)
-        length, name = _FRAME.unpack_from(view, at)
-        end = at + _FRAME.size + length
-        if end + 4 > len(view):
-            raise truncated(file, 1)
-        if zlib.crc32(view[at + 4 : end]) != int.from_bytes(view[end : end + 4], "big"):
-            raise damaged(file, 1, f"the checksum of its part {name!r} is wrong")
-        if name == _PNG_END:
-            return chunks
-        chunks.append((name, bytes(view[at + _FRAME.size : end])))
-        at = end + 4
-    raise damaged(file, 1, f"it has more than {_MAX_CHUNKS} parts")
-
-
-def _written(chunks: Chunks) -> bytes:
-    """A PNG file of some chunks."""
-    parts = [_SIGNATURE]
-    for name, data in (*chunks, (_PNG_END, b"")):
-        parts += [_FRAME.pack(len(data), name), data, zlib.crc32(data, zlib.crc32(name)).to_bytes(4, "big")]
-    return b"".join(parts)
-
-
-def _tags(file: InputFile, chunks: Chunks) -> Tags:
-    """Resolution and orientation: those of one white pixel with the picture's description."""
-    described = [chunk for chunk in chunks if chunk[0] in _DESCRIPTION]
-    if sum(len(data) for _, data in described) > _MAX_DESCRIPTION:
-        raise damaged(file, 1, f"its texts are longer than {_MAX_DESCRIPTION // 1_000_000} MB")
-    header = (b"IHDR", _HEADER.pack(1, 1, 8, 0))
-    described_pixel = _written([header, *described, (b"IDAT", zlib.compress(b"\0\xff"))])
-    return tags_within(described_pixel)
 
 
 PNG = Door(_png_page)

@@ -12,7 +12,6 @@ import pytest
 import tifffile
 from PIL import Image
 
-from grader.scan.decode import limits
 from grader.scan.decode.pages import count_pages, is_blank, pages_of
 from reference.errors import InputFileError
 from tests.jbig2 import write_jbig2_pdf
@@ -236,7 +235,8 @@ def test_a_pdf_without_pages_is_told(tmp_path):
     pikepdf.new().save(path)
     with pytest.raises(InputFileError) as caught:
         count_pages(path)
-    assert caught.value.code == "pages_none"
+    assert caught.value.code == "pdf_damaged"
+    assert "no pages" in caught.value.message
 
 
 def test_a_decompression_bomb_is_not_decoded(tmp_path):
@@ -300,19 +300,65 @@ def test_strokes_of_every_printing_ink_are_dark(tmp_path, ink):
     assert np.array_equal(only_page(path).grey, drawing())
 
 
-@pytest.mark.parametrize("kind", ["planes", "sixteen", "twelve", "real"])
+GREY = drawing()
+DEEP = GREY.astype(np.uint16) * 257
+SHADES = np.repeat((np.arange(256)[::-1] * 257).astype(np.uint16)[None], 3, axis=0)
+INKED = np.dstack([np.zeros_like(GREY)] * 3 + [255 - GREY])
+TIFFS = {
+    "planes": (np.stack([GREY] * 3), {"photometric": "rgb", "planarconfig": "separate"}),
+    "sixteen bits": (DEEP, {}),
+    "sixteen bits, great end first": (DEEP, {"byteorder": ">"}),
+    "sixteen bits, white least": (~DEEP, {"photometric": "miniswhite"}),
+    "sixteen bits in colour": (np.dstack([DEEP] * 3), {"photometric": "rgb"}),
+    "twelve bits": (GREY.astype(np.uint16) << 4, {}),
+    "real": (GREY.astype(np.float32) / 255, {}),
+    "white least": (255 - GREY, {"photometric": "miniswhite"}),
+    "palette": (255 - GREY, {"photometric": "palette", "colormap": SHADES}),
+    "tiles": (GREY, {"tile": (64, 64)}),
+    "tiles deflated": (GREY, {"tile": (64, 64), "compression": "zlib", "predictor": True}),
+    "large offsets": (GREY, {"bigtiff": True}),
+    "transparent": (INKED, {"photometric": "rgb", "extrasamples": ["unassalpha"]}),
+}
+
+
+@pytest.mark.parametrize("kind", TIFFS)
 def test_pixels_of_unusual_depth_or_order_come_through(tmp_path, kind):
-    path, grey = tmp_path / "odd.tif", drawing()
-    match kind:
-        case "planes":
-            tifffile.imwrite(path, np.stack([grey] * 3), photometric="rgb", planarconfig="separate")
-        case "sixteen":
-            tifffile.imwrite(path, grey.astype(np.uint16) * 257)
-        case "twelve":
-            tifffile.imwrite(path, grey.astype(np.uint16) << 4)
-        case _:
-            tifffile.imwrite(path, grey.astype(np.float32) / 255)
-    assert np.array_equal(only_page(path).grey, grey)
+    pixels, options = TIFFS[kind]
+    tifffile.imwrite(tmp_path / "odd.tif", pixels, **options)
+    assert np.array_equal(only_page(tmp_path / "odd.tif").grey, GREY)
+
+
+@pytest.mark.parametrize("tile", [None, (64, 64)])
+@pytest.mark.parametrize("colour", [False, True])
+def test_a_tiff_of_jpegs_is_read_and_its_damage_told(tmp_path, tile, colour):
+    path, grey = tmp_path / "scan.tif", drawing()
+    pixels = np.dstack([grey] * 3) if colour else grey
+    how = {"photometric": "rgb" if colour else "minisblack", "compression": "jpeg", "tile": tile}
+    tifffile.imwrite(path, pixels, compressionargs={"level": 95}, **how)
+    assert np.abs(only_page(path).grey.astype(int) - grey).mean() < JPEG_ERROR_LEVELS
+    with tifffile.TiffFile(path) as file:
+        start, size = file.pages[0].dataoffsets[0], file.pages[0].databytecounts[0]
+    data = bytearray(path.read_bytes())
+    del data[start + size // 2 : start + size - 2]
+    data[start + size // 2 : start + size // 2] = bytes(size - 2 - size // 2)
+    path.write_bytes(data)
+    with pytest.raises(InputFileError) as caught:
+        only_page(path)
+    assert caught.value.code in {"image_damaged", "image_truncated"}
+
+
+def test_each_page_of_a_tiff_is_read(tmp_path):
+    path, grey = tmp_path / "class.tif", drawing()
+    bits = grey < 128
+    with tifffile.TiffWriter(path) as writer:
+        writer.write(grey, resolution=(200, 200))
+        writer.write(bits, photometric="miniswhite", resolution=(300, 300))
+        writer.write(np.dstack([grey] * 3), photometric="rgb", compression="lzw")
+    first, second, third = pages_of(path)
+    assert np.array_equal(first.grey, grey)
+    assert np.array_equal(second.grey, np.where(bits, 0, 255))
+    assert np.array_equal(third.grey, grey)
+    assert (first.dpi, second.dpi, third.dpi) == ((200, 200), (300, 300), None)
 
 
 def raw_pdf(data, **entries):
@@ -346,33 +392,20 @@ def test_deflated_pixels_of_a_pdf_are_taken_out_as_stored(tmp_path):
     assert np.array_equal(only_page(path).grey, bits * np.uint8(255))
 
 
-@pytest.mark.parametrize("share", [0.5, 900.0])
-def test_an_image_with_data_of_another_size_is_told_and_not_unpacked(tmp_path, share):
-    path = tmp_path / "bomb.pdf"
-    raw_pdf(zlib.compress(bytes(int(share * drawing().size))), **GREY8)[0].save(path)
+@pytest.mark.parametrize("how", ["bomb", "cut", "damaged"])
+def test_an_image_whose_data_are_not_whole_or_too_many_is_told(tmp_path, how):
+    path, data = tmp_path / "image.pdf", bytearray(zlib.compress(drawing().tobytes()))
+    match how:
+        case "bomb":
+            data = zlib.compress(bytes(900 * drawing().size))
+        case "cut":
+            del data[len(data) // 2 :]
+        case _:
+            data[len(data) // 2] ^= 0xFF
+    raw_pdf(bytes(data), **GREY8)[0].save(path)
     with pytest.raises(InputFileError) as caught:
         list(pages_of(path))
-    assert caught.value.code == "image_damaged"
-
-
-@pytest.mark.parametrize("in_form", [False, True])
-def test_a_page_of_endless_drawing_commands_is_refused_before_they_are_carried_out(tmp_path, in_form):
-    path = tmp_path / "endless.pdf"
-    pdf, page = raw_pdf(zlib.compress(drawing().tobytes()), **GREY8)
-    packer = zlib.compressobj(9)
-    data = b"".join(packer.compress(b"0 0 m 1 1 l S " * 70_000) for _ in range(40)) + packer.flush()
-    bomb = pikepdf.Stream(pdf, data)
-    bomb["/Filter"] = pikepdf.Name.FlateDecode
-    if in_form:
-        bomb["/Subtype"] = pikepdf.Name.Form
-        page.Resources.XObject.F = pdf.make_indirect(bomb)
-        page.Contents = pdf.make_stream(b"/F Do")
-    else:
-        page.Contents = pdf.make_indirect(bomb)
-    pdf.save(path, compress_streams=False)
-    with pytest.raises(InputFileError) as caught:
-        list(pages_of(path))
-    assert caught.value.code == "pdf_too_heavy"
+    assert caught.value.code in {"image_damaged", "pdf_damaged"}
 
 
 def test_a_jpeg_in_a_pdf_that_claims_too_many_pixels_is_not_decoded(tmp_path):
@@ -459,14 +492,11 @@ def test_a_scan_packed_by_jpeg_2000_is_taken_out_as_stored(tmp_path):
     assert np.array_equal(only_page(path).grey, drawing())
 
 
-def test_a_jpeg_2000_of_more_pixels_than_its_page_says_is_not_unpacked(tmp_path, monkeypatch):
-    monkeypatch.setattr(limits, "MAX_PIXELS", 2 * drawing().size)
+def test_a_jpeg_2000_of_more_pixels_than_its_page_says_is_as_large_as_the_page_says(tmp_path):
     buffer = io.BytesIO()
     Image.fromarray(np.kron(drawing(), np.ones((2, 2), np.uint8))).save(buffer, "JPEG2000")
     path = packed_in_a_pdf(tmp_path / "scan.pdf", buffer.getvalue(), "JPXDecode")
-    with pytest.raises(InputFileError) as caught:
-        list(pages_of(path))
-    assert caught.value.code == "image_too_large"
+    assert only_page(path).grey.shape == SHAPE
 
 
 @pytest.mark.parametrize("annotations", [[42], [pikepdf.Dictionary(Subtype=pikepdf.Name.Link)]])
