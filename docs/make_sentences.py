@@ -56,7 +56,8 @@ EXAMPLES: Mapping[str, str] = {
     "cause": "normal component reversed", "done": "12", "minutes": "4", "open": "38", "total": "30",
     "verdict": "right", "who": "A. B.", "beyond": "@0.2 mm", "good_to": "@0.3 mm", "whose": "7",
     "instead": "v_CA", "share": "62\u00a0%", "file": "class.csv", "most": "1000", "names": "v_A, v_B",
-    "pages": "12", "left": "3",
+    "pages": "12", "left": "3", "known": "moodle, canvas", "endings": ".jpg, .pdf", "field": "key_set_url",
+    "where": "message_type", "fault": "Field required",
     "error": "line 3", "fields": "5", "column": "v_BB", "columns": "4", "mark": ",", "point": "O1",
     "mechanism": "crank-rocker", "level": "all", "what": "n", "last": "30", "value": "31", "called": "7",
     "unfit": "14", "unit": "cm", "axis": "+y",
@@ -75,7 +76,7 @@ EXAMPLES: Mapping[str, str] = {
     "readings": "1:5, 1:4", "rival": "2\u00a0%", "roster": "1:5", "rows": "30", "said": "0.036",
     "scan": "class.pdf#3", "scans": "400", "sign": "$", "size": "97\u00a0%", "strokes": "9000",
     "suffix": ".png", "unpacked": "1600", "values": "60 (a.csv), 65 (b.csv)", "wanted": "9",
-    "row": "2", "lines": "3", "source": "class.pdf", "fault": "line 2, v_A: '6O' is no number",
+    "row": "2", "lines": "3", "source": "class.pdf",
     "wide": "@90 mm", "zone_high": "@120 mm", "zone_wide": "@180 mm",
 }  # fmt: skip
 """Parameters by name: after ``@`` a number with its unit; other texts of the catalogues are translated."""

@@ -1,12 +1,16 @@
 """The options of commands, one record each, from which all who offer, keep or heed them take them.
 
-The command line makes its options of a record's fields, `planmark.toml` its keys, the note of a run and the
-work itself are the record and more.
+The command line makes its options of a record's fields, `planmark.toml` its keys, the web its bodies and
+queries; the note of a run and the work itself are the record and more.
 """
 
+from collections.abc import Collection, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from pathlib import Path
-from typing import Any, Literal
+from types import MappingProxyType
+from typing import Annotated, Any, Literal, Optional, get_args, get_type_hints
+
+from grader.language import LANGUAGES
 
 Level = Literal["symbol", "hint", "full"]
 
@@ -21,6 +25,8 @@ class Option:
     flags : as they are typed; ``--`` and the field's name if empty
     key : its key in `planmark.toml`, empty for none
     least, most : of a number
+    longest : of a text
+    choices : what a text may be, if not any
     """
 
     help: str
@@ -28,6 +34,8 @@ class Option:
     key: str = ""
     least: float | None = None
     most: float | None = None
+    longest: int | None = None
+    choices: tuple[str, ...] = ()
     metavar: str | None = None
     hidden: bool = False
 
@@ -52,8 +60,47 @@ def taken(record: type, source: object) -> dict[str, Any]:
     return {one.name: getattr(source, one.name) for one, _ in offered(record)}
 
 
+PRINTABLE = r"^[^\x00-\x1f\x7f]*$"
+"""Of a text from the web: PostgreSQL stores no NUL, and the other signs have no meaning in a line."""
+
+
+def model_of(
+    name: str,
+    record: type,
+    base: type,
+    only: Collection[str] = (),
+    kinds: Mapping[Any, Any] = MappingProxyType({}),
+    **more: Any,  # noqa: ANN401 - as pydantic's create_model
+) -> Any:  # noqa: ANN401 - a class that is made here
+    """A model of pydantic whose fields are options of a record, all of which may be left out.
+
+    Arguments
+    ---------
+    base : the model's own base
+    only : the names of the fields; those with a key in `planmark.toml`, by their keys, if empty
+    kinds : other types for some types
+    more : fields besides
+    """
+    from pydantic import Field, create_model  # noqa: PLC0415 - the command line needs none
+
+    types, made = get_type_hints(record), dict[str, Any]()
+    for one, told in offered(record):
+        if one.name in only or (told.key and not only):
+            kind = next(
+                (part for part in get_args(types[one.name]) if part is not type(None)), types[one.name]
+            )
+            kind = Literal[told.choices] if told.choices else kinds.get(kind, kind)
+            is_text = kind is str and told.longest
+            bounds = Field(
+                ge=told.least, le=told.most, max_length=told.longest, pattern=PRINTABLE if is_text else None
+            )
+            field_ = Field(default=None, description=told.help)
+            made[one.name if only else told.key] = (Optional[Annotated[kind, bounds]], field_)  # noqa: UP045
+    return create_model(name, __base__=base, **made, **more)
+
+
 def _lang(help_: str = "Language of feedback: en, ro or ru.", default: str | None = "en") -> Any:  # noqa: ANN401
-    return option(help_, default=default, key="language")
+    return option(help_, default=default, key="language", choices=LANGUAGES)
 
 
 def _jobs() -> Any:  # noqa: ANN401 - as above
@@ -135,7 +182,7 @@ class ClassOptions:
     """What stays the same whenever a class is graded again: a run's note keeps it."""
 
     roster: Path | None = option("The class: roster.csv.", key="roster")
-    pages_per_student: int | None = option("Of one class file, in the roster's order.", key="pages")
+    pages_per_student: int | None = option("Of one class file, in the roster's order.", key="pages", least=1)
     lang: str = _lang()
     level: Level = option("What students are told: symbol, hint, or full (with the answers).", default="full")
     with_ghosts: bool = option(
@@ -174,16 +221,19 @@ class ExportOptions:
         key="platform",
     )
     what: str | None = option(
-        "grades (totals), marks (points by criterion), rubric (the criteria), feedback (the pages)."
+        "grades (totals), marks (points by criterion), rubric (the criteria), feedback (the pages).",
+        longest=20,
     )
     criteria: Path | None = option("The platform's criteria: its JSON answer, or a CSV criterion,id.")
     submissions: Path | None = option("The platform's answer that lists the students' submissions.")
     identity: str | None = option("How Moodle's gradebook knows users: idnumber, email, username, id.")
     item: str = option(
-        "The grade item's, assignment's or rubric's name; the assignment's id if absent.", default=""
+        "The grade item's, assignment's or rubric's name; the assignment's id if absent.",
+        default="",
+        longest=200,
     )
     position: int | None = option("The position, where there are some.")
-    combine: str | None = option("Of several positions: sum or mean.")
+    combine: str | None = option("Of several positions: sum or mean.", longest=20)
     maximum: float | None = option("The grade item's maximum.")
     rescale: bool = option("Convert points to the platform's.", "--rescale", default=False)
     visibility: str | None = option("Gradescope: visible, hidden, after_due_date, after_published.")
@@ -209,6 +259,29 @@ class ExportCall(ExportOptions):
         "The gradebook as the platform exports it (ILIAS: status.csv), to fill in."
     )
     ids: Path | None = option("The platform's numbers: a CSV student_id,id[,username,participant].")
+
+
+# On the web ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PublicationOptions:
+    """What an instructor sets of a publication; what is None stays."""
+
+    title: str | None = option("as students see it", longest=120)
+    term: str | None = option("of which all publications can be deleted at once", longest=40)
+    assignment: str | None = option("a built-in name, or an uploaded file's", longest=120)
+    lang: str | None = option("of the pages of feedback", choices=LANGUAGES)
+    level: str | None = option("of hints; students are never told the answers", choices=("symbol", "hint"))
+    attempts: int | None = option(
+        "allowed for each student and variant; 0 allows any number", least=0, most=1000
+    )
+    pages_per_student: int | None = option(
+        "of one class file in the roster's order; 0 where pages are told otherwise", least=0, most=20
+    )
+    is_open: bool | None = option("whether students may check")
+    is_released: bool | None = option("whether students see their feedback")
+    takes_sheets: bool | None = option("whether students may hand in sheets")
 
 
 # Servers ------------------------------------------------------------------------------------------

@@ -1,11 +1,13 @@
 """``planmark export``."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import BaseModel
 
+from grader import lms
 from grader.cli import terminal
 from grader.cli.app import check_language
 from grader.documents import (
@@ -17,13 +19,9 @@ from grader.documents import (
     ReportDocument,
     ResultsDocument,
 )
-from grader.lms.api import canvas, classroom, graph, openedx
-from grader.lms.api.requests import RequestsDocument
 from grader.lms.export import export as deliver
 from grader.lms.export import read_results, usual_name
 from grader.lms.grades import Delivery, Options, people_of
-from grader.lms.moodle_guide import MoodleMarksDocument, MoodleRubricDocument
-from grader.lms.scores import GradescopeDocument, LtiDocument
 from grader.lms.table import with_ids
 from grader.options import ExportCall, ExportOptions, taken
 from grader.rubric import RubricFile
@@ -40,31 +38,22 @@ MODELS: dict[str, tuple[type[BaseModel], Literal["validation", "serialization"]]
     "plan": (PlanDocument, "serialization"),
     "lint": (LintDocument, "serialization"),
     "calibration": (CalibrationDocument, "serialization"),
-    "moodle-rubric": (MoodleRubricDocument, "serialization"),
-    "moodle-marks": (MoodleMarksDocument, "serialization"),
-    "canvas-rubric": (canvas.CanvasRubricBody, "serialization"),
-    "canvas-assessment": (canvas.CanvasBody, "serialization"),
-    "openedx-rubric": (openedx.EdxRubric, "serialization"),
-    "openedx-assessment": (openedx.EdxGrade, "serialization"),
-    "google-rubric": (classroom.GoogleRubric, "serialization"),
-    "google-grade": (classroom.GoogleGrade, "serialization"),
-    "ms-rubric": (graph.GraphRubric, "serialization"),
-    "ms-rubric-outcome": (graph.GraphRubricOutcome, "serialization"),
-    "ms-points-outcome": (graph.GraphPointsOutcome, "serialization"),
-    "ms-feedback-outcome": (graph.GraphFeedbackOutcome, "serialization"),
-    "api-plan": (RequestsDocument, "serialization"),
-    "gradescope": (GradescopeDocument, "serialization"),
-    "lti": (LtiDocument, "serialization"),
     "mechanism": (MechanismFile, "validation"),
     "assignment": (AssignmentFile, "validation"),
     "rubric": (RubricFile, "validation"),
 }
+WRITTEN = {path.stem: path for path in sorted((Path(lms.__file__).parent / "schemas").glob("*.json"))}
+"""The schemas of what is only written: documents that platforms take."""
 
 
 def schema(name: str) -> dict[str, Any]:
     """The JSON Schema (draft 2020-12) of a document or authored file; CallError for an unknown name."""
+    if name in WRITTEN:
+        written: dict[str, Any] = json.loads(WRITTEN[name].read_bytes())
+        return written
     if name not in MODELS:
-        raise CallError("unknown_schema", f"there is no schema '{name}': known are {', '.join(MODELS)}")
+        known = ", ".join([*MODELS, *WRITTEN])
+        raise CallError("unknown_schema", f"there is no schema '{name}': known are {known}")
     model, mode = MODELS[name]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -45,8 +45,6 @@ def grade_folder(folder: Path, name: str, out: Path, options: GradeOptions) -> R
     """
     check_language(options.lang)
     wanted, cluster, decisions = checked_level(options.level), options.cluster, options.decisions
-    if options.pages_per_student is not None and options.pages_per_student < 1:
-        raise CallError("pages_per_student", "--pages-per-student must be 1 or more")
     if decisions is not None and not decisions.is_file():
         raise CallError("file_missing", f"{decisions}: there is no such file of decisions")
     assignment = load_assignment(name)

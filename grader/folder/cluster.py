@@ -88,13 +88,11 @@ def image_of(address: str, out: Path) -> Path:
     stays while it is the same. Raises CallError for a folder that cannot be read or holds nothing.
     """
     image = out / CACHE_FOLDER / IMAGE
-    try:
+    with _storage(address, "check the address, and the storage's settings in the environment"):
         files, root = fsspec.core.url_to_fs(address)
-        names = {
-            _name_in(files, entry["name"].removeprefix(root).strip("/")): entry
-            for entry in files.find(root, detail=True).values()
-            if entry["type"] == "file"
-        }
+        entries = (one for one in files.find(root, detail=True).values() if one["type"] == "file")
+        listed = ((entry["name"].removeprefix(root).strip("/"), entry) for entry in entries)
+        names = {unquote(name) if _is_web(files) else name: entry for name, entry in listed}
         for name, entry in names.items():
             _imagine(_inside(image, name), entry)
         for path in image.rglob("*"):
@@ -105,13 +103,6 @@ def image_of(address: str, out: Path) -> Path:
             write_whole(image / "roster.csv", files.cat_file(_address_in(files, root, "roster.csv")))
         if DECISIONS in names and not (out / DECISIONS).exists():
             write_whole(out / DECISIONS, files.cat_file(_address_in(files, root, DECISIONS)))
-    except PlanmarkError:
-        raise
-    except Exception as error:
-        why = (
-            f"cannot be read ({type(error).__name__}: {error}); check the address, and the storage's settings"
-        )
-        raise CallError("storage_unreadable", f"{address}: {why} in the environment") from error
     if not names:
         raise CallError("folder_missing", f"{address}: there is no such folder, or nothing in it")
     return image
@@ -119,16 +110,20 @@ def image_of(address: str, out: Path) -> Path:
 
 def _is_web(files: fsspec.AbstractFileSystem) -> bool:
     """Whether files are named by addresses of the web, which write what is not ASCII with escapes."""
-    return bool(
-        {"http", "https"}.intersection(
-            [files.protocol] if isinstance(files.protocol, str) else files.protocol
-        )
-    )
+    known = files.protocol
+    return not {"http", "https"}.isdisjoint([known] if isinstance(known, str) else known)
 
 
-def _name_in(files: fsspec.AbstractFileSystem, name: str) -> str:
-    """A file's name in its folder, of how a storage lists it."""
-    return unquote(name) if _is_web(files) else name
+@contextlib.contextmanager
+def _storage(address: str, advice: str) -> Iterator[None]:
+    """Raises CallError with the advice for whatever a storage raises."""
+    try:
+        yield
+    except PlanmarkError:
+        raise
+    except Exception as error:
+        why = f"cannot be read ({type(error).__name__}: {error}); {advice}"
+        raise CallError("storage_unreadable", f"{address}: {why}") from error
 
 
 def _address_in(files: fsspec.AbstractFileSystem, root: str, name: str) -> str:
@@ -163,19 +158,14 @@ def fill(folder: Path) -> None:
     if folder.name != IMAGE or not note.is_file():
         return
     address = note.read_text(encoding="utf-8")
-    try:
+    with _storage(address, "grade it again, or try later"):
         files, root = fsspec.core.url_to_fs(address)
         for path in folder.rglob("*"):
             if path.is_file() and not (known := path.stat()).st_size:
-                name = path.relative_to(folder).as_posix()
-                data = files.cat_file(_address_in(files, root, name))
-                write_whole(path, data)
+                write_whole(
+                    path, files.cat_file(_address_in(files, root, path.relative_to(folder).as_posix()))
+                )
                 os.utime(path, ns=(known.st_mtime_ns, known.st_mtime_ns))
-    except PlanmarkError:
-        raise
-    except Exception as error:
-        why = f"cannot be read ({type(error).__name__}: {error}); grade it again, or try later"
-        raise CallError("storage_unreadable", f"{address}: {why}") from error
 
 
 # What both sides know -----------------------------------------------------------------------------
@@ -230,9 +220,7 @@ class _Pickler(pickle.Pickler):
         super().__init__(file, pickle.HIGHEST_PROTOCOL)
         # The innermost first: one may lie in the other.
         self._folders = sorted(folders.items(), key=lambda item: -len(item[1].parts))
-        self.pages: list[PageRef] = []
-        self.caches: list[PageCache] = []
-        self.jobs: list[Job] = []
+        self.found: list[PageRef | PageCache | Job] = []
 
     def persistent_id(self, value: object) -> tuple[str, str] | None:
         """What stands for a path; None for all else."""
@@ -240,12 +228,8 @@ class _Pickler(pickle.Pickler):
             for name, folder in self._folders:
                 if value.is_relative_to(folder):
                     return name, value.relative_to(folder).as_posix()
-        elif isinstance(value, PageRef):
-            self.pages.append(value)
-        elif isinstance(value, PageCache):
-            self.caches.append(value)
-        elif isinstance(value, Job):
-            self.jobs.append(value)
+        elif isinstance(value, PageRef | PageCache | Job):
+            self.found.append(value)
         return None
 
 
@@ -518,20 +502,13 @@ class Cluster:
 
     def _task(self, function: Callable[..., Any], calls: list[tuple[Any, ...]], counts: list[int]) -> Task:
         """The calls with what the cache has of their pages and readings."""
-        data, found = _pickled((function, calls), self._folders)
-        paths = {
-            cache.path_of(page).with_suffix(suffix)
-            for cache in found.caches
-            for page in found.pages
-            for suffix in (".page", ".ref")
-        }
-        paths |= {
-            self._folders["out"] / CACHE_FOLDER / "readings" / f"{job.name}.reading" for job in found.jobs
-        }
-        files = {}
-        for path in paths:
-            with contextlib.suppress(FileNotFoundError):
-                files[path.relative_to(self._folders["out"]).as_posix()] = path.read_bytes()
+        data, pickler = _pickled((function, calls), self._folders)
+        out, found = self._folders["out"], pickler.found
+        pages = [one for one in found if isinstance(one, PageRef)]
+        paths = {cache.path_of(page) for cache in found if isinstance(cache, PageCache) for page in pages}
+        readings = out / CACHE_FOLDER / "readings"
+        paths |= {readings / f"{job.name}.reading" for job in found if isinstance(job, Job)}
+        files = {path.relative_to(out).as_posix(): path.read_bytes() for path in paths if path.is_file()}
         return Task(data, tuple(counts), files)
 
     def _results(self, future: _Future) -> list[tuple[int, Any]] | Reason:

@@ -24,7 +24,7 @@ from pebble.pool.process import WORKERS_NAME
 
 from grader.files import CANNOT_WRITE, OutputError, log_to
 from grader.records import Reason
-from grader.texts.spoken import message, of_error
+from grader.texts.spoken import message, of_error, told_parameters
 from reference.errors import InputFileError, PlanmarkError
 
 Result = TypeVar("Result")
@@ -80,7 +80,7 @@ def result_of(pool: Pool, function: Callable[..., Result], *call: object, sheets
     """What one call gives; raises InputFileError for the Reason in its place."""
     ((_, result),) = pool.run(function, [call], [sheets])
     if isinstance(result, Reason):
-        raise InputFileError(result.code, message(result))
+        raise InputFileError(result.code, message(result), **told_parameters(result))
     return result
 
 

@@ -16,8 +16,8 @@ from grader.files import create_whole, replacing, write_whole
 from grader.lms import gradebooks, moodle, moodle_guide, scores
 from grader.lms.api import canvas, classroom, graph, openedx
 from grader.lms.grades import Content, Delivery, Grade, Options, grades_of, in_a_row, ready
-from grader.lms.marks import faults_of
 from grader.lms.table import criteria_text, not_as_meant, summary_text
+from reference.authored.toml_file import findings_of
 from reference.errors import CallError, InputFileError, lines_of
 
 
@@ -33,7 +33,8 @@ def read_results(out_dir: Path) -> ResultsDocument:
     except OSError as error:
         raise InputFileError("results_missing", f"{path}: cannot be read ({error.strerror})") from error
     except ValidationError as error:
-        message = f"{path}: is not a planmark results file; grade again\n{faults_of(error)}"
+        faults = lines_of(list(findings_of(error, ResultsDocument)))
+        message = f"{path}: is not a planmark results file; grade again\n{faults}"
         raise InputFileError("results_wrong", message) from error
     except (ValueError, RecursionError) as error:
         raise InputFileError("results_wrong", f"{path}: is not JSON ({error}); grade again") from error
@@ -100,7 +101,7 @@ KINDS: Mapping[tuple[str, str], _Kind] = {
 _NUMBERED = {"moodle", "canvas", "canvas-api"}
 """Their ids are numbers; those of others are texts."""
 TARGETS = tuple(dict.fromkeys(to for to, _ in KINDS))
-_COMMON = frozenset({"to", "what", "out", "people", "titles", "lang", "now"})
+_COMMON = frozenset({"to", "what", "out", "people", "titles", "lang", "called", "now"})
 """Options of every export."""
 
 

@@ -29,7 +29,7 @@ from typing import Self
 from grader.files import is_formula
 from grader.lms.grades import Delivery, Grade, Options, Person, ready
 from grader.lms.marks import plain_comment
-from grader.lms.moodle import pages
+from grader.lms.moodle import pages_in
 from grader.lms.table import (
     Evidence,
     Form,
@@ -285,7 +285,7 @@ def grades_file(grades: Sequence[Grade], options: Options) -> Delivery:
     """The exported gradebook filled in where there is one, else one made anew."""
     if options.form is None:
         return gradebook(grades, options)
-    return fill_gradebook(bytes_of(options.form, "form_missing"), options.form.name, grades, options)
+    return fill_gradebook(bytes_of(options.form, "form_missing"), options.form_name, grades, options)
 
 
 _UTF_16 = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
@@ -380,15 +380,9 @@ def feedback_files(grades: Sequence[Grade], options: Options) -> Delivery:
     matches = match_rows(
         {row: {"ID": match["id"], "login": match["login"]} for row, match in enumerate(found.values())},
         {student: Gradebook.evidence(student, person) for student, person in students.items()},
-        options.form.name,
+        options.form_name,
     )
-    files: dict[str, Path] = {}
-    faults: list[str] = []
-    for grade in ready(grades):
-        if (row := matches.rows.get(grade.student_id)) is not None:
-            files.update(pages(grade, options.out or Path(), folders[row], faults))
-    if faults:
-        message = "not all feedback is there; grade again, nothing was written"
-        raise InputFileError("feedback_missing", f"{message}\n{lines_of(faults)}")
+    own = {student: folders[row] for student, row in matches.rows.items()}
+    files = pages_in(own, ready(grades), options.out or Path())
     missing = {grade.student_id: matches.missing.get(grade.student_id, "") for grade in ready(grades)}
     return Delivery(files, unplaced={student: why for student, why in missing.items() if why})

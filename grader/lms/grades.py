@@ -57,6 +57,7 @@ class Options(ExportOptions):
     people : names, addresses and the platform's numbers by student_id
     titles : the criteria's, in the language of the class, by id; `export` takes them from the results
     form : the platform's own file to fill in: Moodle's worksheet, an exported gradebook
+    called : what people call that file, where it is stored under another name
     now : time of the export; the clock's if None
     """
 
@@ -64,7 +65,13 @@ class Options(ExportOptions):
     people: Mapping[str, Person] = field(default_factory=lambda: MappingProxyType({}))
     titles: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     form: Path | None = None
+    called: str = ""
     now: datetime | None = None
+
+    @property
+    def form_name(self) -> str:
+        """The name of the platform's own file, as messages have it."""
+        return self.called or (self.form.name if self.form is not None else "")
 
     @property
     def moment(self) -> datetime:

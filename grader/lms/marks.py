@@ -5,15 +5,14 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 from markupsafe import Markup
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from grader.documents import CriterionDocument, ReportDocument, Verdict
 from grader.language import Tongue, tongue
 from grader.lms.grades import Grade, Options, ready
-from grader.lms.table import bytes_of, not_as_meant, read_table
+from grader.lms.table import bytes_of, read_table
 from grader.overlay.scene import MARKS
 from reference.errors import CallError, InputFileError, lines_of
 
@@ -25,73 +24,29 @@ CLOSE = 1e-4
 
 # Documents that platforms take --------------------------------------------------------------------
 
-Version = Literal[1]
-"""Of each document's form."""
-Filled = Annotated[str, Field(min_length=1)]
-Id = Annotated[int, Field(gt=0)]
-"""A platform's number of a thing."""
-NotNegative = Annotated[float, Field(ge=0.0)]
-Positive = Annotated[float, Field(gt=0.0)]
-Number = Annotated[str, Field(pattern=r"^[0-9]+(\.[0-9]{1,5})?$")]
-"""Decimal dot, no grouping, no sign."""
+
+def json_text(content: Mapping[str, object]) -> str:
+    """A document as JSON; what it holds stands in a schema, `grader/lms/schemas`, for each platform."""
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-class Payload(BaseModel):
-    """A table that a platform takes: frozen, nothing unknown, only finite numbers."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
-
-
-class PlatformCriterion(Payload):
-    """A criterion, and its number on the platform."""
-
-    criterion: str
-    id: Filled
-    max_points: Positive
-
-
-def json_document(model: type[BaseModel], content: Mapping[str, object], name: str) -> str:
-    """A document as JSON, without what is not given, read back once.
-
-    Raises InputFileError with everything that does not hold to the model; `name` says what it is.
-    """
-    try:
-        document = model.model_validate(content)
-    except ValidationError as error:
-        message = f"{name} would not be what the platform takes; nothing was written\n{faults_of(error)}"
-        raise InputFileError("export_refused", message) from error
-    text = document.model_dump_json(indent=2, exclude_none=True, by_alias=True)
-    if model.model_validate_json(text) != document:
-        raise not_as_meant("the document")
-    return text + "\n"
-
-
-def faults_of(error: ValidationError) -> str:
-    """What a model refuses, a line each with the path in the document."""
-    lines = []
-    for each in error.errors():
-        path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in each["loc"])
-        lines.append(f"${path}: {each['msg'].removeprefix('Value error, ')}")
-    return lines_of(lines)
-
-
-def check_unique(names: Iterable[object], what: str) -> None:
-    """Raises ValueError, for a model, where a name stands twice."""
+def check_unique(names: Iterable[str], what: str) -> None:
+    """Raises InputFileError where a name stands twice; `what` says of what it is."""
     known = set()
     for name in names:
         if name in known:
-            raise ValueError(f"{what} {name} stands twice")
+            message = "the platform would not take this as it is meant; nothing was written"
+            raise InputFileError("export_refused", f"{message}\n  {what} {name} stands twice")
         known.add(name)
 
 
-def check_points(criteria: Iterable[PlatformCriterion], points: Mapping[str, float]) -> None:
-    """Raises ValueError, for a model, unless every criterion has points up to its maximum."""
-    maxima = {criterion.id: criterion.max_points for criterion in criteria}
-    if set(points) != set(maxima):
-        raise ValueError(f"criteria {sorted(points)} are filled, {sorted(maxima)} are there")
-    for name, value in points.items():
-        if value > maxima[name] + CLOSE:
-            raise ValueError(f"criterion {name}: {value:g} is above its maximum {maxima[name]:g}")
+@dataclass(frozen=True, slots=True)
+class PlatformCriterion:
+    """A criterion, and its number on the platform."""
+
+    criterion: str
+    id: str
+    max_points: float
 
 
 # Comments -----------------------------------------------------------------------------------------
@@ -183,9 +138,17 @@ class Mark:
 def marks_of(grade: Grade) -> list[Mark]:
     """The marks behind a grade, report by report.
 
-    Raises InputFileError where they do not add up to the score.
+    Raises InputFileError where they do not add up to the score, or one is not between 0 and its maximum.
     """
     marks = outline(grade)
+    faults = [
+        f"{mark.criterion}: {mark.points:g} of {mark.max_points:g} points"
+        for mark in marks
+        if not -CLOSE <= mark.points <= mark.max_points + CLOSE or mark.max_points <= 0.0
+    ]
+    if faults:
+        message = f"{grade.student_id}: points that there are not; grade again"
+        raise InputFileError("results_wrong", f"{message}\n{lines_of(faults)}")
     total = math.fsum(mark.points for mark in marks)
     score = math.fsum(report.score or 0.0 for report in grade.reports)
     if not math.isclose(total, score, abs_tol=CLOSE):

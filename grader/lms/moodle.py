@@ -225,7 +225,7 @@ def grades_file(grades: Sequence[Grade], options: Options) -> Delivery:
     comments = {grade.student_id: comment(grade) for grade in ready(grades)}
     data = bytes_of(options.form, "form_missing")
     downloaded = datetime.fromtimestamp(int(options.form.stat().st_mtime), UTC)
-    return fill_worksheet(data, options.form.name, grades, options, comments, downloaded)
+    return fill_worksheet(data, options.form_name, grades, options, comments, downloaded)
 
 
 def fill_worksheet(
@@ -447,15 +447,8 @@ def feedback_files(grades: Sequence[Grade], options: Options) -> Delivery:
     graded = ready(grades)
     numbers, why, notes = _participants(grades, options)
     missing = {grade.student_id: why[grade.student_id] for grade in graded if grade.student_id in why}
-    files: dict[str, Path] = {}
-    faults: list[str] = []
-    for grade in graded:
-        if grade.student_id in numbers:
-            folder = f"Participant_{numbers[grade.student_id]}_assignfeedback_file"
-            files.update(pages(grade, options.out or Path(), folder, faults))
-    if faults:
-        message = "not all feedback is there; grade again, nothing was written"
-        raise InputFileError("feedback_missing", f"{message}\n{lines_of(faults)}")
+    folders = {who: f"Participant_{number}_assignfeedback_file" for who, number in numbers.items()}
+    files = pages_in(folders, graded, options.out or Path())
     if missing and not files:
         lines = lines_of([f"{student}: {reason}" for student, reason in missing.items()])
         raise CallError("nothing_to_export", f"no student has a number in Moodle\n{lines}")
@@ -492,7 +485,7 @@ def _participants(
             [] if options.groups is False else ["not for groups: there Moodle takes a number for a group's"]
         )
         return numbers, dict.fromkeys(others, "the table of ids has no participant"), notes
-    sheet = Worksheet.opened(bytes_of(options.form, "form_missing"), options.form.name)
+    sheet = Worksheet.opened(bytes_of(options.form, "form_missing"), options.form_name)
     if "group" in sheet.columns or (options.groups is None and sheet.group_columns):
         titles = ", ".join(f"'{sheet.table.value(0, place)}'" for place in sheet.group_columns)
         maybe = "" if "group" in sheet.columns else "; if that is none of groups, give --no-groups"
@@ -505,7 +498,23 @@ def _participants(
     return numbers, {**matches.missing, **locked}, doubtful
 
 
-def pages(grade: Grade, out: Path, folder: str, faults: list[str]) -> Iterator[tuple[str, Path]]:
+def pages_in(folders: Mapping[str, str], graded: Sequence[Grade], out: Path) -> dict[str, Path]:
+    """The pages of students below their folders in an archive.
+
+    Raises InputFileError for pages that are missing, or of another run than the results.
+    """
+    files: dict[str, Path] = {}
+    faults: list[str] = []
+    for grade in graded:
+        if grade.student_id in folders:
+            files.update(_pages(grade, out, folders[grade.student_id], faults))
+    if faults:
+        message = "not all feedback is there; grade again, nothing was written"
+        raise InputFileError("feedback_missing", f"{message}\n{lines_of(faults)}")
+    return files
+
+
+def _pages(grade: Grade, out: Path, folder: str, faults: list[str]) -> Iterator[tuple[str, Path]]:
     """A student's pages by their names in the archive; what is missing or of another run goes to `faults`."""
     for report, where in zip(grade.reports, grade.folders, strict=True):
         before = "" if len(grade.reports) == 1 else f"position-{where.rpartition('/')[2]}-"

@@ -4,30 +4,21 @@ Texts and limits are those of Moodle 4.5, which checks neither the points' range
 are filled: both are checked here.
 """
 
+import re
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from html import escape
 from pathlib import Path
-from typing import Annotated, Literal, Self
-
-from pydantic import Field, model_validator
 
 from grader.lms.grades import Delivery, Grade, Options
 from grader.lms.marks import (
     Criterion,
-    Filled,
-    Id,
     Mark,
-    NotNegative,
-    Payload,
-    PlatformCriterion,
-    Positive,
-    Version,
-    check_points,
     check_unique,
     class_criteria,
     comment,
     criteria_in,
-    json_document,
+    json_text,
     platform_marks,
     read_answer,
 )
@@ -37,187 +28,11 @@ _LONGEST_NAME = 255
 """Characters of a criterion's name that Moodle stores."""
 _NO_TAGS = str.maketrans("<>", "‹›")
 """Moodle refuses names in which it sees a tag."""
-
-
-# What Moodle takes --------------------------------------------------------------------------------
-
-PlainText = Literal[2]
-Html = Literal[1]
+_PLAIN, _HTML = 2, 1
 """Moodle's FORMAT_PLAIN and FORMAT_HTML."""
-
-
-class MoodleCriterion(Payload):
-    """A criterion of a marking guide."""
-
-    sortorder: Id
-    shortname: Annotated[str, Field(min_length=1, max_length=255)]
-    description: str
-    descriptionformat: PlainText = 2
-    descriptionmarkers: str
-    descriptionmarkersformat: PlainText = 2
-    maxscore: Positive
-
-
-class MoodleComment(Payload):
-    """A frequent comment; Moodle reads the list of them even where it is empty, so there is one."""
-
-    sortorder: Id
-    description: Filled
-    descriptionformat: PlainText = 2
-
-
-class MoodleGuide(Payload):
-    """A marking guide's content."""
-
-    guide_criteria: Annotated[list[MoodleCriterion], Field(min_length=1)]
-    guide_comments: Annotated[list[MoodleComment], Field(min_length=1)]
-
-    @model_validator(mode="after")
-    def _is_whole(self) -> Self:
-        check_unique((criterion.shortname for criterion in self.guide_criteria), "criterion")
-        return self
-
-
-class MoodleDefinition(Payload):
-    """A marking guide ready for use. Who made it when is set by Moodle, but must be in the call."""
-
-    method: Literal["guide"] = "guide"
-    name: Filled
-    description: str = ""
-    descriptionformat: PlainText = 2
-    status: Literal[20] = 20
-    timecreated: Annotated[int, Field(ge=0)]
-    usercreated: Literal[0] = 0
-    timemodified: Annotated[int, Field(ge=0)]
-    usermodified: Literal[0] = 0
-    guide: MoodleGuide
-
-
-class MoodleArea(Payload):
-    """Where the guide belongs."""
-
-    cmid: Id
-    contextid: Id
-    component: Literal["mod_assign"] = "mod_assign"
-    areaname: Literal["submissions"] = "submissions"
-    activemethod: Literal["guide"] = "guide"
-    definitions: Annotated[list[MoodleDefinition], Field(min_length=1, max_length=1)]
-
-
-class MoodleAreas(Payload):
-    """Arguments of the call."""
-
-    areas: Annotated[list[MoodleArea], Field(min_length=1, max_length=1)]
-
-
-class MoodleRubricDocument(Payload):
-    """The call that makes the rubric a marking guide of an assignment.
-
-    `fillings_lost` says how many points of students may go with a guide that is there; None: none may be.
-    """
-
-    schema_version: Version = 1
-    assignment: str
-    fillings_lost: Annotated[int, Field(ge=0)] | None = None
-    wsfunction: Literal["core_grading_save_definitions"] = "core_grading_save_definitions"
-    arguments: MoodleAreas
-
-
-class MoodleFilling(Payload):
-    """Points and remark on a criterion."""
-
-    criterionid: Id
-    score: NotNegative
-    remark: str
-    remarkformat: Html = 1
-
-
-class MoodleFilled(Payload):
-    """A criterion filled."""
-
-    criterionid: Id
-    fillings: Annotated[list[MoodleFilling], Field(min_length=1, max_length=1)]
-
-    @model_validator(mode="after")
-    def _is_whole(self) -> Self:
-        if self.fillings[0].criterionid != self.criterionid:
-            raise ValueError(f"criterion {self.criterionid} is filled as {self.fillings[0].criterionid}")
-        return self
-
-
-class MoodleGuideFilled(Payload):
-    """A marking guide filled."""
-
-    criteria: list[MoodleFilled]
-
-
-class MoodleAdvanced(Payload):
-    """Advanced grading by marking guide."""
-
-    guide: MoodleGuideFilled
-
-
-class MoodleEditor(Payload):
-    """The comment on the whole."""
-
-    text: str
-    format: Html = 1
-
-
-class MoodlePlugins(Payload):
-    """What feedback plugins take; Moodle aborts in the midst where the one for comments is given nothing.
-
-    So in mod/assign/feedback/comments/locallib.php, `is_feedback_modified`, where a comment exists.
-    """
-
-    assignfeedbackcomments_editor: MoodleEditor
-
-
-class MoodleGrade(Payload):
-    """Arguments of the call.
-
-    `grade` is -1, none: Moodle works it out from the guide, and where the assignment has none it
-    must not take points for a grade out of another maximum.
-    """
-
-    assignmentid: Id
-    userid: Id
-    grade: Literal[-1] = -1
-    attemptnumber: Literal[-1] = -1
-    """The latest."""
-    addattempt: Literal[0] = 0
-    workflowstate: Literal[""] = ""
-    applytoall: Literal[0] = 0
-    plugindata: MoodlePlugins
-    advancedgradingdata: MoodleAdvanced
-
-
-class MoodleCall(Payload):
-    """One student's call."""
-
-    student_id: str
-    wsfunction: Literal["mod_assign_save_grade"] = "mod_assign_save_grade"
-    arguments: MoodleGrade
-
-
-class MoodleMarksDocument(Payload):
-    """Points by criterion of a marking guide: a call for each student."""
-
-    schema_version: Version = 1
-    assignment: str
-    criteria: list[PlatformCriterion]
-    calls: list[MoodleCall]
-
-    @model_validator(mode="after")
-    def _is_whole(self) -> Self:
-        check_unique((each.id for each in self.criteria), "criterion")
-        check_unique((call.arguments.userid for call in self.calls), "user")
-        for call in self.calls:
-            filled = call.arguments.advancedgradingdata.guide.criteria
-            check_unique((each.criterionid for each in filled), "criterion")
-            points = {str(each.criterionid): each.fillings[0].score for each in filled}
-            check_points(self.criteria, points)
-        return self
+_READY = 20
+"""Of a definition's status: ready for use."""
+_NUMBER = re.compile("[1-9][0-9]*")
 
 
 # The calls ----------------------------------------------------------------------------------------
@@ -233,25 +48,40 @@ def guide(grades: Sequence[Grade], options: Options) -> Delivery:
     cmid, context_id = _place(options)
     moment = int(options.moment.timestamp())
     criteria = class_criteria(grades, options)
+    # Moodle reads the list of frequent comments even where it is empty, so there is one.
+    frequent = {"sortorder": 1, "description": "See the feedback file.", "descriptionformat": _PLAIN}
     definition = {
+        "method": "guide",
         "name": (options.item.strip() or grades[0].assignment).translate(_NO_TAGS),
+        "description": "",
+        "descriptionformat": _PLAIN,
+        "status": _READY,
+        # Moodle sets these four by itself, but they must be in the call.
         "timecreated": moment,
+        "usercreated": 0,
         "timemodified": moment,
+        "usermodified": 0,
         "guide": {
             "guide_criteria": [_criterion(order, each) for order, each in enumerate(criteria, start=1)],
-            "guide_comments": [{"sortorder": 1, "description": "See the feedback file."}],
+            "guide_comments": [frequent],
         },
     }
+    area = {
+        "cmid": cmid, "contextid": context_id, "component": "mod_assign", "areaname": "submissions",
+        "activemethod": "guide", "definitions": [definition],
+    }  # fmt: skip
     content: dict[str, object] = {
+        "schema_version": 1,
         "assignment": grades[0].assignment,
-        "arguments": {"areas": [{"cmid": cmid, "contextid": context_id, "definitions": [definition]}]},
+        "wsfunction": "core_grading_save_definitions",
+        "arguments": {"areas": [area]},
     }
     notes = []
     if options.replace_guide is not None:
         lost = _fillings(options.replace_guide)
         content["fillings_lost"] = sum(lost)
         notes = [f"saving this guide deletes the one there with {sum(lost)} fillings of {len(lost)} grades"]
-    return Delivery(json_document(MoodleRubricDocument, content, "the marking guide"), notes=tuple(notes))
+    return Delivery(json_text(content), notes=tuple(notes))
 
 
 def _place(options: Options) -> tuple[int, int]:
@@ -315,7 +145,9 @@ def _criterion(order: int, criterion: Criterion) -> dict[str, object]:
         "sortorder": order,
         "shortname": criterion.name.translate(_NO_TAGS)[:_LONGEST_NAME],
         "description": criterion.titles[0],
+        "descriptionformat": _PLAIN,
         "descriptionmarkers": "",
+        "descriptionmarkersformat": _PLAIN,
         "maxscore": criterion.max_points,
     }
 
@@ -333,32 +165,53 @@ def fillings(grades: Sequence[Grade], options: Options) -> Delivery:
             " to core_grading_get_definitions, or a CSV table criterion,id) are needed",
         )
     criteria, marked = platform_marks(grades, options, options.criteria)
+    for each in criteria:
+        if not _NUMBER.fullmatch(each.id):
+            message = f"{each.criterion}: '{each.id}' is no number of a criterion in Moodle"
+            raise InputFileError("criteria", f"{options.criteria}: {message}")
     calls, missing = [], {}
     for grade, marks in marked:
         user = grade.person.platform_id
         if not user:
             missing[grade.student_id] = "the table of ids (--ids) has no id: Moodle's number of the user"
             continue
-        filled = [_filled(number, mark) for number, mark in marks.items()]
+        if not _NUMBER.fullmatch(user):
+            raise CallError("ids", f"{grade.student_id}: '{user}' is no number of a user of Moodle (--ids)")
+        filled = [_filled(int(number), mark) for number, mark in marks.items()]
         arguments = {
-            "assignmentid": options.assignment_id,
-            "userid": user,
-            "plugindata": {"assignfeedbackcomments_editor": {"text": comment(grade)}},
+            "assignmentid": int(options.assignment_id),
+            "userid": int(user),
+            # None: Moodle works it out from the guide, and where the assignment has none it must not take
+            # points for a grade out of another maximum.
+            "grade": -1,
+            "attemptnumber": -1,  # the latest
+            "addattempt": 0,
+            "workflowstate": "",
+            "applytoall": 0,
+            # Moodle aborts in the midst where a comment exists and none is given
+            # (mod/assign/feedback/comments/locallib.php, `is_feedback_modified`).
+            "plugindata": {"assignfeedbackcomments_editor": {"text": comment(grade), "format": _HTML}},
             "advancedgradingdata": {"guide": {"criteria": filled}},
         }
-        calls.append({"student_id": grade.student_id, "arguments": arguments})
+        call = {"student_id": grade.student_id, "wsfunction": "mod_assign_save_grade", "arguments": arguments}
+        calls.append(call)
     if missing and not calls:
         raise CallError(
             "ids_needed", "nobody's number in Moodle is known: give a table student_id,id (--ids)"
         )
-    content = {"assignment": grades[0].assignment, "criteria": criteria, "calls": calls}
-    document = json_document(MoodleMarksDocument, content, "the marking guide's points")
+    check_unique((grade.person.platform_id for grade, _ in marked if grade.person.platform_id), "user")
+    content = {
+        "schema_version": 1,
+        "assignment": grades[0].assignment,
+        "criteria": [asdict(each) for each in criteria],
+        "calls": calls,
+    }
     note = "each call also replaces the student's feedback comment: without one Moodle stores half of it"
-    return Delivery(document, unplaced=missing, notes=(note,))
+    return Delivery(json_text(content), unplaced=missing, notes=(note,))
 
 
-def _filled(number: str, mark: Mark) -> dict[str, object]:
+def _filled(number: int, mark: Mark) -> dict[str, object]:
     """A remark is shown as HTML."""
     remark = escape(mark.remark, quote=False).replace("\n", "<br>")
-    filling = {"criterionid": number, "score": mark.points, "remark": remark}
+    filling = {"criterionid": number, "score": mark.points, "remark": remark, "remarkformat": _HTML}
     return {"criterionid": number, "fillings": [filling]}

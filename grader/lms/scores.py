@@ -9,95 +9,17 @@ score: anything but `FullyGraded` takes a grade back. Students who have handed i
 posting a Score would hand in for them.
 """
 
-import math
 from collections.abc import Sequence
-from typing import Annotated, Literal, Self, get_args
-
-from pydantic import Field, model_validator
+from typing import Literal, get_args
 
 from grader.lms.grades import Delivery, Grade, Options, ready
-from grader.lms.marks import (
-    CLOSE,
-    Filled,
-    Mark,
-    NotNegative,
-    Payload,
-    Positive,
-    Version,
-    check_unique,
-    json_document,
-    marks_of,
-    plain_comment,
-)
+from grader.lms.marks import Mark, check_unique, json_text, marks_of, plain_comment
 from grader.lms.table import number
 from reference.errors import CallError
 
 # Gradescope ---------------------------------------------------------------------------------------
 
 Visibility = Literal["hidden", "after_due_date", "visible", "after_published"]
-OutputFormat = Literal["text", "html", "simple_format", "md", "ansi"]
-
-
-class GradescopeCriterion(Payload):
-    """What a test stands for."""
-
-    criterion: str
-    position: int | None = None
-    verdict: str
-
-
-class GradescopeTest(Payload):
-    """A criterion that was judged, as a test case."""
-
-    name: Filled
-    number: str
-    score: NotNegative
-    max_score: Positive
-    status: Literal["passed", "failed"]
-    output: str
-    output_format: OutputFormat = "text"
-    visibility: Visibility
-    extra_data: GradescopeCriterion
-
-    @model_validator(mode="after")
-    def _is_whole(self) -> Self:
-        if self.score > self.max_score + CLOSE:
-            raise ValueError(f"{self.score:g} of {self.max_score:g} points")
-        if (self.status == "passed") != math.isclose(self.score, self.max_score, abs_tol=CLOSE):
-            raise ValueError(f"'{self.status}' with {self.score:g} of {self.max_score:g} points")
-        return self
-
-
-class GradescopeOrigin(Payload):
-    """The assignment and the student of the results."""
-
-    schema_version: Version = 1
-    assignment: str
-    student_id: str
-    max_score: Positive
-
-
-class GradescopeDocument(Payload):
-    """A student's `results.json`. The version stands in `extra_data`: Gradescope's own keys are all taken."""
-
-    score: NotNegative
-    output: str
-    output_format: OutputFormat = "text"
-    visibility: Visibility
-    stdout_visibility: Visibility = "hidden"
-    tests: Annotated[list[GradescopeTest], Field(min_length=1)]
-    extra_data: GradescopeOrigin
-
-    @model_validator(mode="after")
-    def _is_whole(self) -> Self:
-        if self.score > self.extra_data.max_score + CLOSE:
-            raise ValueError(f"{self.score:g} of {self.extra_data.max_score:g} points")
-        total = math.fsum(test.score for test in self.tests)
-        is_all = math.isclose(math.fsum(test.max_score for test in self.tests), self.extra_data.max_score)
-        # The total is scaled up where criteria were not judged, and are no tests.
-        if total > self.score + CLOSE or (is_all and total < self.score - CLOSE):
-            raise ValueError(f"the tests give {total:g} points together, the score is {self.score:g}")
-        return self
 
 
 def results(grades: Sequence[Grade], options: Options) -> Delivery:
@@ -122,18 +44,23 @@ def _results(grade: Grade, visibility: str, options: Options) -> str:
     content = {
         "score": float(number(grade.score or 0.0)),
         "output": "\n".join([plain_comment(grade), *others]),
+        "output_format": "text",
         "visibility": visibility,
+        "stdout_visibility": "hidden",
         "tests": [_test(index, mark, parts, visibility) for index, mark in enumerate(judged, start=1)],
+        # The version stands here: Gradescope's own keys are all taken.
         "extra_data": {
+            "schema_version": 1,
             "assignment": grade.assignment,
             "student_id": grade.student_id,
             "max_score": grade.max_score,
         },
     }
-    return json_document(GradescopeDocument, content, f"results.json of {grade.student_id}")
+    return json_text(content)
 
 
 def _test(index: int, mark: Mark, parts: int, visibility: str) -> dict[str, object]:
+    where = {} if mark.position is None else {"position": mark.position}
     return {
         "name": _name(mark),
         "number": str(index),
@@ -141,8 +68,9 @@ def _test(index: int, mark: Mark, parts: int, visibility: str) -> dict[str, obje
         "max_score": mark.max_points / parts,
         "status": "passed" if mark.is_full else "failed",
         "output": mark.remark,
+        "output_format": "text",
         "visibility": visibility,
-        "extra_data": {"criterion": mark.criterion, "position": mark.position, "verdict": mark.verdict},
+        "extra_data": {"criterion": mark.criterion, **where, "verdict": mark.verdict},
     }
 
 
@@ -155,57 +83,6 @@ def _name(mark: Mark) -> str:
 
 _DECIMALS = 5
 """Of a score, as in the tables."""
-
-
-class LtiScore(Payload):
-    """A Score as it is posted to a line item's `scores`; while a person must look, without a score."""
-
-    userId: Filled  # noqa: N815 - the platform's own names, here and below
-    timestamp: Annotated[str, Field(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3,6}(Z|[+-]\d\d:\d\d)$")]
-    """With a fraction of a second and a time zone: platforms refuse a score that is not later than theirs."""
-    activityProgress: Literal["Initialized", "Started", "InProgress", "Submitted", "Completed"]  # noqa: N815
-    gradingProgress: Literal["FullyGraded", "Pending", "PendingManual", "Failed", "NotReady"]  # noqa: N815
-    scoreGiven: NotNegative | None = None  # noqa: N815
-    scoreMaximum: Positive | None = None  # noqa: N815
-    comment: str | None = None
-
-    @model_validator(mode="after")
-    def _is_whole(self) -> Self:
-        if (self.gradingProgress == "FullyGraded") != (self.scoreGiven is not None):
-            raise ValueError("scoreGiven goes with FullyGraded, and with nothing else")
-        if (self.scoreGiven is None) != (self.scoreMaximum is None):
-            raise ValueError("scoreGiven and scoreMaximum go together")
-        if self.scoreGiven is not None and self.scoreGiven > (self.scoreMaximum or 0.0):
-            raise ValueError(f"scoreGiven {self.scoreGiven:g} is above scoreMaximum {self.scoreMaximum:g}")
-        return self
-
-
-class LtiLineItem(Payload):
-    """The line item that the Scores belong to, for a platform that has none yet; it cannot hold a rubric."""
-
-    label: Filled
-    scoreMaximum: Positive  # noqa: N815
-    resourceId: Filled  # noqa: N815
-    tag: Filled
-
-
-class LtiDocument(Payload):
-    """A class's line item and Scores, each to be posted by itself."""
-
-    schema_version: Version = 1
-    assignment: str
-    lineItem: LtiLineItem | None = None  # noqa: N815
-    scores: list[LtiScore]
-
-    @model_validator(mode="after")
-    def _is_whole(self) -> Self:
-        check_unique((score.userId for score in self.scores), "userId")
-        if self.lineItem and {score.scoreMaximum for score in self.scores} - {
-            None,
-            self.lineItem.scoreMaximum,
-        }:
-            raise ValueError("a Score has another maximum than the line item")
-        return self
 
 
 def scores(grades: Sequence[Grade], options: Options) -> Delivery:
@@ -239,8 +116,9 @@ def scores(grades: Sequence[Grade], options: Options) -> Delivery:
         "resourceId": assignment,
         "tag": "grade",
     }
-    content = {"assignment": assignment, "lineItem": line_item, "scores": posted}
-    return Delivery(json_document(LtiDocument, content, "the Scores"), unplaced=missing, notes=tuple(notes))
+    check_unique((str(score["userId"]) for score in posted), "userId")
+    content = {"schema_version": 1, "assignment": assignment, "lineItem": line_item, "scores": posted}
+    return Delivery(json_text(content), unplaced=missing, notes=tuple(notes))
 
 
 def _graded(grade: Grade, options: Options) -> dict[str, object]:

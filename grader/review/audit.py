@@ -13,7 +13,7 @@ from grader.overlay.scene import MARKS
 from grader.review import questions
 from grader.review.session import Answer, Said, Session, Student, mark_of
 from grader.tables.decision_texts import ANSWERS, AuditAnswer
-from reference.errors import CallError
+from grader.texts.spoken import RefusedError
 
 SHORT = 24
 """Verdicts of the sample before the least sure ones are asked: all right, at most 12 % are wrong."""
@@ -93,7 +93,7 @@ def _student(session: Session, one: Checkable) -> Student:
 def check(session: Session, said: Checked) -> None:
     """Write what a person found. Raises as `Session.decide`."""
     if said.answer not in ANSWERS or said.said not in VERDICTS:
-        raise CallError("answer_refused", f"'{said.answer[:40]}' is no answer")
+        raise RefusedError(400, "answer_refused", "no_answer", given=said.answer[:40])
     student = session.student(said.student)
     name = f"audit:{student.criterion(said.criterion).id}"
     answer = Answer(said.student, name, str(AuditAnswer(said.answer, said.said)), seen=said.seen)

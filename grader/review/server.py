@@ -7,6 +7,7 @@ must come from the page itself (Origin, a header of its own, JSON).
 
 import getpass
 import hmac
+import math
 import threading
 import time
 from collections.abc import Awaitable, Callable, Iterator, Sequence
@@ -43,7 +44,8 @@ from grader.review.session import (
 from grader.tables.decision_texts import PageDecision, place_text
 from grader.tables.decisions import Decision
 from grader.tables.reader import TableError
-from reference.errors import CallError, PlanmarkError
+from grader.texts.spoken import RefusedError, told_of
+from reference.errors import PlanmarkError
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
 COOKIE = "planmark"
@@ -64,7 +66,6 @@ EXPORTS = ("moodle", "canvas", "gradescope")
 WORKING = N_("Bringing the pages up to date: %(done)d of %(total)d")
 UP_TO_DATE = N_("The pages are up to date.")
 CLASS_PAGE, TABLE = N_("the class's page"), N_("the table of grades")
-FORBIDDEN = "this address is not allowed here: open the address that planmark review printed"
 Handler = Callable[[Request], Awaitable[Response]]
 
 
@@ -175,10 +176,10 @@ class Review:
         student, sheet = self.session.student(asked.get("student", "")), _whole(asked.get("sheet", ""))
         pages = self.session.pages_of(student)
         if not 0 <= sheet < len(pages):
-            raise CallError("page_missing", "there is no such page")
+            raise RefusedError(400, "page_missing", "no_page")
         x, y, w, h, scale = (_number(asked.get(name, "")) for name in ("x", "y", "w", "h", "scale"))
         if not (0.5 <= w <= 2000.0 and 0.5 <= h <= 2000.0 and 0.1 <= scale <= 100.0):
-            raise CallError("part_refused", "this part of the page cannot be shown")
+            raise RefusedError(400, "part_refused")
         scale = min(scale, 4000.0 / max(w, h))
         picture = self.session.scans.part(pages[sheet], (x, y, w, h), scale)
         return Response(picture, media_type="image/jpeg", headers={"Cache-Control": "private, max-age=600"})
@@ -188,7 +189,7 @@ class Review:
         asked = request.query_params
         ref = page_of(self.session.pages, asked.get("file", ""), _whole(asked.get("page", "")))
         if ref is None:
-            raise CallError("page_missing", "there is no such page")
+            raise RefusedError(400, "page_missing", "no_page")
         return Response(self.session.scans.whole(ref, LONGEST_PX), media_type="image/jpeg")
 
     def out(self, request: Request) -> Response:
@@ -236,12 +237,12 @@ class Review:
         """Whose a page is, its turn, its corners."""
         ref = page_of(self.session.pages, said.file, said.page)
         if ref is None:
-            raise CallError("page_missing", "there is no such page")
+            raise RefusedError(400, "page_missing", "no_page")
         owner = None if said.owner is None else self.session.student(said.owner).report
         student_id = None if owner is None else owner.student_id
         decision = PageDecision(student_id, said.turn, tuple(said.corners))
         if not str(decision):
-            raise CallError("answer_refused", "say whose the page is, or turn it, or give its corners")
+            raise RefusedError(400, "answer_refused", "answer_empty")
         position = None if owner is None else owner.position
         row = Decision("", position, page_criterion(ref), str(decision), by=said.by)
         self.session.decide_page(ref, row, said.seen, said.window)
@@ -283,7 +284,7 @@ class Review:
                 for name, label in (("index.html", CLASS_PAGE), (table.name, TABLE))
             ]
         except PlanmarkError as error:
-            run.message = error.message
+            run.message = told_of(error, speaker)
         finally:
             run.running = False
 
@@ -365,7 +366,7 @@ class OnPage(Said):
 def _whole(value: object) -> int:
     number = _number(value)
     if number != int(number):
-        raise CallError("answer_refused", f"{value} is no whole number")
+        raise RefusedError(400, "answer_refused", "no_whole_number", given=number)
     return int(number)
 
 
@@ -373,9 +374,9 @@ def _number(value: object) -> float:
     try:
         number = float(str(value))
     except ValueError:
-        raise CallError("answer_refused", f"'{str(value)[:40]}' is no number") from None
+        number = math.nan
     if not abs(number) < 1e6:
-        raise CallError("answer_refused", f"'{str(value)[:40]}' is no such number")
+        raise RefusedError(400, "answer_refused", "no_number", given=str(value)[:40])
     return number
 
 
@@ -444,7 +445,7 @@ def _posted(review: Review, model: type[Said], act: Callable[[Any], dict[str, An
         async for part in request.stream():
             body += part
             if len(body) > MOST_BYTES:
-                return JSONResponse({"message": "too much is posted"}, 413)
+                return _refused(RefusedError(413, "refused", "too_much_posted"), review)
         try:
             said = model.model_validate_json(bytes(body))
         except ValidationError as error:
@@ -474,7 +475,12 @@ def _told(review: Review, act: Callable[[], Response]) -> Response:
     except TableError as error:
         return JSONResponse({"message": error.told(speaker).message, "code": error.code}, 400)
     except PlanmarkError as error:
-        return JSONResponse({"message": error.message, "code": error.code}, 400)
+        return _refused(error, review)
+
+
+def _refused(error: PlanmarkError, review: Review) -> Response:
+    status = error.status if isinstance(error, RefusedError) else 400
+    return JSONResponse({"message": told_of(error, review.speaker), "code": error.code}, status)
 
 
 # Who may use it -----------------------------------------------------------------------------------
@@ -494,18 +500,16 @@ def refusal(request: Request, review: Review) -> Response | None:
     """Why a request is not answered; None where it is."""
     host, token, is_let_in = request.headers.get("host", ""), review.token, review.by is not None
     if not token and not is_let_in and urlsplit(f"//{host}").hostname not in LOOPBACK:
-        return JSONResponse({"message": FORBIDDEN}, 403)
+        return _refused(RefusedError(403, "refused", "review_host"), review)
     if token and not _has_token(request, token):
         given = request.query_params.get("token", "")
         if request.url.path == "/" and hmac.compare_digest(given.encode(), token.encode()):
             response = RedirectResponse("/", 303)
             response.set_cookie(COOKIE, token, httponly=True, samesite="lax")
             return response
-        return JSONResponse(
-            {"message": "the token is missing or wrong: open the address with its token"}, 401
-        )
+        return _refused(RefusedError(401, "refused", "review_token"), review)
     if request.method == "POST" and not _is_own_page(request, host):
-        return JSONResponse({"message": "only the review's own page may post"}, 403)
+        return _refused(RefusedError(403, "refused", "review_form"), review)
     return None
 
 

@@ -33,8 +33,9 @@ from grader.review.doubts import Doubt, doubts_of, figures_read, in_order, readi
 from grader.review.scans import Scans
 from grader.tables.decisions import ClashError, Decision, DecisionFile, Key
 from grader.tables.measurements import StudentSubmission
+from grader.texts.spoken import RefusedError
 from reference.construction.graph import Construction
-from reference.errors import CallError, PlanmarkError
+from reference.errors import PlanmarkError
 
 OPEN = "review"
 MOST_COMMENTS = 30
@@ -87,11 +88,11 @@ class Student:
         return self.job.folder
 
     def criterion(self, name: str) -> CriterionDocument:
-        """A criterion by its id. Raises CallError."""
+        """A criterion by its id. Raises RefusedError."""
         for criterion in self.report.criteria:
             if criterion.id == name:
                 return criterion
-        raise CallError("criterion_unknown", f"{self.job.folder} has no criterion {name}")
+        raise RefusedError(400, "criterion_unknown", student=self.job.folder, name=name)
 
 
 class Said(BaseModel):
@@ -234,11 +235,11 @@ class Session:
         return run
 
     def student(self, key: str) -> Student:
-        """A student by the key. Raises CallError."""
+        """A student by the key. Raises RefusedError."""
         for student in self.students:
             if student.key == key:
                 return student
-        raise CallError("student_unknown", f"there is no student '{key}' in this class any more")
+        raise RefusedError(400, "student_unknown", name=key)
 
     def pages_of(self, student: Student) -> list[ScannedPage]:
         """The pages as the last run read them."""
@@ -267,7 +268,7 @@ class Session:
     def decide(self, answers: Sequence[Answer], by: str, window: str) -> list[Student]:
         """Write what a person decided, all of it or nothing; the students whom it concerns, marked anew.
 
-        Raises ChangedError where somebody else was quicker, CallError for an answer that cannot be used.
+        Raises ChangedError where somebody else was quicker, RefusedError for an answer that cannot be used.
         """
         with self._lock:
             wanted: list[tuple[Decision, str]] = []
@@ -512,11 +513,11 @@ class Session:
     def snapped(self, key: str, sheet: int, figure: str, at: tuple[float, float]) -> tuple[float, float]:
         """The point of the ink that is meant by a place on a page, both in sheet millimetres.
 
-        Raises CallError for a page that there is not.
+        Raises RefusedError for a page that there is not.
         """
         pages = self.pages_of(self.student(key))
         if not 0 <= sheet < len(pages):
-            raise CallError("page_missing", "there is no such page")
+            raise RefusedError(400, "page_missing", "no_page")
         node = snapped(pages[sheet].ink, *at, figure)
         return node.at.real, -node.at.imag
 

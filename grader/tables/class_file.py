@@ -3,11 +3,11 @@
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, BaseModel
 
-from grader.options import GradeOptions, offered
+from grader.options import GradeOptions, model_of, offered
 from reference.authored.assignment import built_in, locate
 from reference.authored.toml_file import NOT_TOML, Authored, is_file, load
 from reference.errors import AuthoredFileError, Finding
@@ -23,16 +23,11 @@ def _check_path(text: str) -> str:
 _Path = Annotated[str, AfterValidator(_check_path)]
 
 
-class ClassFile(Authored):
-    """The keys as they are written; all may be absent."""
-
-    assignment: _Path | None = None
-    roster: _Path | None = None
-    language: Literal["en", "ro", "ru"] | None = None
-    pages: Annotated[int, Field(ge=1)] | None = None
-    platform: _Path | None = None
-    out: _Path = "results"
-    log: _Path | None = None
+ClassFile = model_of(
+    "ClassFile", GradeOptions, Authored, kinds={Path: _Path, str: _Path},
+    assignment=(_Path | None, None), out=(_Path, "results"), log=(_Path | None, None),
+)  # fmt: skip
+"""The keys as they are written; all may be absent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,10 +77,10 @@ def read_class_file(path: Path, platforms: Collection[str]) -> ClassSettings:
     return ClassSettings(path, {keys[key]: values[key] for key in written}, keys)
 
 
-def _loaded(path: Path) -> ClassFile:
+def _loaded(path: Path) -> BaseModel:
     """The file as it is written; of a path in double quotes with backslashes the fault says what to do."""
     try:
-        return load(ClassFile, path)
+        return load(ClassFile, path)  # type: ignore[no-any-return]
     except AuthoredFileError as error:
         (first, *_) = error.findings
         if first.code != NOT_TOML or b"\\" not in path.read_bytes():

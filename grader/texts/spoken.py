@@ -1,7 +1,7 @@
 """Sentences of reasons and problems in a language: numbers with their units, names as students know them."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Protocol, cast
+from typing import Any, Protocol, cast
 
 from grader.documents import ProblemDocument, UnmatchedDocument, UnreadDocument
 from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
@@ -9,6 +9,7 @@ from grader.records import Reason, Unread, Value
 from grader.texts.clauses import CLAIMS, CLAUSES
 from grader.texts.faults import FAULTS, ON_LINE
 from grader.texts.problems import PROBLEMS
+from grader.texts.refusals import REFUSALS
 from reference.errors import PlanmarkError
 
 ENGLISH = tongue(ROOT_LANGUAGE)
@@ -218,6 +219,36 @@ def message(reason: Coded, speaker: Tongue = ENGLISH) -> str:
 def of_error(error: PlanmarkError, file: str | None = None) -> Reason:
     """An error as a problem: its parameters, and its own words as the `detail`."""
     return Reason(error.code, {**error.parameters, "detail": error.message}, file)
+
+
+def told_parameters(reason: Reason) -> dict[str, Any]:
+    """What a problem's sentence names, as an error's parameters: its own words are the error's message."""
+    return {key: value for key, value in reason.parameters.items() if key != "detail"}
+
+
+def refusal(reason: Reason, speaker: Tongue = ENGLISH) -> str:
+    """What is said of a refused request; of an error its own words, in other languages its sentence."""
+    if reason.code in REFUSALS:
+        return speaker.gettext(REFUSALS[reason.code]) % reason.parameters
+    return (speaker is not ENGLISH and sentence(reason, speaker)) or message(reason, speaker)
+
+
+class RefusedError(PlanmarkError):
+    """A request that is not answered: HTTP's `status`, a code, and `why` where several share the code.
+
+    The sentence is that of `why`, else of the code, in `grader.texts.refusals` or of a problem.
+    """
+
+    exit_status = 1
+
+    def __init__(self, status: int, code: str, why: str = "", /, **parameters: float | str) -> None:
+        self.status, self.reason = status, Reason(why or code, parameters)
+        super().__init__(code, refusal(self.reason), **parameters)
+
+
+def told_of(error: PlanmarkError, speaker: Tongue) -> str:
+    """What is said of an error in a language."""
+    return refusal(error.reason if isinstance(error, RefusedError) else of_error(error), speaker)
 
 
 # Documents ----------------------------------------------------------------------------------------

@@ -13,13 +13,12 @@ from pydantic import Field
 from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
-from grader.language import N_
+from grader.texts.spoken import RefusedError
 from grader.web.guard import (
     INVITATION,
     MAILED,
     NO_TOKENS,
     RESET,
-    RefusedError,
     hash_of,
     is_password,
     missing,
@@ -38,7 +37,6 @@ VALID_S = {INVITATION: 7 * 86400.0, RESET: 7 * 86400.0, MAILED: 3600.0}
 """How long what was sent is valid: a letter is read soon, and lies about for long."""
 STEP_S = 30
 """A code of a device is for so long (RFC 6238)."""
-OVER = N_("this invitation is not valid any more: ask for a new one")
 
 
 class SignIn(Strict):
@@ -100,7 +98,7 @@ def sign_in(call: Called, who: SignIn) -> dict[str, Any]:
     if not is_password(account, who.password) or account is None:
         call.note("sign-in refused", who.name)
         call.session.commit()
-        raise RefusedError(401, "sign_in", N_("the name or the password is wrong"))
+        raise RefusedError(401, "sign_in", "wrong_name_or_password")
     if account.totp:
         _check_code(call, account, account.totp, who.code)
     return _entered(call, account)
@@ -129,10 +127,10 @@ def join(call: Called, who: Invited) -> dict[str, Any]:
     """Answer an invitation: the account gets its password."""
     waiting, account = _answered(call, who.token, {INVITATION})
     if account.password:
-        raise RefusedError(403, "invitation", OVER)
+        raise RefusedError(403, "invitation")
     other = call.session.scalar(select(Account).where(Account.name == who.name, Account.id != account.id))
     if other is not None:
-        raise RefusedError(409, "name_taken", "somebody has this name already: choose another")
+        raise RefusedError(409, "name_taken", name=who.name)
     account.name, account.password = who.name, hash_of(who.password, who.name)
     call.session.delete(waiting)
     call.note("joined", who.name)
@@ -227,7 +225,7 @@ def remove_second_factor(call: Called, number: Row) -> dict[str, str]:
 def _check_code(call: Call, account: Account, secret: str, code: str) -> None:
     """Raise RefusedError for a code that is wrong, or was used."""
     if not code:
-        raise RefusedError(401, "second_factor", N_("give the code of your second factor, too"))
+        raise RefusedError(401, "second_factor", "code_needed")
     call.service.guard.count("code", [f"account {account.id}"])
     totp, now = pyotp.TOTP(secret), int(time.time()) // STEP_S
     for step in range(now - 1, now + 2):
@@ -236,7 +234,7 @@ def _check_code(call: Call, account: Account, secret: str, code: str) -> None:
             return
     call.note("code refused", account.name)
     call.session.commit()
-    raise RefusedError(401, "second_factor", N_("the code is wrong or was used: wait for the next one"))
+    raise RefusedError(401, "second_factor", "code_wrong")
 
 
 @router.get("/accounts")
@@ -255,7 +253,7 @@ def listed(call: Called) -> list[dict[str, Any]]:
 def remove_account(call: Called, number: Row) -> dict[str, str]:
     """Remove an instructor; the publications stay."""
     if call.admin.id == number:
-        raise RefusedError(409, "own_account", "nobody removes the own account: let another do it")
+        raise RefusedError(409, "own_account")
     found = call.session.get(Account, number)
     if found is None:
         raise missing("account")
@@ -270,7 +268,7 @@ def new_token(call: Called, title: Annotated[Name, Query()]) -> dict[str, str]:
     """A token for a program, shown once: it may do what its instructor may."""
     account, token = call.account, secrets.token_urlsafe(32)
     if title in NO_TOKENS:
-        raise RefusedError(422, "title", "choose another title")
+        raise RefusedError(422, "title", "token_title")
     call.session.add(Visit(id=digest_of(token), account=account, title=title, links={}))
     call.note("token made", title)
     return {"title": title, "token": token}
@@ -298,7 +296,7 @@ def invitation(session: Session, name: str, *, is_admin: bool) -> str:
     """A token by which somebody makes their account. Raises RefusedError where the name is taken."""
     account = session.scalar(select(Account).where(Account.name == name))
     if account is not None and account.password:
-        raise RefusedError(409, "name_taken", f"there is an account '{name}' already")
+        raise RefusedError(409, "name_taken", name=name)
     account = account or Account(name=name, is_admin=is_admin)
     token = secrets.token_urlsafe(32)
     session.add_all([account, Visit(id=digest_of(token), account=account, title=INVITATION, links={})])
@@ -310,9 +308,9 @@ def _answered(call: Call, token: str, kinds: Collection[str]) -> tuple[Visit, Ac
     call.service.guard.count("sign_in", [call.visitor.address])
     waiting = call.session.get(Visit, digest_of(token))
     if waiting is None or waiting.title not in kinds or waiting.account is None:
-        raise RefusedError(403, "invitation", OVER)
+        raise RefusedError(403, "invitation")
     if time.time() - waiting.created > VALID_S[waiting.title]:
-        raise RefusedError(403, "invitation", N_("this invitation is too old: ask for a new one"))
+        raise RefusedError(403, "invitation", "invitation_old")
     return waiting, waiting.account
 
 
@@ -320,7 +318,7 @@ def _proved(call: Call, password: str) -> Account:
     """The instructor who is signed in, and has said the password again. Raises RefusedError."""
     call.service.guard.count("sign_in", [call.visitor.address])
     if call.visitor.is_program or not is_password(call.account, password):
-        raise RefusedError(403, "password", N_("the password is wrong"))
+        raise RefusedError(403, "password", "wrong_password")
     return call.account
 
 

@@ -17,13 +17,14 @@ from starlette.exceptions import HTTPException
 
 from grader import __version__
 from grader.language import tongue
+from grader.texts.spoken import RefusedError, told_of
 from grader.web import accounts, claims, instructors, lti, pages, students
-from grader.web.guard import Guard, RefusedError, Rim
+from grader.web.guard import Guard, Rim, language_of
 from grader.web.mail import Mail
 from grader.web.queue import Photo, Queue
 from grader.web.reviews import Reviews
 from grader.web.self_check import checked_photo
-from grader.web.service import Call, Service, language_of
+from grader.web.service import Call, Service
 from grader.web.settings import LOOPBACK, Settings
 from grader.web.store import Account, Store
 from reference.errors import PlanmarkError
@@ -120,10 +121,9 @@ def first_invitation(settings: Settings) -> str | None:
 
 
 async def _told(request: Request, error: Exception) -> Response:
-    if isinstance(error, RefusedError):
-        return _answer(request, error.status, error.code, error.told(tongue(language_of(request))))
-    code = error.code if isinstance(error, PlanmarkError) else "refused"
-    return _answer(request, HTTPStatus.UNPROCESSABLE_ENTITY, code, str(error))
+    assert isinstance(error, PlanmarkError)  # noqa: S101 - these alone are told here
+    status = error.status if isinstance(error, RefusedError) else HTTPStatus.UNPROCESSABLE_ENTITY
+    return _answer(request, status, error.code, told_of(error, tongue(language_of(request))))
 
 
 async def _invalid(request: Request, error: Exception) -> Response:

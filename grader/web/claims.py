@@ -11,9 +11,8 @@ from typing import Any
 from fastapi import APIRouter
 from sqlalchemy import select, update
 
-from grader.language import N_
 from grader.tables.roster import RosterRow, read_roster
-from grader.web.guard import RefusedError, missing
+from grader.texts.spoken import RefusedError
 from grader.web.launch import Message
 from grader.web.service import Call, Called, Key, Route, Row
 from grader.web.store import Link, LtiClaim, LtiUser, Publication
@@ -62,8 +61,7 @@ def claimed(call: Call, user: LtiUser, publication: Publication, student: str, m
             call.note("came as a student" if is_first else "claim waits", f"{publication.key} {student}")
         call.session.commit()
     if not claim.holds:
-        why = N_("somebody else has come as this student: your instructor decides who it is")
-        raise RefusedError(409, "lti_claimed", why)
+        raise RefusedError(409, "lti_claimed")
     return claim
 
 
@@ -84,7 +82,7 @@ def listed(call: Called, key: Key) -> list[dict[str, Any]]:
 @router.put("/{number}")
 def decide(call: Called, key: Key, number: Row) -> dict[str, str]:
     """Say that this one is the student; whoever was it before is it no more."""
-    claim = _own_claim(call, key, number)
+    claim = call.own_row(key, LtiClaim, number, "claim")
     others = call.session.scalars(
         select(LtiClaim).where(
             LtiClaim.publication_id == claim.publication_id, LtiClaim.id != claim.id, LtiClaim.holds,
@@ -102,18 +100,11 @@ def decide(call: Called, key: Key, number: Row) -> dict[str, str]:
 @router.delete("/{number}")
 def refuse(call: Called, key: Key, number: Row) -> dict[str, str]:
     """Say that this one is not the student, and take back what the launch gave."""
-    claim = _own_claim(call, key, number)
+    claim = call.own_row(key, LtiClaim, number, "claim")
     take_back_links(call, [claim.id])
     call.session.delete(claim)
     call.note("claim refused", f"{key} {claim.student_id}")
     return {"state": "refused"}
-
-
-def _own_claim(call: Call, key: str, number: int) -> LtiClaim:
-    own, claim = call.own(key), call.session.get(LtiClaim, number)
-    if claim is None or claim.publication_id != own.id:
-        raise missing("claim")
-    return claim
 
 
 def take_back_links(call: Call, numbers: Sequence[int]) -> None:

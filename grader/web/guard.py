@@ -33,10 +33,10 @@ from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from zxcvbn import zxcvbn
 
-from grader.language import N_, Tongue
+from grader.language import LANGUAGES, tongue
+from grader.texts.spoken import RefusedError, told_of
 from grader.web.settings import Settings
 from grader.web.store import Account, Link, Publication, Store, Visit, digest_of
-from reference.errors import PlanmarkError
 
 COOKIE = "planmark_visit"
 FORM_HEADER = "X-Planmark-Form"
@@ -87,47 +87,30 @@ _NOBODY = _HASHER.hash(secrets.token_urlsafe())
 """Compared with where there is no such account: the time tells nothing."""
 
 
-class RefusedError(PlanmarkError):
-    """A request that is not answered; `status` is HTTP's, `text` a key of the catalogues where it has one."""
-
-    exit_status = 1
-
-    def __init__(self, status: int, code: str, text: str, /, **known: object) -> None:
-        super().__init__(code, text % known if known else text)
-        self.status, self.text, self.known = status, text, known
-
-    def told(self, speaker: Tongue) -> str:
-        """The message in a language."""
-        text = speaker.gettext(self.text)
-        return text % self.known if self.known else text
-
-
-NO_SUCH = {"page": N_("there is no such page"), "publication": N_("there is no such assignment here")}
-
-
-def forbidden(message: str) -> RefusedError:
+def forbidden(why: str) -> RefusedError:
     """The error for those who may not."""
-    return RefusedError(403, "forbidden", message)
+    return RefusedError(403, "forbidden", why)
 
 
 def missing(what: str = "page") -> RefusedError:
     """The error for what is not there, or is not the visitor's to see: both read the same."""
-    return RefusedError(404, "not_found", NO_SUCH.get(what, f"there is no such {what}"))
+    return RefusedError(404, "not_found", f"no_{what}")
+
+
+def language_of(request: Request) -> str:
+    """The language that a visitor chose, else the browser's, else English."""
+    chosen = request.query_params.get("lang") or request.cookies.get("planmark_lang", "")
+    wanted = [chosen, *request.headers.get("accept-language", "").split(",")]
+    codes = (one.strip()[:2].lower() for one in wanted)
+    return next((code for code in codes if code in LANGUAGES), LANGUAGES[0])
 
 
 def hash_of(password: str, name: str) -> str:
     """What is stored of a password of somebody. Raises RefusedError for a short or a common one."""
     if not LEAST_PASSWORD <= len(password) <= 200:
-        raise RefusedError(
-            422,
-            "password_short",
-            N_("the password must have %(least)s to 200 signs: a sentence is good"),
-            least=LEAST_PASSWORD,
-        )
+        raise RefusedError(422, "password_short", least=LEAST_PASSWORD)
     if zxcvbn(password[:_LOOKED_AT], [name, "planmark"])["guesses"] < LEAST_GUESSES:
-        raise RefusedError(
-            422, "password_common", N_("this password is easily guessed: a sentence of your own is good")
-        )
+        raise RefusedError(422, "password_common")
     return _HASHER.hash(password)
 
 
@@ -217,7 +200,7 @@ class Guard:
         if kind.lower() == "bearer":
             visit = session.get(Visit, digest_of(token.strip()))
             if visit is None or visit.title in NO_TOKENS:
-                raise RefusedError(401, "token", "the token is not known")
+                raise RefusedError(401, "token")
             return Visitor(token, visit, is_program=True, address=address)
         secret = request.cookies.get(COOKIE, "")
         visit = session.get(Visit, digest_of(secret)) if secret else None
@@ -274,7 +257,7 @@ class Guard:
         given = request.headers.get(FORM_HEADER, "")
         is_own = origin is None or origin.partition("://")[2] == request.headers.get("host", "")
         if not is_own or not hmac.compare_digest(given.encode(), self.form_token(visitor).encode()):
-            raise forbidden(N_("the page is out of date: load it again, and repeat what you did"))
+            raise forbidden("form_old")
 
     # How often ------------------------------------------------------------------------------------
 
@@ -282,9 +265,7 @@ class Guard:
         """Count a use of something. Raises RefusedError where there are too many in a minute."""
         for one in who:
             if not self._limiter.hit(RATES[rate], rate, one):
-                raise RefusedError(
-                    429, "too_often", N_("too often in a short time: wait a minute, then go on")
-                )
+                raise RefusedError(429, "too_often")
 
     # Links ----------------------------------------------------------------------------------------
 
@@ -304,9 +285,7 @@ class Guard:
     @staticmethod
     def _valid(link: Link | None) -> Link:
         if link is None or link.is_revoked or link.expires < time.time():
-            raise RefusedError(
-                404, "link", N_("this link is not valid any more: ask your instructor for a new one")
-            )
+            raise RefusedError(404, "link")
         return link
 
     def own_link(self, session: Session, visitor: Visitor, publication: Publication) -> Link | None:
@@ -348,35 +327,36 @@ class Rim:
             return
         host = Headers(scope=scope).get("host", "")
         if host != self.settings.host and _name_of(host) not in self.hosts:
-            await _refuse(send, 421, "this address is not served here: open the server's own address")
+            await _refuse(scope, send, RefusedError(421, "refused", "other_host"))
             return
         most, sender = self._most(scope["path"]), address_of(scope)
-        taken, until, refusal = 0, 0.0, None
+        taken, until = 0, 0.0
+        refused: RefusedError | None = None
 
         async def bounded() -> Message:
-            nonlocal taken, until, refusal
+            nonlocal taken, until, refused
             if until == inf:  # all of it is there: the application waits for the end of the connection
                 return await receive()
             if not until:
                 until = asyncio.get_running_loop().time() + GRACE_S
                 self._sending[sender] += 1
-            refusal = CROWDED if self._sending[sender] > MOST_SENDING else None
-            if refusal is None:
-                message, refusal = await _in_time(receive, until + taken / LEAST_PACE)
+            refused = _crowded() if self._sending[sender] > MOST_SENDING else None
+            if refused is None:
+                message, refused = await _in_time(receive, until + taken / LEAST_PACE)
                 size = len(message.get("body", b""))
                 taken += size
                 self._held[sender] += size
                 held = self._held.total() > self.room or self._held[sender] > SHARE * self.room
-                too_large = (413, f"larger than {most // 1_000_000} MB: send a smaller file")
-                refusal = refusal or (too_large if taken > most else CROWDED if held else None)
-            if refusal is not None:
-                raise _RefusedBodyError
+                too_large = RefusedError(413, "refused", "too_large", most=most // 1_000_000)
+                refused = refused or (too_large if taken > most else _crowded() if held else None)
+            if refused is not None:
+                raise refused
             if not message.get("more_body"):
                 until = self._ended(sender)
             return message
 
         async def with_headers(message: Message) -> None:
-            if refusal is not None:  # whatever the application answers to that
+            if refused is not None:  # whatever the application answers to that
                 return
             if message["type"] == "http.response.start":
                 known = {name for name, _ in message["headers"]}
@@ -385,14 +365,14 @@ class Rim:
             await send(message)
 
         try:
-            with contextlib.suppress(_RefusedBodyError):
+            with contextlib.suppress(RefusedError):
                 await self.app(scope, bounded, with_headers)
         finally:
             self._held -= Counter({sender: taken})
             if 0.0 < until < inf:
                 self._ended(sender)
-        if refusal is not None:
-            await _refuse(send, *refusal)
+        if refused is not None:
+            await _refuse(scope, send, refused)
 
     def _ended(self, sender: str) -> float:
         """Forget a body that is being sent; a time that never comes."""
@@ -420,7 +400,6 @@ MOST_SENDING = 60
 """Bodies that come from one address at one time: a class behind a school's address that sends its photos."""
 SHARE = 2 / 3
 """Of the room for all bodies that one address may take."""
-CROWDED = (503, "too many files are being sent: wait a minute, then send it again")
 _FILES = re.compile(
     r"/api/v1/publications/[^/]+/(?:(?P<photo>photos|sheets)|(?:assignment/|roster/|exports/[^/]+/)?files/.+)/?"
 )
@@ -435,22 +414,22 @@ def _name_of(host: str) -> str | None:
         return None
 
 
-class _RefusedBodyError(Exception):
-    pass
+def _crowded() -> RefusedError:
+    return RefusedError(503, "refused", "crowded")
 
 
-async def _in_time(receive: Receive, until: float) -> tuple[Message, tuple[int, str] | None]:
+async def _in_time(receive: Receive, until: float) -> tuple[Message, RefusedError | None]:
     """The next part of a body, or why it is waited for no longer."""
     try:
         async with asyncio.timeout_at(until):
             return await receive(), None
     except TimeoutError:
-        return {}, (408, "it came too slowly: send it again, where the network is better")
+        return {}, RefusedError(408, "refused", "too_slow_body")
 
 
-async def _refuse(send: Send, status: int, text: str) -> None:
+async def _refuse(scope: Scope, send: Send, error: RefusedError) -> None:
+    told = told_of(error, tongue(language_of(Request({"query_string": b"", **scope}))))
     head = [(b"content-type", b"application/json"), (b"connection", b"close")]
-    await send({"type": "http.response.start", "status": status, "headers": head})
-    await send(
-        {"type": "http.response.body", "body": json.dumps({"code": "refused", "message": text}).encode()}
-    )
+    await send({"type": "http.response.start", "status": error.status, "headers": head})
+    body = json.dumps({"code": error.code, "message": told}).encode()
+    await send({"type": "http.response.body", "body": body})

@@ -7,11 +7,11 @@ import tempfile
 import time
 from dataclasses import replace
 from pathlib import PurePath
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query
 from fastapi.responses import Response
-from pydantic import Field
+from pydantic import BaseModel, Field
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
@@ -20,10 +20,12 @@ from grader.documents import LintDocument
 from grader.folder.workers import result_of
 from grader.lms.export import TARGETS, export, read_results, usual_name
 from grader.lms.grades import Options, people_of
+from grader.options import ExportOptions, PublicationOptions, model_of, offered
 from grader.rubric import rubric_of
 from grader.tables.roster import read_roster
+from grader.texts.spoken import RefusedError
 from grader.web.erase import erase_student
-from grader.web.guard import RefusedError, missing
+from grader.web.guard import missing
 from grader.web.places import (
     AUTHORED,
     SUBMITTED,
@@ -45,12 +47,12 @@ from grader.web.store import (
     Regrading,
     Sheet,
     digest_of,
+    last_job,
 )
 from grader.web.students import (
     HANDING_IN,
     WITHOUT_NUL,
     JobState,
-    Lang,
     Strict,
     check_pages,
     pages_in,
@@ -70,23 +72,11 @@ StudentId = Annotated[str, Path(pattern=r"^[A-Za-z0-9._-]{1,80}$")]
 # Publications -------------------------------------------------------------------------------------
 
 
-class Settings(Strict):
-    """What an instructor sets of a publication; what is left out stays."""
+SETTINGS = tuple(one.name for one, _ in offered(PublicationOptions))
 
-    title: Annotated[str, Field(max_length=120, pattern=WITHOUT_NUL)] | None = None
-    term: Annotated[str, Field(max_length=40, pattern=r"^[^\x00-\x1f\x7f]*$")] | None = None
-    assignment: Annotated[str, Field(max_length=120, pattern=WITHOUT_NUL)] | None = None
-    lang: Lang | None = None
-    level: Literal["symbol", "hint"] | None = None
-    attempts: Annotated[int, Field(ge=0, le=1000)] | None = Field(
-        default=None, description="allowed for each student and variant; 0 allows any number"
-    )
-    pages_per_student: Annotated[int, Field(ge=0, le=20)] | None = Field(
-        default=None, description="of one class file in the roster's order; 0 where pages are told otherwise"
-    )
-    is_open: bool | None = None
-    is_released: bool | None = None
-    takes_sheets: bool | None = None
+
+class Settings(model_of("Settings", PublicationOptions, Strict, SETTINGS)):  # type: ignore[misc]
+    """What an instructor sets of a publication; what is left out stays."""
 
 
 @router.get("/assignments")
@@ -194,7 +184,7 @@ def remove_member(call: Called, key: Key, number: Row) -> dict[str, Any]:
     own = call.own(key)
     left = [one for one in own.members if one.id != number]
     if not left:
-        raise RefusedError(409, "last_member", "somebody must stay: add a colleague first")
+        raise RefusedError(409, "last_member")
     own.members = left
     call.note("member removed", f"{key} {number}")
     return facts(own)
@@ -229,18 +219,9 @@ def linted(data: pathlib.Path, key: str, name: str) -> LintDocument:
 
 def facts(publication: Publication) -> dict[str, Any]:
     """A publication's settings."""
-    names = (
-        "key", "title", "term", "assignment", "lang", "level", "attempts", "pages_per_student", "is_open",
-        "is_released", "takes_sheets", "created",
-    )  # fmt: skip
     members = [{"id": one.id, "name": one.name} for one in publication.members]
-    return {**{name: getattr(publication, name) for name in names}, "members": members}
-
-
-def last_job(session: Session, publication: Publication) -> Job | None:
-    """The last job that graded the class."""
-    own = select(Job).where(Job.publication_id == publication.id, Job.kind == "grade")
-    return session.scalar(own.order_by(Job.id.desc()).limit(1))
+    known = {name: getattr(publication, name) for name in ("key", *SETTINGS, "created")}
+    return {**known, "members": members}
 
 
 def students_of(roster: pathlib.Path) -> list[dict[str, Any]]:
@@ -264,9 +245,7 @@ def files_of(session: Session, publication: Publication, places: Places) -> list
 
 
 def _remove(call: Call, publication: Publication) -> None:
-    job = last_job(call.session, publication)
-    if job is not None and job.state in {"queued", "running"}:
-        raise RefusedError(409, "job_runs", "the class is being graded: cancel that first")
+    call.idle(publication)
     places = call.places(publication)
     call.session.delete(publication)
     call.note("publication removed", publication.key)
@@ -296,8 +275,6 @@ def put_roster(call: Called, key: Key, body: Body) -> dict[str, Any]:
     try:
         store(trial, body)
         count = len(read_roster(trial, "roster.csv").rows)
-    except PlanmarkError as error:
-        raise RefusedError(422, error.code, error.message) from error
     finally:
         trial.unlink(missing_ok=True)
     store(places.roster, body, replace=True)
@@ -312,18 +289,15 @@ def put_file(call: Called, key: Key, name: FileName, body: Body, *, replace: boo
     call.count("upload")
     called = person_name(name, SUBMITTED)
     if PurePath(called).name.lower() in {"roster.csv", "decisions.csv"}:
-        raise RefusedError(
-            422, "file_name", "upload the roster as the roster; decisions are made in the review"
-        )
+        raise RefusedError(422, "file_name", "file_reserved")
     stored = stored_name(called)
     with trial_of(call, own, PurePath(stored).suffix, body) as trial:
-        pages = pages_in(call, own, trial)
+        pages = pages_in(call, own, trial, called)
         with HANDING_IN:
             known = select(Sheet).where(Sheet.publication_id == own.id, Sheet.file == stored)
             sheet = call.session.scalar(known) or Sheet(publication_id=own.id, student_id="", file=stored)
             if sheet.student_id:
-                why = f"{called}: a student has handed this in; choose another name"
-                raise RefusedError(409, "file_exists", why)
+                raise RefusedError(409, "file_exists", "file_of_student", name=called)
             check_pages(call, own, pages, replaced=stored)
             is_same = call.places(own).keep(called, body, replace=replace)
             sheet.pages = pages
@@ -383,20 +357,25 @@ def results(call: Called, key: Key) -> Response:
     """`results.json` of the last run."""
     path = call.places(call.own(key)).results / "results.json"
     if not path.is_file():
-        raise missing("result: grade the class first")
+        raise missing("result")
     return Response(path.read_bytes(), media_type="application/json")
 
 
+CHOSEN = ("what", "item", "position", "combine", "maximum", "rescale")
+
+
+class Chosen(model_of("Chosen", ExportOptions, BaseModel, CHOSEN)):  # type: ignore[misc]
+    """The options of an export that need no file of the platform."""
+
+
+def _options(platform: str, chosen: Chosen, **more: Any) -> Options:  # noqa: ANN401 - an export's options
+    return Options(to=platform, **chosen.model_dump(exclude_none=True), **more)
+
+
 @router.get("/publications/{key}/exports/{platform}")
-def export_file(
-    call: Called,
-    key: Key,
-    platform: str,
-    what: Annotated[str | None, Query(max_length=20)] = None,
-    maximum: Annotated[float | None, Query(gt=0.0, lt=1e6)] = None,
-) -> Response:
+def export_file(call: Called, key: Key, platform: str, chosen: Annotated[Chosen, Query()]) -> Response:
     """The file for a platform, as `planmark export` writes it without the platform's own file."""
-    return _exported(call, key, Options(to=platform, what=what, maximum=maximum))
+    return _exported(call, key, _options(platform, chosen))
 
 
 @router.post("/publications/{key}/exports/{platform}/files/{name}", openapi_extra=FILE_BODY)
@@ -406,9 +385,7 @@ def filled_in(
     platform: str,
     name: FileName,
     body: Body,
-    what: Annotated[str | None, Query(max_length=20)] = None,
-    *,
-    rescale: bool = False,
+    chosen: Annotated[Chosen, Query()],
 ) -> Response:
     """The platform's own worksheet or gradebook, which is sent as the body, filled in."""
     folder = call.places(call.own(key)).top / f"form-{secrets.token_hex(6)}"
@@ -416,9 +393,7 @@ def filled_in(
     form = folder / stored_name(called)
     try:
         store(form, body)
-        return _exported(call, key, Options(to=platform, what=what, form=form, rescale=rescale))
-    except PlanmarkError as error:
-        raise RefusedError(422, error.code, error.message.replace(form.name, called)) from error
+        return _exported(call, key, _options(platform, chosen, form=form, called=called))
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
@@ -426,7 +401,7 @@ def filled_in(
 def _exported(call: Call, key: str, options: Options) -> Response:
     own = call.own(key)
     if options.to not in TARGETS:
-        raise missing(f"platform: known are {', '.join(TARGETS)}")
+        raise RefusedError(404, "not_found", "no_export", known=", ".join(TARGETS))
     places = call.places(own)
     people = people_of(places.roster) if places.roster.is_file() else {}
     options = replace(options, out=places.results, lang=own.lang, people=people)
@@ -457,7 +432,7 @@ def make_links(call: Called, key: Key, student: str | None = None) -> list[dict[
     own = call.own(key)
     known = [one["student_id"] for one in students_of(call.places(own).roster)]
     if student is not None and student not in known:
-        raise missing("student on the roster")
+        raise missing("student")
     valid = set(
         call.session.scalars(
             select(Link.student_id).where(
@@ -493,9 +468,7 @@ def links(call: Called, key: Key) -> list[dict[str, Any]]:
 @router.delete("/publications/{key}/links/{number}")
 def revoke(call: Called, key: Key, number: Row) -> dict[str, str]:
     """Revoke a personal link at once."""
-    own, link = call.own(key), call.session.get(Link, number)
-    if link is None or link.publication_id != own.id:
-        raise missing("link")
+    link = call.own_row(key, Link, number, "link")
     link.is_revoked = True
     call.note("link revoked", f"{key} {link.student_id}")
     return {"state": "revoked"}
@@ -520,9 +493,7 @@ def requests(call: Called, key: Key) -> list[dict[str, Any]]:
 @router.put("/publications/{key}/requests/{number}")
 def answer(call: Called, key: Key, number: Row, said: Answer) -> dict[str, str]:
     """Answer a request."""
-    own, request = call.own(key), call.session.get(Regrading, number)
-    if request is None or request.publication_id != own.id:
-        raise missing("request")
+    request = call.own_row(key, Regrading, number, "request")
     request.answer, request.answered = said.answer, time.time()
     call.note("request answered", f"{key} {request.student_id}")
     return {"state": "answered"}
@@ -532,9 +503,7 @@ def answer(call: Called, key: Key, number: Row, said: Answer) -> dict[str, str]:
 def remove_student(call: Called, key: Key, student: StudentId) -> dict[str, Any]:
     """Delete all that is kept of a student; files that hold other students, too, are told and stay."""
     own = call.own(key)
-    job = last_job(call.session, own)
-    if job is not None and job.state in {"queued", "running"}:
-        raise RefusedError(409, "job_runs", "the class is being graded: cancel that first")
+    call.idle(own)
     kept = erase_student(call.session, own, call.places(own), student)
     call.note("student removed", f"{key} {digest_of(student)[:8]}")
     return {"state": "removed", "kept": kept}

@@ -13,6 +13,8 @@ from grader.records import Reason
 
 MOST_JUDGES = 4
 """Of 110 MB each: 100 values a second and more."""
+MOST_POOLS = 3
+"""In which a call is tried, each time its pool breaks: another call may have killed the process."""
 Result = TypeVar("Result")
 
 
@@ -20,21 +22,37 @@ class Judges:
     """A pool for short calls without limits: requests that share one interpreter only take turns."""
 
     def __init__(self, jobs: int) -> None:
+        self._jobs = jobs
+        self._renewing = threading.Lock()
+        self._pool = self._started()
+
+    def _started(self) -> ProcessPoolExecutor:
         context = multiprocessing.get_context("spawn")
-        self._pool = ProcessPoolExecutor(jobs, context, initializer=end_with_parent)
-        for _ in range(jobs):  # each call lets one more process start
-            self._pool.submit(int)
+        pool = ProcessPoolExecutor(self._jobs, context, initializer=end_with_parent)
+        for _ in range(self._jobs):  # each call lets one more process start
+            pool.submit(int)
+        return pool
 
     def run(
         self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]], sheets: Iterable[int] = ()
     ) -> Iterator[tuple[int, Result | Reason]]:
-        """As `grader.folder.workers.Pool.run`; where a process was killed, in this one."""
+        """As `grader.folder.workers.Pool.run`."""
         del sheets
         for index, call in enumerate(calls):
+            yield index, self._result(function, *call)
+
+    def _result(self, function: Callable[..., Result], *call: object) -> Result | Reason:
+        """What a call gives; where a process was killed, which breaks the pool, in a new one."""
+        for _ in range(MOST_POOLS):
+            pool = self._pool
             try:
-                yield index, self._pool.submit(guarded, function, *call).result()
+                return pool.submit(guarded, function, *call).result()
             except BrokenProcessPool:
-                yield index, guarded(function, *call)
+                with self._renewing:  # one of all that wait
+                    if self._pool is pool:
+                        pool.shutdown(wait=False)
+                        self._pool = self._started()
+        return Reason("crashed", {"why": "killed"})
 
     def end(self) -> None:
         """End the processes."""

@@ -17,7 +17,7 @@ from fastapi.responses import RedirectResponse, Response
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from sqlalchemy import delete, select
 
-from grader.web.guard import RefusedError
+from grader.texts.spoken import RefusedError
 from grader.web.outside import caller
 from grader.web.service import Call
 from grader.web.store import LtiPlatform, LtiState, digest_of
@@ -123,19 +123,19 @@ def checked(call: Call, state: str, token: str) -> tuple[Message, LtiPlatform]:
     record = _taken(call, state)
     platform = call.session.get(LtiPlatform, record["platform"])
     if platform is None:
-        raise _refused("the platform is not registered here any more")
+        raise _refused("launch_unregistered")
     try:
         header = jwt.get_unverified_header(token)
         message = Message.model_validate(jwt.decode(token, options={"verify_signature": False}))
     except ValidationError as error:
         fault = error.errors(include_url=False, include_context=False, include_input=False)[0]
         where = ".".join(str(part).removeprefix(CLAIM) for part in fault["loc"])
-        raise _refused(f"{where}: {fault['msg']}", 400) from error
+        raise _refused("launch_fault", 400, where=where, fault=fault["msg"]) from error
     except (jwt.PyJWTError, ValueError, RecursionError) as error:
-        raise _refused("it is no signed message", 400) from error
+        raise _refused("launch_no_message", 400) from error
     _check(message, platform, record["nonce"])
     if header.get("alg") not in ALGORITHMS or not isinstance(header.get("kid"), str):
-        raise _refused("it is not signed as LTI asks for")
+        raise _refused("launch_unsigned")
     try:
         jwt.decode(
             token, _key(call, platform, header["kid"]), algorithms=[header["alg"]],
@@ -143,7 +143,7 @@ def checked(call: Call, state: str, token: str) -> tuple[Message, LtiPlatform]:
             options={"require": ["exp", "iat", "nonce"]},
         )  # fmt: skip
     except (jwt.PyJWTError, TypeError, ValueError) as error:
-        raise _refused("the platform's key has not signed it") from error
+        raise _refused("launch_forged") from error
     return message, platform
 
 
@@ -153,15 +153,13 @@ def _taken(call: Call, state: str) -> dict[str, Any]:
     record = session.get(LtiState, name)
     browser = call.request.cookies.get(_cookie_of(state), "")
     if record is None or record.expires < time.time() or "nonce" not in record.what:
-        raise _refused("it was used already, or has waited too long: open the activity again")
+        raise _refused("launch_late")
     if not secrets.compare_digest(record.what["browser"], digest_of(browser)):
-        raise _refused(
-            "this browser has not begun it: allow its cookies, or open the activity in a new window"
-        )
+        raise _refused("launch_other_browser")
     taken = session.execute(delete(LtiState).where(LtiState.id == name))
     session.commit()
     if not taken.rowcount:  # type: ignore[attr-defined]
-        raise _refused("it was used already")
+        raise _refused("launch_used")
     return record.what
 
 
@@ -185,7 +183,7 @@ def _check(message: Message, platform: LtiPlatform, nonce: str) -> None:
         wrong["deep_linking_settings"] = message.choice is None
     found = [name for name, is_wrong in wrong.items() if is_wrong]
     if found:
-        raise _refused(f"{', '.join(found)} is not right")
+        raise _refused("launch_claims", claims=", ".join(found))
 
 
 def _key(call: Call, platform: LtiPlatform, name: str) -> Any:  # noqa: ANN401 - of each algorithm its own
@@ -194,11 +192,11 @@ def _key(call: Call, platform: LtiPlatform, name: str) -> Any:  # noqa: ANN401 -
         answer = caller(is_local=call.service.settings.is_local).get(platform.key_set_url)
         keys = jwt.PyJWKSet.from_dict(json.loads(answer.content))
     except (requests.RequestException, jwt.PyJWTError, ValueError, TypeError, AttributeError, RecursionError):
-        raise _refused("the platform's keys cannot be fetched: its key set address must give them") from None
+        raise _refused("launch_no_keys") from None
     try:
         return keys[name].key
     except KeyError:
-        raise _refused("the platform has no such key") from None
+        raise _refused("launch_no_key") from None
 
 
 def platform_of(call: Call, issuer: str, client_id: str) -> LtiPlatform | None:
@@ -214,5 +212,5 @@ def _cookie_of(state: str) -> str:
     return f"planmark-lti-{digest_of(state)[:16]}"
 
 
-def _refused(why: str, status: int = 403) -> RefusedError:
-    return RefusedError(status, "lti_launch", f"the launch is refused: {why}")
+def _refused(why: str, status: int = 403, **parameters: str) -> RefusedError:
+    return RefusedError(status, "lti_launch", why, **parameters)

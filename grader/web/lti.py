@@ -26,13 +26,13 @@ from pylti1p3.service_connector import ServiceConnector
 from sqlalchemy import delete, select
 
 from grader.files import write_whole
-from grader.language import N_
 from grader.lms.export import draft, read_results
 from grader.lms.grades import Options, Person
+from grader.texts.spoken import RefusedError
 from grader.web.claims import claimed, row_of, take_back_links
-from grader.web.guard import RefusedError, missing
+from grader.web.guard import missing
 from grader.web.launch import STATE_S, Message, began, checked, platform_of
-from grader.web.outside import caller, check_url
+from grader.web.outside import caller, why_not_asked
 from grader.web.service import Call, Called, Key, Route, Row
 from grader.web.settings import Settings
 from grader.web.store import (
@@ -76,10 +76,9 @@ def register(call: Called, platform: Platform) -> dict[str, Any]:
     """Register a platform; one that is there already has its data changed."""
     admin = call.admin
     for name in ("auth_login_url", "auth_token_url", "key_set_url"):
-        try:
-            check_url(getattr(platform, name), is_local=call.service.settings.is_local)
-        except ValueError as error:
-            raise RefusedError(422, "address", f"{name}: {error}") from error
+        wrong = why_not_asked(getattr(platform, name), is_local=call.service.settings.is_local)
+        if wrong is not None:
+            raise RefusedError(422, "address", wrong, field=name)
     known = platform_of(call, platform.issuer, platform.client_id)
     if known is None:
         known = LtiPlatform()
@@ -200,8 +199,8 @@ def registration_of(platform: LtiPlatform, settings: Settings) -> Registration:
 def _login(call: Call, form: Mapping[str, str]) -> Response:
     platform = platform_of(call, form.get("iss", ""), form.get("client_id", ""))
     if platform is None or not form.get("login_hint"):
-        why = "the platform is not registered here" if platform is None else "it does not say for whom it is"
-        raise RefusedError(400, "lti_login", f"the platform's login is refused: {why}")
+        why = "login_unregistered" if platform is None else "login_for_nobody"
+        raise RefusedError(400, "lti_login", why)
     return began(call, platform, form)
 
 
@@ -238,7 +237,7 @@ def launch(
 ) -> Response:
     """The second request of a launch, which the platform has signed."""
     if error:
-        raise RefusedError(400, "lti_launch", "the platform does not launch: sign in there again")
+        raise RefusedError(400, "lti_launch", "launch_ended")
     call.service.guard.count("address", [call.visitor.address])
     message, platform = checked(call, state, id_token)
     user = _user(call, platform, message)
@@ -314,8 +313,7 @@ def _learnt(call: Call, user: LtiUser, message: Message) -> Response:
         None if activity.publication_id is None else call.session.get(Publication, activity.publication_id)
     )
     if publication is None:
-        why = N_("your instructor has not chosen yet what this activity shows")
-        raise RefusedError(404, "lti_unchosen", why)
+        raise RefusedError(404, "lti_unchosen")
     _let_out(call, user, publication)
     visit = call.visitor.visit
     if visit is not None:  # whoever used this browser before is not the one who comes now
@@ -392,7 +390,7 @@ def _asked(call: Call, name: str) -> LtiState:
     account, state = call.account, call.session.get(LtiState, digest_of(name))
     visit = call.visitor.visit
     if state is None or visit is None or state.what.get("visit") != visit.id or account is None:
-        raise RefusedError(404, "lti_choice", "open the activity on the platform again, then choose")
+        raise RefusedError(404, "lti_choice")
     return state
 
 
@@ -421,7 +419,7 @@ def send_scores(call: Called, key: Key) -> dict[str, Any]:
     own = call.own(key)
     activities = call.session.scalars(select(LtiActivity).where(LtiActivity.publication_id == own.id)).all()
     if not activities:
-        raise RefusedError(404, "lti_activity", "no activity of a platform shows this assignment")
+        raise RefusedError(404, "lti_activity")
     results = read_results(call.places(own).results)
     told: dict[str, Any] = {"sent": [], "same": [], "refused": {}, "withheld": {}}
     for activity in activities:

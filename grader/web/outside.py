@@ -54,33 +54,39 @@ def addresses_of(host: str, port: int, *, is_loopback: bool = False) -> list[str
     return list(dict.fromkeys(found))
 
 
-def check_url(url: str, *, is_local: bool) -> None:
-    """Raise ValueError for an address that the server must not ask.
+def why_not_asked(url: str, *, is_local: bool) -> str | None:
+    """Why the server must not ask an address: a code; None where it may.
 
     A name that leads nowhere now is let pass: it is looked up again for every connection.
 
     Arguments: `is_local` is of a server that serves its own machine alone, and may ask it over http.
     """
-    parts = urlsplit(url)
-    host, port = parts.hostname or "", parts.port
+    try:
+        parts = urlsplit(url)
+        host, port = parts.hostname or "", parts.port
+    except ValueError:
+        return "address_not_https"
     if is_local and parts.scheme == "http" and host in LOOPBACK:
-        return
+        return None
     if parts.scheme != "https" or not host or parts.username:
-        raise ValueError("must begin with https://")
+        return "address_not_https"
     if host.rstrip(".").endswith(("localhost", ".local", ".internal")):
-        raise ValueError("is an address within a network")
+        return "address_inside"
     try:
         addresses_of(host, port or 443)
-    except InsideError as error:
-        raise ValueError(str(error)) from error
+    except InsideError:
+        return "address_inside"
+    except UnicodeError:  # no name that can be looked up
+        return "address_not_https"
     except OSError:
-        return
+        return None
+    return None
 
 
 def caller(*, is_local: bool) -> requests.Session:
     """What asks a platform; any fault is a requests.RequestException.
 
-    Arguments: `is_local` as in `check_url`.
+    Arguments: `is_local` as in `why_not_asked`.
     """
     session = _Bounded()
     session.trust_env = False  # a proxy would look names up by itself

@@ -18,6 +18,7 @@ from grader.folder.batch import Batch
 from grader.folder.inventory import is_tool_file
 from grader.rubric import rubric_of
 from grader.tables.reader import why_no_id
+from grader.texts.spoken import RefusedError
 from grader.web.store import Publication
 from reference.authored.assignment import Assignment, built_in, load_assignment
 from reference.authored.toml_file import MAX_BYTES
@@ -108,16 +109,14 @@ def places_of(data: Path, publication: Publication) -> Places:
 def person_name(name: str, endings: tuple[str, ...]) -> str:
     """What people call a file: in any script, in one line, with the folders of an uploaded folder.
 
-    Raises CallError for a file of another kind, and for one that a system or editor leaves behind.
+    Raises RefusedError for a file of another kind, and for one that a system or editor leaves behind.
     """
     parts = [shown_text(part) for part in re.split(r"[\\/]+", name) if part.strip() not in {"", ".", ".."}]
     last = PurePath(parts[-1] if parts else "-")
     if last.suffix.lower() not in endings:
         raise _other_kind(name, endings)
     if is_tool_file(last.name):
-        raise CallError(
-            "file_name", f"'{last.name[:60]}': a file that other programs leave behind, no submission"
-        )
+        raise RefusedError(422, "file_name", "file_of_program", name=last.name[:60])
     return "/".join(parts)
 
 
@@ -129,14 +128,14 @@ def stored_name(name: str) -> str:
     return f"file-{made}{PurePath(name).suffix.lower()}"
 
 
-def _other_kind(name: str, endings: tuple[str, ...]) -> CallError:
-    return CallError("file_name", f"'{name[:60]}': the file's name must end in one of {', '.join(endings)}")
+def _other_kind(name: str, endings: tuple[str, ...]) -> RefusedError:
+    return RefusedError(422, "file_name", "file_ending", name=name[:60], endings=", ".join(endings))
 
 
 def safe_name(name: str, endings: tuple[str, ...]) -> str:
     """The name under which an assignment's file is stored: letters, digits, ``.``, ``_``, ``-``.
 
-    Raises CallError for a name of another kind, and for one without any of these.
+    Raises RefusedError for a name of another kind, and for one without any of these.
     """
     plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
     parts = [part for part in re.split(r"[\\/]+", plain) if part not in {"", ".", ".."}]
@@ -149,39 +148,36 @@ def safe_name(name: str, endings: tuple[str, ...]) -> str:
 
 
 def stored(folder: Path, name: str) -> Path:
-    """A file that is in a folder, by its name. Raises CallError where there is none."""
+    """A file that is in a folder, by its name. Raises RefusedError where there is none."""
     for path in folder.glob("*"):
         if path.name == name and path.is_file():
             return path
-    raise CallError("file_missing", f"there is no file '{name[:60]}'")
+    raise RefusedError(422, "file_missing", "file_unknown", name=name[:60])
 
 
 def store(path: Path, content: bytes, *, replace: bool = False, shown: str = "") -> bool:
     """Store a file; whether it was there already with the same content.
 
-    Raises CallError where another file has that name, `shown` to people, and may not be replaced.
+    Raises RefusedError where another file has that name, `shown` to people, and may not be replaced.
     """
     if path.is_file():
         if path.read_bytes() == content:
             return True
         if not replace:
-            why = "a file of this name is there already with other content; rename it, or replace it"
-            raise CallError("file_exists", f"{shown or path.name}: {why}")
+            raise RefusedError(422, "file_exists", name=shown or path.name)
     write_whole(path, content)
     return False
 
 
 def assignment_of(data: Path, publication: Publication) -> Assignment:
-    """The published assignment. Raises CallError without one, AuthoredFileError for one with faults."""
+    """The published assignment. Raises RefusedError without one, AuthoredFileError for one with faults."""
     if not publication.assignment:
-        raise CallError("assignment_missing", "no assignment is chosen yet")
+        raise RefusedError(422, "assignment_missing")
     if publication.assignment in built_in():
         return load_assignment(publication.assignment)
     path = stored(places_of(data, publication).authored, publication.assignment)
     if far := _names_elsewhere(path):
-        raise CallError(
-            "file_elsewhere", f"{path.name}: '{far[:60]}' is not in its own folder; upload it beside it"
-        )
+        raise RefusedError(422, "file_elsewhere", file=path.name, name=far[:60])
     return load_assignment(path)
 
 

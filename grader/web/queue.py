@@ -24,7 +24,7 @@ from grader.folder.batch import Batch, grade
 from grader.folder.workers import Workers, guarded, result_of
 from grader.records import Reason
 from grader.review.session import moves
-from grader.texts.spoken import message
+from grader.texts.spoken import message, told_parameters
 from grader.web.judges import MOST_JUDGES, Judges, end_with_parent
 from grader.web.places import batch_of, places_of
 from grader.web.settings import Settings
@@ -188,7 +188,8 @@ class Queue:
             except _TurnOverError:
                 self._again(job)
             except PlanmarkError as error:
-                self._end(job, "failed", {"code": error.code}, error.message)
+                known = {"code": error.code, "parameters": error.parameters}
+                self._end(job, "failed", known, error.message)
             except Exception as error:
                 LOG.exception("job %d", job_id)
                 self._end(job, "failed", {"code": "internal_error"}, f"a fault of planmark ({error})")
@@ -267,7 +268,7 @@ class Queue:
                 case ("done", result):
                     return result  # type: ignore[no-any-return]
                 case ("failed", Reason() as problem):
-                    raise PlanmarkError(problem.code, message(problem))
+                    raise PlanmarkError(problem.code, message(problem), **told_parameters(problem))
 
 
 class _StoppedError(Exception):

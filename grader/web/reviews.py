@@ -19,12 +19,12 @@ from grader.language import tongue
 from grader.review.server import application
 from grader.review.session import Request, Session
 from grader.tables.decisions import DecisionFile
-from grader.web.guard import RefusedError
-from grader.web.instructors import last_job
+from grader.texts.spoken import RefusedError, told_of
+from grader.web.guard import language_of
 from grader.web.places import batch_of
 from grader.web.service import Call, Service
 from grader.web.store import Publication, Regrading
-from reference.errors import CallError, PlanmarkError
+from reference.errors import PlanmarkError
 
 MOST = 4
 """Classes whose reviews are kept in memory; another one is opened again in a few seconds."""
@@ -47,7 +47,9 @@ class Reviews:
             session, name, lang = await run_in_threadpool(lambda: self._let_in(request, key))
         except PlanmarkError as error:
             status = error.status if isinstance(error, RefusedError) else 422
-            response = JSONResponse({"code": error.code, "message": error.message}, status)
+            response = JSONResponse(
+                {"code": error.code, "message": told_of(error, tongue(language_of(request)))}, status
+            )
         else:
             if path or scope["path"].endswith("/"):
                 app = application(session, lang, by=name)
@@ -64,11 +66,7 @@ class Reviews:
             visitor = self.service.guard.visitor(request, store)
             call = Call(self.service, store, visitor, request, Response())
             publication = call.own(key)
-            job = last_job(store, publication)
-            if job is not None and job.state in {"queued", "running"}:
-                raise RefusedError(
-                    409, "job_runs", "the class is being graded: review it when that has ended"
-                )
+            job = call.idle(publication)
             requests = _requests(_waiting(store, publication))
             name, lang = call.account.name, call.lang
         with self._lock:
@@ -81,7 +79,7 @@ class Reviews:
         if known is None:
             batch = batch_of(self.service.settings.data, publication)
             if not (batch.out / "results.json").is_file():
-                raise CallError("results_missing", "grade the class first")
+                raise RefusedError(422, "results_missing", "no_result")
             note = partial(self.service.store.note_mark, publication.key)
             known = Session(batch, self.service.queue.workers, note=note)
             known.bring_up_to_date(lambda *_: None, name)

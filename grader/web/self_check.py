@@ -11,7 +11,7 @@ from typing import Any
 from grader.comparison.task import task_of
 from grader.feedback.student_page import AS_MEASURED, SHEET
 from grader.feedback.words import symbols
-from grader.language import N_, Tongue, tongue
+from grader.language import Tongue, tongue
 from grader.options import Level
 from grader.overlay.closeup import page_views, scan_element, svg
 from grader.overlay.measured import measured_picture
@@ -19,21 +19,11 @@ from grader.overlay.scene import Picture
 from grader.rubric import rubric_of
 from grader.self_check.advice import RESULTS, CheckedLine
 from grader.self_check.values import check_values
-from grader.tables.measurements import (
-    NOTHING_MEASURED,
-    columns_of,
-    measurements_in,
-    names_of,
-)
-from grader.texts.spoken import PLACES
-from grader.web.guard import RefusedError
+from grader.tables.measurements import NOTHING_MEASURED, columns_of, measurements_in, names_of
+from grader.texts.spoken import PLACES, RefusedError
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.quantities import SCALE_UNITS, unit_of
 
-RANGES = {
-    "n": N_("give your number n, from %(first)s to %(last)s"),
-    "position": N_("give the position, from %(first)s to %(last)s"),
-}
 _BARE = re.compile(r"\d*[.,]?\d+([eE][+-]?\d+)?", re.ASCII)
 
 
@@ -46,7 +36,7 @@ def variant_of(assignment: Assignment, n: int | None, position: int | None) -> V
     for what, value in (("n", n), ("position", position)):
         known = assignment.numbers(what)
         if known is not None and value not in known:
-            raise RefusedError(422, f"{what}_range", RANGES[what], first=known[0], last=known[-1])
+            raise RefusedError(422, f"{what}_range", first=known[0], last=known[-1])
         chosen.append(None if known is None else value)
     return assignment.variant(*chosen)
 

@@ -3,21 +3,22 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import wraps
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from fastapi import Depends, Path, Request, Response
 from fastapi.routing import APIRoute
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from grader.language import LANGUAGES, N_
-from grader.web.guard import Guard, RefusedError, Visitor, forbidden, missing
+from grader.texts.spoken import RefusedError
+from grader.web.guard import Guard, Visitor, forbidden, language_of, missing
 from grader.web.mail import Mail
 from grader.web.places import Places, places_of
 from grader.web.queue import Queue
 from grader.web.settings import Settings
-from grader.web.store import Account, Link, Publication, Store
+from grader.web.store import Account, Job, Link, LtiClaim, Publication, Regrading, Store, last_job
 
+OfPublication = TypeVar("OfPublication", Link, LtiClaim, Regrading)
 CHANGING = frozenset({"POST", "PUT", "PATCH", "DELETE"})
 
 
@@ -46,14 +47,14 @@ class Call:
     def account(self) -> Account:
         """The instructor who is signed in. Raises RefusedError where nobody is."""
         if self.visitor.account is None:
-            raise RefusedError(401, "sign_in", N_("sign in first"))
+            raise RefusedError(401, "sign_in")
         return self.visitor.account
 
     @property
     def admin(self) -> Account:
         """The administrator who is signed in. Raises RefusedError for everybody else."""
         if not self.account.is_admin:
-            raise forbidden("only an administrator may do this")
+            raise forbidden("administrators")
         return self.account
 
     @property
@@ -92,6 +93,20 @@ class Call:
             raise missing("publication")
         return found
 
+    def own_row(self, key: str, table: type[OfPublication], number: int, what: str) -> OfPublication:
+        """A row that belongs to a publication of the instructor. Raises RefusedError for any other."""
+        own, row = self.own(key), self.session.get(table, number)
+        if row is None or row.publication_id != own.id:
+            raise missing(what)
+        return row
+
+    def idle(self, publication: Publication) -> Job | None:
+        """The last job that graded a class. Raises RefusedError while it waits or runs."""
+        job = last_job(self.session, publication)
+        if job is not None and job.state in {"queued", "running"}:
+            raise RefusedError(409, "job_runs")
+        return job
+
     def link(self, publication: Publication) -> Link | None:
         """The personal link by which the visitor came, while it is valid."""
         return self.service.guard.own_link(self.session, self.visitor, publication)
@@ -116,14 +131,6 @@ class Route(APIRoute):
             return answer
 
         super().__init__(path, committed, **known)
-
-
-def language_of(request: Request) -> str:
-    """The language that a visitor chose, else the browser's, else English."""
-    chosen = request.query_params.get("lang") or request.cookies.get("planmark_lang", "")
-    wanted = [chosen, *request.headers.get("accept-language", "").split(",")]
-    codes = (one.strip()[:2].lower() for one in wanted)
-    return next((code for code in codes if code in LANGUAGES), LANGUAGES[0])
 
 
 def called(request: Request, response: Response) -> Iterator[Call]:

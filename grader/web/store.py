@@ -321,6 +321,12 @@ CONNECTIONS = 60
 """More than all threads that may want one: 40 that answer requests, those of the queue, the server's own."""
 
 
+def last_job(session: Session, publication: Publication) -> Job | None:
+    """The last job that graded the class."""
+    own = select(Job).where(Job.publication_id == publication.id, Job.kind == "grade")
+    return session.scalar(own.order_by(Job.id.desc()).limit(1))
+
+
 class Store:
     """The data base.
 

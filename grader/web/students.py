@@ -20,13 +20,14 @@ from sqlalchemy.exc import IntegrityError
 from grader.documents import ReportDocument
 from grader.files import make_folder, result_folders, write_whole
 from grader.folder.workers import guarded, result_of
-from grader.language import N_
+from grader.language import tongue
 from grader.lms.export import read_results
 from grader.records import Reason
 from grader.review.server import page_file
+from grader.scan.decode.limits import load
 from grader.scan.decode.pages import count_pages
-from grader.texts.spoken import message, of_error
-from grader.web.guard import RefusedError, forbidden, missing
+from grader.texts.spoken import RefusedError, of_error, refusal
+from grader.web.guard import forbidden, missing
 from grader.web.places import assignment_of
 from grader.web.self_check import checked_form, form_of, variant_of
 from grader.web.service import FILE_BODY, Call, Called, Key, Route
@@ -159,7 +160,7 @@ def may_check_photo(call: Called, key: Key) -> Publication:
     call.count("photo")
     waiting = select(func.count()).select_from(Job).where(Job.kind == "photo", Job.state == "queued")
     if (call.session.scalar(waiting) or 0) >= MOST_WAITING:
-        raise RefusedError(503, "busy", N_("very many photos wait now: send yours again in some minutes"))
+        raise RefusedError(503, "busy")
     _check_seconds(call, publication)
     call.session.commit()
     return publication
@@ -183,15 +184,11 @@ def _check_seconds(call: Call, publication: Publication) -> None:
         Job.kind != "grade", Job.publication_id == publication.id, Job.created > time.time() - 3600.0
     )
     if (call.session.scalar(spent.where(Job.sender == sender)) or 0.0) > settings.sender_seconds:
-        why = N_("your files took very long: send the next one in an hour")
-        raise RefusedError(429, "seconds", why)
+        raise RefusedError(429, "seconds")
     strangers = spent.where(Job.sender.startswith("visit:"))
     is_stranger = sender.startswith("visit:")
     if is_stranger and (call.session.scalar(strangers) or 0.0) > settings.class_seconds:
-        why = N_(
-            "checking the photos of this class took very long: use your personal link, or try in an hour"
-        )
-        raise RefusedError(429, "seconds", why)
+        raise RefusedError(429, "seconds", "seconds_of_class")
 
 
 @router.post("/publications/{key}/photos", status_code=202, openapi_extra=FILE_BODY)
@@ -211,13 +208,7 @@ def check_photo(
     with trial_of(call, publication, ending, body) as path:
         pages = pages_in(call, publication, path)
         if pages > most:
-            raise RefusedError(
-                413,
-                "pages",
-                N_("this file has %(pages)s pages: send %(most)s at most"),
-                pages=pages,
-                most=most,
-            )
+            raise RefusedError(413, "pages", "pages_of_photo", pages=pages, most=most)
         left = use_attempt(call, publication, variant)
     asked = {
         "file": path.name, "assignment": str(assignment.path), "n": n, "position": position, "lang": lang,
@@ -310,7 +301,7 @@ def may_hand_in(call: Called, key: Key) -> tuple[Publication, Link]:
     publication = call.publication(key)
     link = personal(call, publication)
     if not publication.takes_sheets:
-        raise forbidden(N_("sheets are not handed in here now"))
+        raise forbidden("no_sheets_now")
     call.count("photo")
     call.session.commit()
     return publication, link
@@ -329,7 +320,7 @@ def hand_in(
     publication, link = asked
     folder, ending = call.places(publication).handed_in, ending_of(body)
     with trial_of(call, publication, ending, body) as trial:
-        pages = pages_in(call, publication, trial)
+        pages = pages_in(call, publication, trial, name)
         with HANDING_IN:
             check_pages(call, publication, pages, student=link.student_id)
             at = datetime.now(UTC)
@@ -363,13 +354,11 @@ def check_pages(
     left = settings.upload_pages - sum(count for _, count in known)
     if student:
         if len(own) >= MOST_SHEETS:
-            why = N_("%(count)s sheets of yours are there already")
-            raise RefusedError(403, "sheets", why, count=len(own))
+            raise RefusedError(403, "sheets", count=len(own))
         of_students = sum(count for sender, count in known if sender)
         left = min(left, settings.student_pages - sum(own), settings.class_pages - of_students)
     if pages > left:
-        why = N_("this file has %(pages)s pages: %(left)s more may be handed in")
-        raise RefusedError(403, "pages", why, pages=pages, left=max(0, left))
+        raise RefusedError(403, "pages", pages=pages, left=max(0, left))
 
 
 @router.get("/publications/{key}/sheets")
@@ -394,7 +383,7 @@ def open_for_checks(call: Call, key: str) -> Publication:
     """A publication that students may check values against; instructors may try theirs at any time."""
     publication = call.publication(key)
     if not publication.is_open and not call.visitor.is_member(publication):
-        raise forbidden(N_("the self-check is not open now"))
+        raise forbidden("not_open")
     return publication
 
 
@@ -412,9 +401,7 @@ def use_attempt(call: Call, publication: Publication, variant: Variant) -> int |
     more = update(Attempt).where(*own, Attempt.count < publication.attempts).values(count=Attempt.count + 1)
     count = call.session.scalar(more.returning(Attempt.count))
     if count is None:
-        raise RefusedError(
-            403, "attempts_used", N_("all %(count)s attempts are used"), count=publication.attempts
-        )
+        raise RefusedError(403, "attempts_used", count=publication.attempts)
     return publication.attempts - int(count)
 
 
@@ -422,7 +409,7 @@ def personal(call: Call, publication: Publication) -> Link:
     """The student's personal link. Raises RefusedError for a visitor without a valid one."""
     link = call.link(publication)
     if link is None:
-        raise RefusedError(401, "link_needed", N_("open the personal link that you were sent"))
+        raise RefusedError(401, "link_needed")
     return link
 
 
@@ -431,7 +418,7 @@ def own_publication(call: Call, key: str) -> Publication:
     publication = call.publication(key)
     personal(call, publication)
     if not publication.is_released:
-        raise forbidden(N_("the feedback is not released yet"))
+        raise forbidden("not_released")
     return publication
 
 
@@ -460,12 +447,12 @@ def ending_of(body: bytes) -> str:
     """How a picture is stored, by its first bytes. Raises RefusedError for any other file."""
     ending = next((one for start, one in _PICTURES.items() if body.startswith(start)), None)
     if ending is None:
-        raise RefusedError(415, "file_type", N_("send a photo or scan: JPEG, PNG, TIFF or PDF"))
+        raise RefusedError(415, "file_type")
     return ending
 
 
-def pages_in(call: Call, publication: Publication, path: Path) -> int:
-    """Number of pages of a stored file, counted in a worker in the sender's seconds.
+def pages_in(call: Call, publication: Publication, path: Path, shown: str = "") -> int:
+    """Number of pages of a stored file, which is called `shown`, counted in a worker in the sender's seconds.
 
     Raises RefusedError for a damaged one, and for a sender who has none left.
     """
@@ -474,21 +461,21 @@ def pages_in(call: Call, publication: Publication, path: Path) -> int:
     _check_seconds(call, publication)
     sender, now = _sender(call, publication), time.time()
     try:
-        pages, seconds = result_of(call.service.queue.workers, counted, path)
+        pages, seconds = result_of(call.service.queue.workers, counted, path, shown or "the file")
     except InputFileError as error:  # its worker was ended
         pages, seconds = of_error(error), call.service.settings.limits.seconds
     times = {"started": now - seconds, "ended": now}
     call.session.add(Job(publication=publication, kind="count", state="done", sender=sender, **times))
     call.session.commit()
     if isinstance(pages, Reason):
-        raise RefusedError(422, pages.code, message(pages).replace(path.name, "the file"))
+        raise RefusedError(422, pages.code, **dict[str, Any](pages.parameters))
     return pages
 
 
-def counted(path: Path) -> tuple[int | Reason, float]:
+def counted(path: Path, shown: str) -> tuple[int | Reason, float]:
     """Number of pages of a file, or why it has none, and how long it took; in a worker."""
     began = time.process_time()
-    return guarded(count_pages, path), time.process_time() - began
+    return guarded(lambda: count_pages(load(path, shown))), time.process_time() - began
 
 
 @contextlib.contextmanager
@@ -517,10 +504,14 @@ def queued(call: Call, job: Job) -> JobState:
 def state_of(call: Call, job: Job) -> JobState:
     """A job as a page shows it."""
     before = call.service.queue.waiting_before(job) if job.state == "queued" else 0
+    told = job.message
+    if job.state == "failed":
+        code, known = job.result["code"], job.result.get("parameters", {})
+        told = refusal(Reason(code, {"detail": job.message, **known}), tongue(call.lang))
     seconds = None if job.started is None or job.ended is None else round(job.ended - job.started, 2)
     return JobState(
         key=job.key, kind=job.kind, state=job.state, stage=job.stage, done=job.done, total=job.total,
-        before=before, message=job.message, result=job.result, seconds=seconds,
+        before=before, message=told, result=job.result, seconds=seconds,
     )  # fmt: skip
 
 

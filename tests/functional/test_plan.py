@@ -104,7 +104,7 @@ def test_a_mechanism_that_does_not_assemble_has_its_own_status(planmark, tmp_pat
     assert "group of B does not assemble" in ran.stderr
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", [*MODELS, "lti"])
 def test_every_schema_is_a_schema(planmark, name):
     ran = planmark("schema", name)
     assert ran.returncode == 0

@@ -6,7 +6,7 @@ import jsonschema
 import pytest
 from pydantic import ValidationError
 
-from grader.cli.exporting import MODELS, schema
+from grader.cli.exporting import MODELS, WRITTEN, schema
 from grader.comparison.evidence import Submission
 from grader.documents import (
     SCHEMA_VERSION,
@@ -26,7 +26,7 @@ PUMP = task_for("pump", 7)
 PRESS = task_for("press", position=1)
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", [*MODELS, *WRITTEN])
 def test_every_schema_is_one(name):
     jsonschema.Draft202012Validator.check_schema(schema(name))
     assert schema(name)["$id"] == f"urn:planmark:{name}:{SCHEMA_VERSION}"

@@ -1,62 +1,16 @@
 """Google Classroom: the rubric of a course work, and students' grades."""
 
 from collections.abc import Sequence
-from typing import Annotated, Self
 from urllib.parse import quote
-
-from pydantic import Field, model_validator
 
 from grader.lms.api.requests import Plan, place_of, students_submissions
 from grader.lms.grades import Delivery, Grade, Options, ready
-from grader.lms.marks import (
-    Filled,
-    NotNegative,
-    Payload,
-    class_criteria,
-    platform_marks,
-)
+from grader.lms.marks import class_criteria, platform_marks
 from grader.lms.table import number
+from reference.errors import CallError
 
-
-class GoogleLevel(Payload):
-    """A level of a criterion."""
-
-    title: Filled
-    points: NotNegative
-
-
-class GoogleCriterion(Payload):
-    """A criterion: at most ten levels, of different points in one order."""
-
-    title: Filled
-    description: str
-    levels: Annotated[list[GoogleLevel], Field(min_length=1, max_length=10)]
-
-    @model_validator(mode="after")
-    def _is_whole(self) -> Self:
-        points = [level.points for level in self.levels]
-        if points != sorted(set(points), reverse=True):
-            raise ValueError("the levels' points are not in order, or stand twice")
-        return self
-
-
-class GoogleRubric(Payload):
-    """The body of ``courses.courseWork.rubrics.create``.
-
-    Source: developers.google.com/workspace/classroom, Rubrics structure and known limitations.
-    """
-
-    criteria: Annotated[list[GoogleCriterion], Field(min_length=1, max_length=50)]
-
-
-class GoogleGrade(Payload):
-    """The body of ``studentSubmissions.patch``: points by criterion are read-only there.
-
-    Source: developers.google.com/workspace/classroom, REST reference.
-    """
-
-    draftGrade: NotNegative  # noqa: N815 - the platform's own names
-    assignedGrade: NotNegative  # noqa: N815
+_MOST_CRITERIA = 50
+"""Of a rubric there (developers.google.com/workspace/classroom, Rubrics structure and known limitations)."""
 
 
 def google_classroom(grades: Sequence[Grade], options: Options) -> Delivery:
@@ -74,6 +28,10 @@ def google_classroom(grades: Sequence[Grade], options: Options) -> Delivery:
         ],
     )
     if options.criteria is None:
+        criteria = class_criteria(grades, options)
+        if len(criteria) > _MOST_CRITERIA:
+            message = f"Google Classroom takes {_MOST_CRITERIA} criteria, the rubric has {len(criteria)}"
+            raise CallError("criteria", f"{message}; export the totals alone (--to csv)")
         body = {
             "criteria": [
                 {
@@ -84,10 +42,10 @@ def google_classroom(grades: Sequence[Grade], options: Options) -> Delivery:
                         for points in (each.max_points, each.max_points / 2.0, 0.0)
                     ],
                 }
-                for each in class_criteria(grades, options)
+                for each in criteria
             ]
         }
-        plan.add(f"POST {path}/rubrics", GoogleRubric, body, "rubric")
+        plan.add(f"POST {path}/rubrics", body, "rubric")
     else:
         platform_marks(grades, options, options.criteria)
     known, missing = students_submissions(grades, options, "courses.courseWork.studentSubmissions.list")
@@ -97,7 +55,7 @@ def google_classroom(grades: Sequence[Grade], options: Options) -> Delivery:
             where = f"{path}/studentSubmissions/{quote(submission.id, safe='')}"
             call = f"PATCH {where}?updateMask=draftGrade,assignedGrade"
             fields = {"draftGrade": score, "assignedGrade": score}
-            plan.add(call, GoogleGrade, fields, "grade", grade.student_id)
+            plan.add(call, fields, "grade", grade.student_id)
     notes = (
         f"the course work must be out of {number(options.maximum or grades[0].max_score)}",
         "grades have two decimals there; points by criterion are read-only for the API: --to csv has them",

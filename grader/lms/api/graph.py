@@ -1,145 +1,26 @@
 """Microsoft Teams through Graph: the rubric, its place in an assignment, levels, points and feedback."""
 
-import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal, Self
+from typing import Any
 from urllib.parse import quote
 
-from pydantic import Field, model_validator
-
-from grader.lms.api.requests import NOT_EMPTY, Plan, place_of, students_submissions, total_of
+from grader.lms.api.requests import Plan, place_of, students_submissions, total_of
 from grader.lms.grades import Delivery, Grade, Options, ready
-from grader.lms.marks import (
-    CLOSE,
-    Filled,
-    Mark,
-    NotNegative,
-    Payload,
-    Positive,
-    class_criteria,
-    plain_comment,
-    platform_marks,
-    read_answer,
-)
+from grader.lms.marks import Mark, class_criteria, plain_comment, platform_marks, read_answer
 from grader.lms.table import number
 from reference.errors import CallError
 
-
-class GraphText(Payload):
-    """A text (itemBody)."""
-
-    content: str
-    contentType: Literal["text", "html"] = "text"  # noqa: N815 - the platform's own names, here and below
+_TYPE = "#microsoft.graph.education"
+"""Of a thing's `@odata.type`, before its own name."""
 
 
-class GraphPointsType(Payload):
-    """That points are given, and how many."""
-
-    type: Literal["#microsoft.graph.educationAssignmentPointsGradeType"] = Field(
-        "#microsoft.graph.educationAssignmentPointsGradeType", alias="@odata.type"
-    )
-    maxPoints: NotNegative | None = None  # noqa: N815
-
-
-class GraphLevel(Payload):
-    """A level, the same for all qualities."""
-
-    displayName: Filled  # noqa: N815
-    description: GraphText
-    grading: GraphPointsType
-
-
-class GraphQuality(Payload):
-    """A criterion of ours; `weight` in per cent of the rubric."""
-
-    description: GraphText
-    criteria: list[Annotated[dict[Literal["description"], GraphText], NOT_EMPTY]]
-    weight: Positive
-
-
-class GraphRubric(Payload):
-    """The body of ``POST /education/me/rubrics`` (learn.microsoft.com/graph, educationuser-post-rubrics)."""
-
-    displayName: Filled  # noqa: N815
-    description: GraphText
-    levels: Annotated[list[GraphLevel], NOT_EMPTY]
-    qualities: Annotated[list[GraphQuality], NOT_EMPTY]
-    grading: GraphPointsType
-
-    @model_validator(mode="after")
-    def _is_whole(self) -> Self:
-        if any(len(quality.criteria) != len(self.levels) for quality in self.qualities):
-            raise ValueError("a quality does not describe every level")
-        total = math.fsum(quality.weight for quality in self.qualities)
-        if not math.isclose(total, 100.0, abs_tol=CLOSE):
-            raise ValueError(f"the weights are {total:g} per cent together")
-        return self
-
-
-class GraphReference(Payload):
-    """The body of ``PUT .../rubric/$ref`` (learn.microsoft.com/graph/api/educationassignment-put-rubric)."""
-
-    id: Annotated[str, Field(alias="@odata.id", pattern=r"^https://graph\.microsoft\.com/v1\.0/\S+$")]
-
-
-class GraphFeedback(Payload):
-    """What is said of a quality."""
-
-    qualityId: Filled  # noqa: N815
-    feedback: GraphText
-
-
-class GraphSelected(Payload):
-    """The level of a quality."""
-
-    qualityId: Filled  # noqa: N815
-    columnId: Filled  # noqa: N815
-
-
-class GraphRubricOutcome(Payload):
-    """A student's levels (learn.microsoft.com/graph/api/educationoutcome-update, as the next two)."""
-
-    type: Literal["#microsoft.graph.educationRubricOutcome"] = Field(
-        "#microsoft.graph.educationRubricOutcome", alias="@odata.type"
-    )
-    rubricQualityFeedback: list[GraphFeedback]  # noqa: N815
-    rubricQualitySelectedLevels: list[GraphSelected]  # noqa: N815
-
-
-class GraphPoints(Payload):
-    """The grade."""
-
-    type: Literal["#microsoft.graph.educationAssignmentPointsGrade"] = Field(
-        "#microsoft.graph.educationAssignmentPointsGrade", alias="@odata.type"
-    )
-    points: Annotated[float, Field(ge=0.0, lt=9_999_999.0)]
-
-
-class GraphPointsOutcome(Payload):
-    """A student's grade."""
-
-    type: Literal["#microsoft.graph.educationPointsOutcome"] = Field(
-        "#microsoft.graph.educationPointsOutcome", alias="@odata.type"
-    )
-    points: GraphPoints
-
-
-class GraphFeedbackOutcome(Payload):
-    """A student's feedback."""
-
-    type: Literal["#microsoft.graph.educationFeedbackOutcome"] = Field(
-        "#microsoft.graph.educationFeedbackOutcome", alias="@odata.type"
-    )
-    feedback: Annotated[dict[Literal["text"], GraphText], NOT_EMPTY]
+def _text(content: str) -> dict[str, str]:
+    return {"content": content, "contentType": "text"}
 
 
 _SHARES = (100.0, 75.0, 50.0, 25.0, 0.0)
 """Per cent; levels are the same for all qualities, so that points between them stand in the feedback."""
-_OUTCOMES: Mapping[str, type[Payload]] = {
-    "rubric": GraphRubricOutcome,
-    "points": GraphPointsOutcome,
-    "feedback": GraphFeedbackOutcome,
-}
+_OUTCOMES = ("rubric", "points", "feedback")
 """In the order in which they are sent: the levels would set the points anew."""
 
 
@@ -162,7 +43,7 @@ def ms_education(grades: Sequence[Grade], options: Options) -> Delivery:
     )
     ask = f"{base}/submissions?$expand=outcomes"
     if options.criteria is None:
-        plan.add("POST /v1.0/education/me/rubrics", GraphRubric, _graph_rubric(grades, options), "rubric")
+        plan.add("POST /v1.0/education/me/rubrics", _graph_rubric(grades, options), "rubric")
         why = "its points follow once the rubric is there: give Graph's answer for it (--criteria)"
         return plan.delivery(grades, unplaced={grade.student_id: why for grade in ready(grades)})
     answer = read_answer(options.criteria)
@@ -174,7 +55,7 @@ def ms_education(grades: Sequence[Grade], options: Options) -> Delivery:
         raise CallError("criteria", f"{options.criteria}: is no educationRubric with its id and levels")
     if options.submissions is None:
         reference = {"@odata.id": f"https://graph.microsoft.com/v1.0/education/me/rubrics/{quote(rubric_id)}"}
-        plan.add(f"PUT {base}/rubric/$ref", GraphReference, reference, "attach")
+        plan.add(f"PUT {base}/rubric/$ref", reference, "attach")
     for grade, marks in marked:
         if submission := known.get(grade.student_id):
             outcomes = {
@@ -185,10 +66,10 @@ def ms_education(grades: Sequence[Grade], options: Options) -> Delivery:
                 continue
             score = grade.out_of(options.maximum, rescale=options.rescale)
             bodies = _graph_outcomes(grade, marks, levels, score)
-            for kind, model in _OUTCOMES.items():
+            for kind in _OUTCOMES:
                 outcome = quote(outcomes[kind] or "", safe="")
                 path = f"{base}/submissions/{quote(submission.id, safe='')}/outcomes/{outcome}"
-                plan.add(f"PATCH {path}", model, bodies[kind], kind, grade.student_id)
+                plan.add(f"PATCH {path}", bodies[kind], kind, grade.student_id)
     notes = [
         f"the assignment must be out of {number(options.maximum or grades[0].max_score)} points",
         "a level is the nearest quarter; the points themselves are the grade's and stand in each feedback",
@@ -201,25 +82,25 @@ def _graph_rubric(grades: Sequence[Grade], options: Options) -> dict[str, Any]:
     criteria = class_criteria(grades, options)
     total = total_of(criteria)
     title = options.item.strip() or grades[0].assignment
+    kind = {"@odata.type": f"{_TYPE}AssignmentPointsGradeType"}
     return {
         "displayName": title,
-        "description": {"content": title},
+        "description": _text(title),
         "levels": [
-            {"displayName": f"{share:g} %", "description": {"content": ""}, "grading": {"maxPoints": share}}
+            {"displayName": f"{share:g} %", "description": _text(""), "grading": {**kind, "maxPoints": share}}
             for share in _SHARES
         ],
         "qualities": [
             {
-                "description": {"content": each.name},
+                "description": _text(each.name),
                 "criteria": [
-                    {"description": {"content": f"{number(each.max_points * share / 100.0)}"}}
-                    for share in _SHARES
+                    {"description": _text(number(each.max_points * share / 100.0))} for share in _SHARES
                 ],
                 "weight": 100.0 * each.max_points / total,
             }
             for each in criteria
         ],
-        "grading": {},
+        "grading": kind,
     }
 
 
@@ -250,13 +131,20 @@ def _graph_outcomes(
     }
     return {
         "rubric": {
+            "@odata.type": f"{_TYPE}RubricOutcome",
             "rubricQualityFeedback": [
-                {"qualityId": quality, "feedback": {"content": text}} for quality, text in said.items()
+                {"qualityId": quality, "feedback": _text(text)} for quality, text in said.items()
             ],
             "rubricQualitySelectedLevels": [
                 {"qualityId": quality, "columnId": level} for quality, level in nearest.items()
             ],
         },
-        "points": {"points": {"points": round(score, 5)}},
-        "feedback": {"feedback": {"text": {"content": plain_comment(grade)}}},
+        "points": {
+            "@odata.type": f"{_TYPE}PointsOutcome",
+            "points": {"@odata.type": f"{_TYPE}AssignmentPointsGrade", "points": round(score, 5)},
+        },
+        "feedback": {
+            "@odata.type": f"{_TYPE}FeedbackOutcome",
+            "feedback": {"text": _text(plain_comment(grade))},
+        },
     }

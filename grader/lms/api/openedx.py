@@ -2,76 +2,14 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal, Self
+from typing import Any
 from urllib.parse import quote
 from xml.etree import ElementTree as ET
 
-from pydantic import Field, model_validator
-
-from grader.lms.api.requests import NOT_EMPTY, Plan, place_of, ready_marks, students_submissions, total_of
+from grader.lms.api.requests import Plan, place_of, ready_marks, students_submissions, total_of
 from grader.lms.grades import Delivery, Grade, Options, in_a_row, ready
-from grader.lms.marks import (
-    CLOSE,
-    Filled,
-    Payload,
-    check_unique,
-    class_criteria,
-    json_document,
-    plain_comment,
-)
+from grader.lms.marks import CLOSE, class_criteria, json_text, plain_comment
 from grader.lms.table import number
-
-Whole = Annotated[int, Field(ge=0, strict=True)]
-
-
-class EdxOption(Payload):
-    """A level of a criterion."""
-
-    order_num: Whole
-    name: Filled
-    label: str
-    explanation: str
-    points: Whole
-
-
-class EdxCriterion(Payload):
-    """A criterion with all points that the class has in it."""
-
-    order_num: Whole
-    name: Filled
-    label: str
-    prompt: str
-    feedback: Literal["disabled", "optional", "required"] = "optional"
-    options: Annotated[list[EdxOption], Field(min_length=2)]
-
-    @model_validator(mode="after")
-    def _is_whole(self) -> Self:
-        check_unique((option.name for option in self.options), "option")
-        return self
-
-
-class EdxRubric(Payload):
-    """The rubric's keys of what Studio's editor sends (edx-ora2, xblock/schema.py, EDITOR_UPDATE_SCHEMA)."""
-
-    criteria: Annotated[list[EdxCriterion], NOT_EMPTY]
-    feedback_prompt: str = ""
-    feedback_default_text: str = ""
-
-
-class EdxMark(Payload):
-    """The option that a student is given."""
-
-    name: Filled
-    feedback: str
-    selectedOption: Filled  # noqa: N815 - the platform's own name, here and below
-
-
-class EdxGrade(Payload):
-    """A staff assessment (edx-platform, ora_staff_grader/serializers.py, StaffAssessSerializer)."""
-
-    overallFeedback: str  # noqa: N815
-    criteria: Annotated[list[EdxMark], NOT_EMPTY]
-
 
 _FACTORS = (1, 2, 4, 5, 10, 20, 25, 50, 100)
 """Of points that are to be whole; finer points than hundredths are rounded, and told."""
@@ -96,6 +34,7 @@ def openedx(grades: Sequence[Grade], options: Options) -> Delivery:
                 "name": each.id,
                 "label": each.titles[0],
                 "prompt": each.titles[0],
+                "feedback": "optional",
                 "options": [
                     {"order_num": place, "name": number(whole / factor), "label": number(whole / factor),
                      "explanation": "", "points": whole}
@@ -104,6 +43,8 @@ def openedx(grades: Sequence[Grade], options: Options) -> Delivery:
             }
             for at, each in enumerate(criteria)
         ],
+        "feedback_prompt": "",
+        "feedback_default_text": "",
     }  # fmt: skip
     plan = Plan(
         "Open edX",
@@ -114,7 +55,7 @@ def openedx(grades: Sequence[Grade], options: Options) -> Delivery:
             "openedx/edx-platform: lms/djangoapps/ora_staff_grader (urls.py, StaffAssessSerializer)",
         ],
     )
-    plan.files["rubric.json"] = json_document(EdxRubric, rubric_body, "rubric.json for Open edX").encode()
+    plan.files["rubric.json"] = json_text(rubric_body).encode()
     plan.files["rubric.xml"] = _olx(rubric_body)
     known, missing = students_submissions(grades, options, "/api/ora_staff_grader/initialize?oraLocation=...")
     (block,) = place_of(options, "assignment_id") if known else ("",)
@@ -133,8 +74,8 @@ def openedx(grades: Sequence[Grade], options: Options) -> Delivery:
             ],
         }
         base = "/api/ora_staff_grader/submission"
-        plan.add(f"POST {base}/lock?{where}", Payload, {}, "lock", student)
-        plan.add(f"POST {base}/grade?{where}", EdxGrade, body, "grade", student)
+        plan.add(f"POST {base}/lock?{where}", {}, "lock", student)
+        plan.add(f"POST {base}/grade?{where}", body, "grade", student)
     notes = [
         (
             f"Open edX takes whole points: all are times {factor}, {number(total_of(criteria))} become"

@@ -3,20 +3,15 @@
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal, Self
+from typing import Any
 from urllib.parse import quote
-
-from pydantic import Field, model_validator
 
 from grader.lms.grades import Delivery, Grade, Options, ready
 from grader.lms.marks import (
     Criterion,
-    Filled,
     Mark,
-    Payload,
-    Version,
     check_unique,
-    json_document,
+    json_text,
     marks_of,
     read_answer,
     together,
@@ -24,36 +19,7 @@ from grader.lms.marks import (
 from grader.lms.table import match_rows
 from reference.errors import CallError
 
-NOT_EMPTY = Field(min_length=1)
-"""Of an object or a list that is never empty."""
-
 # The plan -----------------------------------------------------------------------------------------
-
-
-class PlannedCall(Payload):
-    """A request: the file of its body lies beside the plan."""
-
-    method: Literal["POST", "PUT", "PATCH"]
-    path: Annotated[str, Field(pattern=r"^/[^\s{}]+$")]
-    body: Filled
-    student_id: str | None = None
-
-
-class RequestsDocument(Payload):
-    """The calls in the order in which they are to be made, to the platform's `server`."""
-
-    schema_version: Version = 1
-    platform: str
-    assignment: str
-    server: str
-    sources: list[str]
-    calls: list[PlannedCall]
-
-    @model_validator(mode="after")
-    def _is_whole(self) -> Self:
-        check_unique((call.body for call in self.calls), "body")
-        check_unique((call.path for call in self.calls), "the call")
-        return self
 
 
 @dataclass(slots=True)
@@ -63,29 +29,29 @@ class Plan:
     platform: str
     server: str
     sources: Sequence[str]
-    calls: list[dict[str, str | None]] = field(default_factory=list)
+    calls: list[dict[str, str]] = field(default_factory=list)
     files: dict[str, bytes] = field(default_factory=dict)
 
-    def add(
-        self, call: str, model: type[Payload], body: Mapping[str, Any], what: str, student: str | None = None
-    ) -> None:
+    def add(self, call: str, body: Mapping[str, Any], what: str, student: str | None = None) -> None:
         """Add a call, as ``POST /path``; `what` names its file, after the student."""
         method, _, path = call.partition(" ")
         name = "-".join(filter(None, (f"{len(self.calls) + 1:03}", student, what))) + ".json"
-        self.files[name] = json_document(model, body, f"{name} for {self.platform}").encode()
-        self.calls.append({"method": method, "path": path, "body": name, "student_id": student})
+        self.files[name] = json_text(body).encode()
+        whose = {} if student is None else {"student_id": student}
+        self.calls.append({"method": method, "path": path, "body": name, **whose})
 
     def delivery(self, grades: Sequence[Grade], **more: Any) -> Delivery:  # noqa: ANN401 - fields of a delivery
         """The plan with its files."""
+        check_unique((call["path"] for call in self.calls), "the call")
         content = {
+            "schema_version": 1,
             "platform": self.platform,
             "assignment": grades[0].assignment,
             "server": self.server,
             "sources": self.sources,
             "calls": self.calls,
         }
-        plan = json_document(RequestsDocument, content, "the plan").encode()
-        return Delivery({"plan.json": plan, **self.files}, **more)
+        return Delivery({"plan.json": json_text(content).encode(), **self.files}, **more)
 
 
 def place_of(options: Options, *names: str) -> list[str]:

@@ -20,6 +20,16 @@ CLASS = (
     marked("s03", 5.0, 5.0, status="needs_review"),
     report("s04", None, status="missing"),
 )
+SCHEMAS = {
+    "canvas-api": {"rubric": "canvas-rubric", "student-grade": "canvas-assessment"},
+    "openedx": {"student-grade": "openedx-assessment"},
+    "google-classroom": {"rubric": "google-rubric", "student-grade": "google-grade"},
+    "ms-education": {
+        "rubric": "ms-rubric",
+        **{f"student-{kind}": f"ms-{kind}-outcome" for kind in ("rubric", "points", "feedback")},
+    },
+}
+"""The schema of each body, by the end of its file's name."""
 
 
 def planned(tmp_path, to, *reports, **how):
@@ -35,6 +45,11 @@ def planned(tmp_path, to, *reports, **how):
         files = {name: archive.read(name) for name in archive.namelist()}
     plan = json.loads(files["plan.json"])
     jsonschema.validate(plan, schema("api-plan"))
+    for call in plan["calls"]:
+        what = call["body"].removesuffix(".json").rpartition("-")[2]
+        kind = SCHEMAS[to].get(f"student-{what}" if "student_id" in call else what)
+        if kind is not None:
+            jsonschema.validate(json.loads(files[call["body"]]), schema(kind))
     assert all(call["body"] in files for call in plan["calls"])
     return delivery, plan["calls"], {name: json.loads(data) for name, data in files.items() if "json" in name}
 
@@ -102,6 +117,12 @@ def test_the_place_of_a_rubric_must_be_told(tmp_path, to):
 def test_a_number_of_canvas_is_one(tmp_path):
     with pytest.raises(CallError, match="--course-id: 'a/b' is no number"):
         planned(tmp_path, "canvas-api", course_id="a/b", assignment_id="1")
+
+
+def test_two_students_with_one_user_are_refused(tmp_path):
+    people = {"s01": Person(platform_id="sis_user_id:s02")}
+    with pytest.raises(InputFileError, match="submissions/sis_user_id:s02 stands twice"):
+        planned(tmp_path, "canvas-api", **PLACE, people=people)
 
 
 def test_a_student_may_be_called_as_a_file_is(tmp_path):
@@ -181,6 +202,11 @@ def test_classroom_has_the_rubric_and_grades_of_two_decimals(tmp_path):
     )
     assert files["002-s01-grade.json"] == {"draftGrade": 5.33, "assignedGrade": 5.33}
     assert delivery.written == ("s01", "s02")
+
+
+def test_a_rubric_of_more_criteria_than_classroom_takes_is_refused(tmp_path):
+    with pytest.raises(CallError, match="takes 50 criteria, the rubric has 51"):
+        planned(tmp_path, "google-classroom", marked("s01", *[5.0] * 51), **PLACE)
 
 
 def test_a_classrooms_rubric_that_is_there_is_not_made_again(tmp_path):

@@ -5,17 +5,12 @@ import io
 import zipfile
 
 import pytest
-from pydantic import ValidationError
 
 from grader.documents import AlikeDocument
 from grader.files import OutputError
 from grader.lms import table
-from grader.lms.api.canvas import CanvasBody
 from grader.lms.export import KINDS, export, usual_name
 from grader.lms.grades import Options, Person
-from grader.lms.marks import PlatformCriterion
-from grader.lms.moodle_guide import MoodleFilled, MoodleGuide
-from grader.lms.scores import GradescopeTest, LtiDocument
 from grader.lms.table import RawTable
 from reference.errors import CallError
 from tests.unit.lms.classroom import a_class, marked, report, results
@@ -199,12 +194,6 @@ def test_a_filled_in_file_that_reads_otherwise_is_not_written(tmp_path, monkeypa
     refused(tmp_path, Options(to="canvas", form=form(tmp_path, GRADEBOOK)))
 
 
-def test_a_document_that_reads_otherwise_is_not_written(tmp_path, monkeypatch):
-    text = '{"assignment": "press", "scores": []}'
-    monkeypatch.setattr(LtiDocument, "model_dump_json", lambda *_, **__: text)
-    refused(tmp_path, Options(to="lti"))
-
-
 @pytest.mark.parametrize("broken", ["read", "namelist"])
 def test_an_archive_that_reads_otherwise_is_not_written(tmp_path, monkeypatch, broken):
     monkeypatch.setattr(zipfile.ZipFile, broken, lambda *_: [])
@@ -222,44 +211,3 @@ def test_maxima_that_differ_have_no_one_row_of_points(tmp_path):
         export(two, tmp_path / "o.csv", Options(to="canvas", maximum=10.0))
     export(two, tmp_path / "o.csv", Options(to="canvas", maximum=10.0, rescale=True))
     assert (tmp_path / "o.csv").read_text().splitlines()[3].endswith(",2.5")
-
-
-CRITERION = {"criterion": "c1", "id": "_1", "max_points": 5.0}
-CALL = {
-    "student_id": "s01",
-    "path": "/p",
-    "body": {
-        "submission": {"posted_grade": "5"},
-        "comment": {"text_comment": "x"},
-        "rubric_assessment": {"_1": {"points": 5.0, "comments": ""}},
-    },
-}
-BULK = {"posted_grade": "5", "text_comment": "x", "rubric_assessment": {}}
-TEST = {
-    "name": "x", "number": "1", "score": 6.0, "max_score": 5.0, "status": "passed", "output": "",
-    "visibility": "visible", "extra_data": {"criterion": "c1", "verdict": "full"},
-}  # fmt: skip
-FILLING = {"criterionid": 2, "score": 1, "remark": ""}
-GUIDED = {"shortname": "a", "description": "", "descriptionmarkers": "", "maxscore": 1}
-
-
-@pytest.mark.parametrize(
-    ("model", "document", "why"),
-    [
-        (GradescopeTest, TEST, "6 of 5 points"),
-        (MoodleFilled, {"criterionid": 1, "fillings": [FILLING]}, "as 2"),
-        (
-            MoodleGuide,
-            {
-                "guide_criteria": [{**GUIDED, "sortorder": 1}, {**GUIDED, "sortorder": 2}],
-                "guide_comments": [{"sortorder": 1, "description": "x"}],
-            },
-            "criterion a stands twice",
-        ),
-        (CanvasBody, {**CALL["body"], "submission": {"posted_grade": "4"}}, "the criteria give 5 together"),
-        (PlatformCriterion, {**CRITERION, "more": 1}, "more"),
-    ],
-)  # fmt: skip
-def test_documents_that_a_platform_would_misread_are_none(model, document, why):
-    with pytest.raises(ValidationError, match=why):
-        model.model_validate(document)

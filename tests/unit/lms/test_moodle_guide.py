@@ -7,7 +7,7 @@ import pytest
 
 from grader.cli.exporting import schema
 from grader.lms.grades import Person
-from reference.errors import CallError, InputFileError
+from reference.errors import CallError, InputFileError, PlanmarkError
 from tests.unit.lms.classroom import marked, moodle
 
 AREA = {
@@ -181,13 +181,14 @@ def test_places_and_people_that_nobody_tells_are_asked_for(tmp_path, answer, how
 @pytest.mark.parametrize(
     ("people", "message"),
     [
-        ({"s01": Person(platform_id="x")}, r"calls\[0\]\.arguments\.userid"),
-        ({"s01": Person(platform_id="0")}, r"calls\[0\]\.arguments\.userid"),
-        ({"s01": Person(platform_id="5"), "s02": Person(platform_id="05")}, "user 5 stands twice"),
+        ({"s01": Person(platform_id="x")}, "s01: 'x' is no number of a user of Moodle"),
+        ({"s01": Person(platform_id="0")}, "s01: '0' is no number"),
+        ({"s01": Person(platform_id="5"), "s02": Person(platform_id="05")}, "s02: '05' is no number"),
+        ({"s01": Person(platform_id="5"), "s02": Person(platform_id="5")}, "user 5 stands twice"),
     ],
 )
-def test_numbers_that_are_none_are_refused_with_the_place(tmp_path, answer, people, message):
-    with pytest.raises(InputFileError, match=message):
+def test_numbers_that_are_none_are_refused_with_the_student(tmp_path, answer, people, message):
+    with pytest.raises(PlanmarkError, match=message):
         moodle(
             tmp_path, "marks", marked("s01", 5.0, 2.5), marked("s02", 5.0, 2.5),
             criteria=answer(GUIDE), people=people, assignment_id=17,
@@ -203,5 +204,12 @@ def test_points_above_a_criterions_maximum_are_refused(tmp_path, answer):
             "criteria": [wrong.criteria[0].model_copy(update={"points": 7.0}), wrong.criteria[1]],
         }
     )
-    with pytest.raises(InputFileError, match="criterion 11: 7 is above its maximum 5"):
+    with pytest.raises(InputFileError, match="c1: 7 of 5 points"):
         moodle(tmp_path, "marks", wrong, criteria=answer(GUIDE), people=PEOPLE, assignment_id=17)
+
+
+def test_a_criterion_that_has_no_number_of_moodle_is_refused(tmp_path):
+    path = tmp_path / "criteria.csv"
+    path.write_text("criterion,id\nc1,x\nc2,12\n")
+    with pytest.raises(InputFileError, match="c1: 'x' is no number of a criterion in Moodle"):
+        moodle(tmp_path, "marks", marked("s01", 5.0, 2.5), criteria=path, people=PEOPLE, assignment_id=17)

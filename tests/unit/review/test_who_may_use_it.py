@@ -116,3 +116,17 @@ def test_the_token_opens_it_once_and_a_cookie_keeps_it_open(guarded):
     own = {"X-Planmark": "review", "Origin": "http://10.0.0.5:8321"}
     assert guarded.post("/api/undo", json={"window": "w"}, headers=own).status_code == 200
     assert guarded.post("/api/undo", json={"window": "w"}, headers={**own, "Origin": HERE}).status_code == 403
+
+
+@pytest.mark.parametrize(
+    ("path", "code", "told"),
+    [
+        ("/page?file=a.jpg&page=1", "page_missing", "nu există această pagină"),
+        ("/page?file=a.jpg&page=x", "answer_refused", "„x” nu este un număr care se poate folosi aici"),
+        ("/page?file=a.jpg&page=1.5", "answer_refused", "1.5 nu este un număr întreg"),
+        ("/api/question?student=s99", "student_unknown", "studentul s99 nu mai este în această grupă"),
+    ],
+)
+def test_refusals_are_told_in_the_reviewers_language(empty, path, code, told):
+    answer = TestClient(application(empty, "ro"), base_url=HERE).get(path)
+    assert (answer.status_code, answer.json()) == (400, {"code": code, "message": told})

@@ -13,6 +13,7 @@ from grader.texts.clauses import CLAIMS, CLAUSES
 from grader.texts.faults import FAULTS
 from grader.texts.problems import PROBLEMS
 from grader.texts.reasons import FOLLOWS, FULL, HINTS, reason_sentence
+from grader.texts.refusals import REFUSALS
 from grader.texts.spoken import ENGLISH, clause, fault, message, of_error, sentence, unread_document
 from reference.errors import InputFileError
 
@@ -21,7 +22,7 @@ PROSE = {"message", "reason", "feedback"}
 """Fields that hold sentences."""
 APART = {
     "split", "rsplit", "partition", "rpartition", "splitlines", "startswith", "endswith", "removeprefix",
-    "removesuffix", "find", "index",
+    "removesuffix", "replace", "find", "index",
 }  # fmt: skip
 SEARCHES = {"match", "fullmatch", "search", "findall", "finditer", "sub"}
 MAKERS = {"Reason", "_why", "_no_order", "TextError", "_at", "refused"}
@@ -59,7 +60,14 @@ def taken_apart(tree: ast.AST) -> Iterator[int]:
 
 
 @pytest.mark.parametrize(
-    "code", ['a.message.partition(" ")', '"no" in a.message', "re.match(x, a.reason)", "message(a)[:3]"]
+    "code",
+    [
+        'a.message.partition(" ")',
+        '"no" in a.message',
+        "re.match(x, a.reason)",
+        "message(a)[:3]",
+        "message(a).replace(x, y)",
+    ],
 )
 def test_what_takes_a_sentence_apart_is_seen(code: str) -> None:
     assert list(taken_apart(ast.parse(code))) == [1]
@@ -103,6 +111,30 @@ def test_every_code_that_is_made_has_its_sentence() -> None:
     found = dict(codes_made())
     assert len(found) > 160
     assert {code: where for code, where in found.items() if code not in known} == {}
+
+
+def refusals_made() -> Iterator[tuple[str, str]]:
+    """What says why wherever a request is refused, and where that is."""
+    before = {"RefusedError": "", "forbidden": "", "_refused": "", "missing": "no_"}
+    for name, tree in trees():
+        for node in ast.walk(tree) if name.startswith(("grader/web/", "grader/review/")) else ():
+            match node:
+                case ast.Call(func=ast.Name(id=maker), args=[*args]) if maker in before:
+                    codes = [one.value for one in args if isinstance(one, ast.Constant)]
+                    texts = [one for one in codes if isinstance(one, str)]
+                    if texts and isinstance(args[-1], ast.Constant):
+                        yield before[maker] + texts[-1], f"{name}:{node.lineno}"
+
+
+def test_every_refusal_has_its_sentence() -> None:
+    found = dict(refusals_made())
+    assert len(found) > 50
+    assert {code: where for code, where in found.items() if code not in REFUSALS} == {}
+
+
+@pytest.mark.parametrize("lang", [lang for lang in LANGUAGES if lang != "en"])
+def test_every_refusal_is_told_in_every_language(lang: str) -> None:
+    assert [text for text in REFUSALS.values() if tongue(lang).gettext(text) == text] == []
 
 
 @pytest.mark.parametrize("lang", LANGUAGES)

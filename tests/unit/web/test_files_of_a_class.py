@@ -7,8 +7,8 @@ from urllib.parse import quote
 import pytest
 
 from grader.authoring.new import new_assignment
+from grader.texts.spoken import RefusedError
 from grader.web.places import AUTHORED, SUBMITTED, person_name, safe_name, stored_name
-from reference.errors import CallError
 
 NAMES = {
     "s01.jpg": "s01.jpg",
@@ -48,13 +48,13 @@ def test_a_name_never_reaches_a_path_as_it_is():
 
 @pytest.mark.parametrize("name", ["s01.exe", "s01.html", "s01.svg", ".jpg", "..", "", "/", "a.toml"])
 def test_other_kinds_of_files_are_refused(name):
-    with pytest.raises(CallError, match="must end in"):
+    with pytest.raises(RefusedError, match="must end in"):
         person_name(name, SUBMITTED)
 
 
 @pytest.mark.parametrize("name", ["._s01.jpg", "~$class.csv", "class/.hidden.pdf", "results.json"])
 def test_what_other_programs_leave_behind_is_refused(name):
-    with pytest.raises(CallError, match="other programs"):
+    with pytest.raises(RefusedError, match="other programs"):
         person_name(name, SUBMITTED)
 
 

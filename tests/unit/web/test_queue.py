@@ -3,6 +3,7 @@
 import os
 import signal
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from starlette.testclient import TestClient
@@ -132,13 +133,48 @@ def test_a_data_base_that_cannot_be_opened_is_told():
             Store(url)
 
 
-def test_values_are_judged_in_processes_and_where_one_was_killed_here():
-    judges = Judges(1)
-    try:
-        (elsewhere,) = judges.run(os.getpid, [()])
-        assert elsewhere[1] != os.getpid()
-        os.kill(elsewhere[1], signal.SIGKILL)
-        assert list(judges.run(os.getpid, [(), ()])) == [(0, os.getpid()), (1, os.getpid())]
-        assert isinstance(next(judges.run(int, [("x",)]))[1], Reason)
-    finally:
-        judges.end()
+def hangs_at_first(path):
+    """Nothing, unless it is the first call: that one writes its process's number, and waits to be killed."""
+    if not path.exists():
+        path.with_suffix(".part").write_text(str(os.getpid()))
+        path.with_suffix(".part").rename(path)
+        time.sleep(600.0)
+
+
+def kills_its_process():
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+@pytest.fixture
+def judges():
+    made = Judges(1)
+    yield made
+    made.end()
+
+
+@pytest.mark.slow
+def test_a_pool_whose_process_was_killed_is_made_anew(judges):
+    ((_, first),) = judges.run(os.getpid, [()])
+    os.kill(first, signal.SIGKILL)
+    (_, second), (_, third) = judges.run(os.getpid, [(), ()])
+    assert len({os.getpid(), first, second}) == 3
+    assert second == third
+    assert isinstance(next(judges.run(int, [("x",)]))[1], Reason)
+
+
+@pytest.mark.slow
+def test_what_waits_in_a_pool_that_breaks_goes_on_in_the_new_one(judges, tmp_path):
+    path = tmp_path / "first"
+    with ThreadPoolExecutor() as asking:
+        waiting = [asking.submit(list, judges.run(hangs_at_first, [(path,)])) for _ in range(3)]
+        while not path.exists():
+            time.sleep(0.01)
+        os.kill(int(path.read_text()), signal.SIGKILL)
+        assert [one.result() for one in waiting] == [[(0, None)]] * 3
+
+
+@pytest.mark.slow
+def test_a_call_that_kills_every_process_is_told_and_harms_no_other(judges):
+    ((_, told),) = judges.run(kills_its_process, [()])
+    assert told == Reason("crashed", {"why": "killed"})
+    assert list(judges.run(int, [("7",)])) == [(0, 7)]
