@@ -1,6 +1,8 @@
 """What all tests share."""
 
+import os
 import signal
+import sys
 from pathlib import Path
 
 import pytest
@@ -19,9 +21,20 @@ settings.register_profile(
 # Nobody's checkout fails by a draw that nobody else has; new ones are drawn where somebody asks for them.
 settings.load_profile("fresh" if PROFILE == "fresh" else "same")
 
+# Else each process that a test starts compiles the whole program again, and each worker all tests.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     # A shell lets what it starts in the background ignore Ctrl+C, and the programs that tests start with it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_cmdline_main(config: pytest.Config) -> None:
+    """Let each worker go through whole files, so that what a file or a room shares is made once."""
+    if getattr(config.option, "numprocesses", None) and config.option.dist == "no":
+        config.option.dist = "worksteal"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

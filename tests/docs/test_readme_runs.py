@@ -15,6 +15,7 @@ import pytest
 
 from reference.authored.assignment import library, load_assignment
 from reference.plan import exact_plan
+from tests.waiting import PATIENCE_S
 
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -53,7 +54,7 @@ def _serves(command: list[str], desk: Path, environment: dict[str, str]) -> None
         finally:
             server.send_signal(signal.SIGINT)
         try:
-            server.wait(timeout=300)
+            server.wait(timeout=PATIENCE_S)
         finally:
             server.kill()
     assert "http://127.0.0.1:" in "".join(said)
@@ -73,7 +74,7 @@ def _run(command: str, desk: Path, statuses: set[int]) -> None:
         capture_output=True,
         text=True,
         encoding="utf-8",
-        timeout=300,
+        timeout=PATIENCE_S,
         check=False,
     )
     assert ran.returncode in statuses, f"{command}\n{ran.stdout}\n{ran.stderr}"

@@ -11,6 +11,7 @@ from subprocess import CompletedProcess
 import pytest
 
 from tests import inline
+from tests.waiting import PATIENCE_S
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PROGRAM = (sys.executable, "-u", "-m", "grader")
@@ -35,5 +36,5 @@ def start(folder: Path, *arguments: object, **variables: str) -> subprocess.Pope
 def run(folder: Path, *arguments: object, **variables: str) -> CompletedProcess[str]:
     """The program as a process, from its start to its end."""
     with start(folder, *arguments, **variables) as process:
-        out, err = process.communicate(timeout=300)
+        out, err = process.communicate(timeout=PATIENCE_S)
     return CompletedProcess(arguments, process.returncode, out, err)

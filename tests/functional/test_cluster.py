@@ -21,6 +21,7 @@ from grader.rubric import rubric_of
 from reference.authored.assignment import load_assignment
 from reference.errors import CallError
 from tests.functional.conftest import ROOT
+from tests.waiting import PATIENCE_S
 
 distributed = pytest.importorskip("distributed")
 fsspec = pytest.importorskip("fsspec")
@@ -92,13 +93,13 @@ def running(workers):
         dask("worker", where, "--nworkers", str(workers), "--nthreads", "1", "--host", "127.0.0.1"),
     ]
     try:
-        with distributed.Client(where, timeout=120, set_as_default=False) as client:
-            client.wait_for_workers(workers, timeout=120)
+        with distributed.Client(where, timeout=PATIENCE_S, set_as_default=False) as client:
+            client.wait_for_workers(workers, timeout=PATIENCE_S)
         yield where, processes[0]
     finally:
         for process in reversed(processes):
             process.terminate()
-            process.wait(timeout=60)
+            process.wait(timeout=PATIENCE_S)
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +114,7 @@ def test_a_lost_scheduler_is_told_and_what_was_done_is_kept(handed_in, tmp_path)
         results = pool.run(time.sleep, [(0.0,)] * 100)
         assert next(results)[1] is None
         scheduler.kill()
-        scheduler.wait(timeout=60)
+        scheduler.wait(timeout=PATIENCE_S)
         with pytest.raises(CallError, match="the scheduler has ended; what was marked is kept") as caught:
             list(results)
     assert caught.value.code == "cluster_lost"

@@ -13,8 +13,10 @@ import pytest
 import typer.main
 
 from grader.cli.app import app
+from tests.examples import slow
 from tests.functional.conftest import ENVIRONMENT, PROGRAM, ROOT, run, start
 from tests.inline import planmark
+from tests.waiting import PATIENCE_S
 
 COMMANDS = sorted(typer.main.get_command(app).commands)
 SAMPLES = ROOT / "samples" / "pump"
@@ -220,7 +222,7 @@ def test_no_color_leaves_out_colours(tmp_path, variables, coloured):
     for arguments in (["plan", "nothing"], ["lint", "pump"]):
         subprocess.run(  # noqa: S603 - our own program
             [*PROGRAM, *arguments], cwd=tmp_path, env=environment, stdout=terminal, stderr=terminal,
-            check=False, timeout=300,
+            check=False, timeout=PATIENCE_S,
         )  # fmt: skip
         shown = os.read(screen, 100_000)
         assert (re.search(rb"\x1b\[[0-9;]*3[0-7]m", shown) is not None) == coloured, arguments
@@ -231,14 +233,16 @@ def test_no_color_leaves_out_colours(tmp_path, variables, coloured):
 @pytest.mark.parametrize(
     ("arguments", "encoding"),
     [
-        ("check pump --measured class/s07.json --lang ru", "cp1252"),
         ("check pump --measured class/s07.json --lang ru", "ascii"),
         ("plan pump --n 7", "ascii"),
-        ("plan pump --n 7 --json", "ascii"),
-        ("lint pump", "ascii"),
-        ("cycle pump --n 7 --lang ro", "ascii"),
-        ("schema report", "ascii"),
-        ("--help", "ascii"),
+        *slow(
+            ("check pump --measured class/s07.json --lang ru", "cp1252"),
+            ("plan pump --n 7 --json", "ascii"),
+            ("lint pump", "ascii"),
+            ("cycle pump --n 7 --lang ro", "ascii"),
+            ("schema report", "ascii"),
+            ("--help", "ascii"),
+        ),
     ],
 )
 def test_an_encoding_without_our_letters_stops_nothing(course, arguments, encoding):
@@ -254,7 +258,7 @@ def interrupted(process, begins):
     """What a command still says when it is interrupted as soon as it has begun its work."""
     assert process.stderr.readline().startswith(begins)
     os.killpg(process.pid, signal.SIGINT)
-    _, err = process.communicate(timeout=300)
+    _, err = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 130
     return err.splitlines()
 

@@ -10,6 +10,7 @@ import pytest
 
 from reference.authored.assignment import library, load_assignment
 from reference.kinematics.motion import move
+from tests.examples import slow
 
 ROUNDING = 1e-12
 PRINTED = 5e-6
@@ -109,10 +110,12 @@ def test_in_russian_fields_are_told_apart_by_semicolons(planmark, tmp_path):
 @pytest.mark.parametrize(
     ("call", "page", "lang"),
     [
-        ("pump --n 7", "297x210", "en"),
         ("press --position 0 --of B,D", "297x210", "en"),
-        ("shaper --n 3 --of v_E,a_E,omega_3,epsilon_3", "210x297", "ro"),
-        ("shaper --n 3 --of v_E_x,a_E,omega_3,epsilon_3,D", "420x297", "ru"),
+        *slow(
+            ("pump --n 7", "297x210", "en"),
+            ("shaper --n 3 --of v_E,a_E,omega_3,epsilon_3", "210x297", "ro"),
+            ("shaper --n 3 --of v_E_x,a_E,omega_3,epsilon_3,D", "420x297", "ru"),
+        ),
     ],
 )
 def test_the_diagram_is_drawn_on_a_page_of_its_size(planmark, tmp_path, call, page, lang):

@@ -12,6 +12,7 @@ import psutil
 import pytest
 
 from tests.functional.conftest import ENVIRONMENT
+from tests.waiting import PATIENCE_S
 
 pytestmark = pytest.mark.slow
 
@@ -43,7 +44,7 @@ def handed_in(tmp_path):
 
 def graded(folder, out):
     """A run without disturbance; its results without times and without what the run before was."""
-    ended = subprocess.run(call(folder, out), capture_output=True, text=True, timeout=600, check=False)  # noqa: S603 - our own program
+    ended = subprocess.run(call(folder, out), capture_output=True, text=True, timeout=PATIENCE_S, check=False)  # noqa: S603 - our own program
     assert ended.returncode in {0, 1}, ended.stderr
     return results_of(out)
 
@@ -66,6 +67,7 @@ from pathlib import Path
 from grader.folder.batch import Batch, grade
 from grader.rubric import rubric_of
 from reference.authored.assignment import load_assignment
+from tests.waiting import PATIENCE_S, until
 
 
 def pause(what, done, total):
@@ -128,7 +130,7 @@ def test_without_room_the_run_ends_with_a_message_and_the_next_one_completes_it(
     out = tmp_path / "out"
     room = (tmp_path / "undisturbed" / lacking).stat().st_size - 1000
     ended = subprocess.run(  # noqa: S603 - our own program
-        call(handed_in, out), capture_output=True, text=True, timeout=600, check=False,
+        call(handed_in, out), capture_output=True, text=True, timeout=PATIENCE_S, check=False,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (room, room)),
     )  # fmt: skip
     assert ended.returncode == 5

@@ -3,8 +3,6 @@
 import json
 import os
 import re
-import struct
-import zlib
 from pathlib import Path
 
 import pikepdf
@@ -39,13 +37,6 @@ def graded(folder, out, *more):
     return planmark("grade", folder, "--assignment", "pump", "--out", out, *more, cwd=out.parent)
 
 
-def png_of(side):
-    parts = [(b"IHDR", struct.pack(">IIBBBBB", side, side, 8, 0, 0, 0, 0)), (b"IDAT", zlib.compress(b"\0")),
-             (b"IEND", b"")]  # fmt: skip
-    chunks = (struct.pack(">I", len(d)) + t + d + struct.pack(">I", zlib.crc32(t + d)) for t, d in parts)
-    return b"\x89PNG\r\n\x1a\n" + b"".join(chunks)
-
-
 def pdf_of(path, pages, encryption=False):
     document = pikepdf.new()
     first = document.make_indirect(pikepdf.Dictionary(Type=pikepdf.Name.Page, MediaBox=[0, 0, 100, 100]))
@@ -59,7 +50,7 @@ def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("hostile")
     (folder / "s10_zero.jpg").write_bytes(b"")
     (folder / "s11.jpg").write_text("this is my homework\n", encoding="utf-8")
-    (folder / "s12.png").write_bytes(png_of(100_000))
+    (folder / "s12.png").write_bytes(hostile.png_of(100_000, 100_000))
     pdf_of(folder / "s13.pdf", 5000)
     pdf_of(folder / "s14.pdf", 1, pikepdf.Encryption(user="a", owner="b"))
     (folder / "s15.gif").write_bytes(b"GIF89a" + bytes(30))
@@ -101,6 +92,7 @@ def test_what_is_wrong_with_a_file_stands_in_its_owners_report(results, name, co
 def test_a_file_whose_name_is_no_text_is_told_and_is_nobodys(results):
     told = [one["file"] for one in results[2]["unmatched"]]
     assert told == [NOBODYS.encode("utf-8", "backslashreplace").decode()]
+    assert "name.jpg" in (results[1] / "index.html").read_text(encoding="utf-8")
 
 
 def test_the_good_work_beside_them_is_graded(results):

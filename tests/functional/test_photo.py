@@ -40,6 +40,7 @@ def test_what_is_drawn_rightly_is_right_and_nothing_expected_is_shown(drawn: tup
     assert any("acceleration plan" in problem for problem in told.problems)
 
 
+@pytest.mark.slow
 def test_another_variant_is_off_without_the_answer(drawn: tuple[SceneWork, Path]) -> None:
     student, path = drawn
     others = [one for one in student.assignment.variants() if one != student.variant]

@@ -10,6 +10,7 @@ import urllib.request
 import pytest
 
 from tests.functional.conftest import start
+from tests.waiting import PATIENCE_S
 
 
 @pytest.fixture
@@ -63,7 +64,7 @@ def test_a_decision_is_in_the_results_when_the_review_has_ended(graded):
     with pytest.raises(urllib.error.HTTPError):
         urllib.request.urlopen(f"{address}api/question")  # noqa: S310 - this machine's
     served.send_signal(signal.SIGINT)
-    said, _ = served.communicate(timeout=300)
+    said, _ = served.communicate(timeout=PATIENCE_S)
     assert served.returncode == 0, said
     assert "1 submissions" in said
     report = json.loads((graded / "out" / "s07" / "report.json").read_text(encoding="utf-8"))

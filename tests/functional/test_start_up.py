@@ -9,7 +9,9 @@ import pytest
 
 from grader.cli import commands_called
 from grader.cli.app import app
+from tests.examples import slow
 from tests.functional.conftest import ENVIRONMENT
+from tests.waiting import PATIENCE_S
 
 HEAVY = frozenset(
     "scipy cv2 skimage reportlab pikepdf pypdfium2 PIL tifffile imagecodecs simplejpeg zxingcpp jinja2 rich"
@@ -32,6 +34,7 @@ def tell():
 
 atexit.register(tell)
 from grader.cli import main
+from tests.examples import slow
 main()
 """
 
@@ -41,7 +44,7 @@ def imported(folder, command):
     """The modules that a command has imported when it ends."""
     run = subprocess.run(  # noqa: S603 - our own program
         [sys.executable, "-c", PROGRAM, *command.split()], cwd=folder, env=ENVIRONMENT, capture_output=True,
-        text=True, encoding="utf-8", timeout=300, check=False,
+        text=True, encoding="utf-8", timeout=PATIENCE_S, check=False,
     )  # fmt: skip
     assert run.returncode in {0, 1}, run.stderr
     modules = (folder / "imported.txt").read_text().split("\n")
@@ -66,16 +69,18 @@ def folder(tmp_path_factory):
     [
         ("--help", set()),
         ("plan pump --n 7 --json", set()),
-        ("plan pump --n 7", {"rich"}),
-        ("plan pump --n 7 --svg plan.svg", {"rich"}),
-        ("plan pump --all --csv all.csv", set()),
-        ("plan pump --all", {"rich"}),
         ("check pump --measured measured.json", set()),
-        ("lint pump", {"rich", "scipy"}),
-        ("schema report", set()),
-        ("cycle pump --n 7 --csv cycle.csv", set()),
-        ("cycle pump --n 7", {"rich", "mpmath"}),
-        ("cycle pump --n 7 --svg cycle.svg", {"mpmath", "PIL"}),
+        *slow(
+            ("plan pump --n 7", {"rich"}),
+            ("plan pump --n 7 --svg plan.svg", {"rich"}),
+            ("plan pump --all --csv all.csv", set()),
+            ("plan pump --all", {"rich"}),
+            ("lint pump", {"rich", "scipy"}),
+            ("schema report", set()),
+            ("cycle pump --n 7 --csv cycle.csv", set()),
+            ("cycle pump --n 7", {"rich", "mpmath"}),
+            ("cycle pump --n 7 --svg cycle.svg", {"mpmath", "PIL"}),
+        ),
     ],
 )
 def test_a_command_imports_no_heavy_library_that_it_does_not_use(folder, command, allowed):
@@ -130,7 +135,7 @@ def test_the_scanner_loads_where_things_are_printed_and_not_the_pdf_writer():
         env=ENVIRONMENT,
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=PATIENCE_S,
         check=True,
     )
     modules = set(run.stdout.split())

@@ -50,13 +50,6 @@ def check(path):
         assert len(one.problems) <= 22
 
 
-@given(st.binary(max_size=200), st.sampled_from([".csv", ".json"]))
-def test_any_bytes_are_measurements_or_their_faults(tmp_path_factory, data, suffix):
-    path = tmp_path_factory.mktemp("measured") / f"x{suffix}"
-    path.write_bytes(data)
-    check(path)
-
-
 @given(HEADER, st.lists(st.lists(CELLS, max_size=8), max_size=4), st.sampled_from(",;"))
 def test_any_table_is_measurements_or_their_faults(tmp_path_factory, header, rows, delimiter):
     path = tmp_path_factory.mktemp("measured") / "x.csv"

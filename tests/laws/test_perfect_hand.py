@@ -12,7 +12,7 @@ from grader.marking.mark import CHARGED, judge
 from grader.rubric import HandTable, rubric_of
 from reference.authored.assignment import built_in, load_assignment
 from reference.construction.mistakes import Drawing, single_mistakes
-from tests.examples import examples, sample
+from tests.examples import examples, sample, slow
 from tests.hands import changed, drawn_nodes, measured, sheet, task_for
 
 WITHIN, BEYOND = 0.9, 1.1
@@ -96,7 +96,7 @@ TASKS = [("pump", 8, None), ("shaper", 5, None)]
 
 
 @pytest.mark.parametrize(("name", "n", "position"), TASKS)
-@pytest.mark.parametrize("source", ["sheet", "directions", "lengths"])
+@pytest.mark.parametrize("source", ["sheet", "lengths", *slow("directions")])
 def test_one_mistake_of_a_perfect_hand_costs_the_vectors_of_one_node(name, n, position, source):
     """Whatever it is: what is drawn from there follows, and is not charged a second time."""
     task = task_for(name, n, position)

@@ -1,5 +1,7 @@
 """Captions and title blocks of simulated plain sheets: what is read at least, and next to nothing wrongly."""
 
+from dataclasses import replace
+
 import pytest
 
 from grader.pipeline import missing_scales, read_submission
@@ -10,29 +12,39 @@ from grader.scan.page import open_page, writing_on
 from grader.tables.measurements import StudentSubmission
 from grader.tables.scale_text import SURE, Declared, parse_scale
 from reference.authored.assignment import SCALE_NAMES, load_assignment
-from tests.bench.captions import plain_class
+from samples.simulation import CAREFUL, TYPICAL, any_settings, simulate
 
 pytestmark = pytest.mark.slow
-STUDENTS, FIRST = 4, 41
+PUMP = load_assignment("pump")
+STUDENTS = {
+    41: (19, TYPICAL, "Соколов Алина"),
+    42: (25, TYPICAL, "Lungu Diana"),
+    43: (17, TYPICAL, "Петров Алина"),
+    44: (22, CAREFUL, "Lungu Radu"),
+}
+"""Their numbers, hands and names, by seed; they draw on plain paper, scanned on a flatbed at 300 dpi."""
 LEAST_NUMBERS, LEAST_SCALES = 2, 2
 """Read surely and rightly on these students' sheets at least."""
 
 
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("plain")
-    pages = []
-    for student in plain_class("pump", STUDENTS, FIRST):
-        for number, sheet in enumerate(student.sheets):
-            path = sheet.save(folder / f"{student.student_id}_{number}")
-            pages.append((student, sheet, open_page(PageRef(path.name, path=path))))
+    """Each student's variant, the sheets as drawn, and as opened."""
+    folder, pages = tmp_path_factory.mktemp("plain"), []
+    for seed, (n, hand, name) in STUDENTS.items():
+        variant = PUMP.variant(n)
+        settings = any_settings(seed, device="flatbed", dpi=300.0, mistakes=0.0, work=(PUMP, variant))
+        drawn = simulate(PUMP, variant, seed, replace(settings, hand=hand), student_id=name)
+        for number, sheet in enumerate(drawn):
+            path = sheet.save(folder / f"{seed}_{number}")
+            pages.append((variant, sheet, open_page(PageRef(path.name, path=path))))
     return pages
 
 
 def test_numbers_are_read_and_none_wrongly(pages):
     read = [
-        (written_number(writing_on(page, closely=True), range(1, 31), NUMBER_WORDS), student.variant.n)
-        for student, _, page in pages
+        (written_number(writing_on(page, closely=True), range(1, 31), NUMBER_WORDS), variant.n)
+        for variant, _, page in pages
     ]
     sure = [(number.text, str(n)) for number, n in read if number is not None and number.confidence >= SURE]
     assert [pair for pair in sure if pair[0] != pair[1]] == []
@@ -53,10 +65,10 @@ def test_scales_are_read_and_few_wrongly(pages):
 
 
 def test_nothing_is_looked_for_that_the_roster_says(pages, monkeypatch):
-    student, sheet, page = pages[0]
+    variant, sheet, page = pages[0]
     declared = {name: f"{value} m/mm" for name, value in sheet.truth["scales"]["declared"].items()}
-    submission = StudentSubmission("m01", student.variant, (page.ref,), declared=declared)
+    submission = StudentSubmission("m01", variant, (page.ref,), declared=declared)
     monkeypatch.setattr("grader.pipeline.spotters", None)
     assert missing_scales(submission) == ()
-    (read,) = read_submission(submission, [page], load_assignment("pump"), Asked())
+    (read,) = read_submission(submission, [page], PUMP, Asked())
     assert read.reading.written == {}

@@ -9,6 +9,7 @@ from reference.authored.assignment import load_assignment
 from samples.simulation import HABITS, PERFECT, PageStyle, Scan, Settings, Student, simulate
 from samples.simulation.student import encoded
 
+pytestmark = pytest.mark.slow
 SMALL = Scan(dpi=45.0, noise=0.0, tint_grain=0.0, dust=0)
 
 

@@ -8,8 +8,8 @@ import pytest
 from reference.authored.assignment import load_assignment
 from samples.simulation import HARDSHIPS, PERFECT, Scan, Settings, any_settings, simulate, with_hardships
 from samples.simulation.hand import draw, task_of
-from tests.examples import slow
 
+pytestmark = pytest.mark.slow
 SMALL = Scan(dpi=45.0, noise=0.0, tint_grain=0.0, dust=0)
 
 
@@ -52,7 +52,7 @@ def test_hardships_come_as_often_as_they_say():
     assert all(one.student.helpers == 0 and one.scan.stains == 0 for one in plain)
 
 
-@pytest.mark.parametrize("name", ["shaper", *slow("pump", "press", "engine", "piston")])
+@pytest.mark.parametrize("name", ["shaper", "pump", "press", "engine", "piston"])
 def test_a_mixed_class_makes_only_mistakes_that_its_mechanism_offers(name):
     assignment = load_assignment(name)
     variants = assignment.variants()

@@ -15,6 +15,7 @@ from samples.simulation.instruments import Instruments
 from samples.simulation.mistakes import CODES, SPEED_FACTORS, Occasion, possible, with_mistake
 from tests.drawn import MECHANISMS, planned
 
+pytestmark = pytest.mark.slow
 ROUNDING_MM = 1e-6
 PEN_WIDTH_MM = 0.5
 

@@ -13,6 +13,7 @@ from reference.authored.assignment import load_assignment
 from samples.simulation import Scan, Settings, Student, blank_back, simulate, write_pdf, write_truth
 from samples.simulation.printing import printed_sheets
 
+pytestmark = pytest.mark.slow
 SMALL = Scan(dpi=40.0, dpi_tag=40.0)
 
 

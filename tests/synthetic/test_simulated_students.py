@@ -22,6 +22,7 @@ from samples.simulation import (
 from samples.simulation.hand import draw, task_of
 from samples.simulation.mistakes import CODES
 
+pytestmark = pytest.mark.slow
 ROUNDING_MM = 2e-4
 TINY = replace(CLEAN_SCAN, dpi=12.0)
 """A scan of a few pixels, where only the truth matters."""

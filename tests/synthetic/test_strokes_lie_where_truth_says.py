@@ -9,6 +9,7 @@ from samples.simulation.raster import render
 from samples.simulation.strokes import PenWidth, straight
 from samples.simulation.view import PaperView
 
+pytestmark = pytest.mark.slow
 RENDER_ERROR_MM = 0.01  # what sampling by whole pixels leaves of a centre of mass at 150 dpi
 SCAN_ERROR_MM = 0.02
 

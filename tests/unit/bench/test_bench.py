@@ -20,6 +20,7 @@ SHARE_OF_PLAN = 1e-12
 READING = row_of("plain", "a plain sheet", ReadingTally(refused=7), 123.0)
 
 
+@pytest.mark.slow
 def test_every_built_in_assignment_is_held_against_fifty_digits():
     rows = {row.assignment: row for row in measure_errors()}
     assert rows.keys() >= {"pump", "press", "engine", "shaper"}
@@ -30,6 +31,7 @@ def test_every_built_in_assignment_is_held_against_fifty_digits():
         assert row.construction <= SHARE_OF_PLAN
 
 
+@pytest.mark.slow
 def test_the_speed_of_ours_stands_beside_scipys_with_the_errors_of_each():
     rows = list(measure_speed(quick=True, batches=(1, 30)))
     assert len(rows) == speed_rows()

@@ -390,6 +390,7 @@ def test_scans_are_judged_as_read_against_what_was_drawn(monkeypatch):
     assert by_name["v_A"].due != "absent"
 
 
+@pytest.mark.slow
 def test_a_class_goes_through_the_whole_program():
     timed = measure_class(6, "engine")
     assert timed.graded == timed.rows == 6

@@ -174,6 +174,7 @@ def test_vertices_of_ideal_strokes_are_where_lines_meet():
     assert ideal.p95_mm < VERTEX_MM
 
 
+@pytest.mark.slow
 def test_strokes_are_measured_against_the_pencil_strokes_that_were_drawn():
     row = measure_resolution(120.0)
     assert row.recall_solid > 0.9
@@ -182,6 +183,7 @@ def test_strokes_are_measured_against_the_pencil_strokes_that_were_drawn():
     assert str(row.spurious) in next(lines_tables(LinesFigures([row], IDEAL)))[2][0]
 
 
+@pytest.mark.slow
 def test_a_scene_is_timed_from_the_file_to_the_students_page():
     row = measure_scene(replace(scene_named("plain"), dpi=100.0), 1, memory=False)
     assert all(spent > 0.0 for spent in row.times_ms.values())

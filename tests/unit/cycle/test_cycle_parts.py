@@ -16,6 +16,7 @@ from reference.authored.assignment import load_assignment
 from reference.kinematics.cycle import cycle
 from reference.kinematics.motion import WHAT_IS_IN_LINE
 from reference.mechanism import FixedGuide, Yoke
+from tests.examples import slow
 
 ROUNDING = 1e-12
 
@@ -143,7 +144,7 @@ def test_dead_points_at_one_place_are_marked_once(press):
     assert "this variant: φ = 45°" in texts
 
 
-@pytest.mark.parametrize("lang", ["en", "ru"])
+@pytest.mark.parametrize("lang", ["ru", *slow("en")])
 @pytest.mark.parametrize(
     ("name", "n", "position", "of"),
     [

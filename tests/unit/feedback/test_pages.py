@@ -12,22 +12,20 @@ from grader.overlay.scene import MARKS
 from tests.unit.feedback.parsed import Page
 from tests.unit.feedback.works import HOSTILE, criterion, hostile_report, picture, report, results
 
-
-def everything():
-    return [
-        feedback_page(report(), [picture(), picture("s07_2.jpg", spread=250.0)], "en"),
-        feedback_page(hostile_report(), [picture(HOSTILE)], "ro", "hint", About(HOSTILE, HOSTILE)),
-        feedback_page(report(criteria=[], mistakes=[], scales={}, status="missing", score=None), [], "ru"),
-        index_page(results(report(), hostile_report()), "en", title=HOSTILE, student_names={"s08": HOSTILE}),
-    ]
+EVERYTHING = [
+    feedback_page(report(), [picture(), picture("s07_2.jpg", spread=250.0)], "en"),
+    feedback_page(hostile_report(), [picture(HOSTILE)], "ro", "hint", About(HOSTILE, HOSTILE)),
+    feedback_page(report(criteria=[], mistakes=[], scales={}, status="missing", score=None), [], "ru"),
+    index_page(results(report(), hostile_report()), "en", title=HOSTILE, student_names={"s08": HOSTILE}),
+]
 
 
-@pytest.mark.parametrize("text", everything())
+@pytest.mark.parametrize("text", EVERYTHING)
 def test_tags_are_closed_in_order_and_nothing_is_left_open(text):
     assert Page(text).open == []
 
 
-@pytest.mark.parametrize("text", everything())
+@pytest.mark.parametrize("text", EVERYTHING)
 def test_nothing_is_fetched_from_elsewhere(text):
     for tag, attributes in Page(text).tags:
         for name in ("src", "href", "xlink:href", "action"):
@@ -37,7 +35,7 @@ def test_nothing_is_fetched_from_elsewhere(text):
     assert "@import" not in text
 
 
-@pytest.mark.parametrize("text", everything())
+@pytest.mark.parametrize("text", EVERYTHING)
 def test_what_students_write_is_never_run(text):
     assert "<script>alert" not in text
     assert text.count("<script") <= 1
@@ -49,7 +47,7 @@ def test_a_students_page_runs_no_script_at_all():
     assert "script-src" not in policy[1]
 
 
-@pytest.mark.parametrize("text", everything())
+@pytest.mark.parametrize("text", EVERYTHING)
 def test_links_within_a_page_lead_somewhere(text):
     page = Page(text)
     for _tag, attributes in page.tags:
@@ -166,7 +164,7 @@ def test_instructors_are_told_how_a_sheet_was_placed_and_students_are_not():
     assert "placed by" not in feedback_page(told, [picture()], "en", "hint")
 
 
-@pytest.mark.parametrize("text", everything())
+@pytest.mark.parametrize("text", EVERYTHING)
 def test_a_printed_page_is_a4_on_white_and_cuts_no_row_and_no_picture(text):
     printed = text.split("@media print {", 1)[1].split("</style>")[0]
     assert "@page { size: A4" in printed

@@ -192,6 +192,7 @@ def test_the_truth_says_who_vouches_for_each_point(known, preview):
     assert (x, y, who) == (round(node.x_mm, 3), round(node.y_mm, 3), "moved")
 
 
+@pytest.mark.slow
 def test_what_is_given_can_be_read_and_measured(known, preview):
     file, _ = preview
     answer(file, ("yes", ""))

@@ -19,16 +19,17 @@ from grader.records import Reason
 from reference.errors import InputFileError
 from tests.examples import slow
 from tests.unit.folder import calls
+from tests.waiting import PATIENCE_S
 
-LIMITS = Limits(seconds=2.0, memory_mb=400)
+LIMITS = Limits(memory_mb=400)
 ROOT = Path(__file__).parents[3]
 KILLED = 0.05
 """Share of the results after which a process is killed."""
 
 
-def codes(jobs, work):
+def codes(jobs, work, limits=LIMITS):
     """What each call gives: its result, or the code of its problem."""
-    with Workers(jobs, LIMITS, calls.__name__) as workers:
+    with Workers(jobs, limits, calls.__name__) as workers:
         results = dict(workers.run(calls.does, work))
     assert sorted(results) == list(range(len(work)))
     return [
@@ -37,7 +38,7 @@ def codes(jobs, work):
     ]
 
 
-@pytest.mark.parametrize("jobs", [2, *slow(1)])
+@pytest.mark.parametrize("jobs", [1, *slow(2)])
 def test_what_breaks_a_process_or_a_limit_costs_that_call_alone(jobs):
     broken = {
         "crashes": "crashed",
@@ -53,10 +54,11 @@ def test_what_breaks_a_process_or_a_limit_costs_that_call_alone(jobs):
 
 def test_what_takes_too_long_is_ended_though_it_would_go_on_for_minutes(monkeypatch):
     monkeypatch.setattr(workers_module, "_PATIENCE", 1)
-    assert codes(1, [("sleeps", 600), ("doubled", 1)]) == ["too_slow", 2]
+    assert codes(1, [("sleeps", 600), ("doubled", 1)], Limits(seconds=2.0)) == ["too_slow", 2]
 
 
-def test_processor_time_ends_a_call_and_waiting_for_a_busy_machine_does_not():
+def test_processor_time_ends_a_call_and_waiting_for_a_busy_machine_does_not(monkeypatch):
+    monkeypatch.setattr(workers_module, "_PATIENCE", 100)
     with Workers(1, Limits(seconds=0.5), calls.__name__) as workers:
         results = dict(workers.run(calls.does, [("sleeps", 1.0), ("spins", 600)]))
     assert results[0] == 1.0
@@ -121,8 +123,8 @@ def test_the_processes_end_with_their_parent(tmp_path, sent):
         children = psutil.Process(parent.pid).children(recursive=True)
         assert len(children) >= 2
         parent.send_signal(sent)
-        parent.wait(timeout=30)
-    _, alive = psutil.wait_procs(children, timeout=30)
+        parent.wait(timeout=PATIENCE_S)
+    _, alive = psutil.wait_procs(children, timeout=PATIENCE_S)
     assert not alive
 
 
@@ -133,5 +135,5 @@ def test_the_pool_closes_at_once_though_its_processes_are_busy():
         assert next(running) == (0, 0.01)
         processes = [psutil.Process(child.pid) for child in active_children() if child.name == WORKERS_NAME]
         assert processes
-    _, alive = psutil.wait_procs(processes, timeout=30)
+    _, alive = psutil.wait_procs(processes, timeout=PATIENCE_S)
     assert not alive

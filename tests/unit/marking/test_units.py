@@ -12,6 +12,7 @@ from grader.marking.mark import judge
 from reference.construction.mistakes import RPM_FACTOR, Mistake
 from samples.simulation import CAREFUL, TYPICAL
 from samples.simulation.wording import declared_texts
+from tests.examples import slow
 from tests.hands import drawn_by, handed_in, measured, rule_scales, task_for
 
 TASKS = [task_for("pump", 7), task_for("press", position=2), task_for("shaper", 3)]
@@ -63,7 +64,7 @@ def slips_of(judgement):
     return [one for one in judgement.mistakes if one.code == "units"]
 
 
-@pytest.mark.parametrize("task", TASKS, ids=lambda task: task.assignment.id)
+@pytest.mark.parametrize("task", [TASKS[0], *slow(*TASKS[1:])], ids=lambda task: task.assignment.id)
 @pytest.mark.parametrize("slip", SLIPS)
 def test_a_slip_of_units_is_named_and_costs_one_criterion(task, slip):
     change, detail = SLIPS[slip]

@@ -15,6 +15,7 @@ from grader.lms.grades import Options
 from grader.rubric import rubric_of
 from reference.authored.assignment import load_assignment
 from reference.errors import InputFileError
+from tests.inline import Inline
 
 HERE = Path(__file__).parent
 FOLDERS = sorted(path.parent for path in HERE.glob("*/results.json"))
@@ -82,7 +83,7 @@ def test_a_regrade_says_what_moved_against_an_earlier_version(folder, tmp_path):
     out.mkdir()
     shutil.copy(folder / "results.json", out / "results.json")
     pump = load_assignment("pump")
-    results = grade(Batch(pump, rubric_of(pump), tmp_path / "in", out), lambda *_: None)
+    results = grade(Batch(pump, rubric_of(pump), tmp_path / "in", out), lambda *_: None, Inline())
     before = {one.student_id: one.before for one in results.moved}
     now = {report.student_id: report.score for report in results.reports}
     gone = {one["student_id"] for one in told(folder)["reports"]} - {"s08"}

@@ -9,6 +9,7 @@ import pytest
 from grader.reading.read import read_figures
 from grader.records import VELOCITY_PLAN, Ink, Letters
 from reference.authored.assignment import Assignment
+from tests.examples import slow
 from tests.unit.reading.drawn import blank_sheet, ink_of, task
 
 SIGNS = {sign: column for column, sign in enumerate([*"oabcdnpπABCD'"])} | {"": 13}
@@ -74,14 +75,14 @@ def drawn_and_read(assignment: Assignment, seed: int, *, letters: bool, primes: 
     )
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [0, 1, *slow(*range(2, 6))])
 def test_a_plan_that_no_mechanism_explains_is_read_by_its_letters(seed):
     drawn, read, _ = drawn_and_read(task("pump")[0], seed, letters=True)
     right = [name for name, way in drawn.items() if name in read and abs(read[name] - way) < NEAR_MM]
     assert len(right) >= 0.8 * len(drawn)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [0, 1, *slow(*range(2, 6))])
 def test_without_letters_such_a_plan_is_not_believed(seed):
     drawn, read, sure = drawn_and_read(task("pump")[0], seed, letters=False)
     assert not [

@@ -28,6 +28,7 @@ from reference.errors import AuthoredFileError, CallError, MechanismError, Planm
 from reference.mechanism import PointOnLine
 from reference.plan import exact_plan
 from tests import every_group
+from tests.examples import slow
 
 
 def table(name: str) -> dict:
@@ -302,7 +303,7 @@ def files(name: str) -> tuple[dict, dict]:
 
 
 @pytest.mark.parametrize(
-    "name", ["pump", "press", "engine", "pump-collinear", "shaper", "piston", "every group"]
+    "name", ["pump", "engine", "pump-collinear", "shaper", "piston", *slow("press", "every group")]
 )
 def test_a_damaged_file_gives_a_plan_or_a_told_error_and_nothing_else(name):
     rng = random.Random(name)

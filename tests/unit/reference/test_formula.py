@@ -78,11 +78,11 @@ HOSTILE = [
 
 @pytest.mark.parametrize("text", HOSTILE)
 def test_a_hostile_formula_is_refused_with_a_reason_and_at_once(text):
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(FormulaError) as error:
         parse(text)({"n": 2.0})
     assert str(error.value)
-    assert time.perf_counter() - start < PATIENCE_S
+    assert time.process_time() - start < PATIENCE_S
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from grader.solution.sentences import wording_of
 from reference.drawing.canvas import svg
 from reference.drawing.sheets import reference_drawing
 from tests.drawn import CASES, planned
+from tests.examples import slow
 
 SVG = "{http://www.w3.org/2000/svg}"
 TOUCH_MM = 0.1
@@ -97,7 +98,7 @@ def overlap(one, other):
     return min(min(one[2], other[2]) - max(one[0], other[0]), min(one[3], other[3]) - max(one[1], other[1]))
 
 
-@pytest.mark.parametrize("lang", ["en", "ru"])
+@pytest.mark.parametrize("lang", ["ru", *slow("en")])
 @pytest.mark.parametrize("case", CASES)
 def test_no_text_touches_a_stroke_or_another_text(case, lang, tmp_path_factory):
     folder = tmp_path_factory.mktemp("drawn")

@@ -3,7 +3,6 @@
 import io
 import json
 import threading
-import time
 
 import pytest
 from PIL import Image
@@ -14,6 +13,7 @@ from grader.review.session import mark_of
 from grader.tables.decisions import Decision, DecisionFile
 from tests.examples import slow
 from tests.unit.review.conftest import PUMP, Page, silent
+from tests.waiting import until
 
 SCANNED, ENTERED = "s02", "s09"
 
@@ -155,48 +155,48 @@ def test_a_settled_verdict_is_overridden(page, session):
 
 
 def test_undo_brings_back_what_stood_there_before(page, session):
-    own = page.rows()[SCANNED, "v_D"]["verdict"]
-    page.answer(SCANNED, "v_D", "full", comment="first")
-    page.answer(SCANNED, "v_D", "none")
+    own = page.rows()[ENTERED, "v_D"]["verdict"]
+    page.answer(ENTERED, "v_D", "full", comment="first")
+    page.answer(ENTERED, "v_D", "none")
     undone = page.said("/api/undo").json()
-    assert undone["undone"] == "s02/v_D"
-    assert (decided(session)["s02", "v_D"].verdict, decided(session)["s02", "v_D"].comment) == (
+    assert undone["undone"] == "s09/v_D"
+    assert (decided(session)["s09", "v_D"].verdict, decided(session)["s09", "v_D"].comment) == (
         "full",
         "first",
     )
     page.said("/api/undo")
     assert not decided(session)
-    assert page.rows()[SCANNED, "v_D"]["verdict"] == own
+    assert page.rows()[ENTERED, "v_D"]["verdict"] == own
     assert page.said("/api/undo").json()["undone"] == ""
 
 
 def test_the_undo_of_one_window_leaves_the_others_alone(page, session):
-    page.answer(SCANNED, "v_D", "full")
+    page.answer(ENTERED, "v_D", "full")
     assert page.said("/api/undo", window="another").json()["undone"] == ""
     assert decided(session)
 
 
 def test_two_windows_and_neither_loses_anything(page, session):
-    row = page.rows()[SCANNED, "v_D"]
-    answer = {"student": SCANNED, "criterion": "v_D", "seen": row["seen"]}
+    row = page.rows()[ENTERED, "v_D"]
+    answer = {"student": ENTERED, "criterion": "v_D", "seen": row["seen"]}
     first = page.said("/api/decide", answers=[{**answer, "verdict": "full"}], by="Ana", window="a")
     second = page.said("/api/decide", answers=[{**answer, "verdict": "none"}], by="Ion", window="b")
     assert first.status_code == 200
     assert second.status_code == 409
     assert "Ana" in second.json()["message"]
     assert "right" in second.json()["message"]
-    assert decided(session)["s02", "v_D"].verdict == "full"
+    assert decided(session)["s09", "v_D"].verdict == "full"
 
 
 def test_answers_together_are_written_all_or_none(page, session):
-    page.answer(SCANNED, "v_D", "full")
+    page.answer(ENTERED, "v_D", "full")
     rows = page.rows()
     answers = [
-        {"student": SCANNED, "criterion": name, "verdict": "none", "seen": ""} for name in ("v_DC", "v_D")
+        {"student": ENTERED, "criterion": name, "verdict": "none", "seen": ""} for name in ("v_DC", "v_D")
     ]
     assert page.said("/api/decide", answers=answers).status_code == 409
-    assert ("s02", "v_DC") not in decided(session)
-    answers[1]["seen"] = rows[SCANNED, "v_D"]["seen"]
+    assert ("s09", "v_DC") not in decided(session)
+    answers[1]["seen"] = rows[ENTERED, "v_D"]["seen"]
     assert page.said("/api/decide", answers=answers).status_code == 200
     assert {row.verdict for row in decided(session).values()} == {"none"}
 
@@ -254,9 +254,9 @@ def test_no_answer_is_refused(page):
 
 
 def test_a_comment_is_offered_again_the_commonest_first(page):
-    page.answer(SCANNED, "v_D", "full", comment="rare")
-    page.answer(SCANNED, "v_DC", "full", comment="usual")
-    page.answer(SCANNED, "v_A", "full", comment="usual")
+    page.answer(ENTERED, "v_D", "full", comment="rare")
+    page.answer(ENTERED, "v_DC", "full", comment="usual")
+    page.answer(ENTERED, "v_A", "full", comment="usual")
     assert page.get("/api/class").json()["comments"] == ["usual", "rare"]
 
 
@@ -276,17 +276,18 @@ def test_a_comment_on_the_whole_and_points_added(page, session):
 def test_a_row_that_people_wrote_without_a_position_is_replaced(page, session):
     """A second row on the same would make both of them faults."""
     path = session.batch.folder / "decisions.csv"
-    DecisionFile(path).add(Decision("s02", None, "v_D", "partial", by="by hand"))
-    page.answer(SCANNED, "v_D", "none")
+    DecisionFile(path).add(Decision("s09", None, "v_D", "partial", by="by hand"))
+    page.answer(ENTERED, "v_D", "none")
     assert [row.verdict for row in DecisionFile(path).all()] == ["none"]
 
 
-def test_only_those_of_whom_something_changed_are_marked_anew(page, session):
+def test_of_what_others_write_into_the_file_only_those_whom_it_concerns_are_marked_anew(page, session):
     version = page.get("/api/class").json()["version"]
     path = session.batch.folder / "decisions.csv"
     DecisionFile(path).add(Decision("s09", None, "v_A", "partial", by="by hand"))
     told = page.get("/api/class", params={"since": version}).json()
     assert [one["key"] for one in told["students"]] == [ENTERED]
+    assert page.rows()[ENTERED, "v_A"]["verdict"] == "partial"
 
 
 def test_a_file_that_people_broke_is_told_and_left_alone(page, session):
@@ -299,15 +300,6 @@ def test_a_file_that_people_broke_is_told_and_left_alone(page, session):
     assert path.read_text(encoding="utf-8") == "who,what\n1,2\n"
 
 
-def test_what_others_write_into_the_file_is_taken_in(page, session):
-    version = page.get("/api/class").json()["version"]
-    path = session.batch.folder / "decisions.csv"
-    DecisionFile(path).add(Decision("s02", None, "v_D", "partial", by="by hand"))
-    told = page.get("/api/class", params={"since": version}).json()
-    assert {one["key"] for one in told["students"]} >= {SCANNED}
-    assert page.rows()[SCANNED, "v_D"]["verdict"] == "partial"
-
-
 def test_a_page_that_knows_all_is_told_nothing_again(page):
     version = page.get("/api/class").json()["version"]
     assert page.get("/api/class", params={"since": version}).json()["students"] == []
@@ -316,32 +308,21 @@ def test_a_page_that_knows_all_is_told_nothing_again(page):
 # Nodes ----------------------------------------------------------------------------------------------
 
 
-def test_a_node_snaps_to_the_ink_and_marks_follow(page, session):
+def test_a_node_snaps_to_the_ink_and_marks_follow_it_away_and_back(page, session):
     look = page.get("/api/question", params={"student": SCANNED, "criterion": "v_B"}).json()["look"]
     node = next(one for one in look["nodes"] if one["name"] == "b")
     said = {"student": SCANNED, "sheet": look["sheet"], "node": "velocity_plan:b"}
-    answer = page.said("/api/node", **said, x=node["x"] + 0.8, y=node["y"] - 0.5)
-    assert answer.status_code == 200
-    x, y = decided(session)["s02", "node:velocity_plan:b"].place
-    assert abs(complex(x - node["x"], y - node["y"])) < 0.4
-    assert page.said("/api/node", **said, x=node["x"], y=node["y"]).status_code == 409
-    look = page.get("/api/question", params={"student": SCANNED, "criterion": "v_B"}).json()["look"]
-    seen = next(one["seen"] for one in look["nodes"] if one["name"] == "b")
-    moved = page.said("/api/node", **said, x=node["x"] + 25.0, y=node["y"], seen=seen)
-    after = {one["criterion"]: one for one in moved.json()["students"][0]["rows"]}
-    assert after["v_B"]["verdict"] != "full"
-
-
-def test_marks_follow_a_node_that_is_moved_away_and_back(page, session):
-    look = page.get("/api/question", params={"student": SCANNED, "criterion": "v_B"}).json()["look"]
-    node = next(one for one in look["nodes"] if one["name"] == "b")
-    said = {"student": SCANNED, "sheet": look["sheet"], "node": "velocity_plan:b", "y": node["y"]}
-    verdicts = []
-    for x in (node["x"], node["x"] + 25.0, node["x"]):
+    places, verdicts = [], []
+    for dx, dy in ((0.8, -0.5), (25.0, 0.0), (0.0, 0.0)):
         seen = mark_of(decided(session).get(("s02", "node:velocity_plan:b")))
-        marks = page.said("/api/node", **said, x=x, seen=seen).json()["students"][0]["rows"]
+        moved = page.said("/api/node", **said, x=node["x"] + dx, y=node["y"] + dy, seen=seen)
+        marks = moved.json()["students"][0]["rows"]
         verdicts.append({one["criterion"]: one["verdict"] for one in marks})
+        places.append(complex(*decided(session)["s02", "node:velocity_plan:b"].place))
+    assert abs(places[0] - complex(node["x"], node["y"])) < 0.4
     assert verdicts[0] == verdicts[2] != verdicts[1]
+    assert verdicts[1]["v_B"] != "full"
+    assert page.said("/api/node", **said, x=node["x"], y=node["y"]).status_code == 409
 
 
 # Pages ----------------------------------------------------------------------------------------------
@@ -404,12 +385,12 @@ def test_a_page_decision_that_cannot_be_used_is_refused(page, session):
 
 def finished(page):
     page.said("/api/finish")
-    for _ in range(600):
-        told = page.get("/api/finish").json()
-        if not told["running"]:
-            return told
-        time.sleep(0.1)
-    raise AssertionError("it does not end")
+
+    def told():
+        now = page.get("/api/finish").json()
+        return None if now["running"] else now
+
+    return until(told)
 
 
 def test_finishing_brings_the_pages_up_to_date_and_exports(page, session):
@@ -434,10 +415,10 @@ def test_a_run_that_fails_is_told(page, session):
 
 
 def test_a_second_session_has_every_decision(page, session):
-    page.answer(SCANNED, "v_D", "partial")
+    page.answer(ENTERED, "v_D", "partial")
     again = type(session)(session.batch, session.workers)
     again.bring_up_to_date(silent)
-    assert next(one for one in again.student(SCANNED).report.criteria if one.id == "v_D").verdict == "partial"
+    assert next(one for one in again.student(ENTERED).report.criteria if one.id == "v_D").verdict == "partial"
 
 
 def test_what_could_not_be_read_is_settled_by_hand(session):

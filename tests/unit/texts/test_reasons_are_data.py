@@ -3,6 +3,7 @@
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -30,12 +31,16 @@ MAKERS = {"Reason", "_why", "_no_order", "TextError", "_at", "refused"}
 PLACEHOLDER = re.compile(r"%\((\w+)\)s")
 
 
-def trees() -> Iterator[tuple[str, ast.Module]]:
-    for top in ("grader", "reference"):
-        for path in sorted((ROOT / top).rglob("*.py")):
-            name = path.relative_to(ROOT).as_posix()
-            if not name.startswith("grader/texts/"):
-                yield name, ast.parse(path.read_text(encoding="utf-8"))
+@cache
+def trees() -> list[tuple[str, ast.Module]]:
+    """Every module but those of sentences, by its path."""
+    paths = sorted(path for top in ("grader", "reference") for path in (ROOT / top).rglob("*.py"))
+    names = {path.relative_to(ROOT).as_posix(): path for path in paths}
+    return [
+        (name, ast.parse(path.read_text(encoding="utf-8")))
+        for name, path in names.items()
+        if not name.startswith("grader/texts/")
+    ]
 
 
 def _is_prose(node: ast.AST) -> bool:

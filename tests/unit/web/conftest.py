@@ -1,7 +1,6 @@
 import json
 import re
 import shutil
-import time
 
 import pytest
 from argon2 import PasswordHasher
@@ -16,6 +15,7 @@ from grader.web.places import batch_of
 from grader.web.settings import Settings
 from grader.web.store import Store
 from tests.inline import Inline
+from tests.waiting import until
 
 ADDRESS = "http://127.0.0.1:8000"
 PASSWORD = "four words make one"  # noqa: S105 - of a test
@@ -52,12 +52,12 @@ class Browser(TestClient):
 
     def ended(self, path, job):
         """The job when it has ended."""
-        for _ in range(600):
-            job = self.get(f"/api/v1{path}/{job['key']}").json()
-            if job["state"] not in {"queued", "running"}:
-                return job
-            time.sleep(0.1)
-        raise AssertionError("it does not end")
+
+        def told():
+            now = self.get(f"/api/v1{path}/{job['key']}").json()
+            return None if now["state"] in {"queued", "running"} else now
+
+        return until(told)
 
 
 @pytest.fixture(scope="session")

@@ -10,6 +10,8 @@ import jwt
 import requests
 from jwcrypto.jwk import JWK
 
+from tests.waiting import PATIENCE_S
+
 CLAIM = "https://purl.imsglobal.org/spec/lti/claim/"
 ROLE = "http://purl.imsglobal.org/vocab/lis/v2/membership#"
 SCOPES = [
@@ -134,4 +136,4 @@ class Platform:
         return browser.post("/lti/launch", data=form, follow_redirects=False)
 
     def reachable(self):
-        return requests.get(f"{self.address}/jwks", timeout=5).ok
+        return requests.get(f"{self.address}/jwks", timeout=PATIENCE_S).ok

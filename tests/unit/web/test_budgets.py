@@ -13,6 +13,7 @@ from grader.web.queue import Queue, Turns, _TurnOverError
 from grader.web.store import Job, Publication, Store
 from tests.inline import Inline
 from tests.unit.web.conftest import Browser
+from tests.waiting import until
 
 
 def pdf(pages):
@@ -176,15 +177,15 @@ def test_a_class_that_is_graded_for_long_lets_another_go_first(settings, store, 
     jobs = Queue(settings, store, lambda *_: {})
     jobs.start()
     try:
-        for _ in range(200):
+
+        def are_done():
             with store.session() as session:
-                states = [one.state for one in session.query(Job)]
-            if states == ["done", "done"]:
-                break
-            time.sleep(0.05)
+                return [one.state for one in session.query(Job)] == ["done", "done"]
+
+        until(are_done)
     finally:
         jobs.stop()
-    assert (states, ran) == (["done", "done"], [1, 2, 1])
+    assert ran == [1, 2, 1]
 
 
 def test_a_turn_ends_only_where_another_class_waits_and_is_longer_the_next_time(settings, store, monkeypatch):

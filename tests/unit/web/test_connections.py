@@ -2,13 +2,13 @@
 
 import socket
 import threading
-import time
 
 import pytest
 import uvicorn
 
 from grader.cli import serving
 from grader.cli.reviewing import listener_on
+from tests.waiting import PATIENCE_S, until
 
 ANSWER = [(b"content-length", b"2")]
 
@@ -28,8 +28,7 @@ def server():
         server = uvicorn.Server(config)
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]}, daemon=True)
         thread.start()
-        while not server.started:
-            time.sleep(0.01)
+        until(lambda: server.started)
         server.port = listener.getsockname()[1]
         yield server
         server.should_exit = True
@@ -37,7 +36,7 @@ def server():
 
 
 def opened(server, text):
-    connection = socket.create_connection(("127.0.0.1", server.port), timeout=30.0)
+    connection = socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE_S)
     connection.sendall(text)
     return connection
 
@@ -81,8 +80,8 @@ def test_nothing_is_waited_for_once_a_head_is_there(server):
 
 
 def test_one_address_has_some_connections_only(server, monkeypatch):
-    monkeypatch.setattr(serving, "MOST_OF_ONE", 2)
-    monkeypatch.setattr(serving, "REFUSED_S", 0.1)
+    for name, value in (("MOST_OF_ONE", 2), ("REFUSED_S", 0.1), ("HEAD_S", PATIENCE_S)):
+        monkeypatch.setattr(serving, name, value)
     waiting = [opened(server, b"GET") for _ in range(2)]
     with opened(server, b"") as third:
         assert is_closed(third)
@@ -94,7 +93,8 @@ def test_one_address_has_some_connections_only(server, monkeypatch):
 
 def test_a_connection_too_many_waits_for_its_end_and_the_next_one_does_not(server, monkeypatch):
     """Whoever opens one after the other is slowed down, and the files that stay open have a bound."""
-    for name, value in (("MOST_OF_ONE", 1), ("REFUSED_S", 3600.0), ("MOST_REFUSED", 1)):
+    known = {"MOST_OF_ONE": 1, "REFUSED_S": PATIENCE_S, "MOST_REFUSED": 1, "HEAD_S": PATIENCE_S}
+    for name, value in known.items():
         monkeypatch.setattr(serving, name, value)
     with opened(server, b"GET"), opened(server, b"GET / HTTP/1.1\r\nHost: x\r\n\r\n") as second:
         with opened(server, b"") as third:

@@ -16,6 +16,7 @@ from grader.web.store import Job, Publication, Store
 from reference.errors import CallError, InputFileError
 from tests.inline import Inline
 from tests.unit.web.conftest import ADDRESS
+from tests.waiting import until
 
 
 @pytest.fixture
@@ -38,13 +39,12 @@ def photo_job(store, settings, state="queued"):
 
 
 def ended(store):
-    for _ in range(100):
+    def told():
         with store.session() as session:
             job = session.get_one(Job, 1)
-        if job.state not in {"queued", "running"}:
-            return job
-        time.sleep(0.05)
-    raise AssertionError("it does not end")
+        return None if job.state in {"queued", "running"} else job
+
+    return until(told)
 
 
 @pytest.fixture(autouse=True)
@@ -111,19 +111,19 @@ def test_two_requests_to_grade_are_one_job(graded, admin, monkeypatch):
     assert admin.get(f"/api/v1/publications/{key}/jobs/{one['key']}").json()["state"] == "cancelled"
 
 
+@pytest.mark.slow
 def test_a_class_goes_on_with_the_next_server(graded, settings, service):
     key, _ = graded
     with service.store.session() as session:
         own = session.query(Publication).filter_by(key=key).one()
         session.add(Job(key="left-behind", publication_id=own.id, kind="grade", state="running"))
     with TestClient(application(settings), base_url=ADDRESS) as again:
-        for _ in range(300):
+
+        def is_done():
             with service.store.session() as session:
-                state = session.query(Job).filter_by(key="left-behind").one().state
-            if state == "done":
-                break
-            time.sleep(0.1)
-        assert state == "done"
+                return session.query(Job).filter_by(key="left-behind").one().state == "done"
+
+        until(is_done)
         assert again.get("/").status_code == 200
 
 

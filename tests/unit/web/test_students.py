@@ -9,6 +9,7 @@ import pytest
 from grader.web import store
 from grader.web.store import Link, Regrading
 from tests.unit.web.conftest import SAMPLES, Browser
+from tests.waiting import PATIENCE_S, until
 
 CELLS = {"v_A": "60,0", "kv": "0,219911", "v_B": "12"}
 
@@ -87,10 +88,11 @@ def test_students_behind_one_address_do_not_count_as_one(admin, app):
 @pytest.fixture
 def one_connection(monkeypatch):
     """A data base that answers one request at a time."""
-    monkeypatch.setattr(store, "create_engine", partial(store.create_engine, pool_timeout=20.0))
+    monkeypatch.setattr(store, "create_engine", partial(store.create_engine, pool_timeout=PATIENCE_S))
     monkeypatch.setattr(store, "CONNECTIONS", 1)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("one_connection")
 def test_requests_do_not_keep_a_connection_while_they_wait_for_each_other(admin, app):
     key = admin.publish()
@@ -226,13 +228,12 @@ def test_a_decision_in_the_review_answers_the_request(graded, admin, student, se
     said = {"window": "w", "by": "Ana", "answers": [answer]}
     answered = admin.post(f"/review/{key}/api/decide", json=said, headers=head)
     assert answered.status_code == 200, answered.text
-    for _ in range(50):
+
+    def told():
         with service.store.session() as session:
-            told = session.query(Regrading).one().answer
-        if told:
-            break
-        time.sleep(0.1)
-    assert told == "wrong. measured"
+            return session.query(Regrading).one().answer
+
+    assert until(told) == "wrong. measured"
     assert admin.post(f"/review/{key}/api/decide", json=said).status_code == 403
 
 

@@ -27,6 +27,7 @@ from grader.scan.register.registration import register
 from reference.errors import InputFileError
 from tests import hostile
 from tests.inline import Inline
+from tests.waiting import PATIENCE_S
 
 PROJECT = Path(__file__).parents[4]
 WORKER_BYTES = 1_500_000_000
@@ -87,7 +88,7 @@ def test_large_accepted_pictures_decode_within_a_workers_memory(tmp_path, kind):
         tifffile.imwrite(path, np.zeros((9_000, 13_000, 3), np.uint8), photometric="rgb", compression="zlib")
     done = subprocess.run(  # noqa: S603 - the test's own script
         [sys.executable, "-c", LARGE.format(project=str(PROJECT), path=str(path))],
-        capture_output=True, text=True, check=False, timeout=120,
+        capture_output=True, text=True, check=False, timeout=PATIENCE_S,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_DATA, (WORKER_BYTES, WORKER_BYTES)),
     )  # fmt: skip
     assert done.stdout.startswith("("), done.stderr

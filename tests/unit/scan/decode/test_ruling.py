@@ -1,5 +1,6 @@
 """Printed squares taken out of a page, and what is drawn on them kept."""
 
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -78,21 +79,21 @@ def left_of_squares(clean):
 
 
 PAPERS = {
-    "1 mm": squared(1.0, 190, width_mm=0.12),
-    "1 mm, heavier at 5 mm": squared(1.0, 150, heavy=5, width_mm=0.12),
-    "2.5 mm": squared(2.5),
-    "4 mm, pale": squared(4.0, 215),
-    "5 mm, as dark as a pencil": squared(5.0, PENCIL),
-    "5 mm, broken": squared(5.0, PENCIL, broken=0.4),
-    "7 mm, turned by 3 degrees": squared(7.0, turn_deg=-3.0),
-    "10 mm, bent": squared(10.0, turn_deg=1.0, bend_mm=0.8),
+    "1 mm": partial(squared, 1.0, 190, width_mm=0.12),
+    "1 mm, heavier at 5 mm": partial(squared, 1.0, 150, heavy=5, width_mm=0.12),
+    "2.5 mm": partial(squared, 2.5),
+    "4 mm, pale": partial(squared, 4.0, 215),
+    "5 mm, as dark as a pencil": partial(squared, 5.0, PENCIL),
+    "5 mm, broken": partial(squared, 5.0, PENCIL, broken=0.4),
+    "7 mm, turned by 3 degrees": partial(squared, 7.0, turn_deg=-3.0),
+    "10 mm, bent": partial(squared, 10.0, turn_deg=1.0, bend_mm=0.8),
 }
 PITCH = {name: float(name.split()[0]) for name in PAPERS}
 
 
 @pytest.mark.parametrize("name", PAPERS)
 def test_squares_go_and_strokes_that_cross_them_stay_whole(name):
-    grey = scanned(PAPERS[name])
+    grey = scanned(PAPERS[name]())
     clean, ruling = without_ruling(grey)
     pitches = 1.0 / np.hypot(*ruling.lines_per_px.T) / PX_PER_MM
     assert np.abs(pitches / PITCH[name] - 1.0).max() < 0.005
@@ -138,14 +139,20 @@ def writing():
 TABLE = [((130, 70 + 7 * k), (225, 70 + 7 * k)) for k in range(9)]
 TABLE += [((130 + 19 * k, 70), (130 + 19 * k, 126)) for k in range(6)]
 HATCHING = [((4 * k, 0), (4 * k - 60, 160)) for k in range(75)]
-OTHERS = {"a drawing": plain(), "a table": plain(TABLE), "hatching": plain(HATCHING), "writing": writing()}
+OTHERS = {
+    "a drawing": plain,
+    "a table": partial(plain, TABLE),
+    "hatching": partial(plain, HATCHING),
+    "writing": writing,
+}
 
 
 @pytest.mark.parametrize("name", OTHERS)
 def test_what_has_no_squares_is_left_as_it_is(name):
-    clean, ruling = without_ruling(OTHERS[name])
+    grey = OTHERS[name]()
+    clean, ruling = without_ruling(grey)
     assert ruling is None
-    assert clean is OTHERS[name]
+    assert clean is grey
 
 
 PADS = {

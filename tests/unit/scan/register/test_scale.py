@@ -30,7 +30,7 @@ def log_scale(mm_to_px) -> float:
 
 @pytest.mark.parametrize(
     ("seed", "dpi"),
-    [(0, 150.0), (36, 300.0), *slow(*OTHERS)],
+    [(0, 150.0), *slow((36, 300.0), *OTHERS)],
 )
 def test_a_wrong_resolution_never_gives_a_wrong_scale_with_confidence(seed, dpi, tmp_path):
     settings = any_settings(seed, device="flatbed", dpi=dpi, mistakes=0.0)

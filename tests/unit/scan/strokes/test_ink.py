@@ -14,6 +14,7 @@ from grader.scan.decode.ruling import without_ruling
 from grader.scan.register.registration import rectify
 from grader.scan.strokes.ink import find_ink
 from grader.texts.spoken import message
+from tests.examples import slow
 
 SHARED = Path(__file__).resolve().parents[5] / "shared"
 PX_PER_MM = 200 / 25.4
@@ -487,7 +488,7 @@ def test_strokes_are_counted_before_any_is_fitted(monkeypatch):
     assert "straight strokes" in refusal(paper)
 
 
-@pytest.mark.parametrize("pitch", [5, 1])
+@pytest.mark.parametrize("pitch", [5, *slow(1)])
 def test_squares_that_were_taken_out_are_no_strokes(pitch):
     paper = Paper()
     for step in range(0, 420, pitch):

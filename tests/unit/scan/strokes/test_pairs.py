@@ -120,6 +120,7 @@ def test_families_of_parallel_strokes_are_those_of_spreading_labels():
     assert np.array_equal(_family_size(first, second, len(ends)), expected)
 
 
+@pytest.mark.slow
 def test_twenty_thousand_strokes_are_compared_in_bounded_memory():
     rng = np.random.default_rng(3)
     fitted = strokes(segments(20_000, rng, 20.0), rng)
