@@ -1,4 +1,4 @@
-"""Write what authors are told of broken files: a page of the site.
+"""Write the messages that authors get for broken files: a page of the site.
 
     python -m docs.make_faults > faults.md
 
@@ -10,7 +10,7 @@ import sys
 
 from tests.functional.broken_files import CASES, FILES, Told, told
 
-HEAD = """# What is told of broken files
+HEAD = """# Messages on broken files
 
 A good course, broken in one place at a time: what was changed, and the message. Written anew with each build.
 """

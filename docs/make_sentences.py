@@ -1,10 +1,10 @@
-"""Write every text that people read, side by side in all languages: a page of the site.
+"""Write every text that people read, side by side in all languages: pages of the site, one for each topic.
 
     python -m docs.make_sentences > sentences.md
 
-`mkdocs build` puts it into the site (`site_hooks.py`). Texts stand in the order of the files that say them,
-each with an example: its parameters filled as a page would fill them. Below them stand the titles and tasks
-of the built-in assignments and rubrics. A native speaker can read it from top to bottom, about half an hour.
+`mkdocs build` puts the pages into the site (`site_hooks.py`); the command prints all of them. Texts are in
+the order of the files that hold them, each with an example: its parameters filled as a page would fill them.
+A native speaker reads all of them in about half an hour.
 """
 
 import re
@@ -24,11 +24,21 @@ COUNTS = (1, 3, 20)
 """Numbers that take every form of a plural in all three languages."""
 PLACEHOLDER = re.compile(r"%\((\w+)\)[sd]|\{(\w+)\}")
 KEYWORDS = {"_": None, "gettext": None, "N_": None, "ngettext": (1, 2)}
-HEAD = """# Every sentence, in all languages
-
-Written from the catalogues ([how to translate](translating.md)). Names and numbers are examples. `/` stands
-between the forms for 1, 3 and 20.
+HEAD = """Written from the catalogues ([how to translate](translating.md)). Names and numbers are examples.
+`/` separates the forms for 1, 3 and 20.
 """
+TOPICS: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "sentences-marks": ("Reasons of verdicts", ("grader/texts/reasons", "grader/texts/spoken")),
+    "sentences-mistakes": ("Mistakes", ("grader/feedback/mistakes", "grader/feedback/redo_steps")),
+    "sentences-problems": ("Problems of files and pages", ("grader/texts", "grader/tables", "grader/owners")),
+    "sentences-feedback": ("Pages of students and classes", ("grader/feedback", "grader/lms")),
+    "sentences-self-check": ("Self-check", ("grader/self_check", "grader/cli")),
+    "sentences-review": ("Review", ("grader/review",)),
+    "sentences-web": ("Web application", ("grader/web",)),
+    "sentences-paper": ("Sheets, solutions and diagrams", ("grader",)),
+}
+"""Pages by name: the title, and the beginnings of the files whose texts it has; the first match counts."""
+ASSIGNMENTS = "sentences-assignments", "Built-in assignments"
 
 Row = tuple[str, ...]
 """A text in each of the languages."""
@@ -95,8 +105,8 @@ OTHERWISE: Mapping[str, Mapping[str, str]] = {
     "It is zero": {"measured": "@5.1 mm"},
     "%(at)s is not drawn": {"at": "v_BA"},
     "It is too short for": {"length": "@2.4 mm"},
-    "It could not be read": {"why": "%(nodes)s, on which it hangs, was not read for certain"},
-    "It was read with": {"why": "%(nodes)s, on which it hangs, was not read for certain"},
+    "It could not be read": {"why": "%(nodes)s, on which it depends, was not read for certain"},
+    "It was read with": {"why": "%(nodes)s, on which it depends, was not read for certain"},
     "The sheet could not be placed": {"why": "only %(share)s of the sheet is in the picture"},
     "From %(start)s": {"direction": "parallel to %(link)s, from %(tail)s towards %(head)s"},
 }
@@ -189,21 +199,23 @@ def _translated(value: object) -> Iterator[Row]:
             yield from _translated(one)
 
 
-# The page -----------------------------------------------------------------------------------------
+# The pages ----------------------------------------------------------------------------------------
 
 
-def page() -> str:
-    """The document."""
-    parts = [HEAD]
-    for title, groups in (("Sentences of the program", texts()), ("Built-in assignments", authored())):
-        parts.append(f"## {title}\n")
-        parts += [_table(name, rows) for name, rows in groups.items()]
-    return "\n".join(parts)
+def pages() -> dict[str, str]:
+    """Return the pages by their names: one for each of `TOPICS`, and one for the built-in assignments."""
+    tables: dict[str, list[str]] = {name: [] for name in TOPICS}
+    for file, rows in texts().items():
+        name = next(name for name, (_, starts) in TOPICS.items() if file.startswith(starts))
+        tables[name].append(_table(file, rows))
+    tables[ASSIGNMENTS[0]] = [_table(file, rows) for file, rows in authored().items()]
+    titles = {name: title for name, (title, _) in TOPICS.items()} | dict([ASSIGNMENTS])
+    return {f"{name}.md": "\n".join([f"# {titles[name]}\n", HEAD, *parts]) for name, parts in tables.items()}
 
 
 def _table(name: str, rows: list[Row]) -> str:
     names = " | ".join(tongue(lang).name for lang in LANGUAGES)
-    lines = [f"### {name}", "", f"| {names} |", f"|{' --- |' * len(LANGUAGES)}"]
+    lines = [f"## {name}", "", f"| {names} |", f"|{' --- |' * len(LANGUAGES)}"]
     lines += [f"| {' | '.join(map(_cell, row))} |" for row in rows]
     return "\n".join([*lines, ""])
 
@@ -213,4 +225,4 @@ def _cell(text: str) -> str:
 
 
 if __name__ == "__main__":
-    sys.stdout.write(page())
+    sys.stdout.write("\n".join(pages().values()))

@@ -13,6 +13,6 @@ from docs import make_faults, make_sentences
 
 def on_files(files: Files, *, config: MkDocsConfig) -> Files:
     """Add the generated pages."""
-    for name, made in (("sentences.md", make_sentences), ("faults.md", make_faults)):
-        files.append(File.generated(config, name, content=made.page()))
+    for name, page in {**make_sentences.pages(), "faults.md": make_faults.page()}.items():
+        files.append(File.generated(config, name, content=page))
     return files

@@ -1,3 +1,3 @@
-"""What was drawn, and what it is worth."""
+"""The reading and marking of what students draw."""
 
 __version__ = "0.1.0"

@@ -18,22 +18,22 @@ Verdict = Literal["full", "partial", "none", "follow_through", "review", "not_ju
 Status = Literal["graded", "needs_review", "unreadable", "missing"]
 ScaleName = Literal["kL", "kv", "ka"]
 Cause = Literal["assignment", "rubric", "submission", "roster", "decision", "program", "new", "gone"]
-"""Why a mark moved."""
+"""Cause of a changed mark."""
 Sign = Literal["hand_errors", "same_place", "same_numbers", "same_picture", "other_number"]
-"""Why sheets look alike."""
+"""Sign of similarity between sheets."""
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Parameters = dict[str, int | float | str | list[str]]
-"""What a reason or problem names: numbers (the name ends in the unit), names of vectors, texts as written."""
+"""Values in a reason or problem: numbers (the name ends in the unit), vector names, texts as written."""
 
 
 _GIVEN: dict[tuple[type, frozenset[str]], set[str]] = {}
-"""Which fields documents of each kind were given; nobody changes a document's fields."""
+"""Fields given to documents of each kind; a document's fields never change."""
 
 
 class Document(BaseModel):
-    """A table of a JSON document: frozen, nothing unknown, only finite numbers.
+    """A table of a JSON document: frozen, no unknown fields, only finite numbers.
 
-    A record with attributes of these names is taken as it is: nobody copies it field by field.
+    A record with attributes of these names is accepted as it is, without copying field by field.
     """
 
     model_config = ConfigDict(
@@ -41,7 +41,7 @@ class Document(BaseModel):
     )
 
     def model_post_init(self, _context: object) -> None:
-        """Share the set of given fields with others of the kind: it is half of a document's memory."""
+        """Share the set of given fields with other documents of the kind: it is half of their memory."""
         given = self.__pydantic_fields_set__
         shared = _GIVEN.setdefault((type(self), frozenset(given)), given)
         object.__setattr__(self, "__pydantic_fields_set__", shared)
@@ -72,7 +72,7 @@ class MeasurementsDocument(Document):
 
 
 class ReasonDocument(Document):
-    """A reason: its code, a sentence in English, and what that names."""
+    """A reason: its code, a sentence in English, and the sentence's parameters."""
 
     code: str
     message: str
@@ -86,7 +86,7 @@ class ProblemDocument(ReasonDocument):
 
 
 class SheetDocument(Document):
-    """The place of the sheet in its image."""
+    """Position of the sheet in its image."""
 
     method: str
     px_per_mm: float
@@ -106,7 +106,7 @@ class NodeDocument(Document):
 
 
 class OtherReadingDocument(Document):
-    """Another reading of a vector; the confidence is that it is this one or one before it."""
+    """Another reading of a vector; the confidence is that it is this one or one listed before it."""
 
     length_mm: float
     direction_deg: float
@@ -132,7 +132,7 @@ class FigureDocument(Document):
 
 
 class UnreadDocument(Document):
-    """A vector or length that was asked for and not read, and the reason in English."""
+    """A requested vector or length that was not read, and the reason in English."""
 
     name: str
     reason: str
@@ -151,7 +151,7 @@ class TimingDocument(Document):
 
 
 class ReadingDocument(Document):
-    """The reading of one page; `sheet` is null where the page could not be registered."""
+    """The reading of one page; `sheet` is null if the page could not be registered."""
 
     schema_version: Version = 1
     source: str
@@ -168,7 +168,7 @@ class ReadingDocument(Document):
 
 
 class Quantity(Document):
-    """A drawn or expected vector, an angular value or a scale; None where not known or meaningless.
+    """A drawn or expected vector, an angular value or a scale; None if not known or meaningless.
 
     Length and direction are on paper, the value is in SI.
     """
@@ -185,23 +185,23 @@ class Tolerance(Document):
     length_mm: float | None = None
     direction_deg: float | None = None
     value: float | None = None
-    """Of scales, angular quantities and computed values, in the unit of what is expected."""
+    """For scales, angular quantities and computed values, in the unit of the expected value."""
     widened: bool = False
-    """Whether it is more than the rubric states, because a careful hand's small errors add up here."""
+    """True if it is more than the rubric states, because small errors of careful drawing add up here."""
 
 
 class DecidedDocument(Document):
-    """Who decided a verdict in the program's place, when (ISO 8601), what it was before, and why."""
+    """The decision of a person: who, when (ISO 8601), the verdict before, and why."""
 
     by: str
     at: str
     before: Verdict | None
-    """Null where the decision moved a node and the verdict follows from it."""
+    """Null if the decision moved a node and the verdict follows from it."""
     comment: str = ""
 
 
 class AppliedDecisionDocument(Document):
-    """A row of the decisions as it was applied; `criterion` may be a node, a page, `total` or `comment`."""
+    """A row of the decisions as applied; `criterion` may be a node, a page, `total` or `comment`."""
 
     criterion: str
     verdict: str
@@ -229,7 +229,7 @@ class CriterionDocument(Document):
     vector: str | None
     """The vector or angular quantity judged; null for a scale and a link."""
     points: float | None
-    """Null while under review, and where not judged."""
+    """Null while under review, and if not judged."""
     max_points: float
     verdict: Verdict
     measured: Quantity
@@ -237,22 +237,22 @@ class CriterionDocument(Document):
     tolerance: Tolerance
     confidence: Share
     probability: Share | None = None
-    """That the verdict is right; under review, of the likeliest one. Null in reports of earlier versions."""
+    """Probability that the verdict is right; under review, of the likeliest one. Null in older reports."""
     proposed: Verdict | None = None
     """Under review, the likeliest verdict."""
     decided: DecidedDocument | None = None
-    """Where a person decided."""
+    """Null if no person decided."""
     mistake: str | None = None
     """Code of the mistake that explains a loss."""
     feedback: str = ""
     reasons: list[str] = []
-    """Codes of what the verdict rests on, most important first."""
+    """Codes of the reasons for the verdict, most important first."""
     why: list[ReasonDocument] = []
-    """The same with their parameters."""
+    """The same reasons with their parameters."""
     link: str | None = None
     """The link of the mechanism judged."""
     section: str | None = None
-    """The section of the rubric that it belongs to, where that has a weight of its own."""
+    """The section of the rubric that it belongs to, if that has a weight of its own."""
 
     @property
     def drawn(self) -> str:
@@ -261,7 +261,7 @@ class CriterionDocument(Document):
 
 
 class RivalDocument(Document):
-    """Another mistake that would explain the same nearly as well."""
+    """Another mistake that would explain the same losses nearly as well."""
 
     code: Code
     at: str
@@ -272,10 +272,10 @@ class RivalDocument(Document):
 
 
 class MistakeDocument(Document):
-    """A mistake that explains what is off: its code, where it was made, the criteria it explains.
+    """A mistake that explains errors: its code, where it was made, the criteria it explains.
 
-    `feedback` says what was done and what to redo, `redo` the steps of the construction from there on,
-    both in the student's language at the level of feedback asked for.
+    `feedback` says what was done and what to redo, `redo` lists the steps of the construction from there on,
+    both in the student's language at the requested level of feedback.
     """
 
     code: Code
@@ -284,7 +284,7 @@ class MistakeDocument(Document):
     confidence: Share
     detail: str = ""
     parameters: Parameters = {}
-    """What `detail` says, by name."""
+    """Values named by `detail`."""
     rivals: list[RivalDocument] = []
     feedback: str = ""
     redo: list[str] = []
@@ -299,13 +299,13 @@ class ScaleDocument(Document):
     text: str | None = None
     """As the student wrote it."""
     refused: str | None = None
-    """Why a declared scale was not accepted."""
+    """Reason why a declared scale was not accepted."""
     source: Literal["roster", "measurements", "box"] | None = None
-    """Where it was declared: ``box`` is the printed sheet's; None where it was not."""
+    """Place of the declaration (``box``: on the printed sheet); null if it was not declared."""
 
 
 class ReadSheets(Document):
-    """The pages behind a report."""
+    """The pages read for a report."""
 
     sheets: list[ReadingDocument] = []
 
@@ -325,16 +325,16 @@ class ReportDocument(Document):
     score_range: tuple[float, float] | None
     max_score: float
     expected_score: float | None = None
-    """The mean of the score over what the verdicts may be; null where nothing was judged."""
+    """Mean of the score over the possible verdicts; null if nothing was judged."""
     added: float = 0.0
-    """Points that a person added to the score, or took away."""
+    """Points that a person added to the score, or subtracted."""
     comment: str = ""
-    """A person's, on the whole submission."""
+    """A person's comment on the whole submission."""
     decisions: list[AppliedDecisionDocument] = []
-    """All that people decided of it and that was applied."""
+    """All decisions of people about it that were applied."""
     criteria: list[CriterionDocument] = []
     said: dict[str, SaidDocument] = {}
-    """What the program itself said, by criterion, where the verdict is another one or a person's."""
+    """The program's own verdict, by criterion, if a person decided or the verdict has changed."""
     mistakes: list[MistakeDocument] = []
     scales: dict[ScaleName, ScaleDocument] = {}
     problems: list[ProblemDocument] = []
@@ -342,7 +342,7 @@ class ReportDocument(Document):
 
 
 class UnmatchedDocument(Document):
-    """A page or file that is nobody's, or claimed by two sources that disagree."""
+    """A page or file without an owner, or claimed by two sources that disagree."""
 
     file: str
     page: int | None = None
@@ -352,7 +352,7 @@ class UnmatchedDocument(Document):
 
 
 class StandingDocument(Document):
-    """The standing of a submission: its status and points, or the range in which they lie."""
+    """The state of a submission: its status and points, or the range in which they lie."""
 
     status: Status
     score: float | None
@@ -360,9 +360,9 @@ class StandingDocument(Document):
 
 
 class CriterionMovedDocument(Document):
-    """A criterion that is marked otherwise than before; null before or after where it was not asked for.
+    """A criterion with a changed mark; null before or after if it was not asked for.
 
-    Points are out of `max_points`, null under review and where not judged.
+    Points are out of `max_points`, null under review and if not judged.
     """
 
     id: str
@@ -374,9 +374,9 @@ class CriterionMovedDocument(Document):
 
 
 class MovedDocument(Document):
-    """A submission that stands elsewhere than after the run before; null before (new) or after (gone).
+    """A submission that changed since the run before; null before (new) or after (gone).
 
-    `why`: what changed in between; empty where nothing says.
+    `why`: the causes of the change; empty if none is known.
     """
 
     student_id: str
@@ -388,16 +388,16 @@ class MovedDocument(Document):
 
 
 class AlikeDocument(Document):
-    """Sheets that look alike, more than independent hands come to: a person should look at both.
+    """Sheets that look more alike than independent drawings do: a person should look at both.
 
     Attributes
     ----------
-    students, positions : whose, in pairs; more than two where several look alike
-    why : `hand_errors` (the same small errors of the hand), `same_place` (figures lie alike on the
-        sheet), `same_numbers` (entered values are the same where independent ones differ),
-        `same_picture` (the ink lies alike), `other_number` (drawn with the other's number)
-    measure : how many such pairs a class of this size would show by chance if everybody worked alone;
-        null for `other_number` by itself, which is no coincidence but may be a slip
+    students, positions : of the similar sheets; more than two if several look alike
+    why : `hand_errors` (the same small drafting errors), `same_place` (figures lie alike on the sheet),
+        `same_numbers` (entered values are the same although independent ones differ), `same_picture` (the ink
+        lies alike), `other_number` (drawn with the other's number)
+    measure : number of such pairs expected by chance in a class of this size if everybody worked alone; null
+        for `other_number` by itself, which is no coincidence but may be a slip
     share, compared : agreement of the errors or numbers compared, 0..1, and how many there were
     """
 
@@ -410,7 +410,7 @@ class AlikeDocument(Document):
 
 
 class StaleDecisionDocument(Document):
-    """A decision that was not applied, because what it was about has changed since: its line and why."""
+    """A decision that was not applied because its subject has changed since: its line and why."""
 
     line: int
     student_id: str
@@ -422,13 +422,13 @@ class StaleDecisionDocument(Document):
     comment: str = ""
     code: str = ""
     reason: str
-    """In English."""
+    """Reason in English."""
 
 
 class LikeDocument(Document):
-    """Settled verdicts that are not trusted any more: those of probability `most` or less.
+    """Settled verdicts that are no longer trusted: those of probability `most` or less.
 
-    `criterion`, `verdict` and `mistake` narrow them down; without a criterion all of that probability.
+    `criterion`, `verdict` and `mistake` narrow them down; without a criterion, all of that probability.
     """
 
     criterion: str | None = None
@@ -438,26 +438,26 @@ class LikeDocument(Document):
 
 
 class OpenedDocument(Document):
-    """Verdicts that an audit opened: which, why, and how many."""
+    """Verdicts that an audit reopened: which, why, and how many."""
 
     like: LikeDocument
     student_id: str
-    """Whose verdict was found wrong; empty where `settle` was raised."""
+    """The student whose verdict was found wrong; empty if `settle` was raised."""
     count: int
 
 
 Source = Literal["printed", "plain", "photo", "entered"]
-"""What verdicts were read from: scans of printed sheets or of plain paper, photos, entered values."""
+"""Source of verdicts: scans of printed sheets or of plain paper, photos, entered values."""
 
 
 class ReliabilityDocument(Document):
-    """Verdicts on which a person had a say, held against the probabilities that were stated for them.
+    """Verdicts that a person checked, compared with the probabilities stated for them.
 
     Attributes
     ----------
-    source : what they were read from
+    source : where the values were read
     kind : settled verdicts that were audited, or proposals that were decided
-    count, right : how many, and how many of them a person found right
+    count, right : their number, and how many of them a person found right
     said : the mean of the stated probabilities
     """
 
@@ -475,14 +475,14 @@ class TrustDocument(Document):
     ----------
     settled : verdicts that the program settled by itself
     audited, right, unclear : of the random sample: checked, found right, not decidable
-    at_most : share of the settled verdicts that are wrong, with 95 % confidence and whenever the audit
-        stops; undecidable ones count as wrong. Null while nothing is audited
-    least_sure, least_sure_right : checked besides, because they were least sure: no random sample
-    settle, raised : the probability from which the rubric settles verdicts; the one above which this class
-        does, where the audit proves more errors than `settle` allows, else null
+    at_most : share of the settled verdicts that are wrong, with 95 % confidence whenever the audit stops;
+        undecidable ones count as wrong. Null while nothing is audited
+    least_sure, least_sure_right : checked in addition because they were least sure: no random sample
+    settle, raised : the probability from which the rubric settles verdicts; the higher one used for this
+        class if the audit proves more errors than `settle` allows, else null
     opened : verdicts that wait for a person again
-    reliability : what was said against what was found
-    moved : points of drawings that a person put elsewhere
+    reliability : stated probabilities compared with what people found
+    moved : points of drawings that a person moved
     """
 
     settled: int
@@ -505,7 +505,7 @@ class ResultsDocument(Document):
     schema_version: Version = 1
     assignment: str
     titles: dict[str, str] = {}
-    """The criteria's titles in the language of the class, by id; those of a report are in its student's."""
+    """The criteria's titles in the language of the class, by id; a report's are in its student's."""
     reports: list[ReportDocument]
     unmatched: list[UnmatchedDocument] = []
     moved: list[MovedDocument] = []
@@ -513,23 +513,23 @@ class ResultsDocument(Document):
     stale: list[StaleDecisionDocument] = []
     """Decisions that wait for a person to look again."""
     expected_wrong: float | None = None
-    """How many of the settled verdicts are expected to be wrong, by their probabilities."""
+    """Expected number of wrong verdicts among the settled ones, by their probabilities."""
     trust: TrustDocument | None = None
-    """What people checked says of the verdicts; null before anybody has checked one."""
+    """Reliability of the verdicts according to people's checks; null before the first check."""
 
 
 # Lint: an assignment held against every variant ---------------------------------------------------
 
 
 class VariantDocument(Document):
-    """A variant; null where the assignment has no such number."""
+    """A variant; null if the assignment has no such number."""
 
     n: int | None
     position: int | None
 
 
 class LintFindingDocument(Document):
-    """A finding: how grave, a stable code, where, what, for which variants (none: the files as such)."""
+    """A finding: its severity, a stable code, where, what, for which variants (none: the files as such)."""
 
     severity: Literal["fault", "warning", "hint"]
     code: str
@@ -548,10 +548,10 @@ class LintLeast(Document):
 
 
 class LintVariant(VariantDocument):
-    """One variant's figures; without figures where it cannot be solved, `problem` says why.
+    """One variant's figures; without figures if it cannot be solved, `problem` says why.
 
-    `transmission` is a sine, `room` how many times as large the tightest figure could be drawn in
-    its zone of the answer sheet.
+    `transmission` is a sine, `room` the factor by which the tightest figure could be enlarged in its zone of
+    the answer sheet.
     """
 
     assembles: bool
@@ -565,7 +565,7 @@ class LintVariant(VariantDocument):
 
 
 class LintScales(Document):
-    """Scales, the least and the largest over all variants, and what they give."""
+    """Scales, the least and the largest over all variants, and their effect."""
 
     name: Literal["proposed", "round", "round_each"]
     kL: tuple[float, float]  # noqa: N815 - the field's own name for it
@@ -605,7 +605,7 @@ class CalibrationPoint(Document):
 
 
 class CalibrationSegments(Document):
-    """Errors of the calibration page's segments, null where none was read."""
+    """Errors of the calibration page's segments, null if none was read."""
 
     printed: int
     read: int
@@ -620,8 +620,8 @@ class CalibrationSegments(Document):
 class CalibrationDocument(Document):
     """The measurements of `planmark calibrate`: scales over true lengths, along the upright sheet's axes.
 
-    `scale_x` and `scale_y` are null without a stated resolution, they and the rest of a scanner's map
-    for a photo (`camera`). `skew_deg` is by how much the sheet's right angle comes out wider.
+    `scale_x` and `scale_y` are null without a stated resolution; so are they and the rest of a scanner's map
+    for a photo (`camera`). `skew_deg` is the error of the sheet's right angle.
     """
 
     schema_version: Version = 1

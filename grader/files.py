@@ -13,7 +13,7 @@ from typing import Any, Protocol
 from reference.errors import CallError, PlanmarkError
 
 _FORMULA = re.compile("'*[ \u00a0\ufeff]*[=+\\-@\t\r\n＝＋－＠]")
-"""How a text begins that a spreadsheet would run; an apostrophe before it says that it is text."""
+"""Start of a text that a spreadsheet would run; an apostrophe before it marks it as text."""
 _CONTROL = re.compile("[\x00-\x08\x0a-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
 """Signs that move a terminal's cursor, begin a line of a log, or turn the order of what is read."""
 CANNOT_WRITE = "cannot_write"
@@ -61,7 +61,7 @@ def write_parts(path: Path, parts: Iterable[bytes | str]) -> None:
 
 
 def is_formula(text: str) -> bool:
-    """Whether a spreadsheet would run this text."""
+    """Return whether a spreadsheet would run this text."""
     return _FORMULA.match(text) is not None
 
 

@@ -1,4 +1,4 @@
-r"""Languages of what students and instructors read: English, Romanian, Russian.
+r"""Languages of the texts for students and instructors: English, Romanian, Russian.
 
 English texts stand in the code and are the keys; `locale/<lang>/LC_MESSAGES/planmark.po` holds the
 other languages. `docs/translating.md` says what to do after a text has changed.
@@ -18,7 +18,7 @@ ROOT_LANGUAGE = "en"
 
 
 def N_(text: str) -> str:  # noqa: N802 - gettext's own name for it
-    """Mark a text for the catalogues where it is only kept, and translated later."""
+    """Mark a text for the catalogues if it is only stored here and translated later."""
     return text
 
 
@@ -29,70 +29,70 @@ UNITS = (
 """Units as people read them; each has its letters in every language."""
 
 SIDES = {"left": N_("on the left"), "right": N_("on the right"), "ahead": N_("ahead"), "behind": N_("behind")}
-"""Where a joint lies, as a datum of a variant."""
+"""Side on which a joint lies, as a datum of a variant."""
 
 _LANGUAGE_NAMES = {"en": "English", "ro": "română", "ru": "русский"}
 
 
 @dataclass(frozen=True, slots=True)
 class Tongue:
-    """A language at work: texts, plurals, numbers and units."""
+    """A language in use: texts, plurals, numbers and units."""
 
     lang: str
     catalogue: gnu.NullTranslations
 
     def gettext(self, text: str) -> str:
-        """The text in this language, itself where the catalogue has none."""
+        """Return the text in this language, or the text itself if the catalogue has none."""
         return self.catalogue.gettext(text) if text else ""
 
     def ngettext(self, one: str, many: str, count: int) -> str:
-        """The form that goes with `count`."""
+        """Return the form that goes with `count`."""
         return self.catalogue.ngettext(one, many, count)
 
     def number(self, value: float, decimals: int) -> str:
-        """A number with so many decimals and the language's decimal mark; no grouping, no minus zero."""
+        """Format a number with `decimals` decimals and the language's mark; no grouping, no minus zero."""
         # Adding zero turns minus zero into zero.
         text = f"{round(value, decimals) + 0.0:.{decimals}f}"
         return text.replace("-", "−").replace(".", self.decimal_mark)
 
     def trimmed(self, value: float, decimals: int) -> str:
-        """A number with at most so many decimals: 2, 2.5, 0.25."""
+        """Format a number with at most `decimals` decimals: 2, 2.5, 0.25."""
         text = self.number(value, decimals)
         return text.rstrip("0").rstrip(self.decimal_mark) if decimals else text
 
     @property
     def decimal_mark(self) -> str:
-        """What stands before the decimals."""
+        """The language's decimal mark."""
         return "." if self.lang == ROOT_LANGUAGE else ","
 
     def significant(self, value: float, digits: int = 3) -> str:
-        """A number with so many significant digits; large whole numbers keep all of theirs."""
+        """Format a number with significant digits; large whole numbers keep all of theirs."""
         if value == 0.0 or not math.isfinite(value):
             return self.number(value, 0) if value == 0.0 else str(value)
         decimals = digits - 1 - math.floor(math.log10(abs(value)))
         return self.number(value, max(0, decimals))
 
     def quantity(self, value: float, decimals: int, unit: str) -> str:
-        """A number and its unit, which never part at a line's end."""
+        """Format a number and its unit, joined by a non-breaking space."""
         return f"{self.number(value, decimals)}\N{NO-BREAK SPACE}{self.unit(unit)}"
 
     def value(self, value: float, unit: str, digits: int = 4) -> str:
-        """A number with so many significant digits, and its unit if it has one."""
+        """Format a number with significant digits, and its unit if it has one."""
         return f"{self.significant(value, digits)}\N{NO-BREAK SPACE}{self.unit(unit)}".rstrip()
 
     def unit(self, unit: str) -> str:
-        """A unit in this language's letters; `m/s^2` and `m/s2` are written with a superscript."""
+        """Return a unit in this language's letters; `m/s^2` and `m/s2` are written with a superscript."""
         return self.gettext(unit.replace("s^2", "s²").replace("s2", "s²"))
 
     @property
     def name(self) -> str:
-        """What the language calls itself."""
+        """The language's name in that language."""
         return _LANGUAGE_NAMES[self.lang]
 
 
 @cache
 def tongue(lang: str) -> Tongue:
-    """The language of a code such as `ro` or `ro-RO`; raises CallError for others than en, ro, ru."""
+    """Return the language for a code such as `ro` or `ro-RO`; raises CallError for others than en, ro, ru."""
     code = lang.replace("_", "-").partition("-")[0].lower()
     if code not in LANGUAGES:
         known = ", ".join(LANGUAGES)

@@ -1,4 +1,4 @@
-"""The options of commands, one record each, from which all who offer, keep or heed them take them.
+"""The options of commands, one record each, used by all code that offers, stores or reads them.
 
 The command line makes its options of a record's fields, `planmark.toml` its keys, the web its bodies and
 queries; the note of a run and the work itself are the record and more.
@@ -104,11 +104,11 @@ def _lang(help_: str = "Language of feedback: en, ro or ru.", default: str | Non
 
 
 def _jobs() -> Any:  # noqa: ANN401 - as above
-    return option("Processes; all processors if absent.", least=1)
+    return option("Number of processes (default: all processors).", least=1)
 
 
 def _port(default: int) -> Any:  # noqa: ANN401 - as above
-    return option("0 takes any that is free.", default=default, least=0, most=65535)
+    return option("Port; 0 takes any free one.", default=default, least=0, most=65535)
 
 
 # A variant ----------------------------------------------------------------------------------------
@@ -118,8 +118,8 @@ def _port(default: int) -> Any:  # noqa: ANN401 - as above
 class VariantOptions:
     """Which variant."""
 
-    n: int | None = option("The student's number, where data depend on it.")
-    position: int | None = option("The position, where there are some.")
+    n: int | None = option("The student's number, if the data depend on it.")
+    position: int | None = option("The position, if the assignment has any.")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -152,7 +152,7 @@ class CycleOptions(VariantOptions):
     """The options of ``planmark cycle``."""
 
     of: list[str] | None = option(
-        "What to tell: v_B, a_B, v_BA, a_BA_n (with _x or _y a component), omega_3, epsilon_3, D (the path of"
+        "Quantities: v_B, a_B, v_BA, a_BA_n (with _x or _y a component), omega_3, epsilon_3, D (the path of"
         " point D); several with commas. All speeds and accelerations if absent."
     )
     samples: int = option("Positions over the cycle.", default=361)
@@ -169,8 +169,8 @@ class CheckOptions(VariantOptions):
     measured: Path | None = option("Measurement file, CSV or JSON.")
     photo: Path | None = option("Photo or scan of the drawn sheet, instead of measurements.")
     lang: str = _lang()
-    level: Level = option("symbol (right or off), hint (in which way), full (numbers).", default="hint")
-    page: Path | None = option("Draw and tell it in this HTML file, too.")
+    level: Level = option("symbol (right or off), hint (how it is off), full (numbers).", default="hint")
+    page: Path | None = option("Also write the result to this HTML file.")
     template: Path | None = option("Write the CSV file to fill in.")
 
 
@@ -184,11 +184,11 @@ class ClassOptions:
     roster: Path | None = option("The class: roster.csv.", key="roster")
     pages_per_student: int | None = option("Of one class file, in the roster's order.", key="pages", least=1)
     lang: str = _lang()
-    level: Level = option("What students are told: symbol, hint, or full (with the answers).", default="full")
+    level: Level = option("Feedback for students: symbol, hint, or full (with the answers).", default="full")
     with_ghosts: bool = option(
         "With --level full: draw expected vectors, dotted.", "--ghosts/--no-ghosts", default=True
     )
-    decisions: Path | None = option("What people decided; decisions.csv in the folder if absent.")
+    decisions: Path | None = option("File of decisions (default: decisions.csv in the folder).")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -196,10 +196,10 @@ class GradeOptions(ClassOptions):
     """The options of ``planmark grade``."""
 
     jobs: int | None = _jobs()
-    time_limit: float = option("Seconds that a file or a sheet may take.", default=60.0, least=1.0)
-    memory_limit: int = option("Megabytes that a file or a sheet may take.", default=1500, least=300)
-    watch: bool = option("Grade what comes into the folder, too, until Ctrl+C.", "--watch", default=False)
-    every: float = option("With --watch: seconds between two looks.", default=5.0, least=0.1)
+    time_limit: float = option("Time limit for a file or a sheet, seconds.", default=60.0, least=1.0)
+    memory_limit: int = option("Memory limit for a file or a sheet, megabytes.", default=1500, least=300)
+    watch: bool = option("Also grade new files in the folder, until Ctrl+C.", "--watch", default=False)
+    every: float = option("With --watch: seconds between two checks.", default=5.0, least=0.1)
     cluster: str | None = option(
         "Scheduler of a Dask cluster that does the work; FOLDER may be s3://bucket/class then.",
         metavar="ADDRESS",
@@ -237,8 +237,8 @@ class ExportOptions:
     maximum: float | None = option("The grade item's maximum.")
     rescale: bool = option("Convert points to the platform's.", "--rescale", default=False)
     visibility: str | None = option("Gradescope: visible, hidden, after_due_date, after_published.")
-    course_id: str | None = option("The platform's own, of the course or class.")
-    assignment_id: str | None = option("The platform's own, of the assignment.")
+    course_id: str | None = option("The platform's ID of the course or class.")
+    assignment_id: str | None = option("The platform's ID of the assignment.")
     cmid: int | None = option("Moodle's number of the activity: the id in its address.", least=1)
     context_id: int | None = option("Moodle's number of the activity's context.", least=1)
     replace_guide: Path | None = option(
@@ -292,19 +292,19 @@ class ReviewOptions:
     """The options of ``planmark review``."""
 
     host: str = option("Address to listen on; other machines need the --token, too.", default="127.0.0.1")
-    token: str = option("What people must have in the address: 8 signs or more.", default="")
+    token: str = option("Secret required in the address: at least 8 characters.", default="")
     port: int = _port(8321)
     jobs: int | None = _jobs()
-    lang: str | None = _lang("Of the page: en, ro or ru; as graded if absent.", None)
+    lang: str | None = _lang("Language of the page: en, ro or ru (default: as graded).", None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServeOptions:
     """The options of ``planmark serve``."""
 
-    host: str = option("Address to listen at; others reach 0.0.0.0.", default="127.0.0.1")
+    host: str = option("Address to listen on; 0.0.0.0 admits other machines.", default="127.0.0.1")
     port: int = _port(8000)
-    address: str | None = option("Under which students reach it: https://NAME.")
-    database: str | None = option("postgresql+psycopg://...; SQLite in the folder if not given.")
-    mail: str | None = option("smtps://USER@HOST/SENDER sends links to new passwords.")
+    address: str | None = option("The address that students use: https://NAME.")
+    database: str | None = option("postgresql+psycopg://... (default: SQLite in the folder).")
+    mail: str | None = option("Mail server for links to new passwords: smtps://USER@HOST/SENDER.")
     jobs: int | None = _jobs()

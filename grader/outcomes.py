@@ -73,13 +73,13 @@ class Outcome:
     name : the vector, angular quantity or scale judged
     verdict : full, partial, none, follow_through, review, not_judged
     possible : under review, the verdicts it lies between (worst, best); else twice the verdict
-    measured, expected, tolerance : the evidence; `expected` is against the original data, or
-        against the student's own earlier values where the verdict is follow_through
+    measured, expected, tolerance : the evidence; `expected` follows the original data, or the student's own
+        earlier values if the verdict is follow_through
     confidence : that the verdict is right
-    reasons : most important first; empty only for a declared scale that nothing can be held against
+    reasons : most important first; empty only for a declared scale that cannot be compared with anything
     mistake : code of the mistake that explains a loss, or None
-    cause : that mistake, where diagnosis found it
-    shares : of the points, that `possible` gives; empty where the verdicts alone say it
+    cause : that mistake, if the diagnosis found it
+    shares : shares of the points for `possible`; empty if the verdicts alone determine them
     probability : that the verdict is right; under review, that the proposed share is
     proposed : the likeliest share of the points
     """
@@ -101,7 +101,7 @@ class Outcome:
 
     @property
     def proposed_verdict(self) -> Verdict:
-        """The verdict that the proposed share gives."""
+        """The verdict that corresponds to the proposed share."""
         if self.proposed == 1.0:
             return "follow_through" if "follow_through" in self.possible else "full"
         return "none" if self.proposed == 0.0 else "partial"
@@ -109,17 +109,17 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class NamedMistake:
-    """A mistake that is named to a student, because it explains what is off.
+    """A mistake that is named to a student, because it explains errors.
 
     Attributes
     ----------
     mistake : what was done instead of the right thing
-    explains : the criteria that lost by it
+    explains : the criteria that lost points by it
     confidence : the probability that it was made
-    line : where a line was drawn wrongly: ``from`` a node, the ``link`` that gives its direction, and
-        ``line = guide`` where it follows a guide, ``driven across`` or ``driven along`` of the driven link
-    rivals : mistakes that explain it nearly as well: what was handed in (lengths alone, say) does not tell
-        them apart
+    line : how a line was drawn wrongly: ``from`` a node, the ``link`` that gives its direction, and ``line =
+        guide`` if it follows a guide, ``driven across`` or ``driven along`` for the driving link
+    rivals : mistakes that explain it nearly as well: the submission (lengths alone, say) cannot tell them
+        apart
     """
 
     mistake: Mistake
@@ -135,12 +135,12 @@ class NamedMistake:
 
     @property
     def at(self) -> str:
-        """The node, vector, scale or figure that it was made at."""
+        """The node, vector, scale or figure where it was made."""
         return self.mistake.at
 
     @property
     def detail(self) -> dict[str, float | str]:
-        """What is known of it beside code and place, by the names that reports and sentences use."""
+        """Details of it besides code and place, by the names that reports and sentences use."""
         return {**_detail(self.mistake), **self.line}
 
 
@@ -174,10 +174,10 @@ class UsedScale:
 
     Attributes
     ----------
-    text : as the student wrote it, None where not declared
-    declared : parsed, None where not declared or refused
-    used : what the marking used
-    assumed : whether `used` is the assignment's rule or the drawn crank instead of the declared
+    text : as the student wrote it, None if not declared
+    declared : parsed, None if not declared or refused
+    used : the scale used for marking
+    assumed : whether `used` comes from the assignment's rule or the drawn crank instead of the declaration
     refused : why a declared text was not accepted, or None
     """
 
@@ -190,14 +190,13 @@ class UsedScale:
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """Points: `total` is None while anything is under review; `low`, `high` say between what.
+    """Points: `total` is None while anything is under review; `low` and `high` are its limits.
 
     Attributes
     ----------
-    points : by criterion; None where under review or not judged
-    expected : the mean of the total over what the verdicts may be; None where nothing was judged
-    maximum : the rubric's total; `total`, `low` and `high` are scaled to it where criteria were
-        not judged
+    points : by criterion; None if under review or not judged
+    expected : the mean of the total over the possible verdicts; None if nothing was judged
+    maximum : the rubric's total; `total`, `low` and `high` are scaled to it if criteria were not judged
     """
 
     points: Mapping[str, float | None]
@@ -210,7 +209,7 @@ class Score:
 
 @dataclass(frozen=True, slots=True)
 class Unfit:
-    """How many vectors fit nothing, `of` so many that were handed in."""
+    """The number of vectors that fit no explanation, `of` the number handed in."""
 
     vectors: int
     of: int
@@ -220,7 +219,7 @@ class Unfit:
 class Judgement:
     """All results of marking one submission.
 
-    `unfit` : the vectors that no explanation reaches; None where one reaches every plan
+    `unfit` : the vectors that no explanation reaches; None if one reaches every plan
     """
 
     outcomes: tuple[Outcome, ...]
@@ -231,5 +230,5 @@ class Judgement:
 
     @property
     def needs_review(self) -> bool:
-        """Whether a person must look before the score counts."""
+        """True if a person must look before the score counts."""
         return self.score.total is None

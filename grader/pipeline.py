@@ -1,4 +1,4 @@
-"""How a sheet becomes a mark: one submission, top to bottom.
+"""Mark a sheet: the whole way of one submission, top to bottom.
 
     file -> page (pixels) -> sheet (millimetres) -> ink (strokes) -> reading (named vectors)
          -> judgement (verdicts, mistakes, points) -> report and pictures

@@ -1,4 +1,4 @@
-"""The records that flow between the stages, frozen, with arrays inside.
+"""The records passed between the stages, frozen, with arrays inside.
 
 Sheet coordinates are millimetres from the upright sheet's top left corner, x right, y down.
 Where a record holds a *complex* position it is x - i y: y points up, so that the argument of a
@@ -19,7 +19,7 @@ Box = tuple[float, float, float, float]
 """x, y, width, height in sheet millimetres."""
 
 ZONE_SLACK_MM = 2.0
-"""Half of the gap between the zones of a printed sheet: a line may run a little past its zone's edge."""
+"""Half of the gap between the zones of a printed sheet: a line may extend a little past its zone's edge."""
 
 MECHANISM = "mechanism"
 VELOCITY_PLAN = "velocity_plan"
@@ -36,7 +36,7 @@ class Reason:
     Attributes
     ----------
     code : stable, as in `docs/errors.md` or `grader.outcomes`
-    parameters : what the sentence names: numbers (`_mm`, `_deg`, `_px`, `_s`, `_percent` end the names of
+    parameters : values used in the sentence: numbers (`_mm`, `_deg`, `_px`, `_s`, `_percent` end the names of
         those with a unit), names of vectors and nodes, texts as written; `why` and `advice` are codes of
         clauses of their own
     file : the file that it concerns
@@ -66,13 +66,13 @@ class Page:
     Attributes
     ----------
     source, page : file name as the user gave it, and page number from 1
-    grey : (h, w) uint8, 255 = paper, printed squares taken out
+    grey : (h, w) uint8, 255 = paper, printed squares removed
     dpi : horizontal and vertical resolution that the file states, or None
     turn_deg : counter-clockwise turn that the file asks viewers to apply (EXIF, PDF), 0/90/180/270
-    paper_mm : width and height of the stored image on paper where the file states it (PDF), or None
-    damage : first and last damaged row, where the file shows it; empty for a whole page
-    turn_is_sure : a person said the turn: the page is read no other way up
-    ruling : the printed squares of its paper, None where there are none
+    paper_mm : width and height of the stored image on paper if the file states it (PDF), or None
+    damage : first and last damaged row, if the file shows damage; empty for a whole page
+    turn_is_sure : a person confirmed the turn: no other orientation is tried
+    ruling : the printed squares of its paper, or None
     """
 
     source: str
@@ -88,32 +88,32 @@ class Page:
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """Whose page this is, as its QR code says."""
+    """The owner of a page, according to its QR code."""
 
     assignment: str
     student_id: str
     n: int | None
     position: int | None
     kind: str
-    """`all`, `velocity` or `acceleration`: which drawing the page is for."""
+    """The drawing that the page is for: `all`, `velocity` or `acceleration`."""
 
 
 @dataclass(frozen=True, slots=True)
 class PageRef:
-    """A page of a file that was handed in, and what is known of it.
+    """A page of a submitted file, and what is known about it.
 
     Attributes
     ----------
-    file, page, pages : the file's name as the user knows it, the page from 1, how many pages the file has
+    file, page, pages : the file's name as the user knows it, the page from 1, the number of pages in the file
     blank : nobody drew on it
     identity : from its QR code, or None
-    digest : of the file's content, empty where any content will do
+    digest : of the file's content, empty if any content will do
     problem : why the page cannot be used, or None; such a page is not opened again
-    path : where the file is
+    path : path of the file
     content : digest of its pixels, empty before it is decoded: the same page may come in another file
-    turn_deg : counter-clockwise turn that makes it upright, where a person said so
-    corners_px : the sheet's corners, from the upright sheet's top left clockwise, stored pixels, where a
-        person gave them; else empty
+    turn_deg : counter-clockwise turn that makes it upright, if a person gave it
+    corners_px : the sheet's corners, from the upright sheet's top left clockwise, stored pixels, if a person
+        gave them; else empty
     """
 
     file: str
@@ -134,7 +134,7 @@ class PageRef:
 
 @dataclass(frozen=True, slots=True)
 class Lens:
-    """How a camera's lens bent the picture, see `grader.scan.register.distortion`.
+    """Distortion of the picture by the camera's lens, see `grader.scan.register.distortion`.
 
     Attributes
     ----------
@@ -187,7 +187,7 @@ class Sheet:
     lens: Lens | None = None
 
     def longer(self, factor: float, scale_se: float) -> "Sheet":
-        """The same page where every length is so many times what it was taken for."""
+        """Return the page with every length scaled by a factor."""
         shorter = np.diag([1.0 / factor, 1.0 / factor, 1.0])
         matrix, lens = self.mm_to_px @ shorter, self.lens
         if lens is not None:
@@ -199,9 +199,9 @@ class Sheet:
         )  # fmt: skip
 
     def boxes_of(self, figures: Collection[str]) -> list[Box] | None:
-        """The zones of these figures with the gap around them, where they are not all there are.
+        """Return the zones of these figures with the gap around them, unless they are all of the sheet's.
 
-        None stands for the whole sheet; of the sketch alone there are no boxes.
+        None stands for the whole sheet; the sketch alone has no boxes.
         """
         if not figures or self.zones.keys() <= set(figures):
             return None
@@ -240,12 +240,12 @@ class Strokes:
 
 
 HEAD_AHEAD, HEAD_BACK, TAIL_AHEAD, TAIL_BACK = range(4)
-"""What `Tips.kind` tells: a vector's head or tail, of one that points along its stroke or against it."""
+"""Values of `Tips.kind`: a vector's head or tail, of a vector along its stroke or against it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Tips:
-    """Where vectors end along strokes, by arrowheads, dots, circles and lines that meet there.
+    """Ends of vectors along strokes, found by arrowheads, dots, circles and lines that meet there.
 
     Attributes
     ----------
@@ -268,7 +268,7 @@ NO_TIPS = Tips(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64), np.zer
 
 
 FAINT = 25
-"""Of 255: ink map values up to this are paper."""
+"""Ink map values up to this, of 255, are paper."""
 BESIDE_PX = 3
 """Half a millimetre beside a segment still belongs to it."""
 
@@ -287,7 +287,7 @@ class InkMap:
     px_per_mm: float
 
     def share_inked(self, first: complex, last: complex, beside_px: int = BESIDE_PX) -> float:
-        """The share of the middle of a segment (complex mm) that has ink on it or beside it, 0..1."""
+        """Return the share of a segment's middle part (complex mm) with ink on it or beside it, 0..1."""
         along = np.linspace(0.25, 0.75, max(int(abs(last - first)), 4))
         at = (first + along * (last - first)) * self.px_per_mm
         beside = 1j * np.exp(1j * np.angle(last - first)) * np.arange(-beside_px, beside_px + 1)
@@ -333,15 +333,15 @@ class NodePlaces:
 
 @dataclass(frozen=True, slots=True)
 class Letters:
-    """Pieces of ink that can be written signs, a row each, with what each may be.
+    """Pieces of ink that may be written signs, one per row, with the probability of each sign.
 
     Attributes
     ----------
     box_mm : (k, 4) x, y, width, height in sheet mm, y down
-    probability : (k, s) of each sign; a row's sum is 1, with the probability that it is no sign
-    whole : (k,) a piece of ink of its own; otherwise what was left when strokes were taken out
-    column : the columns of `probability` by sign; `""` is no sign, and signs that look alike at any
-        size (o, O and 0) share one
+    probability : (k, s) of each sign; a row's sum is 1, including the probability that it is no sign
+    whole : (k,) a separate piece of ink; otherwise what was left after strokes were removed
+    column : the columns of `probability` by sign; `""` is no sign, and signs that look alike at any size (o,
+        O and 0) share one
     """
 
     box_mm: FloatArray
@@ -364,7 +364,7 @@ class Letters:
         return self.box_mm[:, 3]
 
     def chance(self, sign: str) -> FloatArray:
-        """(k,) probability of a sign. Raises KeyError for one that is not told apart."""
+        """(k,) probability of a sign. Raises KeyError for a sign that is not distinguished."""
         return self.probability[:, self.column[sign]]
 
 
@@ -376,11 +376,11 @@ class Ink:
     ----------
     strokes : straight strokes
     circles : (m, 3) small circles (joints, pivots) and arcs closed enough to have a centre: x, y, r
-    marks : (j, 4) boxes x, y, w, h of what is neither: letters, digits, hatching, blobs
+    marks : (j, 4) boxes x, y, w, h of everything else: letters, digits, hatching, blobs
     where : the ink map
-    letters : what can be written signs, None where they were not looked for
-    tips : where vectors end along the strokes
-    problems : what of the page was left out, or may be
+    letters : possible written signs, None if they were not looked for
+    tips : ends of vectors along the strokes
+    problems : parts of the page that were, or may have been, left out
     """
 
     strokes: Strokes
@@ -392,7 +392,7 @@ class Ink:
     problems: tuple[Reason, ...] = ()
 
     def longer(self, factor: float) -> "Ink":
-        """The same ink where every length is so many times what it was taken for."""
+        """Return the ink with every length scaled by a factor."""
         strokes, letters = self.strokes, self.letters
         return replace(
             self,
@@ -416,7 +416,7 @@ class ReadNode:
     ----------
     at : complex, x - i y in sheet millimetres
     cov : (2, 2) covariance in mm^2, axes x and y up
-    confidence : probability that the name is right and the place within 0.5 mm of what was drawn
+    confidence : probability that the name is right and the position within 0.5 mm of what was drawn
     """
 
     at: complex
@@ -431,9 +431,9 @@ class ReadNode:
 
 @dataclass(frozen=True, slots=True)
 class OtherReading:
-    """Another explanation's vector of the same name.
+    """The vector that another explanation gives the same name.
 
-    `confidence`: probability that the vector is this one, or one that is named before it.
+    `confidence`: probability that the vector is this one, or one listed before it.
     """
 
     length_mm: float
@@ -447,10 +447,10 @@ class ReadVector:
 
     Attributes
     ----------
-    length_mm, se_mm : length on paper; None where only a direction or value is known
+    length_mm, se_mm : length on paper; None if only a direction or value is known
     direction_deg, se_deg : counter-clockwise from the sheet's +x, 0 <= d < 360; None if not known
     confidence : probability that this is the vector named, within 0.5 mm
-    others : what else it may be, likeliest first
+    others : other possible readings, likeliest first
     """
 
     length_mm: float | None
@@ -471,11 +471,11 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """What was written: a scale in its printed box or behind its label on plain paper, or a number.
+    """Handwriting as read: a scale in its printed box or behind its label on plain paper, or a number.
 
     Attributes
     ----------
-    text : the likeliest text; empty where nothing could be read
+    text : the likeliest text; empty if nothing could be read
     confidence : probability that this is what was written, whatever its spelling
     others : texts of other meaning with their probabilities, likeliest first
     """
@@ -487,7 +487,7 @@ class Written:
 
 @dataclass(frozen=True, slots=True)
 class Unread:
-    """A node or vector that was asked for and not read, and why. False in a condition.
+    """A requested node or vector that was not read, and why. False in a condition.
 
     `is_blank`: there is no ink where it must be, in a figure that was read.
     """
@@ -502,7 +502,7 @@ class Unread:
 
 @dataclass(frozen=True, slots=True)
 class Swapped:
-    """Two nodes of a plan that have each other's letter beside them, with the probability of it."""
+    """Two nodes of a plan whose letters are exchanged, with the probability of it."""
 
     figure: str
     first: str
@@ -512,17 +512,16 @@ class Swapped:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What was drawn (or measured by hand), with names.
+    """A drawing as read (or as measured by hand), with names.
 
     Attributes
     ----------
-    figures : by `mechanism`, `velocity_plan`, `acceleration_plan`; absent where not on the sheet
-    unread : what was asked for and not read
+    figures : by `mechanism`, `velocity_plan`, `acceleration_plan`; absent if not on the sheet
+    unread : requested nodes and vectors that were not read
     problems : what a person should know
-    written : what stands in the printed boxes, or in captions on plain paper, by scale; empty boxes are left
-        out
-    lengths : measured lengths that stand in the printed cells, mm, and the probability of it, by vector
-    swapped : letters that stand at each other's node; the figures keep the construction's names
+    written : contents of the printed boxes, or of captions on plain paper, by scale; empty boxes are left out
+    lengths : measured lengths from the printed cells, mm, with their probability, by vector
+    swapped : exchanged letters; the figures keep the construction's names
     """
 
     figures: Mapping[str, Figure]
@@ -535,12 +534,12 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class Backdrop:
-    """A page cleaned to draw on: upright where it could be registered, else turned as its file asks.
+    """A page cleaned for drawing on it: upright if registered, else turned as its file asks.
 
     Attributes
     ----------
     scan : (h, w) uint8
-    page_mm : what its whole width and height are on paper
+    page_mm : its whole width and height on paper
     registered : whether sheet millimetres are known on it
     """
 
@@ -557,13 +556,13 @@ class ScannedPage:
 
     Attributes
     ----------
-    image : its pixels; None before it is decoded, and once they are not needed any more
-    sheet, ink : its registration and its strokes; None from where the page was refused, `problems` say why
-    reading : what was written and drawn, with names
+    image : its pixels; None before it is decoded, and once they are no longer needed
+    sheet, ink : its registration and its strokes; None if the page was refused, `problems` say why
+    reading : handwriting and drawing, with names
     timing_ms : by stage
-    narrowed : zones of the printed sheet were passed over because nothing in them is asked for
-    backdrop : the cleaned scan to draw on; None where the page could not be decoded
-    flaws : what of the picture spoils reading
+    narrowed : zones of the printed sheet were skipped because nothing in them is asked for
+    backdrop : the cleaned scan to draw on; None if the page could not be decoded
+    flaws : flaws of the picture that impair reading
     """
 
     ref: PageRef
@@ -578,7 +577,7 @@ class ScannedPage:
     flaws: tuple[Reason, ...] = ()
 
     def longer(self, factor: float, scale_se: float) -> "ScannedPage":
-        """The same page where every length is so many times what it was taken for; before it is read."""
+        """Return the page, before it is read, with every length scaled by a factor."""
         sheet, ink, behind = self.sheet, self.ink, self.backdrop
         if behind is not None:
             wide, high = behind.page_mm
@@ -591,6 +590,6 @@ class ScannedPage:
         )
 
     def asked_only(self, names: Collection[str]) -> "ScannedPage":
-        """The page, with what could not be read as far as it is asked for; all of it without `names`."""
+        """Return the page with only the requested names among its unread ones; unchanged without `names`."""
         unread = tuple(gap for gap in self.reading.unread if not names or gap.name in names)
         return replace(self, reading=replace(self.reading, unread=unread))

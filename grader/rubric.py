@@ -1,4 +1,4 @@
-"""Rubrics: what is asked for, the points it gives, and the tolerances.
+"""Rubrics: the requested criteria, their points, and the tolerances.
 
 All numbers that judge a student are data of the rubric: the tolerances on paper and the drafting errors
 for which they are widened, the bands of partial points, the verdict on what was not handed in.
@@ -25,21 +25,21 @@ NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 
 class Band(Authored):
-    """Partial points: up to `factor` times the tolerance there is this share of them."""
+    """Partial points: this share for an error up to `factor` times the tolerance."""
 
     factor: Annotated[float, Field(ge=1.0, allow_inf_nan=False)]
     share: Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class ToleranceTable(Authored):
-    """How far off full marks may be.
+    """Largest errors for full marks.
 
-    Length: the larger of `length_mm` and `length_relative` of the expected length. Direction: the
-    larger of `direction_deg` and the angle at which the vector's end is `across_mm` off. Vectors
-    shorter than `least_mm` (expected) have no direction that could be judged. Up to
-    `partial_factor` times the tolerance gives half points; `bands` in its place gives several steps.
-    A verdict on a scan that is another one within `certain_errors` standard errors of the reading
-    goes to a person: 1.645 leaves one in twenty that lie just at a limit on the wrong side of it.
+    Length: the larger of `length_mm` and `length_relative` of the expected length. Direction: the larger of
+    `direction_deg` and the angle at which the vector's end is `across_mm` off. Vectors shorter than
+    `least_mm` (expected) have no direction to judge. Up to `partial_factor` times the tolerance gives half
+    points; `bands` replaces it by several steps. If the verdict on a scan changes within `certain_errors`
+    standard errors of the reading, a person decides: 1.645 leaves one in twenty of the cases just at a limit
+    on its wrong side.
     """
 
     length_mm: Positive = 1.0
@@ -75,17 +75,17 @@ class ToleranceTable(Authored):
 
     @property
     def farthest(self) -> float:
-        """How many times the tolerance still gives points."""
+        """The largest multiple of the tolerance that still gives points."""
         return self.all_bands[-1][0] if self.all_bands else 1.0
 
     def length_at(self, expected_mm: float) -> float:
-        """The tolerance of a length, millimetres: the larger of the absolute and the relative one."""
+        """Return the tolerance of a length, mm: the larger of the absolute and the relative one."""
         return max(self.length_mm, self.length_relative * expected_mm)
 
     def direction_at(self, expected_mm: float) -> float | None:
-        """The tolerance of a direction, degrees: the larger of the fixed one and that of the end across.
+        """Return the tolerance of a direction, deg: the larger of the fixed one and that of the end across.
 
-        None where the vector is too short to judge its direction.
+        None if the vector is too short to judge its direction.
         """
         if expected_mm < self.least_mm or expected_mm == 0.0:
             return None
@@ -93,17 +93,17 @@ class ToleranceTable(Authored):
 
 
 class HandTable(Authored):
-    """A careful hand's errors, standard deviations of one act, for which tolerances are widened.
+    """Errors of careful drawing, standard deviations of one act, for which tolerances are widened.
 
-    `angle_deg`: a line set along or across another; `place_mm`: a length transferred, an arc opened, the
-    foot of a line by half of it; `mark_mm`: a point marked. `ruler_mm` and `protractor_deg`: a length and
-    a direction measured and written down. A right drawing may be off by `sigmas` standard deviations of
-    what these make of it together; 0 leaves the tolerances as they are. No tolerance grows to more than
-    `at_most` times itself: a mistake could hide in it. What is off by more, yet by no more than a careful
-    hand may be, goes to a person.
+    `angle_deg`: a line set along or across another; `place_mm`: a length transferred, an arc opened, half of
+    it for the foot of a line; `mark_mm`: a point marked. `ruler_mm` and `protractor_deg`: a length and a
+    direction measured and written down. A right drawing may deviate by `sigmas` standard deviations of their
+    combined effect; 0 leaves the tolerances unchanged. No tolerance grows to more than `at_most` times
+    itself: a mistake could hide in it. A larger error that careful drawing can still explain goes to a
+    person.
 
-    Careful plotting is good to 0.1-0.4 mm, 0.25 mm usually taken; at both ends of a line of 70 mm that is
-    0.3 degrees. Rulers are read to half a millimetre, protractors to a degree.
+    Careful plotting is good to 0.1-0.4 mm, 0.25 mm usually taken; at both ends of a line of 70 mm that is 0.3
+    degrees. Rulers are read to half a millimetre, protractors to a degree.
     """
 
     angle_deg: NotNegative = 0.3
@@ -116,14 +116,14 @@ class HandTable(Authored):
 
 
 class DoubtTable(Authored):
-    """When a verdict stands without a person.
+    """Conditions under which a verdict needs no person.
 
-    A verdict whose probability is at least `settle` is settled. `in_doubt` decides what lies within
-    `certain_errors` standard errors of the reading of a limit: for the `student` (it counts), by a
-    `person`, or `strict` (only what is within the limit for certain counts); these are the decision
-    rules of ISO 14253-1 and JCGM 106. Where no more than `stake` of the maximum is left open, it is
-    settled in the student's favour. `other_variant`: another student's data are left to a `person`,
-    earn `none`, or are marked as any mistake (`follow`).
+    A verdict whose probability is at least `settle` is settled. `in_doubt` decides cases within
+    `certain_errors` standard errors of a limit: for the `student` (it counts), by a `person`, or `strict`
+    (only what is certainly within the limit counts); these are the decision rules of ISO 14253-1 and JCGM
+    106. If no more than `stake` of the maximum is open, it is settled in the student's favour.
+    `other_variant`: another student's data go to a `person`, earn `none`, or are marked as any mistake
+    (`follow`).
     """
 
     settle: Annotated[float, Field(ge=0.5, le=1.0)] = 0.97
@@ -136,7 +136,7 @@ Section = Literal["mechanism", "scales", "velocity_plan", "acceleration_plan", "
 
 
 class WeightsTable(Authored):
-    """What a section of the rubric is worth, whatever the points within it add up to."""
+    """The weight of each section of the rubric, whatever the sum of its points."""
 
     mechanism: Positive | None = None
     scales: Positive | None = None
@@ -148,8 +148,8 @@ class WeightsTable(Authored):
 class CriterionTable(Authored):
     """One criterion: exactly one of a `vector`, an `angular` quantity, a `scale` or a `link`, and its points.
 
-    `optional`: not judged where it was not handed in. `direction = false`: only the length counts.
-    `tolerance` replaces the rubric's for this criterion, `follow_through` the rubric's too.
+    `optional`: not judged if it was not handed in. `direction = false`: only the length counts. `tolerance`
+    replaces the rubric's for this criterion, so does `follow_through`.
     """
 
     id: Identifier
@@ -172,7 +172,7 @@ class CriterionTable(Authored):
 
     @property
     def name(self) -> str:
-        """The vector, angular quantity, scale or link asked for."""
+        """The requested vector, angular quantity, scale or link."""
         return self.vector or self.angular or self.scale or self.link or ""
 
     @property
@@ -198,15 +198,15 @@ class RubricFile(Authored):
     doubt: DoubtTable = DoubtTable()
     weights: WeightsTable = WeightsTable()
     missing: Literal["review", "none", "not_judged"] = "none"
-    """The verdict on what is asked for and was not handed in; a blank in a table is never `review`."""
+    """The verdict on a requested item that was not handed in; a blank in a table is never `review`."""
     least_confidence: Annotated[float, Field(ge=0.0, le=1.0)] = 0.9
-    """What is read with less is no evidence of what follows from it."""
+    """A value read with less confidence is no evidence for follow-through."""
     follow_through: bool = True
     least_followed_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.2
-    """What follows from an earlier answer that makes it shorter than this share of the right length is
-    not judged: such a follow-through is trivial."""
+    """If an earlier answer makes a vector shorter than this share of the right length, it is not judged: such
+    a follow-through is trivial."""
     values_alone: bool = False
-    """Whether a computed value counts for a vector without its drawn length."""
+    """True if a computed value counts for a vector without its drawn length."""
     criterion: Annotated[list[CriterionTable], Field(min_length=1)]
 
     @property
@@ -216,19 +216,19 @@ class RubricFile(Authored):
 
     @property
     def vectors(self) -> tuple[str, ...]:
-        """The vectors asked for."""
+        """The requested vectors."""
         return tuple(criterion.vector for criterion in self.criterion if criterion.vector)
 
     @property
     def needs_accelerations(self) -> bool:
-        """Whether anything asked for needs the acceleration plan."""
+        """True if any criterion needs the acceleration plan."""
         return any(c.name.startswith(("a_", "epsilon_")) or c.scale == "ka" for c in self.criterion)
 
     def tolerance_of(self, asked: CriterionTable | str) -> ToleranceTable:
-        """The tolerance of a criterion, or of the vector, angular quantity, scale or link of that name.
+        """Return the tolerance of a criterion, or of the vector, angular quantity, scale or link so named.
 
-        It is the criterion's own, else the rubric's. Where several criteria ask for the same name, the
-        first one with a tolerance of its own counts for it.
+        It is the criterion's own, else the rubric's. If several criteria ask for the same name, the first one
+        with a tolerance of its own counts for it.
         """
         if not isinstance(asked, str):
             return asked.tolerance or self.tolerance
@@ -236,7 +236,7 @@ class RubricFile(Authored):
         return next(own, self.tolerance)
 
     def follows_through(self, criterion: CriterionTable) -> bool:
-        """Whether full marks are given for what follows rightly from an earlier wrong value."""
+        """Return whether full marks are given for values that follow from an earlier wrong value."""
         return self.follow_through if criterion.follow_through is None else criterion.follow_through
 
     @property
@@ -248,7 +248,7 @@ class RubricFile(Authored):
         return {one.id: one.points * factors[one.section] for one in self.criterion}
 
     def weight_of(self, section: Section) -> float | None:
-        """What a section is worth whatever its points add up to; None where its points say it."""
+        """Return the weight of a section; None if its points determine it."""
         weight: float | None = getattr(self.weights, section)
         return weight
 
@@ -266,11 +266,11 @@ class RubricFile(Authored):
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """The figures and vectors to read on pages; everything where no figure is named.
+    """The figures and vectors to read on pages; everything if no figure is named.
 
     Attributes
     ----------
-    figures : those that a rubric asks anything of, and the sketch
+    figures : those that a rubric has criteria for, and the sketch
     vectors : all vectors of these figures
     entries : the vectors whose measured lengths have cells on the printed sheets of the `assignment`
     """
@@ -287,7 +287,7 @@ class Asked:
 
 
 def asked_of(assignment: Assignment, rubric: RubricFile) -> Asked:
-    """What a rubric asks to be read."""
+    """Return what must be read for a rubric."""
     construction = construction_for(assignment, accelerations=rubric.needs_accelerations)
     known = [construction.vectors[name] for name in rubric.vectors if name in construction.vectors]
     plans = dict.fromkeys(construction.figure_of(vector.head) for vector in known)
@@ -297,7 +297,7 @@ def asked_of(assignment: Assignment, rubric: RubricFile) -> Asked:
 
 
 def check_rubric(rubric: RubricFile, construction: Construction) -> list[Finding]:
-    """Names in the rubric that the construction does not know."""
+    """Report names in the rubric that the construction does not know."""
     known = {
         "vector": tuple(construction.vectors),
         "angular": tuple(construction.rates),
@@ -318,9 +318,9 @@ def check_rubric(rubric: RubricFile, construction: Construction) -> list[Finding
 
 
 def rubric_of(assignment: Assignment) -> RubricFile:
-    """The rubric of an assignment, held against its mechanism.
+    """Return the rubric of an assignment, checked against its mechanism.
 
-    Raises AuthoredFileError with every fault, names that the mechanism does not have among them.
+    Raises AuthoredFileError with every fault, including names that the mechanism does not have.
     """
     rubric = load_rubric(assignment.file.rubric, beside=assignment.path)
     findings = check_rubric(rubric, construction_for(assignment))
@@ -331,7 +331,7 @@ def rubric_of(assignment: Assignment) -> RubricFile:
 
 
 def load_both(name: str | Path) -> tuple[Assignment, RubricFile]:
-    """An assignment and its rubric; raises AuthoredFileError with the faults of all their files together."""
+    """Load an assignment and its rubric; raises AuthoredFileError with the faults of all their files."""
     faults, loaded, rubric = Faults(), None, None
     path = locate("assignment", str(name))
     with faults:
@@ -347,7 +347,7 @@ def load_both(name: str | Path) -> tuple[Assignment, RubricFile]:
 
 
 def load_rubric(name: str | Path, *, beside: Path | None = None) -> RubricFile:
-    """A rubric by its built-in name, a neighbour of the assignment's file, or its path.
+    """Load a rubric by its built-in name, from beside the assignment's file, or by its path.
 
     Raises CallError for an unknown name, AuthoredFileError with every fault of the file.
     """
@@ -378,14 +378,14 @@ def _twice(rubric: RubricFile) -> Iterator[Finding]:
 
 
 def _reserved(rubric: RubricFile) -> Iterator[Finding]:
-    """Ids that mean something else where people decide."""
+    """Report ids that have another meaning in people's decisions."""
     for index, criterion in enumerate(rubric.criterion):
         if criterion.id in {"total", "comment"}:
             yield Finding(f"$.criterion[{index}].id", f"{criterion.id} has a meaning in decisions.csv")
 
 
 def _idle_weights(rubric: RubricFile) -> Iterator[Finding]:
-    """Weights of sections without criteria."""
+    """Report weights of sections without criteria."""
     kinds = {
         "mechanism": "link",
         "scales": "scale",

@@ -1,1 +1,1 @@
-"""What a perfect student draws: exact plane kinematics and its graphical construction."""
+"""Exact plane kinematics and its graphical construction: the plans of a perfect student."""

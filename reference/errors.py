@@ -16,15 +16,15 @@ from pathlib import Path
 from typing import Self
 
 MOST_FINDINGS = 20
-"""A person reads no more at a time; a hostile file has a million."""
+"""Findings shown at once: a hostile file may have a million."""
 _MOST_CHARACTERS = 500
-"""Of a line of a message: a name in the file may be a megabyte long."""
+"""Longest line of a message: a name in the file may be a megabyte long."""
 _LONGEST_NAME = 64
-"""Longer ones are like no name there is, and comparing them takes the square of their length."""
+"""Longer names match no known name, and comparing them takes the square of their length."""
 
 
 class PlanmarkError(Exception):
-    """What is wrong, where, and what to do. `code` is stable; the message is for people.
+    """An error that says what is wrong, where, and what to do. `code` is stable; the message is for people.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class PlanmarkError(Exception):
         self.code, self.parameters = code, parameters
 
     def __reduce__(self) -> tuple[object, ...]:
-        # Errors come back from worker processes as they were, whatever their classes are made from.
+        # Errors return from worker processes unchanged, whatever arguments their classes take.
         return (type(self).__new__, (type(self), self.message), self.__dict__)
 
 
@@ -50,7 +50,7 @@ class CallError(PlanmarkError):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One fault of an authored file: where (a path such as ``$.criteria[3].points``), what is right.
+    """One fault of an authored file: its path, such as ``$.criteria[3].points``, and what is right there.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Finding:
 
 
 def lines_of(findings: Sequence[object]) -> str:
-    """Findings as lines of a message: the first twenty, and how many more there are."""
+    """Format findings as lines of a message: the first twenty, and how many more there are."""
     lines = [str(finding) for finding in findings[:MOST_FINDINGS]]
     lines = [line if len(line) <= _MOST_CHARACTERS else f"{line[:_MOST_CHARACTERS]}..." for line in lines]
     if len(findings) > MOST_FINDINGS:
@@ -76,8 +76,13 @@ def lines_of(findings: Sequence[object]) -> str:
     return "\n".join(f"  {line}" for line in lines)
 
 
+def counted(count: int, noun: str) -> str:
+    """Return a number with its noun: ``1 fault``, ``2 faults``."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def near_names(name: str, known: Iterable[str], *, most: int = 2, cutoff: float = 0.6) -> list[str]:
-    """The known names that a misspelt name may stand for, the nearest first; case does not count.
+    """Return the known names that a misspelt name may stand for, nearest first, ignoring case.
 
     Arguments: `cutoff` is the least similarity, 0..1, as `difflib` counts it.
     """
@@ -88,7 +93,7 @@ def near_names(name: str, known: Iterable[str], *, most: int = 2, cutoff: float 
 
 
 def runs_of(numbers: Sequence[int]) -> list[list[int]]:
-    """Whole numbers in rising order, those that follow each other together."""
+    """Group ascending whole numbers into runs of consecutive ones."""
     runs: list[list[int]] = []
     for number in numbers:
         if runs and number == runs[-1][-1] + 1:
@@ -99,7 +104,7 @@ def runs_of(numbers: Sequence[int]) -> list[list[int]]:
 
 
 def ranges_of(numbers: Sequence[int]) -> str:
-    """Whole numbers in rising order in words: ``from 1 to 30``, or with gaps ``= 1..9, 11, 13, 14``."""
+    """Describe ascending whole numbers: ``from 1 to 30``, or with gaps ``= 1..9, 11, 13, 14``."""
     runs = runs_of(numbers)
     if len(runs) == 1:
         return f"from {numbers[0]} to {numbers[-1]}"
@@ -109,27 +114,27 @@ def ranges_of(numbers: Sequence[int]) -> str:
 
 
 def look_alikes(text: str) -> str:
-    """What to say of letters that only look Latin, as the Cyrillic А; nothing where there are none."""
+    """Return a remark on letters that only look Latin, such as the Cyrillic А; empty if there are none."""
     foreign = [letter for letter in text if letter.isalpha() and not letter.isascii()]
     names = dict.fromkeys(f"'{one}' is {unicodedata.name(one, 'no letter')}" for one in foreign[:3])
     return f" ({', '.join(names)}: type it on a Latin keyboard)" if names else ""
 
 
 class AuthoredFileError(PlanmarkError):
-    """A mechanism, assignment or rubric file: all its faults at once, and those of the files with it."""
+    """All faults of a mechanism, assignment or rubric file and of the files with it."""
 
     def __init__(
         self, file: str, findings: tuple[Finding, ...], others: Sequence["AuthoredFileError"] = ()
     ) -> None:
-        text = f"{file}: {len(findings)} fault(s)\n{lines_of(findings)}"
+        text = f"{file}: {counted(len(findings), 'fault')}\n{lines_of(findings)}"
         super().__init__("authored_file", "\n".join([text, *(other.message for other in others)]))
         self.file, self.findings, self.others = file, findings, tuple(others)
 
 
 class Faults:
-    """Gathers the faults of several files, to be told together.
+    """Gather the faults of several files, so that one error reports them all.
 
-    In a `with` block it takes what is raised, and the next block goes on; `tell` raises all of it.
+    Used in a `with` block, it catches AuthoredFileError, and the next block runs; `tell` raises all of them.
     """
 
     def __init__(self) -> None:
@@ -144,12 +149,12 @@ class Faults:
         return isinstance(error, AuthoredFileError)
 
     def add(self, file: Path, findings: Iterable[Finding]) -> None:
-        """The findings of one file, where there are any."""
+        """Add the findings of one file, if there are any."""
         if found := tuple(findings):
             self.errors.append(AuthoredFileError(str(file), found))
 
     def tell(self) -> None:
-        """Raises AuthoredFileError with everything that was gathered; nothing where there is nothing."""
+        """Raise AuthoredFileError with everything gathered; do nothing if there is nothing."""
         if self.errors:
             first, *others = self.errors
             raise AuthoredFileError(first.file, first.findings, others)

@@ -35,7 +35,7 @@ def direction(angle_rad: FloatArray) -> ComplexArray:
 
 
 def meet(p: ComplexArray, u: ComplexArray, q: ComplexArray, v: ComplexArray) -> ComplexArray:
-    """Where the line through p along u meets the line through q along v; nan where parallel."""
+    """Intersection of the line through p along u with the line through q along v; nan if parallel."""
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(p + u * (cross(q - p, v) / cross(u, v)))
 
@@ -43,7 +43,7 @@ def meet(p: ComplexArray, u: ComplexArray, q: ComplexArray, v: ComplexArray) -> 
 def two_arcs(
     p: ComplexArray, p_radius: FloatArray, q: ComplexArray, q_radius: FloatArray, side: int | FloatArray
 ) -> ComplexArray:
-    """The third corner of a triangle on pq by its other two sides; nan where it does not close.
+    """The third corner of a triangle on pq, given its other two sides; nan if the triangle does not close.
 
     Heron's formula in factors: 16 K^2 = (s - d)(s + d)(d - m)(d + m), s and m the sum and the
     difference of the radii, d = |pq|. Well conditioned up to the flat triangle itself.
@@ -65,7 +65,7 @@ def two_arcs(
 def arc_and_line(
     p: ComplexArray, radius: FloatArray, q: ComplexArray, u: ComplexArray, side: int | FloatArray
 ) -> ComplexArray:
-    """Where the arc about p meets the line through q along the unit vector u; nan where it does not.
+    """Intersection of the arc about p with the line through q along the unit vector u; nan if there is none.
 
     Arguments: `side` is +1 for the crossing ahead of p along u, -1 for the one behind.
     """

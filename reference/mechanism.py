@@ -1,4 +1,4 @@
-"""A planar mechanism for one variant or for many: ground, a driven link, Assur groups in order.
+"""A planar mechanism for one variant or for many: ground, a driving link, Assur groups in order.
 
 All numbers are SI and arrays that broadcast over variants and positions, shape (N,). Angles are
 counter-clockwise from +x. Branches are explicit signs, never starting guesses: `side` is +1 to the
@@ -21,7 +21,7 @@ Side = int | FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Crank:
-    """The driven link: pivot on the ground, pin at its end; `omega` may be negative (clockwise)."""
+    """The driving link: pivot on the ground, pin at its end; `omega` may be negative (clockwise)."""
 
     link: str
     pivot: str
@@ -31,12 +31,12 @@ class Crank:
     omega: FloatArray
     epsilon: FloatArray
     accelerated: bool
-    """Whether the mechanism has a crank acceleration at all: if not, a_A has no tangential part."""
+    """True if the crank has an angular acceleration: without one, a_A has no tangential part."""
 
 
 @dataclass(frozen=True, slots=True)
 class DrivenSlider:
-    """The driven link is a slider: its `pin` lies at `displacement_m` along a fixed guide."""
+    """The driving link is a slider: its `pin` lies at `displacement_m` along a fixed guide."""
 
     link: str
     pin: str
@@ -52,7 +52,7 @@ Driver = Crank | DrivenSlider
 
 @dataclass(frozen=True, slots=True)
 class FixedGuide:
-    """A straight guide on the ground, by a point of it (m) and its direction."""
+    """A straight guide on the ground, given by one of its points (m) and its direction."""
 
     through_m: ComplexArray
     angle_rad: FloatArray
@@ -157,12 +157,12 @@ class Plate:
 
     @property
     def line_ratio(self) -> FloatArray | None:
-        """Where the three points are in line for every variant: the ratio of `PointOnLine`."""
+        """The ratio of `PointOnLine` if the three points are in line for every variant, else None."""
         return np.asarray(self.shape.real) if np.all(self.shape.imag == 0.0) else None
 
     @property
     def is_ever_flat(self) -> bool:
-        """In line for some variant: its perpendiculars coincide, its image comes by similarity."""
+        """True if the three points are in line for some variant, so that the image comes by similarity."""
         return bool(np.any(self.shape.imag == 0.0))
 
 
@@ -198,7 +198,7 @@ Group = Dyad | Slider | SlottedLink | CrossSlider | Yoke | Plate | PointOnLine |
 
 @dataclass(frozen=True, slots=True)
 class Mechanism:
-    """Ground pivots (complex metres), the driven link, and the groups in the order of assembly."""
+    """Ground pivots (complex metres), the driving link, and the groups in order of assembly."""
 
     ground_m: Mapping[str, ComplexArray]
     driver: Driver
@@ -206,24 +206,24 @@ class Mechanism:
 
     @property
     def crank(self) -> Crank:
-        """The driven crank; raises ValueError where a slider drives."""
+        """The driven crank; raises ValueError if a slider drives."""
         if not isinstance(self.driver, Crank):
             raise ValueError("this mechanism is driven by a slider, not by a crank")  # noqa: TRY004
         return self.driver
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """All named points: ground pivots, the driven pin, then what each group adds."""
+        """Names of all joints: ground pivots, the driven pin, then what each group adds."""
         added = (joint for group in self.groups for joint in joints_of(group))
         return (*self.ground_m, self.driver.pin, *added)
 
     def is_ground(self, joint: str) -> bool:
-        """Whether a joint does not move."""
+        """Return whether a joint is fixed to the ground."""
         return joint in self.ground_m
 
 
 def translated(mechanism: Mechanism, by: ComplexArray) -> Mechanism:
-    """The whole mechanism translated by a vector, complex metres."""
+    """Return the mechanism translated by a vector, complex metres."""
 
     def onward(guide: Guide) -> Any:  # noqa: ANN401 - of the kind that it is given
         return replace(guide, through_m=guide.through_m + by) if isinstance(guide, FixedGuide) else guide
@@ -249,13 +249,13 @@ def driven_of(driver: Driver) -> FloatArray:
 
 
 def rows_of(mechanism: Mechanism, rows: Sequence[int] | np.ndarray) -> Mechanism:
-    """The mechanism of some of its variants."""
+    """Return the mechanism of some of its variants."""
     chosen: Mechanism = with_arrays(mechanism, lambda values: values[rows])
     return chosen
 
 
 def guides_of(group: Group) -> tuple[Guide, ...]:
-    """The guides on which a group slides."""
+    """Guides on which a group slides."""
     match group:
         case Slider(guide=guide) | Yoke(guide=guide):
             return (guide,)
@@ -279,13 +279,13 @@ def joints_of(group: Group) -> tuple[str, ...]:
 
 
 Array = np.ndarray[Any, np.dtype[Any]]
-"""Real or complex: one number for all variants, or one for each."""
+"""Real or complex numbers: one for all variants, or one for each."""
 PLAIN = (str, int, float, complex, NoneType)
-"""What a mechanism is made of besides records, tuples, mappings and arrays."""
+"""Types that a mechanism consists of besides records, tuples, mappings and arrays."""
 
 
 def with_arrays(part: Any, change: Callable[[Array], Any]) -> Any:  # noqa: ANN401 - the same kind of part
-    """A mechanism, or a part of it, with every array replaced, in the order of its fields."""
+    """Return a mechanism, or a part of it, with every array replaced, in the order of its fields."""
     if isinstance(part, np.ndarray):
         return change(part)
     if isinstance(part, PLAIN):
@@ -298,7 +298,7 @@ def with_arrays(part: Any, change: Callable[[Array], Any]) -> Any:  # noqa: ANN4
 
 
 def form_of(part: Any) -> Hashable:  # noqa: ANN401 - a mechanism, or whatever a part is made of
-    """All of a mechanism except the values of its arrays; equal for mechanisms with one construction."""
+    """Return all of a mechanism except the values of its arrays; equal if they share a construction."""
     if isinstance(part, np.ndarray):
         return str(part.dtype.kind)
     if isinstance(part, PLAIN):

@@ -1,4 +1,4 @@
-"""Functions on three kinds of numbers: arrays, Python's own, and numbers of many digits (mpmath).
+"""Functions for three kinds of numbers: arrays, Python's own, and numbers of many digits (mpmath).
 
 With them the closed forms of `reference.kinematics.assur` are written once. A root of a negative number
 is nan: the figure does not close there.
@@ -42,18 +42,18 @@ def nearest(x: Number) -> Number:
 
 
 def _library(x: Number) -> Any:  # noqa: ANN401 - a module, or mpmath's context, which has no types
-    """The library whose functions take numbers of this kind (not for Python's own)."""
+    """Return the library for numbers of this kind (not for Python's own)."""
     return np if isinstance(x, np.ndarray) else _mp()
 
 
 IN_QUARTERS = 0.6366197723675814
 """Quarter turns in a radian."""
 QUARTER_1, QUARTER_2, QUARTER_3 = 1.5707963267341256, 6.077100506303966e-11, 2.0222662487959506e-21
-"""A quarter turn in three parts, the first two of 33 bits: Cody and Waite's reduction of an angle."""
+"""A quarter turn in three parts, the first two of 33 bits: the Cody-Waite reduction of an angle."""
 
 
 def quarters(angle: Number) -> tuple[Number, Number]:
-    """The nearest number of quarter turns in an angle, and the rest, accurate by itself."""
+    """Split an angle into the nearest number of quarter turns and the rest, which keeps its own accuracy."""
     if not isinstance(angle, (float, np.ndarray)):  # a tuple: faster to ask than a union
         mp = _mp()
         turns = mp.nint(2 * angle / mp.pi)
@@ -63,7 +63,7 @@ def quarters(angle: Number) -> tuple[Number, Number]:
 
 
 def larger(x: Number, y: Number) -> Number:
-    """The larger of two; nan where either is."""
+    """The larger of two numbers; nan if either is nan."""
     if isinstance(x, float) and isinstance(y, float):
         return x if x > y or x != x else y  # noqa: PLR0124 - only nan differs from itself
     if isinstance(x, np.ndarray) or isinstance(y, np.ndarray):
@@ -72,7 +72,7 @@ def larger(x: Number, y: Number) -> Number:
 
 
 def where(condition: Any, x: Number, y: Number) -> Number:  # noqa: ANN401 - one truth, or an array of them
-    """One number where a condition holds, another where it does not."""
+    """Select x where a condition holds, y elsewhere."""
     if isinstance(condition, np.ndarray):
         return np.where(condition, x, y)
     return x if condition else y

@@ -1,4 +1,4 @@
-"""The exact plan of a variant, or of many: named nodes and vectors, in SI and in millimetres on paper.
+"""The exact plan of one or many variants: named nodes and vectors, in SI and in millimetres on paper.
 
 Taken from the closed form of `reference.kinematics.motion`, not from the construction: the two are
 independent, and tests compare them.
@@ -46,7 +46,7 @@ class Plan:
 
     @property
     def construction(self) -> Construction:
-        """How it is drawn."""
+        """The construction that draws the plan."""
         return self.drawing.construction
 
     def drawn_mm(self, vector: str) -> ComplexArray:
@@ -59,12 +59,12 @@ class Plan:
         return np.asarray(np.max([np.abs(node) for node in self.nodes_mm[figure].values()], axis=0))
 
     def is_zero(self, vector: str) -> NDArray[np.bool_]:
-        """Whether a vector's true length is zero but for rounding, against the size of its plan."""
+        """Return whether a vector's true length is zero, apart from rounding, relative to its plan's size."""
         figure = self.construction.figure_of(self.construction.vectors[vector].head)
         return np.asarray(np.abs(self.drawn_mm(vector)) <= ZERO_SHARE * self.size_mm(figure))
 
     def direction_deg(self, vector: str) -> FloatArray:
-        """Counter-clockwise from +x, 0 <= d < 360; nan for a zero vector."""
+        """Direction counter-clockwise from +x, 0 <= d < 360; nan for a zero vector."""
         angle = np.degrees(np.angle(self.drawn_mm(vector))) % 360.0 % 360.0
         return np.where(self.is_zero(vector), np.nan, angle)
 
@@ -72,7 +72,7 @@ class Plan:
 def construction_for(
     assignment: Assignment, variants: list[Variant] | None = None, *, accelerations: bool = True
 ) -> Construction:
-    """How an assignment's plans are drawn, of some variants; of the first where none are named."""
+    """Return the construction of an assignment's plans for some variants (default: the first one)."""
     return construction_of(
         assignment.mechanism(assignment.variants()[:1] if variants is None else variants),
         accelerations=accelerations,
@@ -87,7 +87,7 @@ def exact_plan(
     *,
     accelerations: bool = True,
 ) -> Plan:
-    """The exact plans of some variants, at the scales given or those that the assignment proposes.
+    """Return the exact plans of some variants, at the given scales or those that the assignment proposes.
 
     Raises MechanismError where a variant does not assemble.
     """
@@ -110,7 +110,7 @@ def exact_plan(
 def _nodes(
     construction: Construction, mechanism: Mechanism, motion: Motion, scales: Scales
 ) -> dict[str, dict[str, ComplexArray]]:
-    """Every node from the closed form: images of the joints, and ends of normal components."""
+    """Return every node from the closed form: images of the joints, and ends of normal components."""
     figures = {"mechanism": {joint: np.asarray(r / scales.kL) for joint, r in motion.position.items()}}
     for figure, pole in construction.poles.items():
         primed = figure == "acceleration_plan"
@@ -128,7 +128,7 @@ def _nodes(
 
 
 def vectors_of(construction: Construction, mechanism: Mechanism, motion: Motion) -> dict[str, ComplexArray]:
-    """Every vector of the plans from the closed form, complex, m/s and m/s^2, shape (N,)."""
+    """Return every vector of the plans from the closed form, complex, m/s and m/s^2, shape (N,)."""
     one = np.ones(1)
     nodes = _nodes(construction, mechanism, motion, Scales(one, one, one))
     return {
@@ -139,7 +139,7 @@ def vectors_of(construction: Construction, mechanism: Mechanism, motion: Motion)
 
 
 def _component(motion: Motion, vector: Vector) -> ComplexArray:
-    """A normal component v^2 / l towards the link's first joint, or a Coriolis one 2 i omega v."""
+    """Return a normal component v^2 / l towards the link's first joint, or a Coriolis one 2 i omega v."""
     pin, node = vector.link or ("", "")
     relative = motion.velocity[node] - motion.velocity[pin]
     if vector.turning is not None:
@@ -149,7 +149,7 @@ def _component(motion: Motion, vector: Vector) -> ComplexArray:
 
 
 def _measured(construction: Construction, motion: Motion) -> dict[str, FloatArray]:
-    """The real lengths that the construction measures on the sketch, of slotted links."""
+    """Return the real lengths that the construction measures on the sketch, of slotted links."""
     steps = (step.length for step in construction.steps if isinstance(step, Given))
     normals = (length for length in steps if isinstance(length, Normal) and length.measured)
     links = {length.length: length.measured for length in normals if length.measured}
@@ -165,7 +165,7 @@ def _rate(motion: Motion, name: str) -> FloatArray:
 
 
 def conditioning(plan: Plan) -> dict[str, FloatArray]:
-    """How well the plan can be computed and drawn.
+    """Return measures of how well the plan can be computed and drawn.
 
     ``transmission X``: |sin| on which joint X hangs; ``predicted_error``: relative error of the
     computed velocities and accelerations; ``crossing X``: the angle in degrees at which the
@@ -181,7 +181,7 @@ def conditioning(plan: Plan) -> dict[str, FloatArray]:
 def crossings_deg(
     construction: Construction, drawing: Drawing, nodes: Mapping[str, ComplexArray]
 ) -> dict[str, FloatArray]:
-    """The angle between the two construction lines of each node that is found by two lines."""
+    """Return the angle between the two construction lines of each node that two lines determine."""
     view = View(nodes, drawing.parameters)
     angles = {}
     for step in construction.steps:

@@ -8,14 +8,14 @@ KindName = Literal["length", "velocity", "acceleration", "omega", "epsilon"]
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of quantities.
+    """A kind of quantity.
 
     Attributes
     ----------
-    letter : what names of the kind begin with, before the first underscore
-    unit : SI, as files have it: ``m/s^2``
-    scale : the scale at which it is drawn, empty for what is not drawn
-    figure : where it is drawn, empty as well
+    letter : start of the kind's names, before the first underscore
+    unit : SI, as written in files: ``m/s^2``
+    scale : the scale at which it is drawn; empty if it is not drawn
+    figure : the figure in which it is drawn; empty if it is not drawn
     """
 
     name: KindName
@@ -26,7 +26,7 @@ class Kind:
 
     @property
     def unit_per_mm(self) -> str:
-        """The unit of its scale."""
+        """The unit of its scale, per millimetre on paper."""
         return f"({self.unit})/mm" if "/" in self.unit else f"{self.unit}/mm"
 
 
@@ -39,16 +39,16 @@ KINDS = (
 )
 DRAWN = tuple(kind for kind in KINDS if kind.scale)
 SCALE_OF = {kind.figure: kind.scale for kind in DRAWN}
-"""The scale that each figure is drawn at."""
+"""The scale at which each figure is drawn."""
 SCALE_UNITS = {kind.scale: kind.unit_per_mm for kind in DRAWN}
 _KNOWN = {key: kind for kind in KINDS for key in (kind.letter, kind.scale) if key}
 
 
 def kind_of(name: str) -> Kind:
-    """The kind of a vector, angular quantity or scale; a length for any other name, as links have."""
+    """Return the kind of a vector, angular quantity or scale; a length for other names, such as a link's."""
     return _KNOWN.get(name.partition("_")[0], KINDS[0])
 
 
 def unit_of(name: str) -> str:
-    """The SI unit of a vector, angular quantity or link; of a scale, per millimetre on paper."""
+    """Return the SI unit of a vector, angular quantity or link; of a scale, per millimetre on paper."""
     return SCALE_UNITS.get(name) or kind_of(name).unit

@@ -18,15 +18,15 @@ SEVERITIES: tuple[Severity, ...] = ("fault", "warning", "hint")
 File = Literal["assignment", "mechanism", "rubric"]
 BoolArray = NDArray[np.bool_]
 NAMED = 6
-"""Ranges of numbers that are named before the rest is only counted."""
+"""Ranges of numbers named in a message; the rest is only counted."""
 
 
 @dataclass(frozen=True, slots=True)
 class LintFinding:
-    """A finding: its severity, a stable code, its place (a path such as ``$.criterion[3]``), the message.
+    """A finding: its severity, a stable code, its path (such as ``$.criterion[3]``), the message.
 
-    `variants` is empty where the finding concerns the files as such; `names_them` is true where the
-    message names the variants itself.
+    `variants` is empty if the finding concerns the files as such; `names_them` is true if the message names
+    the variants itself.
     """
 
     severity: Severity
@@ -43,12 +43,12 @@ class LintFinding:
 
 
 def chosen(variants: Sequence[Variant], which: BoolArray) -> tuple[Variant, ...]:
-    """The variants where `which` (N,) is true."""
+    """Return the variants where `which` (N,) is true."""
     return tuple(variant for variant, is_so in zip(variants, which, strict=True) if is_so)
 
 
 def named(variants: Iterable[Variant]) -> str:
-    """Variants as people say them: ``n = 3..7, 12``; with positions ``n = 3, 4, position = 0``."""
+    """Name variants as people do: ``n = 3..7, 12``; with positions ``n = 3, 4, position = 0``."""
     numbers_with: dict[tuple[int, ...], list[int]] = {}
     for n, group in groupby(variants, key=lambda variant: variant.n):
         positions = tuple(variant.position for variant in group if variant.position is not None)
@@ -66,7 +66,7 @@ def named(variants: Iterable[Variant]) -> str:
 
 
 def _ranges(numbers: Sequence[int]) -> str:
-    """Whole numbers in rising order, runs of three and more drawn together."""
+    """Format ascending whole numbers, with runs of three and more as ranges."""
     runs = runs_of(numbers)
     texts: list[str] = []
     for run in runs:
@@ -81,14 +81,14 @@ def _ranges(numbers: Sequence[int]) -> str:
 
 
 def mechanism_place(assignment: Assignment, key: str = "") -> tuple[File, str]:
-    """The file and path of a key of the mechanism, which may stand within the assignment's file."""
+    """Return the file and path of a key of the mechanism, which may be in the assignment's file."""
     if isinstance(assignment.file.mechanism, str):
         return "mechanism", f"${key}"
     return "assignment", f"$.mechanism{key}"
 
 
 def group_place(assignment: Assignment, joint: str | None) -> tuple[File, str]:
-    """The file and path of the group that adds a joint; the driven link's, or the whole mechanism's."""
+    """Return the file and path of the group that adds a joint, of the driving link, or of the mechanism."""
     tables = assignment.mechanism_file.group
     for index, table in enumerate(tables):
         if joint is not None and joint == getattr(table, "node", None):
@@ -97,7 +97,7 @@ def group_place(assignment: Assignment, joint: str | None) -> tuple[File, str]:
 
 
 def group_of_image(assignment: Assignment, node: str) -> tuple[File, str]:
-    """The place of the group whose joint has this image in a plan: ``b'`` is made by the group of B."""
+    """Return the path of the group whose joint has this image in a plan: ``b'`` is made by the group of B."""
     joint = node.removesuffix("'")
     known = {table.node.lower(): table.node for table in assignment.mechanism_file.group}
     return group_place(assignment, known.get(joint))

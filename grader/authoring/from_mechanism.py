@@ -1,4 +1,4 @@
-"""The assignment and the rubric of a mechanism of one's own: made from its file and its construction.
+"""Make the assignment and the rubric for an author's mechanism, from its file and its construction.
 
 They are the four-bar's commented files with other titles, data, scales and criteria.
 """
@@ -34,15 +34,15 @@ from reference.errors import AuthoredFileError, CallError
 from reference.plan import construction_for
 
 Texts = Mapping[str, str]
-"""The assignment's and the rubric's, by their kind."""
+"""Texts of the assignment and of the rubric, by their kind."""
 RANGES = {"n": "{ from = 1, to = 30 }", "position": "{ from = 0, to = 7 }"}
-"""Students and positions of a mechanism whose formulas use their numbers."""
+"""Ranges of students and positions for a mechanism whose formulas use their numbers."""
 _UNITS = {
     "a length": "{length}", "an angle": "°", "revolutions per minute": "rev/min",
     "an angular velocity": "rad/s", "an angular acceleration": "rad/s²", "a speed": "{length}/s",
     "an acceleration": "{length}/s²",
 }  # fmt: skip
-"""Of the keys of a mechanism, by what they measure."""
+"""Units of the keys of a mechanism, by the kind of quantity."""
 
 TITLE = N_("%(mechanism)s: velocities and accelerations")
 TASK = N_(
@@ -61,38 +61,38 @@ ABSOLUTE = {
     "a_n": N_("Normal acceleration of %(point)s"), "a_t": N_("Tangential acceleration of %(point)s"),
 }  # fmt: skip
 RELATIVE = {
-    "v": N_("Velocity of %(point)s about %(other)s"),
-    "a": N_("Acceleration of %(point)s about %(other)s"),
-    "a_n": N_("Normal acceleration of %(point)s about %(other)s"),
-    "a_t": N_("Tangential acceleration of %(point)s about %(other)s"),
-    "a_c": N_("Coriolis acceleration of %(point)s about %(other)s"),
-    "a_r": N_("Acceleration of %(point)s about %(other)s along the guide"),
+    "v": N_("Velocity of %(point)s relative to %(other)s"),
+    "a": N_("Acceleration of %(point)s relative to %(other)s"),
+    "a_n": N_("Normal acceleration of %(point)s relative to %(other)s"),
+    "a_t": N_("Tangential acceleration of %(point)s relative to %(other)s"),
+    "a_c": N_("Coriolis acceleration of %(point)s relative to %(other)s"),
+    "a_r": N_("Acceleration of %(point)s relative to %(other)s along the guide"),
 }
 """Titles of vectors, by their letter and part."""
 _POINTS = {"scale": 1.0, "link": 0.5, "vector": 2.0, "angular": 0.5}
 _OPTIONAL = {"scale", "link", "angular"}
-"""What a student may leave out without losing points."""
+"""Items that a student may leave out without losing points."""
 KEYS_OF_A_CRITERION = """\
 # One for each thing judged: exactly one of vector, angular, scale and link. Of its other keys: points
 # for full marks; optional = true: not judged where it was not handed in; direction = false: only the length
 # counts."""
-"""The start's own comments stand at keys that not every criterion has."""
+"""Replaces the start's comments, which stand at keys that not every criterion has."""
 _PLANS_MM = 60.0
-"""The first vector of a plan at the scales with which the round ones are sought."""
+"""Length of a plan's first vector at the trial scales from which round ones are derived."""
 
 
 def texts_for(mechanism: Path, name: str, start: Texts, table: Path | None) -> dict[str, str]:
-    """The assignment and the rubric of a mechanism's file, at round scales that fit the answer sheets.
+    """Return the assignment and rubric for a mechanism's file, at round scales that fit the answer sheets.
 
     Arguments
     ---------
     mechanism : the file, NAME.mechanism.toml
     name : of the new assignment
-    start : commented files of which all but titles, data, scales and criteria is taken
-    table : the variants' data, where the mechanism has formulas of other names than `n` and `position`
+    start : commented files of which all but titles, data, scales and criteria is kept
+    table : the variants' data, if the mechanism has formulas of other names than `n` and `position`
 
-    Raises AuthoredFileError with the faults of the mechanism or of the table, CallError where the
-    mechanism needs a table and none is given, or no variant of it assembles.
+    Raises AuthoredFileError with the faults of the mechanism or of the table, CallError if the mechanism
+    needs a table and none is given, or no variant of it assembles.
     """
     file = load(MechanismFile, mechanism)
     needed = names_in(file) - {*KEYS}
@@ -139,7 +139,7 @@ def texts_for(mechanism: Path, name: str, start: Texts, table: Path | None) -> d
 
 
 def _too_short(assignment: Assignment, rubric: RubricFile) -> set[str]:
-    """The vectors of which some variant's are too short to be judged on their direction."""
+    """Return the vectors that in some variant are too short to judge their direction."""
     plan = lint(assignment, rubric).plan
     asked = asked_vectors(rubric, plan) if plan is not None else None
     if asked is None:
@@ -158,7 +158,7 @@ def _first_speed(file: MechanismFile) -> str:
 def _assignment(
     file: MechanismFile, name: str, start: str, scales: Mapping[str, float | str], table: Path | None
 ) -> str:
-    """The start's text with other keys in its tables."""
+    """Return the start's text with other keys in its tables."""
     used = names_in(file)
     variant = [f"{key} = {RANGES[key]}" for key in KEYS if key in used and not (key == "n" and table)]
     variant += [f"table = {_text(table.name)}"] if table else []
@@ -184,20 +184,20 @@ def _assignment(
 
 
 def _heading(block: str) -> str:
-    """The name of the table that a block of lines is."""
+    """Return the name of the table that a block of lines is."""
     found = re.search(r"(?m)^\[+([a-z.]+)\]", block)
     return found[1] if found else ""
 
 
 def _with(block: str, keys: Iterable[str]) -> str:
-    """A table's comments and heading, with other keys."""
+    """Return a table's comments and heading, with other keys."""
     lines = block.split("\n")
     at = next(place for place, line in enumerate(lines) if line.startswith("[")) + 1
     return "\n".join([*lines[:at], *keys, *(line for line in lines[at:] if line.startswith("#"))])
 
 
 def _value(formula: str) -> str:
-    """A number as it is, any other formula as text."""
+    """Write a number as it is, any other formula as text."""
     try:
         return f"{float(formula):.15g}"
     except ValueError:
@@ -205,12 +205,12 @@ def _value(formula: str) -> str:
 
 
 def _text(value: object) -> str:
-    """A TOML string: of these texts it is JSON's."""
+    """Return a TOML string, which for these texts is JSON's."""
     return json.dumps(value, ensure_ascii=False)
 
 
 def _titles(title: Text, phrase: str) -> list[str]:
-    """A phrase in the languages that the mechanism's title has."""
+    """Return a phrase in the languages of the mechanism's title."""
     known = {lang: getattr(title, lang) for lang in LANGUAGES}
     return [
         f"{lang} = {_text(tongue(lang).gettext(phrase) % {'mechanism': text})}"
@@ -220,7 +220,7 @@ def _titles(title: Text, phrase: str) -> list[str]:
 
 
 def _given(file: MechanismFile) -> Iterator[tuple[str, str, str]]:
-    """Label, value and unit of what the student needs to draw the mechanism."""
+    """Yield label, value and unit of the data that the student needs to draw the mechanism."""
     tables: list[Any] = [file.driver, *file.group]
     for joint, at in file.ground.items():
         yield from _point(joint, at, file.length_unit)
@@ -261,7 +261,7 @@ def _point(name: str, at: Any, unit: str) -> Iterator[tuple[str, str, str]]:  # 
 
 
 def _labels(table: object) -> dict[Any, str]:
-    """What the data of a table are called, by key, or by key and place in a list."""
+    """Return labels of a table's data, by key, or by key and index in a list."""
     match table:
         case CrankTable():
             link = table.link
@@ -294,7 +294,7 @@ def _labels(table: object) -> dict[Any, str]:
 def _rubric(
     file: MechanismFile, name: str, start: str, assignment: Assignment, unasked: Collection[str] = ()
 ) -> str:
-    """The start's rubric with a criterion for each scale, link, vector and angular quantity."""
+    """Return the start's rubric with a criterion for each scale, link, vector and angular quantity."""
     construction = construction_for(assignment)
     blocks = [block for block in start.split("\n\n") if "[[criterion]]" not in block]
     titles = _titles(file.title, TITLE)
@@ -328,7 +328,7 @@ def _criterion(kind: str, name: str, phrase: str, known: Mapping[str, str]) -> s
 
 
 def titled(name: str, construction: Construction) -> tuple[str, dict[str, str]]:
-    """The phrase for a vector, and the points that stand in it: ``a_BA_n`` is of B about A."""
+    """Return the phrase for a vector, and the points that it names: ``a_BA_n`` is of B relative to A."""
     letter, body, *part = name.split("_")
     joints = {joint for vector in construction.vectors.values() for joint in vector.link or ()}
     joints |= {joint for link in construction.links.values() for joint in link}

@@ -1,6 +1,6 @@
-"""An assignment and its rubric held against every variant at once, before students get it.
+"""Check an assignment and its rubric against every variant at once, before students get it.
 
-A row of figures for each variant, all findings, and the JSON document of both.
+The result has a row of figures for each variant, all findings, and the JSON document of both.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -57,22 +57,22 @@ from reference.plan import Plan, construction_for, exact_plan
 from reference.quantities import SCALE_OF
 
 ODD_RATIO = 200.0
-"""Of the longest link to another one: no drawing shows both, and metres are a thousand millimetres."""
+"""Largest ratio of the longest link to another: no drawing shows both, and metres are a thousand mm."""
 SMALLEST_M, LARGEST_M = 0.002, 50.0
-"""Between a watch's links and a crane's."""
+"""Smallest and largest link: between a watch and a crane."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lint:
-    """What lint found.
+    """The result of lint.
 
     Attributes
     ----------
     rows : the figures of every variant
     findings : the gravest first
-    scales : the proposed ones, and round ones; none where no variant can be solved
+    scales : the proposed ones, and round ones; none if no variant can be solved
     plan : of the variants that can be solved
-    worst : the variant of those that is hardest to draw; None where there are none
+    worst : the variant of those that is hardest to draw; None if there are none
     """
 
     assignment: Assignment
@@ -84,15 +84,15 @@ class Lint:
 
     @property
     def needs_a_person(self) -> bool:
-        """Whether there is more than hints."""
+        """True if there are findings graver than hints."""
         return any(finding.severity != "hint" for finding in self.findings)
 
 
 def lint(assignment: Assignment, rubric: RubricFile) -> Lint:
-    """Hold an assignment and its rubric against every variant.
+    """Check an assignment and its rubric against every variant.
 
-    Everything is evaluated on arrays over the variants; those that cannot be solved are left out of the
-    rest, and only these are examined each by itself.
+    Everything is evaluated on arrays over the variants; those that cannot be solved are excluded, and only
+    these are examined one by one.
     """
     variants = assignment.variants()
     accelerations = rubric.needs_accelerations or any(
@@ -133,7 +133,7 @@ def _numbers(variant: Variant | LintVariant) -> dict[str, int | None]:
 
 
 def _row(variant: Variant, problem: str | None = None, **figures: Any) -> LintVariant:  # noqa: ANN401
-    """One variant's figures; none where it cannot be solved."""
+    """Return one variant's figures; none if it cannot be solved."""
     row: dict[str, Any] = dict.fromkeys(LintVariant.model_fields)
     row |= {**_numbers(variant), "assembles": problem is None, "problem": problem, "under_8_mm": 0}
     return LintVariant.model_validate(row | figures)
@@ -142,7 +142,7 @@ def _row(variant: Variant, problem: str | None = None, **figures: Any) -> LintVa
 def _rows(
     plan: Plan, conditions: Conditions, asked: AskedVectors, rooms: Mapping[int, PageRoom]
 ) -> list[LintVariant]:
-    """The figures of each variant of a plan."""
+    """Return the figures of each variant of a plan."""
     count = len(plan.variants)
     lengths = {
         name: np.where(asked.is_zero[row], np.inf, asked.length_mm[row])
@@ -206,7 +206,7 @@ the gravest first."""
 
 
 def _worst(rows: Sequence[LintVariant]) -> LintWorst:
-    """The variant that is hardest to draw: badly conditioned before too large before too short."""
+    """Return the variant that is hardest to draw: badly conditioned before too large before too short."""
     for name, limit, reason in _REASONS:
         known = [(least, row) for row in rows if (least := getattr(row, name)) is not None]
         least, row = min(known, key=lambda entry: entry[0].value, default=(None, rows[0]))
@@ -219,7 +219,7 @@ def _worst(rows: Sequence[LintVariant]) -> LintWorst:
 
 
 def names_in(thing: object) -> set[str]:
-    """The names that the formulas of an authored table need, however deep they stand."""
+    """Return the names that the formulas of an authored table need, at any depth."""
     leaves = (leaf.side if isinstance(leaf, SideText) else leaf for _, _, leaf in formulas_in(thing, ""))
     return {name for leaf in leaves if isinstance(leaf, Formula) for name in leaf.names}
 
@@ -227,7 +227,7 @@ def names_in(thing: object) -> set[str]:
 def data_findings(
     assignment: Assignment, rubric: RubricFile, construction: Construction
 ) -> Iterator[LintFinding]:
-    """Rubric and assignment against the construction: names unknown, unused, twice, not told."""
+    """Report names in rubric and assignment that are unknown, unused, repeated, or not given to students."""
     yield from _rubric_faults(rubric, construction)
     yield from _unused_values(assignment)
     yield from _not_told(assignment)
@@ -237,7 +237,7 @@ def data_findings(
 
 
 def texts_in(thing: object, path: str) -> Iterator[tuple[str, Text]]:
-    """The texts of an authored table, however deep they stand, each with its path in the file."""
+    """Yield the texts of an authored table, at any depth, each with its path in the file."""
     inside: Iterable[tuple[str, object]] = ()
     if isinstance(thing, Text):
         yield path, thing
@@ -250,7 +250,7 @@ def texts_in(thing: object, path: str) -> Iterator[tuple[str, Text]]:
 
 
 def _untranslated(assignment: Assignment, rubric: RubricFile) -> Iterator[LintFinding]:
-    """Texts that some students would read in English: one finding for each file."""
+    """Report texts that some students would read in English: one finding for each file."""
     file = assignment.file
     files: dict[File, BaseModel] = {"assignment": file, "rubric": rubric}
     if isinstance(file.mechanism, str):
@@ -281,7 +281,7 @@ def _rubric_faults(rubric: RubricFile, construction: Construction) -> Iterator[L
 
 
 def _odd_sizes(assignment: Assignment) -> Iterator[LintFinding]:
-    """Lengths that look as if they were in another unit than the file's."""
+    """Report lengths that seem to be in another unit than the file's."""
     file = assignment.mechanism_file
     values, unit = assignment.values(assignment.variants()), file.length_unit
     lengths = {
@@ -302,7 +302,7 @@ def _odd_sizes(assignment: Assignment) -> Iterator[LintFinding]:
 
 
 def _with_their_own(assignment: Assignment, names: Iterable[str]) -> set[str]:
-    """Names, and the names that their formulas are made of."""
+    """Return names, and the names that their formulas use."""
     values = assignment.file.variant.values
     needed, waiting = set(), list(names)
     while waiting:
@@ -334,13 +334,13 @@ def _unused_values(assignment: Assignment) -> Iterator[LintFinding]:
 
 
 def _not_told(assignment: Assignment) -> Iterator[LintFinding]:
-    """Data that differ between students and set the mechanism, but that no [[given]] tells them."""
+    """Report data that differ between students and set the mechanism, but that no [[given]] states."""
     values, given = assignment.file.variant.values, assignment.file.given
     stated = names_in(given)
 
     def is_stated(name: str) -> bool:
         if name in stated or name not in values:
-            # A number that stands in the mechanism itself is given where a formula with it is: 45*position.
+            # A number used in the mechanism itself counts as given if a formula with it is: 45*position.
             return name in stated
         parts = values[name].names
         return not parts or all(map(is_stated, parts))
@@ -364,7 +364,7 @@ def _unknown_names(assignment: Assignment, construction: Construction) -> Iterat
 def _unneeded(
     assignment: Assignment, rubric: RubricFile, construction: Construction
 ) -> Iterator[LintFinding]:
-    """Joints and figures that nothing asked for depends on."""
+    """Report joints and figures that no criterion depends on."""
     asked = [construction.vectors[name] for name in rubric.vectors if name in construction.vectors]
     asked += [
         construction.vectors[construction.rates[name].vector]
@@ -393,7 +393,7 @@ def _unneeded(
 
 
 def lint_document(result: Lint) -> LintDocument:
-    """The document of `planmark lint --json`."""
+    """Return the document of `planmark lint --json`."""
     return LintDocument(
         assignment=result.assignment.id,
         needs_a_person=result.needs_a_person,

@@ -1,4 +1,4 @@
-"""A new assignment to start from: copies of three commented files, all written or none, never over others.
+"""Start a new assignment: copy three commented files, all or none, never over existing ones.
 
 The built-in assignments, and the mechanisms in the library's folder `starts`, are files with a comment at
 each key. A copy keeps the comments; only the names in it, and the remarks at its top, are new.
@@ -23,7 +23,7 @@ HEADS = {
 # {what}
 # Its mechanism is in {name}.mechanism.toml, its rubric in {name}.rubric.toml.
 #   planmark plan {file} --svg plan.svg   draws a variant
-#   planmark lint {file}   holds all three against every variant
+#   planmark lint {file}   checks all three against every variant
 """,
     "mechanism": "# The mechanism of {file}.\n",
     "rubric": "# The rubric of {file}. Strike out what you do not ask for; set the points.\n",
@@ -47,13 +47,13 @@ def new_assignment(
     Arguments
     ---------
     file : NAME, or a path that ends in NAME.toml or NAME.assignment.toml
-    like : an assignment (a built-in name or a path) whose mechanism, data and rubric are taken
-    mechanism : one of `starts`, or the path of a mechanism's file, for which scales and rubric are made;
-        the four-bar where neither is given
+    like : an assignment (a built-in name or a path) whose mechanism, data and rubric are copied
+    mechanism : one of `starts`, or the path of a mechanism's file, for which scales and rubric are made; the
+        four-bar if neither is given
     table : the data of the variants, a CSV, for a mechanism's file
 
-    Raises CallError where one of the files exists already, or a name is not known; AuthoredFileError
-    where the files of `like` have faults.
+    Raises CallError if one of the files exists already, or a name is not known; AuthoredFileError if the
+    files of `like` have faults.
     """
     if like is not None and mechanism is not None:
         raise CallError("like_or_mechanism", "--like and --mechanism both say what to start from: give one")
@@ -79,7 +79,7 @@ def new_assignment(
 
 
 def _of_own_mechanism(path: Path, name: str, mechanism: Path, table: Path | None) -> New:
-    """An assignment of a mechanism's file; it and the table are copied where they lie elsewhere."""
+    """Write an assignment for a mechanism's file; copy it and the table if they are elsewhere."""
     start = load_start("four-bar")
     made = texts_for(mechanism, name, _renamed_texts(start, name), table)
     what = f"An assignment of {mechanism.name}, at the largest round scales that fit every variant."
@@ -96,7 +96,7 @@ def _of_own_mechanism(path: Path, name: str, mechanism: Path, table: Path | None
 
 
 def _table(source: Assignment, path: Path) -> dict[Path, str]:
-    """The CSV of the source's variants, which the copy names too; none where both use the same file."""
+    """Return the CSV of the source's variants, which the copy names too; none if both use the same file."""
     table = source.file.variant.table
     if table is None or table.file is None:
         return {}
@@ -105,7 +105,7 @@ def _table(source: Assignment, path: Path) -> dict[Path, str]:
 
 
 def _path_and_name(file: Path) -> tuple[Path, str]:
-    """The assignment's file and its name."""
+    """Return the assignment's file and its name."""
     name = file.name.removesuffix(".toml").removesuffix(".assignment")
     if not NAME.fullmatch(name):
         raise CallError("new_name", f"'{file.name}': a name of letters, digits, ., _ or - is needed")
@@ -114,7 +114,7 @@ def _path_and_name(file: Path) -> tuple[Path, str]:
 
 
 def _renamed_texts(source: Assignment, name: str) -> dict[str, str]:
-    """The source's three files under another name, without the remarks at their top."""
+    """Return the source's three files under another name, without the remarks at their top."""
     load_rubric(source.file.rubric, beside=source.path)
     text = source.path.read_text(encoding="utf-8")
     if isinstance(source.file.mechanism, str):
@@ -130,7 +130,7 @@ def _renamed_texts(source: Assignment, name: str) -> dict[str, str]:
 
 
 def _split(text: str) -> tuple[str, str]:
-    """An assignment that holds its mechanism as tables `[mechanism...]`, as the texts of two files."""
+    """Split an assignment that holds its mechanism as tables `[mechanism...]` into the texts of two files."""
     parts = re.split(r"(?m)^(?=\[)", text)
     inside = [part for part in parts if re.match(r"\[\[?mechanism\b", part)]
     rest = "".join(part for part in parts if part not in inside)
@@ -139,7 +139,7 @@ def _split(text: str) -> tuple[str, str]:
 
 
 def _renamed(text: str, names: Mapping[str, str]) -> str:
-    """The text of a file with other names at its top-level keys; CallError where they cannot be replaced."""
+    """Return a file's text with other names at its top-level keys; CallError if they cannot be replaced."""
     renamed = re.sub(r"\A(#.*\n|\s*\n)+", "", text)
     for key, name in names.items():
         line = rf"""(?m)^{key}\s*=\s*("[^"\n]*"|'[^'\n]*')"""
@@ -155,18 +155,18 @@ def _renamed(text: str, names: Mapping[str, str]) -> str:
 
 
 def starts_folder() -> Path:
-    """The folder of the mechanisms to start from."""
+    """Return the folder of the mechanisms to start from."""
     return library() / "starts"
 
 
 def starts() -> list[str]:
-    """The names of the mechanisms to start from."""
+    """Return the names of the mechanisms to start from."""
     suffix = SUFFIXES["assignment"]
     return sorted(path.name.removesuffix(suffix) for path in starts_folder().glob(f"*{suffix}"))
 
 
 def load_start(name: str) -> Assignment:
-    """A mechanism to start from, as an assignment; CallError for an unknown name."""
+    """Load a mechanism to start from, as an assignment; CallError for an unknown name."""
     if name not in starts():
         raise CallError(
             "unknown_mechanism",

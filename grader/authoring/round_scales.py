@@ -1,7 +1,7 @@
 """Sizes of drawings at the proposed scales, and round scales: the largest that fit every variant.
 
-Short vectors, room on the answer sheet and on a plain A3 sheet, and scales as a drawing teacher writes
-them.
+They consider short vectors, room on the answer sheet and on a plain A3 sheet, and the scales customary in
+drawing.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -29,10 +29,10 @@ Extents = Mapping[str, Size]
 """The size of each figure."""
 IntArray = NDArray[np.intp]
 STEPS = (1.0, 2.0, 2.5, 4.0, 5.0, 10.0)
-"""Of 10^k: factors by which a ruler's millimetres are easily multiplied. ISO 5455 has 1, 2, 5 for lengths;
+"""Factors of 10^k by which a ruler's millimetres are easily multiplied. ISO 5455 has 1, 2, 5 for lengths;
 GOST 2.302 adds 2.5 and 4."""
 LEAST_LINK_MM = 20.0
-"""The plans' directions are read off the sketch: a shorter link tells them less well than a hand draws."""
+"""The plans' directions come from the sketch: a shorter link gives them less exactly than a person draws."""
 LEAST_DRAWN_MM = 2.0
 """A shorter link cannot be drawn: more likely the scale is in another unit."""
 _SLACK = 1e-9
@@ -52,7 +52,7 @@ class AskedVectors:
     names : of the vectors, V of them
     length_mm : (V, N)
     is_zero : (V, N), of true length zero (a dead point): no scale makes it longer
-    least_mm : (V,), shorter ones are not judged on their direction
+    least_mm : (V,), the direction of shorter ones is not judged
     """
 
     criteria: tuple[int, ...]
@@ -67,7 +67,7 @@ class AskedVectors:
 
 
 def asked_vectors(rubric: RubricFile, plan: Plan) -> AskedVectors:
-    """The vectors asked for that the mechanism has."""
+    """Return the requested vectors that the mechanism has."""
     asked = {
         index: criterion
         for index, criterion in enumerate(rubric.criterion)
@@ -79,14 +79,14 @@ def asked_vectors(rubric: RubricFile, plan: Plan) -> AskedVectors:
 
 
 def _lengths(plan: Plan, names: tuple[str, ...]) -> tuple[FloatArray, BoolArray]:
-    """(V, N) drawn lengths, and whether each is zero."""
+    """Return (V, N) drawn lengths, and whether each is zero."""
     shape = (len(names), len(plan.variants))
     lengths = np.array([np.abs(plan.drawn_mm(name)) for name in names]).reshape(shape)
     return lengths, np.array([plan.is_zero(name) for name in names], dtype=np.bool_).reshape(shape)
 
 
 def length_findings(rubric: RubricFile, plan: Plan, asked: AskedVectors) -> Iterator[LintFinding]:
-    """Short vectors, each by itself where it is asked for, together where they are not."""
+    """Report short vectors: each one that is asked for, the others together."""
     for row, name in enumerate(asked.names):
         path = f"$.criterion[{asked.criteria[row]}]"
         least = float(asked.least_mm[row])
@@ -131,12 +131,12 @@ def _unasked_findings(rubric: RubricFile, plan: Plan, asked: AskedVectors) -> It
 
 @dataclass(frozen=True, slots=True)
 class PageRoom:
-    """How a page's figures fit at the proposed scales; 1 is just enough, arrays of shape (N,).
+    """Room for a page's figures at the proposed scales; 1 is just enough, arrays of shape (N,).
 
     Attributes
     ----------
-    zones : by figure, how many times as large it could be drawn in its zone of the answer sheet
-    frame : how many times as large all of them could be drawn side by side in a plain A3 sheet's frame
+    zones : by figure, the factor by which it could be enlarged in its zone of the answer sheet
+    frame : the factor by which all of them side by side could be enlarged in a plain A3 sheet's frame
     """
 
     zones: Mapping[str, FloatArray]
@@ -144,7 +144,7 @@ class PageRoom:
 
 
 def extents_of(plan: Plan) -> dict[str, Size]:
-    """How wide and high each figure of every variant is drawn."""
+    """Return width and height of each figure of every variant, mm."""
     count = len(plan.variants)
     extents = {}
     for figure, nodes in plan.nodes_mm.items():
@@ -154,7 +154,7 @@ def extents_of(plan: Plan) -> dict[str, Size]:
 
 
 def pages_of(assignment: Assignment, plan: Plan) -> list[tuple[int, tuple[str, ...]]]:
-    """The assignment's pages with their index, and those of their figures that the plan has."""
+    """Return the assignment's pages with their index, and those of their figures that the plan has."""
     pages = [
         (index, tuple(figure for figure in page.figures if figure in plan.nodes_mm))
         for index, page in enumerate(assignment.file.page)
@@ -163,7 +163,7 @@ def pages_of(assignment: Assignment, plan: Plan) -> list[tuple[int, tuple[str, .
 
 
 def room_of(figures: Sequence[str], extents: Extents) -> PageRoom:
-    """How the figures of one page fit, in the division of the answer sheet that is printed for them."""
+    """Return the room for a page's figures, in the layout of the answer sheet printed for them."""
     largest = {
         figure: (float(extents[figure][0].max()), float(extents[figure][1].max())) for figure in figures
     }
@@ -173,14 +173,14 @@ def room_of(figures: Sequence[str], extents: Extents) -> PageRoom:
 
 
 def growth(box: Box, wide: FloatArray, high: FloatArray) -> FloatArray:
-    """By what factor figures could be enlarged to fill a box, margins for letters kept; (N,)."""
+    """Return the factor by which figures could be enlarged to fill a box, with margins for letters; (N,)."""
     _, _, box_wide, box_high = box
     with np.errstate(divide="ignore"):
         return np.asarray(np.minimum((box_wide - 2 * MARGIN_MM) / wide, (box_high - 2 * MARGIN_MM) / high))
 
 
 def _frame_growth(sizes: Sequence[Size]) -> FloatArray:
-    """The same for all figures of a page in the frame: in a row, in a column, or a figure beside two."""
+    """Return that factor for all figures of a page in the frame: in a row, in a column, or one beside two."""
     wide, high = FRAME_MM[2], FRAME_MM[3]
     turned = [size[::-1] for size in sizes]
     options = [_in_line(sizes, wide, high), _in_line(turned, high, wide)]
@@ -193,7 +193,7 @@ def _frame_growth(sizes: Sequence[Size]) -> FloatArray:
 
 
 def _in_line(sizes: Sequence[Size], along: float, across: float) -> FloatArray:
-    """The growth of figures side by side."""
+    """Return the factor for figures side by side."""
     free = along - 2 * MARGIN_MM * len(sizes)
     lengths, widths = sum(size[0] for size in sizes), np.max([size[1] for size in sizes], axis=0)
     with np.errstate(divide="ignore"):
@@ -201,7 +201,7 @@ def _in_line(sizes: Sequence[Size], along: float, across: float) -> FloatArray:
 
 
 def _beside_pair(alone: Size, pair: Sequence[Size], along: float, across: float) -> FloatArray:
-    """The growth of a figure, and beside it two that share the sheet's other dimension."""
+    """Return the factor for a figure, and beside it two that share the sheet's other dimension."""
     longer = np.max([size[0] for size in pair], axis=0)
     limits = (
         (along - 4 * MARGIN_MM, alone[0] + longer),
@@ -213,7 +213,7 @@ def _beside_pair(alone: Size, pair: Sequence[Size], along: float, across: float)
 
 
 def room_findings(assignment: Assignment, plan: Plan, rooms: Mapping[int, PageRoom]) -> Iterator[LintFinding]:
-    """Figures too large for their zone, and pages whose figures do not fit a plain A3 sheet either."""
+    """Report figures too large for their zone, and pages whose figures do not fit a plain A3 sheet either."""
     for index, room in rooms.items():
         checks = [
             (
@@ -245,12 +245,12 @@ ProposalName = Literal["proposed", "round", "round_each"]
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """Scales and what they give.
+    """Scales and their effect.
 
     Attributes
     ----------
     over_all : over all variants, as it is published
-    short : (N,) how many asked vectors of each variant are shorter than 8 mm
+    short : (N,) number of requested vectors of each variant that are shorter than 8 mm
     still_short : names of the vectors that are, the most frequent first
     """
 
@@ -261,7 +261,7 @@ class Proposal:
 
 
 def round_up(values: FloatArray) -> FloatArray:
-    """The least of `STEPS` times a power of ten that is not below each value (positive, any shape)."""
+    """Round up to the next of `STEPS` times a power of ten (positive, any shape)."""
     decade = 10.0 ** np.floor(np.log10(values) + _SLACK)
     ladder = decade[..., None] * np.asarray(STEPS)
     reached = ladder >= values[..., None] * (1.0 - _SLACK)
@@ -271,7 +271,7 @@ def round_up(values: FloatArray) -> FloatArray:
 def proposals(
     assignment: Assignment, plan: Plan, extents: Extents, asked: AskedVectors, rooms: Mapping[int, PageRoom]
 ) -> list[Proposal]:
-    """The assignment's own scales, round ones for all, and round ones for each variant."""
+    """Return the assignment's own scales, round ones for all, and round ones for each variant."""
     factors = [factor for room in rooms.values() for factor in room.zones.values()]
     own_room = min((float(np.min(factor)) for factor in factors), default=np.inf)
     pages = [figures for _, figures in pages_of(assignment, plan)]
@@ -286,12 +286,12 @@ def proposals(
 
 
 def _shortest_link_m(plan: Plan) -> FloatArray:
-    """The shortest distance (m) that a direction of the plans is taken from, (N,)."""
+    """Return the shortest distance (m) from which a direction of the plans is taken, (N,)."""
     at = plan.motion.position
     links = {vector.link for vector in plan.construction.vectors.values() if vector.link}
     count = len(plan.variants)
     known = [np.abs(at[head] - at[tail]) for tail, head in links if {tail, head} <= at.keys()]
-    # A slider lies on the point under it: that is no link.
+    # A slider coincides with the point under it: there is no link between them.
     lengths = [length for length in known if np.all(length > ZERO_SHARE * np.max(known))]
     if not lengths:
         return np.ones(count)
@@ -299,7 +299,7 @@ def _shortest_link_m(plan: Plan) -> FloatArray:
 
 
 def _needed(template: Template, plan: Plan, extents: Extents) -> dict[str, FloatArray]:
-    """The finest scale at which each figure of a template fits its zone, (N,)."""
+    """Return the finest scale at which each figure of a template fits its zone, (N,)."""
     needed = {}
     for figure, box in template.zones.items():
         factor = growth(box, *extents[figure])
@@ -310,7 +310,7 @@ def _needed(template: Template, plan: Plan, extents: Extents) -> dict[str, Float
 
 
 def _best_template(figures: Sequence[str], plan: Plan, extents: Extents, links_m: FloatArray) -> Template:
-    """The division at which plans are largest, and the sketch not too small to take directions from."""
+    """Return the layout with the largest plans whose sketch is not too small to take directions from."""
 
     def worth(template: Template) -> tuple[float, ...]:
         scales = {
@@ -326,7 +326,7 @@ def _best_template(figures: Sequence[str], plan: Plan, extents: Extents, links_m
 
 
 def _round_scales(templates: Sequence[Template], plan: Plan, extents: Extents, *, together: bool) -> Scales:
-    """Round scales that fit every page; a scale that no page needs stays as it is."""
+    """Return round scales that fit every page; a scale that no page needs is unchanged."""
     scales = {name: np.asarray(getattr(plan.scales, name)) for name in SCALE_OF.values()}
     finest: dict[str, FloatArray] = {}
     for template in templates:
@@ -340,7 +340,7 @@ def _round_scales(templates: Sequence[Template], plan: Plan, extents: Extents, *
 
 
 def _redrawn(extents: Extents, plan: Plan, scales: Scales) -> dict[str, Size]:
-    """The figures' sizes at other scales."""
+    """Return the figures' sizes at other scales."""
     factors = {name: getattr(plan.scales, name) / getattr(scales, name) for name in SCALE_OF.values()}
     return {
         figure: (wide * factors[SCALE_OF[figure]], high * factors[SCALE_OF[figure]])
@@ -383,7 +383,7 @@ def _judged(name: ProposalName, scales: Scales, plan: Plan, asked: AskedVectors,
 
 
 def scale_findings(assignment: Assignment, plan: Plan, proposed: Sequence[Proposal]) -> Iterator[LintFinding]:
-    """Round scales where the proposed ones are none, and whether normals can be built by the triangle."""
+    """Suggest round scales, and report whether normals can be constructed by the triangle."""
     drawn = {figure for _, figures in pages_of(assignment, plan) for figure in figures}
     names = [name for figure, name in SCALE_OF.items() if figure in drawn]
     own, round_, each = (proposal.over_all for proposal in proposed)
@@ -415,7 +415,7 @@ def scale_findings(assignment: Assignment, plan: Plan, proposed: Sequence[Propos
 
 
 def _short_findings(plan: Plan, own: LintScales, each: Proposal) -> Iterator[LintFinding]:
-    """Whether scales of each variant's own make every asked vector long enough, and what no scale does."""
+    """Report whether each variant's own scales make all requested vectors long enough, and what none does."""
     if own.under_8_mm == 0:
         return
     if each.over_all.under_8_mm == 0:
@@ -434,7 +434,7 @@ def _short_findings(plan: Plan, own: LintScales, each: Proposal) -> Iterator[Lin
 
 
 def suggestions(proposed: Sequence[Proposal], plan: Plan, figures: Collection[str]) -> dict[Variant, str]:
-    """The round scales of each variant's own, where they leave fewer asked vectors under 8 mm; as text."""
+    """Return, as text, round scales for each variant that leave fewer requested vectors under 8 mm."""
     own, _, each = proposed
     names = [name for figure, name in SCALE_OF.items() if figure in figures]
     texts = {}
@@ -449,7 +449,7 @@ def suggestions(proposed: Sequence[Proposal], plan: Plan, figures: Collection[st
 
 
 def written(scales: Scales, names: Sequence[str]) -> str:
-    """Scales that are the same for all variants, as people write them."""
+    """Write scales that are the same for all variants, as people do."""
     units = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s^2)/mm"}
     texts = []
     for name in names:
@@ -460,11 +460,11 @@ def written(scales: Scales, names: Sequence[str]) -> str:
 
 
 def ratio_text(scale_m_per_mm: float) -> str:
-    """A scale of lengths as a ratio: 1:5, 1:2.5, 10:1."""
+    """Write a scale of lengths as a ratio: 1:5, 1:2.5, 10:1."""
     ratio = 1000.0 * scale_m_per_mm
     return f"1:{ratio:.4g}" if ratio >= 1.0 - _SLACK else f"{1.0 / ratio:.4g}:1"
 
 
 def ends_of(values: FloatArray) -> tuple[float, float]:
-    """The least and the largest of a scale over the variants."""
+    """Return the least and the largest of a scale over the variants."""
     return float(np.min(values)), float(np.max(values))

@@ -28,16 +28,16 @@ from reference.plan import Plan, conditioning
 LEAST_TRANSMISSION = 0.25
 """|sin| of a transmission angle of about 15 degrees: below it, plans are hard to draw."""
 LEAST_CROSSING_DEG = 20.0
-"""Construction lines that meet at less are hard to intersect by hand: an error across one of them
-moves the node by three times as much."""
+"""Smallest angle between construction lines that can be intersected by hand: below it, an error across one of
+them moves the node by three times as much."""
 LARGEST_ERROR = 1e-9
-"""Relative error of a computed plan that is reported: far below a pencil's, far above a rounding error."""
+"""Relative error of a computed plan above which it is reported: far below a pencil's, far above rounding."""
 SAME_MM = 0.5
-"""Drawings whose nodes all lie within this of each other are the same drawing: a hand's tolerance."""
+"""Drawings whose nodes all lie this close are the same drawing: the tolerance of drawing by hand."""
 NAMED_GROUPS = 3
-"""Groups of equal drawings that are named in the message; the others are counted."""
+"""Groups of equal drawings named in the message; the others are counted."""
 MOST_PAIRS = 100_000
-"""The search ends there: where all variants are the same, there are as many pairs as their number squared."""
+"""Largest number of pairs searched: if all variants are equal, the pairs are their number squared."""
 
 Pairs = tuple[np.ndarray, np.ndarray]
 
@@ -54,14 +54,14 @@ class Broken:
 
 
 def broken_variants(assignment: Assignment, variants: list[Variant]) -> list[Broken]:
-    """The variants that do not assemble or are singular: all at once, the reason of each by itself."""
+    """Return the variants that do not assemble or are singular, with the reason of each."""
     mechanism = assignment.mechanism(variants)
     lost = ~np.isfinite(move_where_possible(mechanism).predicted_error)
     return [Broken(variants[index], reason_at(mechanism, int(index))) for index in np.flatnonzero(lost)]
 
 
 def broken_findings(assignment: Assignment, broken: Sequence[Broken]) -> Iterator[LintFinding]:
-    """A fault for each group and reason, with all its variants and the range of the gaps."""
+    """Report a fault for each group and reason, with all its variants and the range of the gaps."""
     by_reason: dict[str, list[Broken]] = defaultdict(list)
     for variant in broken:
         by_reason[variant.error.template].append(variant)
@@ -75,7 +75,7 @@ def broken_findings(assignment: Assignment, broken: Sequence[Broken]) -> Iterato
 
 
 def assembly_findings(assignment: Assignment, variants: Sequence[Variant]) -> Iterator[LintFinding]:
-    """Variants whose side means another assembly than their neighbours', by n or by position."""
+    """Report variants whose side means another assembly than their neighbours', by n or by position."""
     mechanism = assignment.mechanism([*variants])
     by_node: dict[str, set[int]] = defaultdict(set)
     for of_one in (attrgetter("position"), attrgetter("n")):
@@ -108,7 +108,7 @@ class Conditions:
 
 
 def conditions_of(plan: Plan) -> Conditions:
-    """The figures of every variant of a plan."""
+    """Return the conditioning of every variant of a plan."""
     count = len(plan.variants)
     figures = {name: np.broadcast_to(values, (count,)) for name, values in conditioning(plan).items()}
     transmission, crossing = (
@@ -119,7 +119,7 @@ def conditions_of(plan: Plan) -> Conditions:
 
 
 def condition_findings(assignment: Assignment, plan: Plan, conditions: Conditions) -> Iterator[LintFinding]:
-    """Groups near a singular position, lines that meet at a small angle, results that lose digits."""
+    """Report groups near a singular position, lines that meet at a small angle, results that lose digits."""
     variants, whole = plan.variants, mechanism_place(assignment)
     for node, sine in conditions.transmission.items():
         if np.any(weak := sine < LEAST_TRANSMISSION):
@@ -150,7 +150,7 @@ def condition_findings(assignment: Assignment, plan: Plan, conditions: Condition
 
 
 def _joined(angles: Mapping[str, FloatArray]) -> dict[tuple[str, ...], FloatArray]:
-    """The angles, nodes whose lines meet at the same angles in every variant (b and b') put together."""
+    """Return the angles, with nodes joined whose lines meet at equal angles in every variant (b and b')."""
     joined: dict[tuple[str, ...], FloatArray] = {}
     for node, angle in angles.items():
         same = [names for names, other in joined.items() if np.allclose(angle, other, rtol=0, atol=1e-6)]
@@ -170,8 +170,8 @@ class Ties:
 
     Attributes
     ----------
-    same : every node of every figure lies in the same place
-    passing : every asked vector of either would get full marks for the other
+    same : every node of every figure has the same position
+    passing : every requested vector of either would get full marks for the other
     """
 
     same: Pairs
@@ -179,7 +179,7 @@ class Ties:
 
 
 def ties_of(rubric: RubricFile, plan: Plan, asked: AskedVectors) -> Ties:
-    """Which variants have the same drawing, and which could be copied from each other."""
+    """Return which variants have the same drawing, and which could be copied from each other."""
     nodes = np.stack(
         [
             np.broadcast_to(place, (len(plan.variants),))
@@ -197,7 +197,7 @@ def ties_of(rubric: RubricFile, plan: Plan, asked: AskedVectors) -> Ties:
 
 
 def _passing(rubric: RubricFile, plan: Plan, asked: AskedVectors) -> Pairs:
-    """Pairs in which either's asked vectors are all within the rubric's tolerance of the other's."""
+    """Return pairs whose requested vectors are all within the rubric's tolerance of each other."""
     if not asked.names:
         return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
     vectors = np.stack([plan.drawn_mm(name) for name in asked.names])
@@ -217,7 +217,7 @@ def _passing(rubric: RubricFile, plan: Plan, asked: AskedVectors) -> Pairs:
 
 
 def _tolerances(rubric: RubricFile, asked: AskedVectors) -> tuple[FloatArray, FloatArray]:
-    """(V, N) of length in mm and of direction in radians; pi where a direction is not judged."""
+    """Return (V, N) tolerances, length in mm and direction in radians; pi if a direction is not judged."""
     tables = [rubric.tolerance_of(rubric.criterion[index]) for index in asked.criteria]
     rows = list(zip(tables, asked.length_mm.tolist(), strict=True))
     length = np.array([[table.length_at(mm) for mm in lengths] for table, lengths in rows])
@@ -229,10 +229,10 @@ def _tolerances(rubric: RubricFile, asked: AskedVectors) -> tuple[FloatArray, Fl
 def _pairs(
     coordinates: FloatArray, reach: FloatArray, judge: Callable[[np.ndarray, np.ndarray], BoolArray]
 ) -> Pairs:
-    """Pairs i < j that a judge accepts, of those within reach in the coordinate that tells most apart.
+    """Return pairs i < j that a judge accepts, among those within reach in the most distinctive coordinate.
 
-    Arguments: `coordinates` (C, N) and `reach` (C,), such that pairs further apart than that in any
-    coordinate are never accepted.
+    Arguments: `coordinates` (C, N) and `reach` (C,): pairs farther apart than that in any coordinate are
+    never accepted.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         apart = np.nan_to_num(np.ptp(coordinates, axis=1) / reach, posinf=0.0)
@@ -251,7 +251,7 @@ def _pairs(
 
 
 def groups_of(pairs: Pairs, count: int) -> list[list[int]]:
-    """Variants that hang together by pairs, each group in rising order."""
+    """Return groups of variants connected by pairs, each in ascending order."""
     from scipy.sparse import coo_array  # noqa: PLC0415 - of all commands lint alone needs it
     from scipy.sparse.csgraph import connected_components  # noqa: PLC0415 - as above
 
@@ -264,7 +264,7 @@ def groups_of(pairs: Pairs, count: int) -> list[list[int]]:
 
 
 def tie_findings(plan: Plan, ties: Ties) -> Iterator[LintFinding]:
-    """Groups with the same drawing; and how many further pairs could be copied unseen."""
+    """Report groups with the same drawing, and how many further pairs could be copied unseen."""
     variants = plan.variants
     groups = groups_of(ties.same, len(variants))
     if groups:

@@ -39,23 +39,23 @@ from reference.quantities import SCALE_UNITS, unit_of
 Title = Literal["Scales", "Mechanism", "Velocities", "Accelerations"]
 PLANS: dict[Title, str] = {"Velocities": "velocity_plan", "Accelerations": "acceleration_plan"}
 MARGIN_MM = 15.0
-"""Inside the drawing frame, 10 mm, on all sides."""
+"""Margin inside the drawing frame, 10 mm, on all sides."""
 BOTTOM_MM = A3_MM[1] - MARGIN_MM
 """The lower end of the last row."""
 TITLE_MM, LETTER_MM, UNIT_MM = 4.4, 3.1, 2.7
-"""Heights of letters: of titles, of cells, of units."""
+"""Letter heights of titles, of cells, of units."""
 ROW_MM = 5.6
 """Height of a row: a line of letters and room between two lines."""
 CELL_GAP_MM = 3.0
-"""Between two columns of a block."""
+"""Gap between two columns of a block."""
 BLOCK_GAP_MM = 4.0
-"""Between two blocks."""
+"""Gap between two blocks."""
 HEAD_MM = 20.0
-"""A table's title and its two lines of headings."""
+"""Height of a table's title and its two lines of headings."""
 BETWEEN_MM = 8.0
-"""Between two tables on one page."""
+"""Gap between two tables on one page."""
 PAGE_ROWS = math.floor((BOTTOM_MM - MARGIN_MM - HEAD_MM) / ROW_MM)
-"""Rows that a page has room for: a table is broken only where it has more."""
+"""Rows that fit a page: a table is broken only if it has more."""
 STRIPE = "#f1f3f5"
 GREY = "#5b6470"
 
@@ -74,9 +74,9 @@ class Column:
     Attributes
     ----------
     key : its name in files
-    over, under : its heading on paper: whose it is, and in what unit
-    values : (N,), nan where a variant has none (the direction of a zero vector)
-    digits, kind : on paper, so many decimals (``f``) or significant digits (``g``)
+    over, under : its heading on paper: its name, and its unit
+    values : (N,), nan if a variant has none (the direction of a zero vector)
+    digits, kind : number of decimals (``f``) or significant digits (``g``) on paper
     """
 
     key: str
@@ -96,7 +96,7 @@ class Section:
 
 
 def sections_of(plan: Plan) -> tuple[Section, ...]:
-    """All columns of a plan's variants."""
+    """Return all columns of a plan's variants."""
     count = len(plan.variants)
     scales = [
         Column(name, name, unit, np.broadcast_to(getattr(plan.scales, name), (count,)), 5, "g")
@@ -123,7 +123,7 @@ def _point(joint: str, at: np.ndarray, count: int) -> tuple[Column, ...]:
 
 
 def _rate(plan: Plan, name: str) -> FloatArray:
-    """An angular quantity, exactly zero where the vector that it comes from is."""
+    """Return an angular quantity, exactly zero if the vector that it comes from is."""
     values = np.broadcast_to(plan.rates[name], (len(plan.variants),))
     return np.where(plan.is_zero(plan.construction.rates[name].vector), 0.0, values) + 0.0
 
@@ -138,13 +138,13 @@ def _vector(plan: Plan, name: str) -> tuple[Column, ...]:
 
 
 def identity(variants: Sequence[Variant]) -> list[tuple[str, list[int]]]:
-    """``n`` and ``position`` of each variant, as far as the assignment has them."""
+    """Return ``n`` and ``position`` of each variant, as far as the assignment has them."""
     columns = [(name, [getattr(variant, name) for variant in variants]) for name in ("n", "position")]
     return [(name, numbers) for name, numbers in columns if numbers and numbers[0] is not None]
 
 
 def class_csv(plan: Plan, *, decimal_comma: bool = False) -> str:
-    """A row for each variant; semicolons and decimal commas where the spreadsheet's language has them.
+    """Return a CSV with a row for each variant; semicolons and decimal commas if the language needs them.
 
     Ten significant digits; a zero vector's direction is blank. UTF-8 without a mark, CRLF.
     """
@@ -171,7 +171,7 @@ def _written(value: float, decimal_comma: bool) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Cells:
-    """A column as text: whose it is, its unit, its cells, and how wide it is."""
+    """A column as text: its name, its unit, its cells, and its width."""
 
     over: Text
     under: Text
@@ -200,7 +200,7 @@ def class_pages(
     wording: Wording = ENGLISH,
     tell: Tell | None = None,
 ) -> list[Page]:
-    """Pages of tables, then the reference drawing of each variant."""
+    """Return pages of tables, then the reference drawing of each variant."""
     pages = list(tables)
     for index in range(len(plan.variants)):
         pages.extend(sheet.shapes for sheet in reference_drawing(assignment, plan, index, wording))
@@ -210,7 +210,7 @@ def class_pages(
 
 
 def numbered(pages: Sequence[Page]) -> list[Page]:
-    """The pages with their number and how many there are, below the drawing's frame."""
+    """Number the pages, below the drawing's frame."""
     corner = (A3_MM[0] - MARGIN_MM, A3_MM[1] - 4.5)
     return [
         (*page, Label(corner, f"{number} / {len(pages)}", LETTER_MM, "end", GREY))
@@ -219,9 +219,9 @@ def numbered(pages: Sequence[Page]) -> list[Page]:
 
 
 def table_pages(assignment: Assignment, plan: Plan, words: Tongue) -> list[Page]:
-    """The tables of all sections, one below another; the headings are there again on each page.
+    """Return the tables of all sections, one below another; headings are repeated on each page.
 
-    Arguments: `words` the language of titles, units and decimal marks.
+    Arguments: `words` is the language of titles, units and decimal marks.
     """
     pages: list[list[Shape]] = []
     y = BOTTOM_MM
@@ -241,7 +241,7 @@ def table_pages(assignment: Assignment, plan: Plan, words: Tongue) -> list[Page]
 
 
 def _tables(assignment: Assignment, plan: Plan, words: Tongue) -> Iterator[_VariantTable]:
-    """Each section's columns, as many at a time as a page is wide."""
+    """Yield each section's columns, split to the width of a page."""
     named = tuple(
         _Cells("", words.gettext(name), tuple(str(number) for number in numbers))
         for name, numbers in identity(plan.variants)
@@ -285,7 +285,7 @@ def _column(column: Column, assignment: Assignment, words: Tongue) -> _Cells:
 
 
 def _drawn(table: _VariantTable, rows: range, y: float) -> Iterator[Shape]:
-    """So many rows of a table, from a height down."""
+    """Draw some rows of a table, from a height down."""
     top = y + HEAD_MM
     wide = sum(cells.wide_mm for block in (table.named, *table.blocks) for cells in block)
     right = MARGIN_MM + wide + BLOCK_GAP_MM * len(table.blocks)
@@ -307,7 +307,7 @@ def _drawn(table: _VariantTable, rows: range, y: float) -> Iterator[Shape]:
 
 
 def _block(block: Sequence[_Cells], left: float, rows: range, top: float) -> Iterator[Shape]:
-    """Columns under one name."""
+    """Draw columns under one name."""
     start, right = left + CELL_GAP_MM, left + sum(column.wide_mm for column in block)
     several = len(block) > 1
     place, anchor = ((start + right) / 2.0, "middle") if several else (right, "end")

@@ -1,4 +1,4 @@
-"""The application: its commands, and what becomes of errors.
+"""The application: its commands, and the handling of errors.
 
 Exit status: 0 all done; 1 done, but something needs a person; 2 the call or an authored file is
 wrong; 3 a mechanism does not assemble or is singular; 5 a file cannot be written; 130 interrupted.
@@ -131,12 +131,14 @@ class Commands(_Help, TyperGroup):
 
 
 QuietOption = Annotated[
-    bool, typer.Option("--quiet", "-q", help="Only results and what needs a person; no progress.")
+    bool, typer.Option("--quiet", "-q", help="Print only results and what needs a person, no progress.")
 ]
-VerboseOption = Annotated[bool, typer.Option("--verbose", "-v", help="Print what the log holds, too.")]
+VerboseOption = Annotated[bool, typer.Option("--verbose", "-v", help="Also print the log.")]
 LogOption = Annotated[
     Path | None,
-    typer.Option("--log", help="Add to this file: times, versions, each submission's outcome, tracebacks."),
+    typer.Option(
+        "--log", help="Append to this file: times, versions, each submission's outcome, tracebacks."
+    ),
 ]
 
 
@@ -255,7 +257,7 @@ def _tell_version(wanted: bool) -> None:
 def _options(
     _version: Annotated[
         bool,
-        typer.Option("--version", callback=_tell_version, is_eager=True, help="Tell the version and end."),
+        typer.Option("--version", callback=_tell_version, is_eager=True, help="Show the version and exit."),
     ] = False,
 ) -> None:
     """Options of the program itself."""
@@ -270,9 +272,11 @@ AssignmentArgument = Annotated[
     ),
 ]
 NumberOption = Annotated[
-    int | None, typer.Option("--n", help="The student's number, where data depend on it.")
+    int | None, typer.Option("--n", help="The student's number, if the data depend on it.")
 ]
-PositionOption = Annotated[int | None, typer.Option("--position", help="The position, where there are some.")]
+PositionOption = Annotated[
+    int | None, typer.Option("--position", help="The position, if the assignment has any.")
+]
 AssignmentOption = Annotated[
     str,
     typer.Option("--assignment", help="A built-in name or a .toml file.", autocompletion=_assignments),
@@ -281,7 +285,7 @@ FolderArgument = Annotated[
     Path,
     typer.Argument(
         metavar="FOLDER",
-        help="The folder with what was handed in; the working folder if it has a planmark.toml.",
+        help="The folder with the submissions; the working folder if it has a planmark.toml.",
         default_factory=lambda: None,
         is_eager=True,  # its planmark.toml gives the options that are absent
         callback=class_folder.class_folder,
@@ -302,7 +306,9 @@ ResultsArgument = Annotated[
 ]
 OutOption = Annotated[Path, typer.Option("--out", "-o", help="The folder for the results.")]
 RosterOption = Annotated[Path | None, typer.Option("--roster", help="The class: roster.csv.")]
-JobsOption = Annotated[int | None, typer.Option("--jobs", min=1, help="Processes; all processors if absent.")]
+JobsOption = Annotated[
+    int | None, typer.Option("--jobs", min=1, help="Number of processes (default: all processors).")
+]
 LanguageOption = Annotated[
     str, typer.Option("--lang", help="Language of feedback: en, ro or ru.", autocompletion=_languages)
 ]

@@ -1,4 +1,4 @@
-"""``planmark bench``: run time against error, of the solver and of the reading of the bundled samples.
+"""``planmark bench``: run time and error of the solver and of reading the bundled samples.
 
 The solver's error is the distance between two independent computations of a plan: the construction, step by
 step as it is drawn, and the closed form. The samples' truth, `truth.jsonl`, says what was drawn on each page.

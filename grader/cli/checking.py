@@ -46,8 +46,8 @@ RANGE = N_("%(what)s = %(value)s: this assignment has %(what)s from %(first)s to
 DISAGREES = N_("--%(what)s %(called)s, but %(file)s says %(what)s %(filed)s: which is right?")
 HOW_TO_FILL_IN = N_(
     "# Drawn lengths in mm; _deg: directions counter-clockwise from the horizontal to the right; _value:"
-    " computed values, counter-clockwise positive; scales with their units. What is blank is not checked;"
-    " lines that begin with # are passed over."
+    " computed values, counter-clockwise positive; scales with their units. Blank cells are not checked;"
+    " lines that begin with # are ignored."
 )
 
 

@@ -28,7 +28,7 @@ def collect_class(folder: Path, file: Path, jobs: int | None) -> bool:
     if done.left_out:
         note(f"{done.left_out} page(s) left out: no figure was read, or one lies where the title block is")
     more = f" and {len(done.waiting) - NAMED} more" if len(done.waiting) > NAMED else ""
-    terminal.say(f"Nothing is written yet. Look at {', '.join(done.waiting[:NAMED])}{more}:")
+    terminal.say(f"Nothing is written yet. Check {', '.join(done.waiting[:NAMED])}{more}:")
     terminal.say(f"open {done.preview / LOOK}, answer for each page in {done.preview / PAGES},")
     terminal.say("then run the same command again.")
     return True

@@ -34,7 +34,7 @@ from grader.options import (
 
 @app.command()
 def plan(assignment: AssignmentArgument, options: PlanOptions) -> None:
-    """The exact plan of a variant: a table, JSON, or a drawing true to scale; or those of all variants."""
+    """Compute the exact plan of one variant, or of all: a table, JSON, or a drawing true to scale."""
     if options.every or options.csv is not None:
         from grader.cli.variants import show_class
 
@@ -53,7 +53,7 @@ def lint(
         typer.Option("--svg", help="Draw the variant that is hardest to draw into this SVG file."),
     ] = None,
 ) -> None:
-    """Hold an assignment and its rubric against every variant: all findings at once."""
+    """Check an assignment and its rubric against every variant, and list all findings."""
     from grader.cli.linting import lint_assignment
 
     if lint_assignment(assignment, as_json=as_json, svg=svg):
@@ -80,10 +80,10 @@ def new(
     ] = None,
     table: Annotated[
         Path | None,
-        typer.Option("--table", help="Of your own mechanism: a CSV with the data of each variant."),
+        typer.Option("--table", help="For your own mechanism: a CSV with the data of each variant."),
     ] = None,
 ) -> None:
-    """Write a commented assignment to start from: three files that lint and plan take as they are."""
+    """Write a commented assignment to start from: three files, ready for lint and plan."""
     from grader.authoring.new import new_assignment
     from reference.authored.assignment import load_assignment
 
@@ -102,7 +102,7 @@ def cycle(assignment: AssignmentArgument, options: CycleOptions) -> None:
 
     Over 0 to 360 degrees of the crank, or the range in which it can turn; followed without branch jumps.
 
-    In every position the driven link has the variant's own speed and acceleration.
+    In every position the driving link has the variant's own speed and acceleration.
     """
     from grader.cli.variants import show_cycle
 
@@ -111,7 +111,7 @@ def cycle(assignment: AssignmentArgument, options: CycleOptions) -> None:
 
 @app.command()
 def schema(name: Annotated[str, typer.Argument(help="report, results, reading, measurements, ...")]) -> None:
-    """The JSON Schema of a document or authored file."""
+    """Print the JSON Schema of a document or authored file."""
     import json
 
     from grader.cli import exporting
@@ -134,7 +134,7 @@ def grade(
 
 @app.command()
 def review(results: ResultsArgument, options: ReviewOptions) -> None:
-    """Settle what waits on a web page; decisions go to decisions.csv beside the submissions."""
+    """Decide open questions on a web page; decisions go to decisions.csv beside the submissions."""
     from grader.cli.reviewing import review_class
 
     review_class(results, options)
@@ -146,7 +146,7 @@ def collect(
     file: Annotated[Path, typer.Option("--to", help="The .zip file to write; F.preview is made beside it.")],
     jobs: JobsOption = None,
 ) -> None:
-    """Give away sheets without names, with the decisions as truth; each page is looked at before."""
+    """Collect sheets without names, with the decisions as truth; a person checks each page first."""
     from grader.cli.collecting import collect_class
 
     raise typer.Exit(1 if collect_class(folder, file, jobs) else 0)
@@ -156,7 +156,7 @@ def collect(
 def serve(
     options: ServeOptions,
     data: Annotated[
-        Path, typer.Argument(help="The folder that everything is kept in; made if it is not there.")
+        Path, typer.Argument(help="The folder for all data; created if it does not exist.")
     ] = Path("planmark-data"),
 ) -> None:
     """Serve students' self-check and instructors' classes as a web application."""
@@ -167,7 +167,7 @@ def serve(
 
 @app.command()
 def check(assignment: AssignmentArgument, options: CheckOptions) -> None:
-    """Check measured values, or a photo: right, or off and in which way, without giving the answer away."""
+    """Check measured values or a photo: right, or how they are off, without giving the answer away."""
     from grader.cli.checking import check_measured, check_photo
 
     is_off = (check_photo if options.photo is not None else check_measured)(assignment, options)
@@ -194,7 +194,7 @@ def read(
     position: PositionOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the readings as JSON.")] = False,
 ) -> None:
-    """What is read on scans, with standard errors; no grading."""
+    """Read scans and print the values with their standard errors, without grading."""
     from grader.cli.grading import read_scans
 
     raise typer.Exit(1 if read_scans(scans, assignment, n, position, as_json=as_json) else 0)
@@ -206,14 +206,14 @@ def sheet(
     out: Annotated[Path, typer.Option("--out", "-o", help="The PDF file to write.")],
     roster: RosterOption = None,
     layout: Annotated[
-        Path | None, typer.Option("--layout", help="Write where everything is, as JSON.")
+        Path | None, typer.Option("--layout", help="Write the positions of everything as JSON.")
     ] = None,
     lang: LanguageOption = "en",
     calibration: Annotated[
         bool, typer.Option("--calibration", help="Print the page that measures printer and scanner instead.")
     ] = False,
 ) -> None:
-    """Printable A3 answer sheets of a class: markers, QR code, data, zones."""
+    """Make printable A3 answer sheets for a class: markers, QR code, data, zones."""
     from grader.cli.sheets import print_sheets
 
     print_sheets(assignment, roster, out, layout, lang, calibration=calibration)
@@ -233,7 +233,7 @@ def handout(
     position: PositionOption = None,
     lang: LanguageOption = "en",
 ) -> None:
-    """Task sheets on A4, of a class or of one --n: scheme, data, empty tables, and no solution."""
+    """Make A4 task sheets for a class or for one --n: scheme, data, empty tables, no solution."""
     from grader.cli.sheets import print_handout
 
     print_handout(assignment, roster, n, position, out, lang)
@@ -242,12 +242,13 @@ def handout(
 @app.command()
 def calibrate(
     scans: Annotated[list[Path], typer.Argument(help="Scans of the calibration page.")],
-    as_json: Annotated[bool, typer.Option("--json", help="Print what was measured as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the measurements as JSON.")] = False,
     svg: Annotated[
-        Path | None, typer.Option("--svg", help="Draw where the first scan's page is off, 200 times.")
+        Path | None,
+        typer.Option("--svg", help="Draw the errors of the first scan's page, 200 times enlarged."),
     ] = None,
 ) -> None:
-    """What printer and scanner do to millimetres, by scans of the page `sheet --calibration` prints."""
+    """Measure errors of printer and scanner on scans of the page that `sheet --calibration` prints."""
     from grader.cli.sheets import calibrate_scans
 
     raise typer.Exit(1 if calibrate_scans(scans, svg, as_json=as_json) else 0)
@@ -262,7 +263,7 @@ def match(
     pages_per_student: Annotated[int | None, typer.Option("--pages-per-student")] = None,
     lang: LanguageOption = "en",
 ) -> None:
-    """Draft the roster's `scans` where nothing says whose page is whose, with a contact sheet."""
+    """Suggest owners of pages: a draft of the roster's `scans`, and a contact sheet to check it."""
     from grader.cli.sheets import draft_matches
 
     open_ends = draft_matches(folder, assignment, roster, out, pages_per_student, lang)
@@ -276,7 +277,7 @@ def bench(
     quick: Annotated[bool, typer.Option("--quick", help="One student of each class, fewer runs.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
 ) -> None:
-    """Run time against error: of the solver, and of the reading of the bundled samples."""
+    """Measure run time and error of the solver, and of reading the bundled samples."""
     from grader.cli.benchmark import show_benchmark
 
     show_benchmark(quick=quick, as_json=as_json)

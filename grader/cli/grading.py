@@ -153,7 +153,7 @@ def demo(out: Path, lang: str, jobs: int | None) -> None:
         title = load_assignment(name).file.title.in_language(lang)
         classes[name] = (title, results)
     write_demo_page(classes, out, lang)
-    note(f"Begin at {out / 'index.html'}")
+    note(f"Open {out / 'index.html'}")
     tell_next("review", out / "pump", before="settle or change marks with ")
 
 
@@ -251,16 +251,16 @@ def tell_class(results: ResultsDocument, out: Path) -> None:
         note(sentence)
     page = out / "index.html"
     changes = [_change_line(change) for change in results.moved]
-    _list(f"Moved since the last run: {len(results.moved)}", changes, page)
+    _list(f"Changed since the last run: {len(results.moved)}", changes, page)
     pairs = [_similar_line(pair) for pair in results.alike]
-    _list("Look alike (no accusation; hold both beside each other):", pairs, page)
+    _list("Similar sheets (no accusation; compare them side by side):", pairs, page)
     stale = [
         f"line {one.line}, {_who(one.student_id, one.position)} {one.criterion} {one.verdict}: {one.reason}"
         for one in results.stale
     ]
     _list("Decisions that are out of date, and were not applied; decide again or remove them:", stale, page)
     _list("A person must look at:", list(_waiting(results)), page)
-    note(f"Look at {page}; for programs there is {out / 'results.json'}")
+    note(f"Open {page}; programs read {out / 'results.json'}")
 
 
 def _states(results: ResultsDocument) -> str:
@@ -289,7 +289,7 @@ def _left(results: ResultsDocument) -> str:
     waits = waiting(results)
     looks = sum(len(wait.criteria) or LOOKS_A_PAGE for wait in waits) + LOOKS_A_PAGE * len(results.unmatched)
     minutes = math.ceil(looks * SECONDS_A_LOOK / 60.0)
-    left = f"{len(waits) + len(results.unmatched)}, about {minutes} min of looking" if looks else "nothing"
+    left = f"{len(waits) + len(results.unmatched)}, about {minutes} min of review" if looks else "nothing"
     wrong = results.expected_wrong
     sure = "" if wrong is None else f"; settled verdicts expected to be wrong: {wrong:.1f}"
     return f"Finished: {finished}; waiting: {left}{sure}"

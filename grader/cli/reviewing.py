@@ -34,7 +34,7 @@ def review_class(folder: Path, options: ReviewOptions) -> None:
             "token_needed", f"--host {host} opens the class to other machines: give a --token, too"
         )
     if token and len(token) < LEAST_TOKEN:
-        raise CallError("token_short", f"--token must have {LEAST_TOKEN} signs or more")
+        raise CallError("token_short", f"--token must have at least {LEAST_TOKEN} characters")
     batch = replace(noted_batch(folder), jobs=options.jobs or os.cpu_count() or 1)
     fill_image(batch.folder)
     listener = listener_on(host, options.port)

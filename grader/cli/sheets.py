@@ -27,7 +27,7 @@ from grader.tables.measurements import names_of
 from grader.tables.roster import RosterRow, read_roster
 from grader.texts.spoken import message
 from reference.authored.assignment import Variant, load_assignment
-from reference.errors import CallError, InputFileError
+from reference.errors import CallError, InputFileError, counted
 
 # calibrate ----------------------------------------------------------------------------------------
 
@@ -130,7 +130,7 @@ def _suggest_scales(name: str, roster: Path) -> None:
     for variant, line in list(lines.items())[:SHOWN_VARIANTS]:
         terminal.say(f"  {variant}: {line}", err=True)
     if len(lines) > SHOWN_VARIANTS:
-        terminal.say(f"  ... and {len(lines) - SHOWN_VARIANTS} more variants", err=True)
+        terminal.say(f"  ... and {counted(len(lines) - SHOWN_VARIANTS, 'more variant')}", err=True)
     terminal.say(
         "  to be written into the scale boxes by the student, or into the roster (kL, kv, ka)", err=True
     )
@@ -207,7 +207,7 @@ def draft_matches(
     terminal.say(
         f"{out}: a draft, {open_ends} of {len(draft.suggestions)} pages to be checked ({SURE} = certain)"
     )
-    note(f"Look at {sheet}")
+    note(f"Check {sheet}")
     return open_ends > 0
 
 

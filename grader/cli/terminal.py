@@ -1,4 +1,4 @@
-"""What the terminal and the log are told: notes, the next step, progress in a pipe."""
+"""Output on the terminal and in the log: notes, the next step, progress in a pipe."""
 
 import logging
 import os

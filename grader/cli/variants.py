@@ -246,7 +246,7 @@ def _number(subject: CycleSubject, driven: float) -> str:
 
 
 def _range(subject: CycleSubject) -> Iterator[str]:
-    """How far the driven link goes, what stops it, and what it passes."""
+    """How far the driving link goes, what stops it, and what it passes."""
     cycle = subject.cycle
     what = "crank" if cycle.is_turned else "driven slider"
     here = f"this variant: {_at(subject, cycle.start)}"

@@ -1,4 +1,4 @@
-"""What was drawn held against what is expected, criterion by criterion.
+"""Compare what was drawn with what is expected, criterion by criterion.
 
 - `task`: what is asked: one variant's exact plan and the rubric
 - `evidence`: readings and measurements in one frame, the assignment's

@@ -1,4 +1,4 @@
-"""All criteria of a rubric, in the order of construction, so that earlier mistakes are known.
+"""Judge all criteria of a rubric in the order of construction, so that earlier mistakes are known.
 
 `compare(task, submission)` marks each criterion in three steps. `FollowThrough.expectations` lists what may
 be expected: the original data at the student's scales, what follows from the student's own earlier values,

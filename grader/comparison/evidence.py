@@ -1,4 +1,4 @@
-"""Readings and measurements brought into one frame, the assignment's."""
+"""Bring readings and measurements into one frame, the assignment's."""
 
 import cmath
 import math

@@ -1,4 +1,4 @@
-"""What follows from a student's own earlier values.
+"""Values that follow from a student's own earlier values.
 
 The construction is evaluated with the student's nodes in place of the computed ones. Lengths alone are
 enough for normal and Coriolis components (from the student's own velocities or computed angular

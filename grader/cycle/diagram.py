@@ -1,4 +1,4 @@
-"""The cycle as a diagram by matplotlib: panels of quantities over one axis, paths of points at a round scale.
+"""The cycle as a matplotlib diagram: panels of quantities over one axis, paths of points at a round scale.
 
 Needs matplotlib, the extra ``planmark[plots]``.
 """
@@ -74,17 +74,17 @@ REASONS = (
     N_("its guides are parallel"),
     N_("slot and guide are parallel"),
 )
-"""Why a group stops or is passed, as `reference.kinematics.motion` says it."""
+"""Reasons why a group stops or is passed, in the words of `reference.kinematics.motion`."""
 POSITIONS = 1441
-"""Positions that are drawn, four for each degree of a turn: tips of speeds at dead points look sharp."""
+"""Positions drawn, four for each degree of a turn: tips of speeds at dead points look sharp."""
 MARGIN = 0.035
-"""Share of a limited range that is shown beyond each of its ends."""
+"""Share of a limited range shown beyond each of its ends."""
 CALM = 0.8
-"""Share of the samples that a panel shows at least of a quantity that grows without bound."""
+"""Least share of the samples that a panel shows of a quantity that grows without bound."""
 SPIKE = 8.0
-"""A value this many times larger than the calm ones lies beyond the panel as well."""
+"""A value this many times larger than the calm ones is outside the panel as well."""
 SAME = 1e-3
-"""Degrees or millimetres: dead points nearer to each other than this have one mark."""
+"""Degrees or millimetres: dead points closer than this have one mark."""
 SCALES = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 """Round scales of the paths, times a power of ten."""
 
@@ -120,12 +120,12 @@ class Setting:
         return ", ".join([f"{title} ({self.assignment.id})", *parts])
 
     def shown(self, name: str) -> str:
-        """A quantity's name as students see it."""
+        """Return a quantity's name as students see it."""
         return mathtext(self.assignment.file.names.get(name, name))
 
 
 def mathtext(name: str) -> str:
-    """A name with its indices in matplotlib's notation: ``v_BA`` is v with BA below it.
+    """Return a name with its indices in matplotlib's notation: ``v_BA`` is v with BA below it.
 
     Characters that the notation cannot write are replaced by similar ones.
     """
@@ -138,7 +138,7 @@ def mathtext(name: str) -> str:
 def cycle_diagram(
     subject: CycleSubject, selection: Selection, setting: Setting, formats: Sequence[str]
 ) -> list[bytes]:
-    """The diagram as files of some formats: ``svg``, ``pdf``, ``png``."""
+    """Return the diagram as files of some formats: ``svg``, ``pdf``, ``png``."""
     files = []
     with mpl.rc_context(STYLE):
         figure = cycle_figure(subject, selection, setting)
@@ -151,7 +151,7 @@ def cycle_diagram(
 
 
 def cycle_figure(subject: CycleSubject, selection: Selection, setting: Setting) -> Figure:
-    """The page: a panel for each kind of quantity, and the paths beside them."""
+    """Return the page: a panel for each kind of quantity, and the paths beside them."""
     kinds = [kind for kind in TITLES if any(quantity.kind == kind for quantity in selection.quantities)]
     size = WIDE_MM if kinds and selection.points else LANDSCAPE_MM if len(kinds) <= 2 else PORTRAIT_MM
     figure = Figure(figsize=(size[0] * MM, size[1] * MM))
@@ -172,12 +172,12 @@ def cycle_figure(subject: CycleSubject, selection: Selection, setting: Setting) 
 
 
 def _owner(quantity: CycleQuantity) -> str:
-    """The point, pair of points or link of a quantity: it has one colour in all panels."""
+    """Return the point, pair of points or link of a quantity: it has one colour in all panels."""
     return quantity.of.partition("_")[2]
 
 
 def _speed(subject: CycleSubject, words: Tongue) -> str:
-    """The speed and the acceleration of the driven link."""
+    """Return the speed and the acceleration of the driving link."""
     driver = subject.structure.driver
     if subject.cycle.is_turned:
         rates = (("omega", "omega", "rad/s"), ("epsilon", "epsilon", "rad/s²"))
@@ -200,7 +200,7 @@ def _panels(
     setting: Setting,
     colours: Mapping[str, str],
 ) -> None:
-    """The panels one below another; the marks pass through all of them, their texts stand above."""
+    """Draw the panels one below another; the marks pass through all of them, their texts stand above."""
     words, cycle = setting.words, subject.cycle
     all_axes = figure.subplots(len(kinds), 1, sharex=True, squeeze=False)[:, 0]
     ends = _as_read(subject, cycle.driven[[0, -1]])
@@ -231,7 +231,7 @@ def _panel(
     setting: Setting,
     colours: Mapping[str, str],
 ) -> None:
-    """Curves of quantities of one kind with a legend; a ring on each at the variant's own position."""
+    """Draw curves of quantities of one kind with a legend; a ring marks the variant's own position."""
     words, kind = setting.words, quantities[0].kind
     start = np.array([subject.cycle.start])
     driven = np.linspace(subject.cycle.driven[0], subject.cycle.driven[-1], POSITIONS)
@@ -269,7 +269,7 @@ def _panel(
 def _heights(
     subject: CycleSubject, quantity: CycleQuantity, values: FloatArray, own: float
 ) -> tuple[float, float]:
-    """The least and the largest value to show; without bound, the calm part and the variant's own value."""
+    """Return the smallest and largest value to show; if unbounded, of the calm part and the own position."""
     least, most = float(values.min()), float(values.max())
     size = np.abs(values)
     humps = size[1:-1][(size[1:-1] >= size[:-2]) & (size[1:-1] >= size[2:])]
@@ -281,7 +281,7 @@ def _heights(
 
 
 def _number_ticks(axis: Any, words: Tongue) -> int:  # noqa: ANN401 - matplotlib's axes have no common type
-    """Write numbers in the language; the power of ten that is left to the unit."""
+    """Write numbers in the language; return the power of ten left to the unit."""
     ticks = axis.get_majorticklocs()
     largest = max(map(abs, axis.get_view_interval()))
     power = 0 if 0.1 <= largest < 1e5 else 3 * math.floor(math.log10(largest) / 3.0)
@@ -292,7 +292,7 @@ def _number_ticks(axis: Any, words: Tongue) -> int:  # noqa: ANN401 - matplotlib
 
 
 def _write_marks(axes: Axes, marks: Sequence[CycleMark]) -> None:
-    """The texts of the marks above a panel, each in the lowest row that has room for it."""
+    """Write the texts of the marks above a panel, each in the lowest row that has room for it."""
     left, right = axes.get_xlim()
     figure = cast("Figure", axes.figure)
     figure.draw_without_rendering()
@@ -314,7 +314,7 @@ def _write_marks(axes: Axes, marks: Sequence[CycleMark]) -> None:
 
 
 def marks_of(subject: CycleSubject, words: Tongue) -> Iterator[CycleMark]:
-    """The variant's own position, dead points, flat positions and the ends of the range."""
+    """Yield the variant's own position, dead points, flat positions and the ends of the range."""
     cycle = subject.cycle
     letter, own = "φ" if cycle.is_turned else "s", words.gettext("this variant")
     yield _mark(subject, cycle.start, f"{own}: {letter} = {_driven(subject, cycle.start, words)}", OWN, "-.")
@@ -337,7 +337,7 @@ def _mark(subject: CycleSubject, driven: float, text: str, colour: str, dash: st
 
 
 def _dead_points(subject: CycleSubject, words: Tongue) -> list[tuple[float, str]]:
-    """The dead points, each with the names of all that stand still in it."""
+    """Return the dead points, each with the names of everything at rest there."""
     dead: dict[float, list[str]] = {}
     for stroke in strokes_of(subject):
         name = words.gettext("link %(name)s") % {"name": stroke.name} if stroke.is_angle else stroke.name
@@ -348,12 +348,12 @@ def _dead_points(subject: CycleSubject, words: Tongue) -> list[tuple[float, str]
 
 
 def _as_read(subject: CycleSubject, driven: float | FloatArray) -> FloatArray:
-    """Driven coordinates in degrees or millimetres."""
+    """Return driven coordinates in degrees or millimetres."""
     return np.asarray(np.degrees(driven) if subject.cycle.is_turned else 1e3 * np.asarray(driven))
 
 
 def _driven(subject: CycleSubject, driven: float, words: Tongue) -> str:
-    """A driven coordinate with its unit."""
+    """Write a driven coordinate with its unit."""
     if subject.cycle.is_turned:
         return f"{words.trimmed(float(np.degrees(driven)), 2)}°"
     return words.quantity(1e3 * driven, 2, "mm")
@@ -362,7 +362,7 @@ def _driven(subject: CycleSubject, driven: float, words: Tongue) -> str:
 def _paths(
     figure: Figure, subject: CycleSubject, colours: Mapping[str, str], words: Tongue, room_mm: Box
 ) -> None:
-    """Paths of some points at the largest round scale, and the mechanism in this variant's position."""
+    """Draw paths of some points at the largest round scale, and the mechanism in this variant's position."""
     cycle = subject.cycle
     here = subject.motion_at(np.array([cycle.start]))
     joints = {joint: complex(np.broadcast_to(at, (1,))[0]) for joint, at in here.position.items()}
@@ -407,14 +407,14 @@ def _paths(
 
 
 def _free_direction(lines: Sequence[complex]) -> complex:
-    """The direction, of eight, that lies farthest from all lines that leave a point."""
+    """Return the direction, of eight, farthest from all lines at a point."""
     ways = np.exp(0.25j * np.pi * np.arange(8))
     gaps = [min((abs(float(np.angle(way / line))) for line in lines if line), default=0.0) for way in ways]
     return complex(ways[int(np.argmax(gaps))])
 
 
 def _path_axes(figure: Figure, places: ComplexArray, room_mm: Box) -> tuple[Axes, float, str, float]:
-    """Axes about some places; real metres per metre on paper; the unit of numbers, and units per metre."""
+    """Return axes about some points; metres per metre on paper; the unit of numbers, and units per metre."""
     left, bottom, right, top = room_mm
     x, y = (np.array([side.min(), side.max()]) for side in (places.real, places.imag))
     sides = (right - left - 2.0 * PAD_MM, top - bottom - 2.0 * PAD_MM)
@@ -435,7 +435,7 @@ def _path_axes(figure: Figure, places: ComplexArray, room_mm: Box) -> tuple[Axes
 
 
 def _at_round_angles(subject: CycleSubject, point: str) -> ComplexArray:
-    """Where a point is at every 30 degrees of the crank."""
+    """Return a point's positions at every 30 degrees of the crank."""
     low, high = np.degrees(subject.cycle.driven[[0, -1]])
     first, last = math.ceil(low / 30.0 - 1e-9), math.floor(high / 30.0 + 1e-9)
     angles = np.radians(30.0 * np.arange(first, last + (0 if subject.cycle.turns else 1)))
@@ -444,7 +444,7 @@ def _at_round_angles(subject: CycleSubject, point: str) -> ComplexArray:
 
 
 def _links(subject: CycleSubject) -> list[tuple[str, str]]:
-    """Pairs of joints that a rigid link keeps apart, drawn as lines."""
+    """Return pairs of joints that a rigid link holds at a fixed distance, drawn as lines."""
     pairs = list(subject.construction.links.values())
     for group in subject.structure.groups:
         match group:

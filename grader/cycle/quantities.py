@@ -1,4 +1,4 @@
-"""Strokes of what goes to and fro: dead points, travel, time ratio; and extremes of quantities."""
+"""Strokes of reciprocating and rocking members: dead points, travel, time ratio; extremes of quantities."""
 
 import csv
 import difflib
@@ -27,9 +27,9 @@ from reference.quantities import KindName, kind_of, unit_of
 AXES: tuple[Literal["x", "y"], ...] = ("x", "y")
 _LETTERS = ("v", "a")
 FINE = 361
-"""Samples of a cycle among which extremes and dead points are sought: one degree of a full turn."""
+"""Samples of a cycle searched for extremes and dead points: one degree of a full turn."""
 MANY = 24
-"""An error message lists at most so many known names."""
+"""Most known names listed in an error message."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,13 +44,13 @@ class CycleQuantity:
 
     @property
     def unit(self) -> str:
-        """SI."""
+        """Its SI unit."""
         return unit_of(self.of)
 
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """What a table or a diagram shows: quantities, and points whose paths are drawn."""
+    """The contents of a table or a diagram: quantities, and points whose paths are drawn."""
 
     quantities: tuple[CycleQuantity, ...]
     points: tuple[str, ...] = ()
@@ -81,9 +81,9 @@ class CycleSubject:
         return known
 
     def select(self, names: list[str]) -> Selection:
-        """The quantities and points of some names; speeds and accelerations of all points for none.
+        """Return the named quantities and points; without names, speeds and accelerations of all points.
 
-        Raises CallError with the near names for one that is unknown.
+        Raises CallError with the near names for an unknown one.
         """
         if not names:
             every = [f"{letter}_{joint}" for letter in _LETTERS for joint in self.points]
@@ -111,7 +111,7 @@ class CycleSubject:
 
     @cached_property
     def fine(self) -> tuple[FloatArray, Motion]:
-        """Driven coordinates close enough to find extremes and dead points by, and the motion there."""
+        """Driven coordinates dense enough to find extremes and dead points, and the motion there."""
         cycle = self.cycle
         if cycle.driven.size >= FINE:
             return cycle.driven, cycle.motion
@@ -120,9 +120,9 @@ class CycleSubject:
         return driven, self.motion_at(driven)
 
     def values(self, quantity: CycleQuantity, motion: Motion | None = None) -> FloatArray:
-        """A quantity over the cycle, or in another motion of the mechanism, SI, (N,).
+        """Return a quantity over the cycle, or in another motion of the mechanism, SI, (N,).
 
-        What is smaller than its own predicted error (relative to the largest of its kind) is zero.
+        A value smaller than its own predicted error (relative to the largest of its kind) is zero.
         """
         motion = motion or self.cycle.motion
         values = self._values(quantity, motion)
@@ -131,7 +131,7 @@ class CycleSubject:
         return np.where(is_rounding, 0.0, values)
 
     def size(self, quantity: CycleQuantity) -> float:
-        """How large the largest of a kind usually is over the cycle: against it others are small."""
+        """Return the usual size of the largest quantity of a kind over the cycle, for comparison."""
         return float(np.nanmedian(_largest(quantity.kind, self.fine[1])))
 
     def _values(self, quantity: CycleQuantity, motion: Motion) -> FloatArray:
@@ -154,17 +154,17 @@ class CycleSubject:
             return vectors_of(self.construction, self.structure, motion)[name]
 
     def values_at(self, quantity: CycleQuantity, driven: FloatArray) -> FloatArray:
-        """A quantity at other driven coordinates, nan in singular ones."""
+        """Return a quantity at other driven coordinates, nan in singular ones."""
         return self.values(quantity, self.motion_at(driven))
 
     def motion_at(self, driven: FloatArray) -> Motion:
-        """The motion at other driven coordinates, nan in singular ones."""
+        """Return the motion at other driven coordinates, nan in singular ones."""
         mechanism: Mechanism = self.cycle.following.at(driven)
         return move_where_possible(mechanism)
 
 
 def _largest(kind: KindName, motion: Motion) -> FloatArray:
-    """The size of all that is of a kind, at each sample; angular accelerations are squares of velocities."""
+    """Return the largest of a kind at each sample; angular accelerations are squares of velocities."""
     match kind:
         case "velocity":
             parts = [np.abs(one) for one in motion.velocity.values()]
@@ -179,11 +179,11 @@ def _largest(kind: KindName, motion: Motion) -> FloatArray:
 
 
 def cycle_csv(subject: CycleSubject, selection: Selection, *, decimal_comma: bool = False) -> str:
-    """The driven coordinate and the selected quantities at each sample; the reason where there is none.
+    """Return the driven coordinate and the selected quantities at each sample, or the reason for none.
 
-    Numbers with all their digits (they read back as the same doubles), blank where there is none; the
-    file begins as ``crank angle [deg],v_B [m/s],x_D [m]`` and ends with the column ``note``. With decimal
-    commas fields are separated by semicolons. UTF-8 without a mark, CRLF.
+    Numbers with all their digits (they read back as the same doubles), blank where there is none; the file
+    begins as ``crank angle [deg],v_B [m/s],x_D [m]`` and ends with the column ``note``. With decimal commas
+    fields are separated by semicolons. UTF-8 without a mark, CRLF.
     """
     cycle = subject.cycle
     first = (
@@ -218,23 +218,23 @@ def _written(value: float, decimal_comma: bool) -> str:
 POINTS = 17
 ROUNDS = 11
 APPROACH = np.array([1e-3, 1e-4, 1e-5])
-"""Of the range, from its end: where a quantity is compared to see whether it grows without bound."""
+"""Distances from the end, as shares of the range, at which a quantity is tested for growing without bound."""
 GROWS = 1.8
-"""At least, from each of these to the next: of 1 / sqrt(distance) it is 3.2."""
+"""Least growth from each of these to the next: of 1 / sqrt(distance) it is 3.2."""
 REST = 1e-9
-"""A rate below this share of its largest is rounding: what should stand still, and does."""
+"""A rate below this share of its largest is rounding: the part is at rest."""
 
 
 @dataclass(frozen=True, slots=True)
 class OutputStroke:
-    """To and fro between two dead points.
+    """A stroke between two dead points.
 
     Attributes
     ----------
     name : the slider's point, or the link that rocks
     is_angle : whether `travel` is an angle (rad) or a length (m)
     dead_points : driven coordinates at which it turns back, ascending
-    travel : between its two ends, None where it turns back more than twice a cycle
+    travel : between its two ends, None if it turns back more than twice a cycle
     time_ratio : of the slower stroke to the faster one, at constant crank speed; None as above
     """
 
@@ -247,7 +247,7 @@ class OutputStroke:
 
 @dataclass(frozen=True, slots=True)
 class Extreme:
-    """A largest or smallest value and where; infinite towards ends of the range, where unbounded."""
+    """A largest or smallest value and its place; infinite towards ends of the range if unbounded."""
 
     value: float
     at: tuple[float, ...]
@@ -255,7 +255,7 @@ class Extreme:
 
 @dataclass(frozen=True, slots=True)
 class _Output:
-    """What may go to and fro: its rate, and its place along the guide or its arm."""
+    """A member that may reciprocate or rock: its rate, and its position along the guide or its arm."""
 
     name: str
     is_angle: bool
@@ -264,7 +264,7 @@ class _Output:
 
 
 def strokes_of(subject: CycleSubject) -> tuple[OutputStroke, ...]:
-    """Of all sliders on fixed guides and all links hinged to the ground that go to and fro."""
+    """Return strokes of all sliders on fixed guides and all links hinged to the ground that turn back."""
     strokes = (_stroke(subject, output) for output in _outputs(subject))
     return tuple(stroke for stroke in strokes if stroke.dead_points)
 
@@ -322,7 +322,7 @@ def _stroke(subject: CycleSubject, output: _Output) -> OutputStroke:
 
 
 def _turning_points(subject: CycleSubject, output: _Output) -> Iterator[float]:
-    """Where the rate changes its sign, refined from the samples; over a full cycle its two ends are one."""
+    """Yield positions where the rate changes its sign, refined; the ends of a full cycle are one."""
     cycle = subject.cycle
     samples, motion = subject.fine
     rate = output.rate(motion)
@@ -345,7 +345,7 @@ def _turning_points(subject: CycleSubject, output: _Output) -> Iterator[float]:
 
 
 def _travel(subject: CycleSubject, output: _Output, dead: tuple[float, ...]) -> float:
-    """Between two dead points, an angle followed from sample to sample."""
+    """Return the travel between two dead points, an angle followed from sample to sample."""
     driven, _ = subject.fine
     between = driven[(driven > dead[0]) & (driven < dead[1])]
     place = output.place(subject.motion_at(np.array([dead[0], *between, dead[1]])))
@@ -356,7 +356,7 @@ def _travel(subject: CycleSubject, output: _Output, dead: tuple[float, ...]) -> 
 
 
 def extremes(subject: CycleSubject, quantity: CycleQuantity) -> tuple[Extreme, Extreme]:
-    """The smallest and the largest value over the cycle, not only at its samples."""
+    """Return the smallest and the largest value over the cycle, not only at its samples."""
     values = subject.values(quantity, subject.fine[1])
     smallest, largest = (_refined(subject, quantity, values, sign) for sign in (-1.0, 1.0))
     ends = list(unbounded_ends(subject, quantity))
@@ -387,7 +387,7 @@ def _refined(subject: CycleSubject, quantity: CycleQuantity, values: FloatArray,
 
 
 def unbounded_ends(subject: CycleSubject, quantity: CycleQuantity) -> Iterator[tuple[float, float]]:
-    """Ends of the range towards which a quantity grows without bound, and its sign there."""
+    """Yield ends of the range towards which a quantity grows without bound, and its sign there."""
     cycle: Cycle = subject.cycle
     low, high = float(cycle.driven[0]), float(cycle.driven[-1])
     for stop, inward in zip(cycle.following.stops, (1.0, -1.0), strict=True):

@@ -1,1 +1,1 @@
-"""What students and instructors read: sentences, a page per submission, an index of the class."""
+"""Texts for students and instructors: sentences, a page per submission, an index of the class."""

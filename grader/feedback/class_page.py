@@ -1,4 +1,4 @@
-"""The class's page, and the demo's that leads to its classes. Readable offline, on a phone and on paper."""
+"""The page of a class, and the demo's page that links to its classes. Both work offline and on paper."""
 
 import math
 import shlex
@@ -48,9 +48,9 @@ from grader.overlay.scene import MARKS
 
 _NO_NAMES: Mapping[str, str] = {}
 SHOWN = 12
-"""Students named at once; the others unfold."""
+"""Number of students named at once; the others unfold."""
 FEW = 3
-"""Changed criteria of a student that are shown at once; more unfold together."""
+"""Number of a student's changed criteria shown at once; more unfold together."""
 SIGNS: Mapping[Sign, str] = {
     "hand_errors": N_("the same small errors of the hand"),
     "same_place": N_("figures lie in the same places on the sheet"),
@@ -71,8 +71,8 @@ CAUSES: Mapping[Cause, str] = {
 }
 
 
-REVIEW = N_("Look at what waits, and decide:")
-EXPORT = N_("Hand on what is finished:")
+REVIEW = N_("Decide the open questions:")
+EXPORT = N_("Export finished grades:")
 WRONG = N_("Of %(settled)s verdicts that nobody has checked, about %(wrong)s may be wrong.")
 
 
@@ -123,7 +123,7 @@ def index_page(
     student_names: Mapping[str, str] = _NO_NAMES,
     out: str = "OUT",
 ) -> str:
-    """The class's page; `out` is the folder of the results, as commands name it."""
+    """Return the class's page; `out` is the folder of the results, as commands name it."""
     speaker = tongue(lang)
     links = _links(results.reports)
     followed = follow_through(results)
@@ -170,12 +170,12 @@ def index_page(
 
 
 def needs_review(results: ResultsDocument) -> bool:
-    """Whether anything is there that a person can decide."""
+    """Return whether there is anything that a person can decide."""
     return bool(results.unmatched or results.stale or waiting(results))
 
 
 def _next_steps(results: ResultsDocument, out: str) -> list[tuple[str, str]]:
-    """What to do next, each with its command."""
+    """Return the next steps, each with its command."""
     folder = shlex.quote(out)
     steps = [(REVIEW, f"planmark review {folder}")] if needs_review(results) else []
     if states(results)["graded"]:
@@ -184,7 +184,7 @@ def _next_steps(results: ResultsDocument, out: str) -> list[tuple[str, str]]:
 
 
 def _how_sure(results: ResultsDocument, speaker: Tongue) -> str:
-    """How many verdicts may be wrong; empty where that is not known."""
+    """State how many verdicts may be wrong; empty if that is not known."""
     if results.expected_wrong is None:
         return ""
     known = {"settled": settled(results), "wrong": speaker.significant(results.expected_wrong, 1)}
@@ -192,7 +192,7 @@ def _how_sure(results: ResultsDocument, speaker: Tongue) -> str:
 
 
 def audit_sentence(trust: TrustDocument, speaker: Tongue) -> str:
-    """What the random sample says of all settled verdicts; empty before anything of it is checked."""
+    """State what the random sample shows about all settled verdicts; empty before any of it is checked."""
     if trust.at_most is None:
         return ""
     share = math.ceil(1000.0 * trust.at_most - 1e-9) / 1000.0
@@ -206,7 +206,7 @@ def audit_sentence(trust: TrustDocument, speaker: Tongue) -> str:
 
 
 def trust_sentences(results: ResultsDocument, speaker: Tongue) -> Iterator[str]:
-    """What the verdicts that people checked say of the others; nothing before anybody has checked one."""
+    """Yield what people's checks show about the other verdicts; nothing before the first check."""
     trust = results.trust
     if trust is None:
         return
@@ -237,7 +237,7 @@ def trust_sentences(results: ResultsDocument, speaker: Tongue) -> Iterator[str]:
 
 
 def _reliability(results: ResultsDocument, speaker: Tongue) -> Iterator[tuple[str, str, str, str]]:
-    """Rows of the reliability table: where from, what, the probability stated, how many were right."""
+    """Yield rows of the reliability table: source, kind, stated probability, share found right."""
     for one in [] if results.trust is None else results.trust.reliability:
         found = f"{_per_cent(one.right / one.count, speaker)} ({one.right} / {one.count})"
         source, kind = (speaker.gettext(text) for text in (SOURCES[one.source], KINDS[one.kind]))
@@ -252,7 +252,7 @@ def _per_cent(share: float, speaker: Tongue) -> str:
 
 
 def write_demo_page(classes: Mapping[str, tuple[str, ResultsDocument]], out_dir: Path, lang: str) -> None:
-    """Write `index.html`, which leads to the demo's classes; `classes` by folder: title and results."""
+    """Write `index.html` with links to the demo's classes; `classes` by folder: title and results."""
     speaker = tongue(lang)
     page = (
         environment(speaker.lang)
@@ -277,7 +277,7 @@ def write_demo_page(classes: Mapping[str, tuple[str, ResultsDocument]], out_dir:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A student's name as a link; `page` is empty for one who is gone, `picture` where there is no scan."""
+    """A student's name as a link; `page` is empty for one who is gone, `picture` if there is no scan."""
 
     text: str
     page: str = ""
@@ -285,7 +285,7 @@ class Link:
 
 
 Links = Mapping[tuple[str, int | None], Link]
-"""By student and position."""
+"""Links by student and position."""
 
 
 def _links(reports: Sequence[ReportDocument]) -> Links:
@@ -312,7 +312,7 @@ def _row(report: ReportDocument, names: Mapping[str, str], link: Link, speaker: 
 
 
 def _scale(results: ResultsDocument, criterion: CriterionDocument, speaker: Tongue) -> str:
-    """A scale that was not right: what was declared, and what it is."""
+    """A scale that was not right: the declared one, and the right one."""
     quantities = (criterion.measured, criterion.expected)
     values = [speaker.value(each.value, each.unit or "") for each in quantities if each.value is not None]
     return f"{title_of(results, criterion)}: {' ≠ '.join(values)}"
@@ -375,7 +375,7 @@ def _verdict(verdict: str | None, points: float | None, speaker: Tongue) -> str:
 
 
 def _causes(changes: Sequence[MovedDocument]) -> list[tuple[str, int]]:
-    """Why marks changed, and how often."""
+    """Count the causes of changed marks."""
     times = Counter(cause for change in changes for cause in change.why)
     return [(CAUSES[cause], count) for cause, count in times.most_common()]
 
@@ -386,9 +386,9 @@ _STEP, _WIDE, _HIGH, _FOOT = 34, 28, 80.0, 100.0
 
 
 def distribution_svg(results: ResultsDocument, speaker: Tongue) -> Markup:
-    """The distribution of scores; empty where there are none.
+    """Draw the distribution of scores; empty if there are none.
 
-    Final scores are full bars; what waits stands on top in dashes, at the middle of its range.
+    Final scores are full bars; open ones are dashed on top, at the middle of their range.
     """
     final, waiting = histogram(shares(results)), histogram(open_shares(results))
     tallest = max(a + b for a, b in zip(final, waiting, strict=True))

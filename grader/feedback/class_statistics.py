@@ -1,4 +1,4 @@
-"""The class in figures: states, scores, criteria, mistakes, what waits."""
+"""Statistics of a class: states, scores, criteria, mistakes, open reports."""
 
 from collections import Counter
 from collections.abc import Iterable
@@ -17,7 +17,7 @@ _LOST = {"none", "partial"}
 
 
 def states(results: ResultsDocument) -> Counter[str]:
-    """How many reports are in each state."""
+    """Count the reports in each state."""
     return Counter(report.status for report in results.reports)
 
 
@@ -34,7 +34,7 @@ def shares(results: ResultsDocument) -> list[float]:
 
 
 def open_shares(results: ResultsDocument) -> list[float]:
-    """Of what waits for a person, the middle of the range that the score lies in, as a share."""
+    """Return the middle of the score's range for each report that waits for a person, as a share."""
     return [
         sum(report.score_range) / 2.0 / report.max_score
         for report in results.reports
@@ -44,7 +44,7 @@ def open_shares(results: ResultsDocument) -> list[float]:
 
 
 def histogram(values: Iterable[float]) -> list[int]:
-    """Counts in ten equal bins of 0..1; full marks belong to the last."""
+    """Count values in ten equal bins of 0..1; full marks belong to the last."""
     counts = [0] * BINS
     for value in values:
         counts[min(BINS - 1, max(0, floor(value * BINS + 1e-9)))] += 1
@@ -53,7 +53,7 @@ def histogram(values: Iterable[float]) -> list[int]:
 
 @dataclass(frozen=True, slots=True)
 class ScoreSpread:
-    """Mean, median, least and largest of the final scores, as shares of the maximum."""
+    """Mean, median, smallest and largest of the final scores, as shares of the maximum."""
 
     mean: float
     median: float
@@ -62,7 +62,7 @@ class ScoreSpread:
 
 
 def spread(results: ResultsDocument) -> ScoreSpread | None:
-    """How the final scores spread; None while there are none."""
+    """Return the spread of the final scores; None while there are none."""
     values = shares(results)
     return ScoreSpread(mean(values), median(values), min(values), max(values)) if values else None
 
@@ -72,19 +72,19 @@ def spread(results: ResultsDocument) -> ScoreSpread | None:
 
 @dataclass(frozen=True, slots=True)
 class Hardness:
-    """How a criterion went: the share of its points that was earned where it was judged."""
+    """Difficulty of a criterion: the share of its points that was earned when it was judged."""
 
     title: str
     earned: float
 
 
 def title_of(results: ResultsDocument, criterion: CriterionDocument | CriterionMovedDocument) -> str:
-    """A criterion's title in the language of the class."""
+    """Return a criterion's title in the language of the class."""
     return results.titles.get(criterion.id, criterion.title)
 
 
 def hardest(results: ResultsDocument) -> list[Hardness]:
-    """The criteria at which most points were lost, worst first; those that everybody got are left out."""
+    """Return the criteria that lost most points, worst first; those that everybody got are left out."""
     judged: dict[str, list[CriterionDocument]] = {}
     for report in results.reports:
         for criterion in report.criteria:
@@ -100,14 +100,14 @@ def hardest(results: ResultsDocument) -> list[Hardness]:
 
 
 def settled(results: ResultsDocument) -> int:
-    """How many verdicts the program settled itself."""
+    """Count the verdicts that the program settled itself."""
     criteria = (criterion for report in results.reports for criterion in report.criteria)
     return sum(criterion.verdict in _JUDGED and criterion.decided is None for criterion in criteria)
 
 
 @dataclass(frozen=True, slots=True)
 class Followed:
-    """What counts as right because it follows from an own earlier value: each criterion, how often."""
+    """A criterion judged right because it follows from the student's own earlier value, and how often."""
 
     points: float
     reports: list[ReportDocument]
@@ -129,7 +129,7 @@ def follow_through(results: ResultsDocument) -> Followed:
 
 
 def commonest(results: ResultsDocument) -> list[tuple[str, list[ReportDocument]]]:
-    """Codes of mistakes with the reports that show them, commonest first."""
+    """Return codes of mistakes with the reports that show them, commonest first."""
     reports: dict[str, list[ReportDocument]] = {}
     for report in results.reports:
         for code in dict.fromkeys(mistake.code for mistake in report.mistakes):
@@ -138,7 +138,7 @@ def commonest(results: ResultsDocument) -> list[tuple[str, list[ReportDocument]]
 
 
 def wrong_scales(results: ResultsDocument) -> list[tuple[ReportDocument, list[CriterionDocument], list[str]]]:
-    """Reports whose scales were not right: the criteria lost, and the scales not understood."""
+    """Return reports whose scales were not right: the criteria lost, and the scales not understood."""
     wrong = []
     for report in results.reports:
         # A criterion asks for a scale where it expects something per millimetre on paper.
@@ -158,7 +158,7 @@ def wrong_scales(results: ResultsDocument) -> list[tuple[ReportDocument, list[Cr
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """A report that a person must review, the points at stake, and the criteria that wait."""
+    """A report that a person must review, the points at stake, and its open criteria."""
 
     report: ReportDocument
     points: float
@@ -166,7 +166,7 @@ class Waiting:
 
 
 def waiting(results: ResultsDocument) -> list[Waiting]:
-    """The reports that wait for a person, those with the most points at stake first."""
+    """Return the reports that wait for a person, those with the most points at stake first."""
     reports = [report for report in results.reports if report.status in {"needs_review", "unreadable"}]
     return sorted(
         (
@@ -178,7 +178,7 @@ def waiting(results: ResultsDocument) -> list[Waiting]:
 
 
 def _stake(report: ReportDocument) -> float:
-    """Points between the least and the largest score that are still possible."""
+    """Return the difference between the largest and the smallest score that are still possible."""
     if report.status == "unreadable" or report.score_range is None:
         return report.max_score
     return report.score_range[1] - report.score_range[0]

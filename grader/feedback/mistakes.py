@@ -1,7 +1,7 @@
 """The mistakes that planmark names: a title, what was done, what to redo.
 
-`%(at)s` is the node, vector, scale or figure where it was made. Some are told in other words where a
-link carries a guide: of a Coriolis component, and of the line along the guide.
+`%(at)s` is the node, vector, scale or figure where it was made. Some have other words if a link carries a
+guide: a Coriolis component, and the line along the guide.
 """
 
 import re
@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from grader.language import N_
 
 ALONG_GUIDE = "guide"
-"""The detail `line` of a mistake in a line that runs along a moving guide."""
+"""Value of a mistake's detail `line` for a line along a moving guide."""
 DRIVEN_ACROSS, DRIVEN_ALONG = "driven across", "driven along"
-"""The same of the driven link's vectors: one is perpendicular to the link, one points along it."""
+"""Its values for the driving link's vectors: one is perpendicular to the link, one points along it."""
 CORIOLIS_END, NORMAL_END = "k_", "n_"
-"""First letters of the nodes in which Coriolis and normal components end."""
+"""First letters of the nodes at the ends of Coriolis and normal components."""
 _NAMED = re.compile(r"%\((\w+)\)s")
 
 
@@ -161,7 +161,7 @@ _UNITS: dict[str, Words] = {
         N_("kv is the scale of velocities, ka that of accelerations: write each in its own place."),
     ),
 }  # fmt: skip
-"""By which slip of units it is."""
+"""Words by the kind of unit slip."""
 
 _CORIOLIS: dict[str, Words] = {
     "normal_missing": Words(
@@ -198,7 +198,7 @@ _ALONG_GUIDE: dict[str, Words] = {
 _DRIVEN_ACROSS: dict[str, Words] = {
     "parallel_for_perpendicular": Words(
         N_("vector along the link instead of perpendicular to it"),
-        N_("At %(at)s, the driven link's vector was drawn along the link instead of perpendicular to it."),
+        N_("At %(at)s, the driving link's vector was drawn along the link instead of perpendicular to it."),
         N_("A point that turns about a pivot moves perpendicular to the line from the pivot: lay its vector"
            " off so, in the sense of rotation, then redo the plan."),
     ),
@@ -206,7 +206,7 @@ _DRIVEN_ACROSS: dict[str, Words] = {
 _DRIVEN_ALONG: dict[str, Words] = {
     "parallel_for_perpendicular": Words(
         N_("vector perpendicular to the link instead of along it"),
-        N_("At %(at)s, the driven link's vector was drawn perpendicular to the link instead of along it."),
+        N_("At %(at)s, the driving link's vector was drawn perpendicular to the link instead of along it."),
         N_("A normal acceleration points along the link, from the moving point to the pivot: lay it off so,"
            " then redo the plan."),
     ),
@@ -263,7 +263,7 @@ _PRECISE_UNITS: dict[str, tuple[str, ...]] = {
         N_("The values were computed in %(unit)s instead of SI units: each is %(factor)s times too large."),
     ),
 }  # fmt: skip
-"""Better than `Words.what` where every name in it is known, the first that has all of its names."""
+"""More precise than `Words.what` if every name is known: the first text with all of its names counts."""
 PRECISE_ALONG_GUIDE: dict[str, tuple[str, ...]] = {
     "parallel_for_perpendicular": (
         N_("The line from %(from)s to %(at)s was drawn perpendicular to the guide instead of along it."),
@@ -273,11 +273,11 @@ PRECISE_ALONG_GUIDE: dict[str, tuple[str, ...]] = {
     ),
 }  # fmt: skip
 GIVING_AWAY = frozenset({"factor", "degrees", "n", "position", "crank_deg"})
-"""Details of a mistake that only those who may see the answers are given."""
+"""Details of a mistake that are shown only to those who may see the answers."""
 
 
 def precise(code: str, at: str, line: str, known: Collection[str]) -> str | None:
-    """The text that says what was done with all that is known of it; None where that is too little."""
+    """Return the text that says what was done, with all known details; None if too little is known."""
     if at.startswith(CORIOLIS_END):
         return None
     if code == "units":
@@ -289,11 +289,11 @@ def precise(code: str, at: str, line: str, known: Collection[str]) -> str | None
 
 
 def words_of(code: str, at: str = "", line: str = "") -> Words:
-    """The words for a mistake of this code made there, in a `line` along a guide or across a link.
+    """Return the words for a mistake of this code made there, in a `line` along a guide or across a link.
 
-    Of a slip of units `line` is which one it is.
+    For a slip of units, `line` is its kind.
 
-    Raises KeyError for a code that is not known.
+    Raises KeyError for an unknown code.
     """
     usual = MISTAKES[code]
     if at.startswith(CORIOLIS_END):
@@ -325,14 +325,14 @@ QUESTIONS: dict[str, str] = {
     "arithmetic": N_("What length did you compute for the component that ends in %(at)s, and from what?"),
     "units": N_("In which unit, in which sense and from which axis did you measure?"),
 }
-"""What tells a mistake from others that explain the same: a question that the student can answer."""
+"""A question to the student that distinguishes a mistake from others with the same effect."""
 LEAST_KNOWN: dict[str, str] = {
     "labels_swapped": N_("At which points of your plan do the letters stand?"),
 }
-"""In place of a question that names what is not known."""
+"""Replaces a question that names an unknown detail."""
 
 
 def question_of(code: str, known: Collection[str]) -> str:
-    """The question that tells a mistake from its rivals; empty for a code without one."""
+    """Return the question that distinguishes a mistake from its rivals; empty for a code without one."""
     text = QUESTIONS.get(code, "")
     return text if set(_NAMED.findall(text)) <= set(known) else LEAST_KNOWN.get(code, "")

@@ -1,4 +1,4 @@
-"""Numbers as pages write them: cells of a table, the score, and how the points of the rows become it."""
+"""Numbers as pages write them: table cells, the score, and how it follows from the points of the rows."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -10,13 +10,14 @@ from reference.quantities import unit_of
 
 SUM = N_("The points of all criteria add up to %(sum)s.")
 SCALED = N_(
-    "The points of all criteria add up to %(sum)s of %(judged)s. What was not judged does not count:"
-    " %(sum)s × %(maximum)s / %(judged)s = %(result)s."
+    "The points of all criteria add up to %(sum)s of %(judged)s. Criteria that were not judged do not"
+    " count: %(sum)s × %(maximum)s / %(judged)s = %(result)s."
 )
 WEIGHTED = N_(
-    "What was not judged does not count, and each part of the work keeps its weight: %(terms)s = %(result)s."
+    "Criteria that were not judged do not count, and each part of the work keeps its weight:"
+    " %(terms)s = %(result)s."
 )
-WAITS = N_("What waits for a person adds %(low)s to %(high)s.")
+WAITS = N_("Criteria under review add %(low)s to %(high)s.")
 ADDED = N_("A person added %(points)s.")
 TAKEN = N_("A person took off %(points)s.")
 
@@ -25,7 +26,7 @@ TAKEN = N_("A person took off %(points)s.")
 
 
 def quantity_cells(quantity: Quantity, speaker: Tongue) -> list[str]:
-    """Length and direction on paper, real value: a line each."""
+    """Return length and direction on paper, and real value, a line each."""
     drawn = []
     if quantity.length_mm is not None:
         drawn.append(speaker.quantity(quantity.length_mm, 1, "mm"))
@@ -40,7 +41,7 @@ def quantity_cells(quantity: Quantity, speaker: Tongue) -> list[str]:
 
 
 def tolerance_cells(tolerance: Tolerance, unit: str, speaker: Tongue) -> list[str]:
-    """What full marks allow, in length and direction or in the value, which is in this unit."""
+    """Return the tolerance of full marks, in length and direction, or in the value, whose unit is given."""
     drawn = []
     if tolerance.length_mm is not None:
         drawn.append(f"±{speaker.quantity(tolerance.length_mm, 1, 'mm')}")
@@ -52,7 +53,7 @@ def tolerance_cells(tolerance: Tolerance, unit: str, speaker: Tongue) -> list[st
 
 
 def scale_text(value: float | None, name: str, speaker: Tongue) -> str:
-    """A scale with its unit; a dash where there is none."""
+    """Return a scale with its unit; a dash if there is none."""
     return "–" if value is None else speaker.value(value, unit_of(name))
 
 
@@ -60,7 +61,7 @@ def scale_text(value: float | None, name: str, speaker: Tongue) -> str:
 
 
 def score_text(report: ReportDocument, speaker: Tongue) -> str:
-    """The score, the range it lies in, or a dash."""
+    """Return the score, its range, or a dash."""
     if report.score is not None:
         return speaker.trimmed(report.score, 2)
     if report.score_range is None or report.status in {"missing", "unreadable"}:
@@ -71,7 +72,7 @@ def score_text(report: ReportDocument, speaker: Tongue) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Points that are scaled together: those given, those that could be, and by what they are scaled."""
+    """Points scaled together: those given, those possible, and the factor."""
 
     given: float
     judged: float
@@ -79,14 +80,14 @@ class Part:
 
     @property
     def result(self) -> float:
-        """What it gives of the score."""
+        """Its contribution to the score."""
         return self.given * self.factor
 
 
 def score_line(report: ReportDocument, speaker: Tongue) -> str:
-    """How the points of the rows become the score, so that a reader can compute it again.
+    """Explain how the points of the rows add up to the score, so that a reader can recompute it.
 
-    Empty where nothing was judged.
+    Empty if nothing was judged.
     """
     parts = parts_of(report)
     if not parts:
@@ -95,7 +96,7 @@ def score_line(report: ReportDocument, speaker: Tongue) -> str:
 
 
 def parts_of(report: ReportDocument) -> list[Part]:
-    """Each section with a weight of its own, of which anything was judged, and all others together."""
+    """Return each section with a weight of its own in which anything was judged, and all others together."""
     parts = []
     for section in dict.fromkeys(criterion.section for criterion in report.criteria):
         own = [criterion for criterion in report.criteria if criterion.section == section]
@@ -125,7 +126,7 @@ def _settled(report: ReportDocument, parts: Sequence[Part], speaker: Tongue) -> 
 
 
 def _open_and_added(report: ReportDocument, parts: Sequence[Part], speaker: Tongue) -> Iterator[str]:
-    """What waits, and what a person added or took off."""
+    """Yield the open points, and those that a person added or subtracted."""
     if report.score is None and report.score_range is not None:
         settled = sum(part.result for part in parts) + report.added
         low, high = (max(end - settled, 0.0) for end in report.score_range)
@@ -135,7 +136,7 @@ def _open_and_added(report: ReportDocument, parts: Sequence[Part], speaker: Tong
 
 
 def added_text(report: ReportDocument, speaker: Tongue) -> str:
-    """The points that a person added or took off; empty where none."""
+    """Return the points that a person added or subtracted; empty if none."""
     text = ADDED if report.added > 0.0 else TAKEN
     points = speaker.trimmed(abs(report.added), 2)
     return speaker.gettext(text) % {"points": points} if report.added else ""

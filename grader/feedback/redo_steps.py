@@ -1,8 +1,8 @@
-"""What was done and what to redo: a judgement's mistakes in the student's words.
+"""Explain a judgement's mistakes in the student's words: what was done and what to redo.
 
-The construction's own steps from a wrong node on. Names stand as in reports, `a_BA_n`, so that pages set
-them with their indices. Without numbers the sentences say which line goes where, and by what formula a
-length is found, but give no answer away.
+The steps are the construction's own from a wrong node on. Names are written as in reports, `a_BA_n`, so that
+pages set them with their indices. Without numbers the sentences say which line goes where, and by what
+formula a length is found, but give no answer away.
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,32 +31,32 @@ SIMILAR_UNMEASURED = N_(
 )
 DIVIDE_UNMEASURED = N_("Take %(node)s on the line through %(p)s and %(q)s as the link's points divide it.")
 MOST_STEPS = 8
-"""Of one figure that are told in full: what follows is told by its names."""
+"""Number of a figure's steps that are described in full; later ones are only named."""
 THEN = N_("Then draw again what follows from it: %(nodes)s.")
 
 
 @dataclass(frozen=True, slots=True)
 class PlainSpeaker(Speaker):
-    """Says names as they stand in reports."""
+    """Writes names as they stand in reports."""
 
     def name(self, *names: str) -> Markup:
-        """A node, a vector, or several nodes side by side."""
+        """Return the name of a node, a vector, or several nodes side by side."""
         return Markup("").join(self.subject.shown(name) for name in names)
 
     def scale(self, scale: str) -> Markup:
-        """A scale's name."""
+        """Return a scale's name."""
         return Markup.escape(self.subject.shown(scale))
 
     def rate(self, name: str) -> Markup:
-        """An angular velocity or acceleration."""
+        """Return the name of an angular velocity or acceleration."""
         return Markup.escape(self.subject.shown(name))
 
 
 def redo(subject: Subject, tongue: Tongue, node: str, *, with_numbers: bool) -> list[str]:
-    """The steps from a node on: those of its figure in full, later figures' nodes by name.
+    """Return the steps from a node on: those of its figure in full, later figures' nodes by name.
 
-    Empty for what is no node of the construction. Without numbers, steps of the mechanism are left out:
-    they are nothing but given lengths.
+    Empty if it is no node of the construction. Without numbers, steps of the mechanism are left out: they are
+    nothing but given lengths.
     """
     construction = subject.plan.construction
     order = [step.node for step in construction.steps]
@@ -75,7 +75,7 @@ def redo(subject: Subject, tongue: Tongue, node: str, *, with_numbers: bool) -> 
 
 
 def _touched(steps: tuple[Step, ...], node: str) -> list[Step]:
-    """The step of a node and all that hang on it, in their order."""
+    """Return the step of a node and all that depend on it, in their order."""
     nodes, touched = {node}, []
     for step in steps:
         if step.node in nodes or nodes & set(step.needs):
@@ -93,7 +93,7 @@ def _text(speaker: Speaker, step: Step, *, with_numbers: bool) -> Markup:
 
 
 def _text_without_numbers(speaker: Speaker, step: Step) -> Iterator[Markup]:
-    """A step without a number: its formula, then what is drawn."""
+    """Describe a step without a number: its formula, then what is drawn."""
     match step:
         case TwoLines() | Coincide():
             yield sentences.sentence(speaker, step)
@@ -110,7 +110,7 @@ def _text_without_numbers(speaker: Speaker, step: Step) -> Iterator[Markup]:
 
 
 def _formula(speaker: Speaker, step: Given) -> Iterator[Markup]:
-    """How the component is computed, in names alone."""
+    """Yield the formula of the component, in names alone."""
     name = speaker.vector(step.start, step.node)
     if isinstance(step.length, Normal):
         speed = speaker.vector(step.length.tail, step.length.head)
@@ -128,10 +128,10 @@ def with_mistakes_explained(
     lang: str,
     level: Level = "full",
 ) -> ReportDocument:
-    """The report with its mistakes told: `feedback` and, step by step, what to `redo`.
+    """Return the report with its mistakes explained: `feedback` and, step by step, what to `redo`.
 
-    Arguments: `report` is that of the `judgement`, its mistakes in the same order. At level `symbol`
-    nothing is told, at `hint` no number.
+    Arguments: `report` is that of the `judgement`, its mistakes in the same order. At level `symbol` nothing
+    is explained, at `hint` no number is shown.
     """
     if not judgement.mistakes or level == "symbol":
         return report
@@ -150,7 +150,7 @@ def with_mistakes_explained(
 
 
 def _told(document: MistakeDocument, sentences: Sequence[str]) -> dict[str, object]:
-    """A mistake and its rivals in words."""
+    """Describe a mistake and its rivals in words."""
     rivals = [
         rival.model_copy(update={"feedback": text})
         for rival, text in zip(document.rivals, sentences[1:], strict=True)
@@ -159,14 +159,14 @@ def _told(document: MistakeDocument, sentences: Sequence[str]) -> dict[str, obje
 
 
 def _subject(judgement: Judgement, assignment: Assignment, variant: Variant, speaker: Tongue) -> Subject:
-    """The right plan at the scales that the student drew at."""
+    """Return the right plan at the scales that the student used."""
     used = {name: scale.used for name, scale in judgement.scales.items()}
     plan = exact_plan(assignment, [variant], assignment.scales([variant], **used))
     return Subject(assignment, plan, 0, wording_of(speaker))
 
 
 def _redo(subject: Subject, mistake: NamedMistake, speaker: Tongue, level: Level) -> list[str]:
-    """The steps from the mistake on; none where there is no single step that it was made at."""
+    """Return the steps from the mistake on; none if it was made at no single step."""
     vectors = subject.plan.construction.vectors
     if mistake.code == "arithmetic" and mistake.at in vectors:
         # Its value is wrong, the drawing can stay.

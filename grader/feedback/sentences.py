@@ -1,8 +1,8 @@
 """Reasons and mistakes as sentences.
 
-Three levels of feedback: ``full`` for instructors, with every number; ``hint``, which says in which way
-something is off without giving the answer away; ``symbol``, which says nothing beside the mark.
-Names of vectors stand in sentences as `v_BA`, `a_BA_n`; pages set them with indices.
+There are three levels of feedback: ``full`` for instructors, with every number; ``hint``, which describes the
+error without giving the answer away; ``symbol``, which shows only the mark. Names of vectors stand in
+sentences as `v_BA`, `a_BA_n`; pages set them with indices.
 """
 
 import re
@@ -23,7 +23,7 @@ _NO_NAMES: Mapping[str, str] = {}
 # Criteria -----------------------------------------------------------------------------------------
 
 OPEN_ONLY = frozenset({"near_limit", "hand_may_miss", "doubtful", UNSURE})
-"""Said of what waits alone: no doubt is left where there is a verdict."""
+"""Used only for open criteria: a verdict leaves no doubt."""
 RESIDUALS = frozenset(
     {
         "too_long", "too_short", "turned_left", "turned_right", "reversed", "should_be_zero",
@@ -31,18 +31,18 @@ RESIDUALS = frozenset(
         "not_certainly_within",
     }
 )  # fmt: skip
-"""Said of what is off as it was read: not of what is proposed as right."""
+"""Used for errors as read: not for a criterion proposed as right."""
 IN_FAVOUR = frozenset({"counted_for_you", "at_stake", "right"})
-"""Said of what counts: not of what is proposed as wrong."""
+"""Used for what counts: not for a criterion proposed as wrong."""
 
-NEARLY = N_("Held against your own earlier work it is nearly right; held against the data:")
-MAY_FOLLOW = N_("It may follow rightly from your own earlier work; held against the data:")
-"""In place of `follows` where full marks do not follow, at level `full`."""
-PROBABLY_FOLLOWS = N_("It probably follows rightly from your own earlier work.")
-"""In place of `follows` where that is proposed."""
+NEARLY = N_("Compared with your own earlier work it is nearly right; compared with the data:")
+MAY_FOLLOW = N_("It may be consistent with your own earlier work; compared with the data:")
+"""Replaces `follows` if full marks do not follow, at level `full`."""
+PROBABLY_FOLLOWS = N_("It is probably consistent with your own earlier work.")
+"""Replaces `follows` if that is only proposed."""
 
 TOLD_BESIDE = frozenset({"follows", "counted_for_you", "at_stake", "letters_exchanged"})
-"""Reasons that are told of what follows rightly."""
+"""Reasons that are shown beside `follows`."""
 
 MOST_REASONS = 3
 """More would hide the important ones."""
@@ -51,7 +51,7 @@ MOST_REASONS = 3
 def criterion_feedback(
     outcome: Outcome, lang: str, level: Level = "full", names: Mapping[str, str] = _NO_NAMES
 ) -> str:
-    """What is to be said to one criterion; empty at level `symbol`.
+    """Return the sentences on one criterion; empty at level `symbol`.
 
     `names` renames nodes and scales as the assignment's students know them.
     """
@@ -78,7 +78,7 @@ def criterion_feedback(
 def feedback_again(
     criterion: CriterionDocument, lang: str, level: Level = "full", names: Mapping[str, str] = _NO_NAMES
 ) -> str:
-    """What is to be said to a criterion of a report that is open, in another language than the report's."""
+    """Return the sentences on a report's open criterion in another language than the report's."""
     outcome = Outcome(
         criterion.id, criterion.drawn, criterion.verdict, criterion.measured, criterion.expected,
         criterion.tolerance, criterion.confidence,
@@ -94,7 +94,7 @@ def _as_before(parameters: Parameters) -> dict[str, Value]:
 
 
 def _worth_telling(outcome: Outcome, level: Level = "full") -> list[Reason]:
-    """The reasons without those that say nothing beside the others, or too much."""
+    """Return the reasons without those that add nothing to the others, or say too much."""
     if outcome.verdict == "not_judged" and not outcome.reasons:
         return [Reason(UNCHECKED)]
     codes = {reason.code for reason in outcome.reasons}
@@ -116,7 +116,7 @@ def _worth_telling(outcome: Outcome, level: Level = "full") -> list[Reason]:
     if "doubtful" in codes:
         needless |= {"near_limit"}
     if level != "full" and codes & {"not_measured", "unread"}:
-        # How short it should be is an answer, where nothing was drawn.
+        # If nothing was drawn, the right length would be an answer.
         needless |= {"too_short_to_judge"}
     if "optional" in codes:
         needless |= {"not_measured", "unread"}
@@ -128,14 +128,14 @@ def _worth_telling(outcome: Outcome, level: Level = "full") -> list[Reason]:
     return [
         reason
         for reason in reasons
-        # Of several limits that are near, the first one is enough.
+        # If several limits are near, the first one is enough.
         if reason.code not in needless and (reason.code != "near_limit" or reason is near)
     ]
 
 
 # Mistakes -----------------------------------------------------------------------------------------
 
-RIVALS = N_("What was handed in does not tell this from something else:")
+RIVALS = N_("Your submission fits other explanations nearly as well:")
 """Stands between a mistake and those that explain the same nearly as well."""
 BETWEEN_RIVALS = N_("or:")
 """Stands before each of those."""
@@ -144,9 +144,9 @@ BETWEEN_RIVALS = N_("or:")
 def mistake_feedback(
     mistake: NamedMistake, lang: str, level: Level = "full", names: Mapping[str, str] = _NO_NAMES
 ) -> str:
-    """What was done, most likely, and what to redo; empty at level `symbol` and for an unknown code.
+    """Describe the likeliest mistake and what to redo; empty at level `symbol` and for an unknown code.
 
-    Where rivals explain the same nearly as well, they are told too, each after an "or".
+    Rivals that explain the same nearly as well follow, each after an "or".
     """
     if level == "symbol" or mistake.code not in MISTAKES:
         return ""
@@ -165,10 +165,10 @@ ODDS = N_("How likely that is: %(share)s.")
 def mistake_sentences(
     mistake: NamedMistake, speaker: Tongue, level: Level, names: Mapping[str, str] = _NO_NAMES
 ) -> list[str]:
-    """What was done and what to redo, and the same of each rival, with its odds.
+    """Return what was done and what to redo, then the same for each rival, with its odds.
 
-    After the last one stands the question that tells them apart. A rival that is told in the same words as
-    one before it is empty.
+    The last one ends with the question that distinguishes them. A rival with the same words as one before it
+    is empty.
     """
     told = mistake_sentence(mistake, speaker, level, names)
     found = {told: mistake.confidence}
@@ -191,7 +191,7 @@ def _odds(share: float, speaker: Tongue) -> str:
 
 
 def question(mistake: NamedMistake, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES) -> str:
-    """The one question that tells a mistake from its rivals."""
+    """Return the question that distinguishes a mistake from its rivals."""
     where = {"at": place(mistake.at, speaker, names)}
     known = {**where, **_known(mistake, speaker, "hint", names)}
     return speaker.gettext(question_of(mistake.code, known)) % known
@@ -200,7 +200,7 @@ def question(mistake: NamedMistake, speaker: Tongue, names: Mapping[str, str] = 
 def mistake_sentence(
     mistake: NamedMistake, speaker: Tongue, level: Level, names: Mapping[str, str] = _NO_NAMES
 ) -> str:
-    """What was done and what to redo, whatever its rivals."""
+    """Return what was done and what to redo, regardless of rivals."""
     words = words_of(mistake.code, mistake.at, line_of(mistake))
     where = {"at": place(mistake.at, speaker, names)}
     known = {**where, **_known(mistake, speaker, level, names)}
@@ -209,7 +209,7 @@ def mistake_sentence(
 
 
 def _known(mistake: NamedMistake, speaker: Tongue, level: Level, names: Mapping[str, str]) -> dict[str, str]:
-    """What is known of a mistake, in words; numbers only where they may be told."""
+    """Return the details of a mistake in words; numbers only if they may be shown."""
     told = {
         key: speaker.trimmed(value, 3) if isinstance(value, float) else place(str(value), speaker, names)
         for key, value in mistake.detail.items()
@@ -225,9 +225,9 @@ def _known(mistake: NamedMistake, speaker: Tongue, level: Level, names: Mapping[
 
 
 _IMAGE, ACCELERATED = re.compile("[a-z][0-9]?'?"), "'"
-"""How the images of joints are named in the plans, and those in the acceleration plan."""
+"""Names of images of joints in the plans, and the mark of those in the acceleration plan."""
 
 
 def line_of(mistake: NamedMistake) -> str:
-    """Which kind of line or slip of units it is, as `words_of` takes it; empty where the code is enough."""
+    """Return the kind of line or unit slip, as `words_of` takes it; empty if the code suffices."""
     return str(mistake.detail.get("line", mistake.detail.get("slip", "")))

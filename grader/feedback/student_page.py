@@ -38,23 +38,23 @@ from grader.texts.spoken import PLACES, place
 NUMBER, POSITION, PAGE = N_("number"), N_("position"), N_("page")
 WIDENED = N_("widened")
 FROM_OWN = N_("from your own values")
-"""Beside what was expected where that follows from the student's own earlier values."""
+"""Shown beside the expected value if it follows from the student's own earlier values."""
 MAY_BE_WRONG = N_("What may be wrong")
 AS_MEASURED = N_("drawn from the entered measurements")
 SHEET = N_("the sheet")
 DETAIL = N_("a closer look")
 OR = N_("or")
 WHY_WIDENED = N_(
-    "Widened: small errors of a careful hand add up to more than the rubric's tolerance here, as they do"
-    " where lines meet at a small angle."
+    "Widened: here the small errors of careful drawing add up to more than the rubric's tolerance, as they"
+    " do where lines meet at a small angle."
 )
 UNITS = N_(
     "Lengths are millimetres on paper; directions count counter-clockwise from the horizontal to the right."
 )
 MOST_TITLES = 2
-"""Mistakes in one heading, the likeliest ones; the text below it tells them all."""
+"""Mistakes named in one heading, the likeliest ones; the text below it names them all."""
 PRINTED = "feedback.pdf"
-"""Earlier versions wrote it; an old one is removed, it may show more than the page does now."""
+"""A file that earlier versions wrote; it is removed because it may show more than the page does now."""
 
 GroupName = Literal["lost", "waiting", "right", "not_judged"]
 GROUPS: Mapping[GroupName, tuple[str, ...]] = {
@@ -68,20 +68,20 @@ WAITING: dict[str, str] = {
     "other_variant": N_("drawn with another student's data"),
     "data_misread": N_("drawn with a crank angle that was misread"),
     "data_unclear": N_("perhaps drawn with other data"),
-    "entry_refused": N_("an entry that it rests on cannot be used"),
+    "entry_refused": N_("it depends on an unusable entry"),
     "doubtful": N_("read with too little certainty"),
-    "near_limit": N_("so near the limit of the tolerance that the scan cannot decide"),
-    "hand_may_miss": N_("off by no more than a careful hand may be where lines meet at a small angle"),
+    "near_limit": N_("too close to the limit of the tolerance to decide from the scan"),
+    "hand_may_miss": N_("an error that even careful drawing can make where lines meet at a small angle"),
     "unread": N_("not read on the sheet"),
     "not_measured": N_("nothing was handed in for it"),
     "readings_disagree": N_("the drawing and the entered measurement differ"),
     "written_disagrees": N_("the drawing and the length written on the sheet differ"),
     "scale_assumed": N_("no scale was declared, and the drawing follows another than the assignment's own"),
     "scale_off": N_("the declared scale does not fit the drawing"),
-    "follows": N_("it hangs on what is still open"),
+    "follows": N_("it depends on an open question"),
     "": N_("open"),
 }
-"""Why a person must look, by the code of the reason; the first of these that a criterion has counts."""
+"""Reasons for a person to look, by the code of the reason; a criterion's first code listed here counts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,12 +95,12 @@ class About:
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """A mistake: what happened, what to redo, what it explains, where to see it.
+    """A mistake: what happened, what to redo, what it explains, and its pictures.
 
     Attributes
     ----------
-    alternatives : what would explain the same nearly as well
-    is_open : whether nothing that it explains has lost points yet, and some of it waits for a person
+    alternatives : other explanations that fit nearly as well
+    is_open : whether no criterion that it explains has lost points yet, and one waits for a person
     """
 
     title: str
@@ -115,7 +115,7 @@ class Action:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Rows that are shown together: those that lost points, that wait, that are right, that do not count."""
+    """Rows shown together: those that lost points, that wait, that are right, that do not count."""
 
     title: str
     verdict: str
@@ -123,18 +123,18 @@ class Group:
 
     @property
     def points(self) -> float:
-        """Those that its rows gave."""
+        """Points that its rows gave."""
         return sum(row.points or 0.0 for row in self.rows)
 
     @property
     def max_points(self) -> float:
-        """Those that its rows can give."""
+        """Points that its rows can give."""
         return sum(row.max_points for row in self.rows)
 
 
 @dataclass(frozen=True, slots=True)
 class StudentPage:
-    """A report and its pictures in the student's language; `level` says what may be told.
+    """A report and its pictures in the student's language; `level` says how much may be shown.
 
     The report's own texts (`feedback`, `redo`) are shown as they stand. At levels below `full` no method
     gives an expected value, a tolerance or a scale that was used without being declared.
@@ -148,18 +148,18 @@ class StudentPage:
 
     @property
     def shows_expected(self) -> bool:
-        """Whether the answers may be seen."""
+        """True if the answers may be shown."""
         return self.level == "full"
 
     @property
     def details(self) -> list[str]:
-        """The student's number and position, where there are some."""
+        """The student's number and position, if there are any."""
         known = ((NUMBER, self.report.variant.get("n")), (POSITION, self.report.position))
         return [f"{self.speaker.gettext(word)} {value}" for word, value in known if value is not None]
 
     @property
     def score(self) -> str:
-        """The score, or the range that it lies in."""
+        """The score, or its range."""
         return score_text(self.report, self.speaker)
 
     @property
@@ -170,17 +170,17 @@ class StudentPage:
 
     @property
     def problems(self) -> list[ProblemText]:
-        """Tell the problems of files and sheets."""
+        """The problems of files and sheets as sentences."""
         return [problem_sentence(problem, self.speaker) for problem in self.report.problems]
 
     def shown(self, name: str) -> str:
-        """A vector, link or scale as students know it."""
+        """Return a vector, link or scale as students know it."""
         return self.about.names.get(name, name)
 
     # Criteria and scales --------------------------------------------------------------------------
 
     def group(self, name: GroupName) -> Group:
-        """The rows of a group, those that need not be handed in and were not left out."""
+        """Return the rows of a group, without optional ones that were not handed in."""
         title, *verdicts = GROUPS[name]
         rows = (row for row in self.report.criteria if row.verdict in verdicts and not _is_left_out(row))
         return Group(self.speaker.gettext(title), verdicts[0], tuple(rows))
@@ -192,7 +192,7 @@ class StudentPage:
 
     @property
     def added(self) -> str:
-        """The points that a person added or took off."""
+        """The points that a person added or subtracted."""
         return added_text(self.report, self.speaker)
 
     @property
@@ -207,7 +207,7 @@ class StudentPage:
 
     @property
     def not_required(self) -> list[Markup]:
-        """List what is optional and was not handed in, with the right value where it may be told."""
+        """List optional criteria that were not handed in, with the right value if it may be shown."""
         names = []
         for criterion in filter(_is_left_out, self.report.criteria):
             name = words.symbols(self.shown(criterion.drawn or criterion.id))
@@ -216,21 +216,21 @@ class StudentPage:
         return names
 
     def name(self, criterion: CriterionDocument) -> str:
-        """Name what a criterion is about, where its title does not say it."""
+        """Return a criterion's subject, if its title does not name it."""
         is_needed = criterion.drawn and criterion.drawn not in criterion.title
         return self.shown(criterion.drawn) if is_needed else ""
 
     def sentence(self, criterion: CriterionDocument) -> str:
-        """The sentence on a criterion; empty where its mark says all: just right, or checked by a person."""
+        """Return the sentence on a criterion; empty if its mark says all: right, or checked by a person."""
         is_said = criterion.reasons in (["right"], ["decided"]) and criterion.mistake is None
         return "" if is_said else criterion.feedback
 
     def measured(self, criterion: CriterionDocument) -> list[str]:
-        """Write what was handed in as lines of a cell."""
+        """Return the submitted values as lines of a cell."""
         return quantity_cells(criterion.measured, self.speaker)
 
     def expected(self, criterion: CriterionDocument) -> list[str]:
-        """Write what is right as lines of a cell; a vector shorter than its tolerance has no direction."""
+        """Return the right values as lines of a cell; a vector below its tolerance has no direction."""
         if not self.shows_expected:
             return []
         expected = criterion.expected
@@ -239,7 +239,7 @@ class StudentPage:
         return quantity_cells(expected, self.speaker)
 
     def tolerance(self, criterion: CriterionDocument) -> list[str]:
-        """Tell what full marks allow, and why. A tolerance in per cent would give the expected value away."""
+        """Return the tolerance of full marks, and why. A tolerance in per cent would give the answer away."""
         if not self.shows_expected:
             return []
         unit = criterion.expected.unit or criterion.measured.unit or ""
@@ -255,7 +255,7 @@ class StudentPage:
 
     @property
     def widening(self) -> str:
-        """Why a tolerance is wider than the rubric's; empty where none is."""
+        """Explain why tolerances are wider than the rubric's; empty if none is."""
         is_wider = any(criterion.tolerance.widened for criterion in self.report.criteria)
         return self.speaker.gettext(WHY_WIDENED) if self.shows_expected and is_wider else ""
 
@@ -265,23 +265,23 @@ class StudentPage:
         return self.speaker.gettext(UNITS)
 
     def declared(self, name: ScaleName) -> str:
-        """A scale as it was declared."""
+        """Return a scale as declared."""
         return scale_text(self.report.scales[name].declared, name, self.speaker)
 
     def remarks(self, scale: ScaleDocument) -> list[str]:
-        """Tell how a scale was written, where it was found, and why it was refused."""
+        """Say how and where a scale was written, and why it was refused."""
         source = self.speaker.gettext(words.SOURCES[scale.source]) if scale.source else ""
         return [remark for remark in (scale.text, source, scale.refused) if remark]
 
     def used(self, name: ScaleName) -> str:
-        """A scale as it was used; one that was not declared is an answer."""
+        """Return a scale as used; one that was not declared is an answer."""
         return scale_text(self.report.scales[name].used, name, self.speaker) if self.shows_expected else ""
 
     # Pictures -------------------------------------------------------------------------------------
 
     @property
     def scans(self) -> list[Markup]:
-        """Each scan once; every view of it shows it by its name."""
+        """Each scan once; every view of it refers to it by its name."""
         return [scan_element(picture, index) for index, picture in enumerate(self.pictures)]
 
     @property
@@ -300,20 +300,20 @@ class StudentPage:
 
     @property
     def has_doubts(self) -> bool:
-        """Whether any doubtful vector is drawn."""
+        """True if any doubtful vector is drawn."""
         return any(arrow.doubtful for picture in self.pictures for arrow in picture.scene.arrows)
 
     @property
     def has_ghosts(self) -> bool:
-        """Whether any expected vector is drawn."""
+        """True if any expected vector is drawn."""
         return any(picture.scene.ghosts for picture in self.pictures)
 
     def draw(self, view: PageView) -> Markup:
-        """A view as an element of the page."""
+        """Return a view as an element of the page."""
         return svg(view, self.pictures[view.picture], self.description(view))
 
     def description(self, view: PageView) -> str:
-        """The description of a view in words, for readers who cannot see it."""
+        """Describe a view in words, for readers who cannot see it."""
         verdicts = {
             criterion.drawn: self.speaker.gettext(words.VERDICTS[criterion.verdict])
             for criterion in self.report.criteria
@@ -322,7 +322,7 @@ class StudentPage:
         return f"{self._caption(view)}. {'; '.join(parts)}".rstrip(". ")
 
     def below(self, view: PageView) -> Markup:
-        """The caption below a view: of a detail with the names in it, of other views with their page."""
+        """Return the caption below a view: the names in a detail, the page of other views."""
         caption, picture = self._caption(view), self.pictures[view.picture]
         said = Markup.escape(caption[:1].upper() + caption[1:])
         if view.kind == "sheet":
@@ -335,13 +335,13 @@ class StudentPage:
         return self.speaker.gettext({**PLACES, "sheet": SHEET, "detail": DETAIL}[view.kind])
 
     def _source(self, picture: Picture) -> str:
-        """Name the file and the page."""
+        """Return the file and the page."""
         if not picture.scan:
             return f"{picture.source}, {self.speaker.gettext(AS_MEASURED)}"
         return f"{picture.source}, {self.speaker.gettext(PAGE)} {picture.page}"
 
     def _placed(self, picture: Picture) -> str:
-        """For instructors, how the page's millimetres were found."""
+        """Explain to instructors how the page's millimetres were found."""
         for reading in self.report.reading.sheets if self.shows_expected else ():
             sheet = reading.sheet
             is_this = (reading.source, reading.page) == (picture.source, picture.page)
@@ -367,7 +367,7 @@ class StudentPage:
 
     @property
     def title_of_wrong(self) -> str:
-        """The heading of what is wrong, or may be: while nothing has lost points it is not certain."""
+        """The heading of the errors; while nothing has lost points they are not certain."""
         is_certain = self.group("lost").rows or not all(action.is_open for action in self.actions)
         return self.group("lost").title if is_certain else self.speaker.gettext(MAY_BE_WRONG)
 
@@ -392,7 +392,7 @@ class StudentPage:
 
     @property
     def view_of_others(self) -> PageView | None:
-        """A closer look at what lost points without a named mistake, in the figure of the first of it."""
+        """A detail of the errors without a named mistake, in the figure of the first of them."""
         named = {name for mistake in self.report.mistakes for name in mistake.explains}
         lost = [row for row in self.group("lost").rows if row.drawn and row.id not in named]
         first = {row.drawn for row in lost if (row.vector or "")[:1] == (lost[0].vector or "")[:1]}
@@ -402,7 +402,7 @@ class StudentPage:
 
     @property
     def waiting(self) -> list[tuple[str, list[str]]]:
-        """Reasons for which a person must look, each with the criteria that wait for it."""
+        """The reasons for which a person must look, each with its open criteria."""
         groups: dict[str, list[str]] = {}
         for row in self.group("waiting").rows:
             why = next((code for code in WAITING if code in row.reasons), "")
@@ -413,13 +413,13 @@ class StudentPage:
 
     @property
     def likely(self) -> list[tuple[str, int]]:
-        """Count what waits by its likeliest verdict, where something speaks for one."""
+        """Count open criteria by their likeliest verdict, if one is likely."""
         proposed = [row.proposed for row in self.group("waiting").rows if row.probability != EVEN]
         return [(verdict, proposed.count(verdict)) for verdict in words.VERDICTS if verdict in proposed]
 
 
 def _is_left_out(criterion: CriterionDocument) -> bool:
-    """Whether it was not handed in and need not be."""
+    """Return whether it is optional and was not handed in."""
     return criterion.verdict == "not_judged" and criterion.reasons[:1] == ["optional"]
 
 
@@ -443,10 +443,10 @@ def write_feedback(
     Arguments
     ---------
     report : its criteria's and mistakes' `feedback` is shown as it stands (see `criterion_feedback`)
-    pictures : of its pages, in order; for entered measurements of the plans as measured
-    level : `full` shows what was expected; `hint` and `symbol` do not
+    pictures : of its pages, in order; for entered measurements, the plans as measured
+    level : `full` shows the expected values; `hint` and `symbol` do not
 
-    Raises OutputError where a file cannot be written.
+    Raises OutputError if a file cannot be written.
     """
     scanned = [picture for picture in pictures if picture.png]
     files = ["overlay.png" if k == 1 else f"overlay_{k}.png" for k in range(1, len(scanned) + 1)]
@@ -454,7 +454,7 @@ def write_feedback(
         write_whole(out_dir / file, picture.png)
     write_whole(out_dir / "feedback.html", feedback_page(report, pictures, lang, level, about))
     for old in (*out_dir.glob("overlay*.png"), out_dir / PRINTED):
-        # Of an earlier run: of pages that are no longer handed in, or at another level.
+        # Remove files of an earlier run: of pages no longer handed in, or at another level.
         if old.name not in files:
             old.unlink(missing_ok=True)
 
@@ -466,7 +466,7 @@ def feedback_page(
     level: Level = "full",
     about: About | None = None,
 ) -> str:
-    """The page of one submission; arguments as of `write_feedback`."""
+    """Return the page of one submission; arguments as of `write_feedback`."""
     page = StudentPage(report, tuple(pictures), tongue(lang), level, about or About())
     template = environment(page.speaker.lang).get_template("feedback.html")
     return template.render(

@@ -1,4 +1,4 @@
-"""How verdicts, states, names and problems are written for people."""
+"""Verdicts, states, names and problems as written for people."""
 
 import re
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ VERDICTS = {
     "full": N_("right"),
     "partial": N_("nearly right"),
     "none": N_("wrong"),
-    "follow_through": N_("follows rightly"),
+    "follow_through": N_("consistent with earlier work"),
     "review": N_("waits for a person"),
     "not_judged": N_("not judged"),
 }
@@ -61,7 +61,7 @@ _NAME = re.compile(
 
 @lru_cache(4096)
 def symbols(text: str) -> Markup:
-    """Text with names of vectors, rates and scales set with their indices; everything else escaped."""
+    """Return text with names of vectors, rates and scales set with their indices; everything else escaped."""
     parts: list[Markup] = []
     end = 0
     for match in _NAME.finditer(text):
@@ -85,17 +85,17 @@ def _symbol(match: re.Match[str]) -> Markup:
 
 
 TURNING = (*range(0x202A, 0x202F), *range(0x2066, 0x206A))
-"""Unicode's marks of direction that hold until they are ended."""
+"""Unicode's marks of direction that apply until they are ended."""
 
 
 def _in_order(value: object) -> object:
-    """A text without the signs that turn the order of what follows it on the page: names may have them."""
+    """Return a text without the marks that reverse the order of the text after it: names may contain them."""
     return value.translate(dict.fromkeys(TURNING)) if isinstance(value, str) else value
 
 
 @cache
 def environment(lang: str) -> Environment:
-    """Templates with the sentences and numbers of a language."""
+    """Return the environment of templates, with the sentences and numbers of a language."""
     speaker = tongue(lang)
     made = Environment(
         loader=PackageLoader("grader.feedback"),
@@ -125,7 +125,7 @@ def environment(lang: str) -> Environment:
 
 @dataclass(frozen=True, slots=True)
 class ProblemText:
-    """A problem as a page shows it: what it is, and the program's own words where they say more."""
+    """A problem as a page shows it: its sentence, and the program's own words if they say more."""
 
     text: str
     detail: str
@@ -133,12 +133,12 @@ class ProblemText:
 
 
 def problem_sentence(problem: ProblemDocument, speaker: Tongue, *, brief: bool = False) -> ProblemText:
-    """A problem of a submission; `brief` leaves out its numbers, and an error's own words."""
+    """Return the sentence of a submission's problem; `brief` leaves out numbers and an error's own words."""
     return _text_of(problem, problem.message, problem.file or "", speaker, brief=brief)
 
 
 def unmatched_sentence(unmatched: UnmatchedDocument, speaker: Tongue) -> ProblemText:
-    """A page or file that is nobody's."""
+    """Return the sentence on a page or file without an owner."""
     place = unmatched.file
     if unmatched.page is not None:
         place = f"{place}, {speaker.gettext('page')} {unmatched.page}"

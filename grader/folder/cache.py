@@ -1,4 +1,4 @@
-"""The cache of scans and readings, from which a later run takes what has not changed.
+"""The cache of scans and readings, from which a later run takes unchanged ones.
 
 Everything lies beside the results in small files that are written whole. A file's name or first line
 is a digest of all that its content depends on: what was handed in, what is asked for, and the code of

@@ -1,4 +1,4 @@
-"""What a run changed against the one before it: every student's standing and criteria, and why.
+"""Changes of a run against the previous one: every student's status and criteria, and why.
 
 Beside the results lies a note of what they came from: digests of assignment, rubric and program, and of
 each submission's files and line of the roster. What differs from the note of the run before is the why.

@@ -1,4 +1,4 @@
-"""Calls on the workers of a Dask cluster, with what was handed in read through fsspec.
+"""Calls on the workers of a Dask cluster, which read submissions through fsspec.
 
 A task holds some calls and the files of the cache that they need. A worker carries them out in a process
 of its own with the run's limits, in a folder of its own, and sends back the results with the files that

@@ -1,4 +1,4 @@
-"""Decisions of people given to the submissions and pages that they are about.
+"""Assign people's decisions to the submissions and pages that they concern.
 
 What a decision was about stands in its `basis`, as digests. One whose basis has changed is stale: it is told
 and not applied. One that cannot be applied at all is a fault with its line; the others are applied.

@@ -1,4 +1,4 @@
-"""Page inventory: what a folder holds, before anything is marked.
+"""Page inventory: list the pages of a folder before anything is marked.
 
 Files, pages, blank backs, QR codes, measurements; everything but the roster and the files of tools. Each
 file is opened and each page is decoded in a worker: a page that ends its worker is that page's problem

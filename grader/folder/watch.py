@@ -1,4 +1,4 @@
-"""A folder that a scanner fills: what has come whole since it was graded last."""
+"""A folder that a scanner fills: files completed since the last grading."""
 
 import time
 from collections.abc import Callable, Iterator

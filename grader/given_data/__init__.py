@@ -1,1 +1,1 @@
-"""Whose data a drawing follows: what a student is given, and may not choose."""
+"""The data that a drawing follows: those given to the student, or others."""

@@ -1,4 +1,4 @@
-"""How well parts of a drawing fit each set of data: likelihoods with outliers and propagated errors."""
+"""Likelihoods of parts of a drawing under each set of data, with outliers and propagated errors."""
 
 import math
 
@@ -9,30 +9,30 @@ from grader.given_data.sets import BoolArray
 from reference.geometry import FloatArray
 
 CARES = ((0.7, 0.3), (1.3, 0.4), (2.4, 0.2), (4.0, 0.1))
-"""Drafting errors as multiples of the rubric's hand, and how often they are met."""
+"""Drafting errors as multiples of the rubric's, and their frequencies."""
 TURNS = ((0.7, 0.85), (25.0, 0.15))
-"""By how many degrees a drawing is turned on its sheet (standard deviation), and how often."""
+"""Standard deviations of a drawing's turn on its sheet, degrees, and their frequencies."""
 AS_IT_LIES = ((0.0, 1.0),)
 FITS_WELL = 2.0
-"""Nats a row above nobody's data from which on the own data fit as a drawing lies: it is not tried turned, if
-its own directions lie within `STRAIGHT_DEG` of theirs."""
+"""From this many nats a row above nobody's data, the own data fit a drawing without turning it, if its own
+directions lie within `STRAIGHT_DEG` of theirs."""
 STRAIGHT_DEG = 1.4
 ALIKE_RAD = math.radians(0.7)
-"""The same of a figure beside the others of a sheet."""
+"""Standard deviation of a figure's turn relative to the others of a sheet."""
 ANY_SCALE = 2.0
-"""Standard deviation of a scale's logarithm: any is possible."""
+"""Standard deviation of a scale's logarithm: any scale is possible."""
 ANY_LENGTH = 1.0 / 3.0
-"""Density of the logarithm of a length that is wrong."""
+"""Density of the logarithm of a wrong length."""
 BACKWARDS, BACKWARDS_TOGETHER = 1.5, 4.0
-"""Cost (nats) of one direction that is reversed; and of all of a part, reversed by one mistake."""
+"""Cost (nats) of one reversed direction, and of a whole part reversed by one mistake."""
 ACROSS, QUARTER_RAD = 0.2, math.radians(1.5)
-"""Probability that a direction which is wrong is off by a quarter (along for across); and how exactly."""
+"""Probability that a wrong direction is off by a quarter (along for across), and its standard deviation."""
 SCREENED = 8
-"""So many sets of data, the nearest ones, are held against a part in full."""
+"""Number of nearest sets of data for which a part is evaluated in full."""
 
 
 def fit_of(rows: Rows, is_own: BoolArray) -> FloatArray:
-    """The log probability of rows by each set of data, the first of which is the own; (sets,).
+    """Return the log probability of rows under each set of data, the own one first; (sets,).
 
     Sets that are far from all rows are -inf.
     """
@@ -62,12 +62,12 @@ def _lies_straight(rows: Rows, residuals: FloatArray) -> bool:
 
 
 def nobodys(rows: Rows) -> float:
-    """The logarithm of the probability of a part's rows where they follow no data."""
+    """Return the log probability of a part's rows if they follow no data."""
     return float(np.where(rows.is_angle, -math.log(math.pi), math.log(ANY_LENGTH)).sum())
 
 
 def _nearest(apart: FloatArray, is_own: BoolArray) -> BoolArray:
-    """Which sets of data are the nearest ones: of the own ones, and of all others."""
+    """Return which sets of data are the nearest: of the own ones, and of all others."""
     chosen = np.zeros(len(apart), np.bool_)
     for these in (is_own, ~is_own):
         if these.any():
@@ -77,9 +77,9 @@ def _nearest(apart: FloatArray, is_own: BoolArray) -> BoolArray:
 
 
 def _apart_from(rows: Rows, residuals: FloatArray) -> FloatArray:
-    """How far the rows are from each set of data: squared standard deviations, each row by itself; (sets,).
+    """Return the distance of the rows from each set of data: squared standard deviations; (sets,).
 
-    A part's scale, and how far it is turned, are those at which one of its rows fits exactly.
+    Each row counts by itself. A part's scale and turn are those at which one of its rows fits exactly.
     """
     sigma = np.sqrt((2.0 * rows.drafting**2).sum(axis=1) + rows.reading**2)
     by_each = np.where(rows.is_angle, 1.0, rows.by_scale)
@@ -97,16 +97,16 @@ def _apart_from(rows: Rows, residuals: FloatArray) -> FloatArray:
 
 
 CANCELLED = 1e-13
-"""A row's precision of which no more than this share is left is lost in rounding errors."""
+"""If this share or less of a row's precision is left, it is lost in rounding errors."""
 OUTLYING = 16.0
-"""Squared standard deviations from which on it does not matter how far a row is off."""
+"""Squared standard deviations beyond which the size of a row's error does not matter."""
 
 
 def _fitted(rows: Rows, residuals: FloatArray, turn_rad: float) -> FloatArray:
-    """The log likelihoods of residuals over all sizes of drafting errors; (sets,).
+    """Return the log likelihoods of residuals over all sizes of drafting errors; (sets,).
 
     The rows are jointly normal: errors propagate, so that one error of the crank turns all of them. Outliers
-    are left out one by one; what leaving a row out changes follows from the precision matrix in closed form
+    are left out one by one; the effect of leaving a row out follows from the precision matrix in closed form
     (a Cholesky factorisation of it with pivots).
     """
     covariance = np.array([_covariance(rows, care, turn_rad) for care, _ in CARES])
@@ -143,7 +143,7 @@ def _fitted(rows: Rows, residuals: FloatArray, turn_rad: float) -> FloatArray:
 
 
 def _covariance(rows: Rows, care: float, turn_rad: float) -> FloatArray:
-    """The covariance matrix of the rows with one size of drafting errors and of turns on the sheet."""
+    """Return the covariance matrix of the rows for one size of drafting errors and of turns on the sheet."""
     moved, angles = care * rows.drafting, np.outer(rows.is_angle, rows.is_angle)
     same = rows.part[:, None] == rows.part
     covariance = moved @ moved.T + np.diag(rows.reading**2)
@@ -153,7 +153,7 @@ def _covariance(rows: Rows, care: float, turn_rad: float) -> FloatArray:
 
 
 def _of_outliers(rows: Rows, residuals: FloatArray) -> FloatArray:
-    """The logarithm of each row's density if it is an outlier: anywhere, or a direction a quarter off."""
+    """Return the log density of each row if it is an outlier: anywhere, or a direction off by a quarter."""
     off = (np.abs(residuals) - math.pi / 2.0) / QUARTER_RAD
     across = np.exp(-0.5 * off**2) / (QUARTER_RAD * math.sqrt(math.tau))
     anyhow = np.where(rows.is_angle, (1.0 - ACROSS) / math.pi + ACROSS * across, ANY_LENGTH)

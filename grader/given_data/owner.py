@@ -1,10 +1,11 @@
-"""Whose data a drawing follows: the student's own, another variant's, the own ones misread, or nobody's.
+"""Find whose data a drawing follows: the student's own, another variant's, misread ones, or nobody's.
 
-Found from what a student is given and may not choose: the directions of links and vectors relative to the
-ground, and the ratios of lengths. A declared scale changes none of them. Nothing is followed through here:
-each part of the drawing (sketch, velocity plan, acceleration plan) is held against the exact drawing by each
-set of data, with propagated drafting errors; a vector that does not fit is an outlier, so that a mistake or
-two hide no owner. The posterior has "somebody's data, but these" and "own data, with a mistake" in it.
+The evidence is what a student is given and may not choose: the directions of links and vectors relative to
+the ground, and the ratios of lengths. A declared scale changes none of them. Nothing is followed through
+here: each part of the drawing (sketch, velocity plan, acceleration plan) is compared with the exact drawing
+by each set of data, with propagated drafting errors; a vector that does not fit is an outlier, so that one or
+two mistakes hide no owner. The posterior includes "somebody's data, but these" and "own data, with a
+mistake".
 """
 
 import cmath
@@ -43,7 +44,7 @@ PARTS = (MECHANISM, VELOCITY_PLAN, ACCELERATION_PLAN)
 
 @dataclass(frozen=True, slots=True)
 class Owner:
-    """Whose data a drawing, or a part of it, follows.
+    """The set of data that a drawing, or a part of it, follows.
 
     Attributes
     ----------
@@ -64,33 +65,33 @@ class Owner:
 
     @property
     def is_sure(self) -> bool:
-        """Whether it is sure enough to be said."""
+        """True if it is sure enough to be reported."""
         return self.not_own >= (NAMED if self.has_directions else NAMED_BY_LENGTHS)
 
     @property
     def of_whole(self) -> Data | None:
-        """The data that the whole drawing follows, where that is sure."""
+        """The data that the whole drawing follows, or None if that is not sure."""
         return self.data if self.part == MECHANISM and self.is_sure else None
 
     @property
     def likeliest(self) -> NamedMistake:
-        """The mistake that it is, if it is one."""
+        """The mistake of the likeliest set of data, if it is one."""
         others = tuple(_named(data, self.part, chance) for data, chance in self.rivals)
         return _named(self.data, self.part, self.probability, others)
 
     @property
     def named(self) -> NamedMistake | None:
-        """The mistake that it is; None where that is not sure."""
+        """The mistake, or None if it is not sure."""
         return self.likeliest if self.is_sure else None
 
 
 NAMED, NAMED_BY_LENGTHS = 0.9, 0.99
-"""From this probability on it is said whose data they are; below, a person is asked. Two mistakes may leave
+"""Probability from which the owner of the data is named; below, a person is asked. Two mistakes may produce
 the lengths of another variant, hardly its directions."""
 
 
 def _named(data: Data, part: str, chance: float, rivals: tuple[NamedMistake, ...] = ()) -> NamedMistake:
-    """A set of data as a mistake."""
+    """Return a set of data as a mistake."""
     n, position = (data.variant.n, data.variant.position) if data.kind == "other_variant" else (None, None)
     mistake = Mistake(data.kind, part, n=n, position=position, parameters=data.parameters)
     return NamedMistake(mistake, (), chance, rivals=rivals)
@@ -99,21 +100,21 @@ def _named(data: Data, part: str, chance: float, rivals: tuple[NamedMistake, ...
 # The posterior --------------------------------------------------------------------------------------
 
 LIKELY = 0.05
-"""From this probability on that the data are not the own, single mistakes are tried beside them; if it stays
-as high, a person is asked: a copy marked in silence is as bad as twenty questions about honest sheets. The
+"""From this probability of other than the own data, single mistakes are tried beside them; if it stays as
+high, a person is asked: a copy marked in silence is as bad as twenty questions about honest sheets. The
 priors together are less."""
 APART = 0.01
 """Probability that the parts were not drawn from each other: a sketch drawn anew after the plans, a plan
 drawn with another care."""
 CRANK_ASKED = 0.15
-"""Probability that is given to a crank which was sketched beyond all tolerances and not followed."""
+"""Probability given to a crank that was sketched beyond all tolerances and not followed."""
 LEAST_RIVAL = 0.04
-"""A set of data that is likelier is named beside the best. Between sets that are not the own, differences of
-the likelihood count half: errors of a hand are more alike than independent ones."""
+"""A likelier set of data is named beside the best. Between sets that are not the own, differences of the
+likelihood count half: drafting errors are more alike than independent ones."""
 
 
 def owner_of(task: Task, evidence: Evidence, declared: Mapping[str, str]) -> Owner | None:
-    """Whose data the drawing follows; None where nothing speaks against the own ones.
+    """Return whose data the drawing follows; None if nothing contradicts the own ones.
 
     Arguments: `declared` are the scales as declared, text by name.
     """
@@ -123,7 +124,7 @@ def owner_of(task: Task, evidence: Evidence, declared: Mapping[str, str]) -> Own
     everybody = own_first(drawn_by_variants(task), task)
     scales = declared_scales(task, declared)
     for mistakes in (False, True):
-        # Single mistakes are tried only where something else than the own data is likely.
+        # Single mistakes are tried only if other data than the own are likely.
         sets = sets_of(task, drawn, everybody, mistakes=mistakes)
         posterior = posterior_of(task, evidence, drawn, sets, scales)
         if posterior.not_own < LIKELY:
@@ -133,9 +134,9 @@ def owner_of(task: Task, evidence: Evidence, declared: Mapping[str, str]) -> Own
 
 
 def _crank_elsewhere(task: Task, drawn: DrawnParts) -> Owner | None:
-    """The own data with the crank at the angle sketched; None where it is not followed beyond all tolerances.
+    """Return the own data with the crank as sketched; None unless it is followed beyond all tolerances.
 
-    What is drawn rightly from a crank that is off is the student's own work, its angle is not.
+    What is drawn correctly from a wrong crank is the student's own work, its angle is not.
     """
     link = task.yardstick
     if link is None or task.omega is None:
@@ -152,7 +153,7 @@ def _crank_elsewhere(task: Task, drawn: DrawnParts) -> Owner | None:
 
 
 def _turned_by(task: Task, drawn: DrawnParts, name: str) -> float:
-    """How far a vector or link is turned from the given direction, radians; 0 where that is not sure."""
+    """Return a vector's or link's turn from the given direction, radians; 0 if that is not sure."""
     found = next((vectors[name] for vectors in drawn.values() if name in vectors), None)
     real = task.segments[name].real if name in task.segments else 0j
     if found is None or found.direction_rad is None or not real:
@@ -163,7 +164,7 @@ def _turned_by(task: Task, drawn: DrawnParts, name: str) -> float:
 
 
 def _drawn(task: Task, evidence: Evidence) -> dict[str, dict[str, DrawnVector]]:
-    """What was drawn by part, as read, else as measured."""
+    """Return the drawn vectors by part, as read, else as measured."""
     found: dict[str, dict[str, DrawnVector]] = {part: {} for part in PARTS}
     for name, segment in task.segments.items():
         one = evidence.vector(name)
@@ -199,7 +200,7 @@ class Posterior:
         return float(sum(one[~self.is_own].sum() for one in (self.whole, *self.parts.values())))
 
     def owner(self) -> Owner:
-        """The likeliest owner that is not the student."""
+        """Return the likeliest owner that is not the student."""
         each = {MECHANISM: self.whole, **self.parts}
         part = max(each, key=lambda name: float(each[name][~self.is_own].sum()))
         chances = np.where(self.is_own, 0.0, each[part])
@@ -217,7 +218,7 @@ def posterior_of(
     sets: tuple[ExactDrawings, FloatArray],
     scales: Mapping[str, float],
 ) -> Posterior:
-    """The posterior of whose data each part follows.
+    """Return the posterior of whose data each part follows.
 
     Arguments: `sets` are the exact drawings with their prior probabilities, `scales` those declared.
     """
@@ -237,7 +238,7 @@ def posterior_of(
     scaled = {part: by_scale(task, drawn[part], scales, exact) for part in drawn}
 
     def likely(parts: tuple[str, ...]) -> FloatArray:
-        """The log probability of parts that follow each set of data, or some of them none."""
+        """Return the log probability of parts that follow each set of data, some of them possibly none."""
         ways = []
         for follow in _subsets(parts):
             none = sum(math.log(NOBODYS) + nobodys(rows[part]) for part in parts if part not in follow)
@@ -264,7 +265,7 @@ def posterior_of(
 
 
 def _has_one_sketch(task: Task, evidence: Evidence) -> bool:
-    """Whether both plans follow the same sketch: as read, else as the assignment has its pages."""
+    """Return whether both plans follow the same sketch: as read, else as the assignment has its pages."""
     sketches = list(evidence.sketches.values())
     if len(sketches) > 1:
         return all(one == sketches[0] for one in sketches)
@@ -273,5 +274,5 @@ def _has_one_sketch(task: Task, evidence: Evidence) -> bool:
 
 
 def _subsets(parts: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
-    """All subsets of parts, in their order; the empty one, too."""
+    """Return all subsets of parts, in their order, including the empty one."""
     return chain.from_iterable(combinations(parts, count) for count in range(len(parts) + 1))

@@ -1,4 +1,4 @@
-"""What was drawn of one part, beside what each set of data makes of it: directions and ratios of lengths.
+"""Compare what was drawn of one part with each set of data: directions and ratios of lengths.
 
 Residuals are arrays (sets, rows) with the drafting errors that the construction propagates to each row.
 """
@@ -19,16 +19,16 @@ from reference.geometry import ComplexArray, FloatArray
 LEAST_DOUBT = 0.06
 """Probability that a vector is drawn wrongly, or is an outlier for another reason."""
 LEAST_RULED_MM = 3.0
-"""Shorter lengths tell nothing by their ratio."""
+"""Shorter lengths are not compared by their ratio."""
 RULED_MM, SEEN_MM = 0.25, 0.1
-"""Standard errors of a length laid against a ruler and noted to half a millimetre, and of one seen on a
-sheet, beside those of its ends."""
+"""Standard errors, besides those of its ends, of a length measured with a ruler to half a millimetre, and of
+one read on a sheet."""
 NOTED_DEG = 0.5
-"""Of a direction noted to a degree, beside that of the protractor."""
+"""Standard error of a direction noted to a degree, besides that of the protractor."""
 IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 ZERO, ZERO_MM = 1e-9, 1e-6
 NO_DIRECTION = math.pi / 4.0
-"""The residual of a direction that was drawn where the exact vector is zero: it fits in no way."""
+"""Residual of a direction drawn where the exact vector is zero: it fits in no way."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,10 +38,10 @@ class Rows:
     Attributes
     ----------
     residuals : (sets, rows) of directions radians, folded to a quarter turn; of lengths see `_length`
-    drafting : (rows, acts) how far one standard deviation of each act of drawing moves a row
+    drafting : (rows, acts) shift of a row by one standard deviation of each act of drawing
     reading : (rows,) standard errors of reading or measuring
     is_angle : (rows,) of directions
-    by_scale : (rows,) how far a row moves with the logarithm of the plan's scale
+    by_scale : (rows,) shift of a row with the logarithm of the plan's scale
     doubt : (rows,) probability that a row is of another vector
     reversed : (sets, rows) whether a direction fits only the opposite way
     part : (rows,) the part of the drawing that a row is of
@@ -63,7 +63,7 @@ class Rows:
 
 
 def joined(parts: Sequence[Rows]) -> Rows:
-    """The rows of several parts as those of one drawing."""
+    """Join the rows of several parts into those of one drawing."""
     counts = [len(one) for one in parts]
     return Rows(
         np.concatenate([one.residuals for one in parts], axis=1),
@@ -81,7 +81,7 @@ def joined(parts: Sequence[Rows]) -> Rows:
 def rows_of(
     task: Task, evidence: Evidence, drawn: Mapping[str, DrawnVector], exact: ExactDrawings, *, sheet: int = 0
 ) -> Rows:
-    """Directions of all that was drawn; lengths of links, and of vectors without a direction.
+    """Return directions of all that was drawn; lengths of links, and of vectors without a direction.
 
     Arguments: `sheet` is 1 for a plan that follows the sketch on a second sheet.
     """
@@ -139,11 +139,11 @@ def _direction(task: Task, evidence: Evidence, name: str, one: DrawnVector, expe
 
 
 def _length(task: Task, evidence: Evidence, name: str, one: DrawnVector, expected: ComplexArray) -> _Row:
-    """On a scale that is logarithmic for long and linear for short lengths, by their drafting errors."""
+    """Transform lengths, logarithmic for long and linear for short ones, by their drafting errors."""
     shifts = _shifts(task, name).real
     floor = math.hypot(LEAST_RULED_MM, 3.0 * math.sqrt(shifts @ shifts))
     size = np.abs(expected)
-    # An assembly that there is not has no lengths.
+    # An assembly that does not exist has no lengths.
     off = np.where(np.isfinite(size), np.arcsinh(one.length_mm / floor) - np.arcsinh(size / floor), np.nan)
     shorter = math.hypot(floor, min(one.length_mm, float(size[0])))
     read = math.hypot(_seen(evidence), one.se_mm, 0.0 if evidence.has_sheets else task.rubric.hand.ruler_mm)
@@ -156,14 +156,14 @@ def _seen(evidence: Evidence) -> float:
 
 
 def _shifts(task: Task, name: str) -> ComplexArray:
-    """How far each act of drawing moves the end of a vector or link: along it, and across; (acts,) mm."""
+    """Return the shift of a vector's or link's end by each act of drawing, along and across; (acts,) mm."""
     traced, ends = task.traced(task.rule_scales), task.segments[name]
     shifts = traced.made[ends.head].shifts - traced.nodes[ends.tail].shifts
     return np.asarray(shifts * np.conj(_unit(ends.real)))
 
 
 def _by_sheet(task: Task, drafting: FloatArray, sheet: int) -> FloatArray:
-    """(rows, acts) with the errors of a second sheet's sketch, which is drawn anew, behind all others."""
+    """Return (rows, acts) with the errors of a second sheet's sketch, drawn anew, after all others."""
     every = acts(task.construction)
     of_sketch = np.array([task.construction.figure_of(node) == MECHANISM for node, _, _ in every])
     first = drafting.reshape(len(drafting), len(every))
@@ -176,7 +176,7 @@ def _unit(vector: complex) -> complex:
 
 
 def _largest(drawn: Mapping[str, DrawnVector], exact: ExactDrawings) -> tuple[float, FloatArray]:
-    """The longest of the drawn lengths, and the longest of the same vectors by each set of data."""
+    """Return the longest of the drawn lengths, and the longest of the same vectors under each set of data."""
     if not drawn:
         return 1.0, np.ones(len(exact.data))
     sizes = np.array([np.abs(exact.real[name]) for name in drawn])

@@ -1,4 +1,4 @@
-"""The declared scales beside the driven link's vectors: weak evidence of whose data a plan follows."""
+"""Compare declared scales with the driving link's vectors: weak evidence of whose data a plan follows."""
 
 import math
 from collections.abc import Mapping
@@ -13,16 +13,16 @@ from reference.geometry import FloatArray
 from reference.quantities import kind_of
 
 WRONG_SCALE, OF_ANY = 0.1, 0.5
-"""Probability that a plan follows the rule's scale instead of the declared one, and that it follows any
-other; density of the logarithm of the factor then."""
+"""Probability that a plan follows the rule's scale instead of the declared one, and any other scale; density
+of the logarithm of the factor then."""
 AT_DECLARED, AT_OWN_RULE = 0.4, 0.4
-"""How often a copied plan follows the scale that is declared beside it, or that of the one who drew it."""
+"""Probability that a copied plan follows the scale declared beside it, or that of its original author."""
 SET_OFF_SHARE, SET_OFF_MM = 0.006, 0.4
-"""Standard error of the length of the driven link's vector: of its scale, rounded; of setting it off."""
+"""Standard errors of the driven vector's length: from its rounded scale, and from drawing it."""
 
 
 def declared_scales(task: Task, declared: Mapping[str, str]) -> dict[str, float]:
-    """The scales that were declared as a number, SI for a millimetre."""
+    """Return the scales that were declared as a number, SI per millimetre."""
     units: Mapping[str, str] = dict(task.assignment.file.scales.bare_units.items())
     found = {}
     for name, text in declared.items():
@@ -35,7 +35,7 @@ def declared_scales(task: Task, declared: Mapping[str, str]) -> dict[str, float]
 def _driven(
     task: Task, drawn: Mapping[str, DrawnVector], scales: Mapping[str, float]
 ) -> tuple[str, float] | None:
-    """The driven link's vector of a plan, and its scale as declared; None without them or a length."""
+    """Return the driving link's vector of a plan, and its declared scale; None if either is missing."""
     for scale in ("kv", "ka"):
         name = task.driven_vector(scale)
         has_length = name in drawn and drawn[name].length_mm > 0.0
@@ -45,7 +45,7 @@ def _driven(
 
 
 def _off_scale(drawn: DrawnVector, scale: float, real: FloatArray) -> tuple[FloatArray, float]:
-    """The logarithm of a drawn length to that of a real value at a scale, and its standard error."""
+    """Return the log ratio of a drawn length to a real value at a scale, and its standard error."""
     with np.errstate(all="ignore"):
         off = np.log(drawn.length_mm * scale / real)
     sigma = math.hypot(SET_OFF_SHARE, SET_OFF_MM / drawn.length_mm)
@@ -55,9 +55,9 @@ def _off_scale(drawn: DrawnVector, scale: float, real: FloatArray) -> tuple[Floa
 def by_scale(
     task: Task, drawn: Mapping[str, DrawnVector], scales: Mapping[str, float], exact: ExactDrawings
 ) -> FloatArray:
-    """The logarithm of the probability of a plan's declared scale beside its driven vector; (sets,).
+    """Return the log probability of a plan's declared scale given its driven vector; (sets,).
 
-    A copy may stand beside the copied scale or the own one: it says little, and never hides a copy.
+    A copy may have the copied scale or the student's own: the scale says little, and never hides a copy.
     """
     found = _driven(task, drawn, scales)
     if found is None:

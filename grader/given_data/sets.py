@@ -1,7 +1,7 @@
-"""The sets of data that a drawing may follow, and the exact drawings by them.
+"""The sets of data that a drawing may follow, and the exact drawings for them.
 
 The student's own (also in another assembly, and with each single mistake), every other variant's, and the own
-data with a crank angle that was misread. Exact drawings are arrays over the sets.
+data with a misread crank angle. Exact drawings are arrays over the sets.
 """
 
 import cmath
@@ -37,7 +37,7 @@ Kind = Literal["own", "other_variant", "data_misread"]
 CRANK = "angle crank"
 BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 DrawnParts = Mapping[str, Mapping[str, DrawnVector]]
-"""What was drawn, by part (mechanism or plan) and name."""
+"""Drawn vectors, by part (mechanism or plan) and name."""
 MISREADINGS: Mapping[str, tuple[int, float]] = {
     "clockwise": (-1, 0.0),
     "supplement": (-1, 180.0),
@@ -46,7 +46,7 @@ MISREADINGS: Mapping[str, tuple[int, float]] = {
     "quarter_ahead": (1, 90.0),
     "quarter_behind": (1, -90.0),
 }
-"""How a crank angle is misread: the factor of the angle given, and what is added to it, degrees."""
+"""Ways of misreading a crank angle: the factor of the angle given, and the angle added, degrees."""
 ELSEWHERE = "elsewhere"
 """The crank at an angle that is none of these; the angle is taken from the drawing."""
 
@@ -58,7 +58,7 @@ class Data:
     Attributes
     ----------
     kind : the student's own (also in another assembly, or with a mistake), another variant's, or misread ones
-    variant : whose data they are
+    variant : the variant that the data belong to
     how : of misread data one of `MISREADINGS`, or `ELSEWHERE`
     parameters : the construction's, SI, without scales
     rule : the scales by the assignment's rule
@@ -91,7 +91,7 @@ _everybody: deque[tuple[Assignment, Construction, ExactDrawings]] = deque(maxlen
 
 
 def drawn_by_variants(task: Task) -> ExactDrawings:
-    """The exact drawings of all variants, the same for all students of an assignment."""
+    """Return the exact drawings of all variants, the same for all students of an assignment."""
     for assignment, construction, exact in _everybody:
         if assignment is task.assignment and construction == task.construction:
             return exact
@@ -123,7 +123,7 @@ def _all_variants(task: Task) -> ExactDrawings:
 
 
 def _at(parameters: Parameters, index: int, count: int) -> dict[str, FloatArray]:
-    """The parameters of one of many sets, without scales."""
+    """Return the parameters of one of many sets, without scales."""
     return {
         name: np.asarray(np.ravel(value)[index] if np.size(value) == count else np.ravel(value)[0])
         for name, value in parameters.items()
@@ -132,12 +132,12 @@ def _at(parameters: Parameters, index: int, count: int) -> dict[str, FloatArray]
 
 
 def _exact(construction: Construction, parameters: Parameters, data: tuple[Data, ...]) -> ExactDrawings:
-    """The exact drawings; `parameters` are arrays over the sets."""
+    """Return the exact drawings; `parameters` are arrays over the sets."""
     return _between(construction, evaluate(construction, {**parameters, **AT_SCALE_ONE}), data)
 
 
 def _between(construction: Construction, nodes: Nodes, data: tuple[Data, ...]) -> ExactDrawings:
-    """The vectors and links between nodes, arrays over the sets."""
+    """Return the vectors and links between nodes, arrays over the sets."""
     ends = {one.name: (one.tail, one.head) for one in construction.vectors.values()} | dict(
         construction.links
     )
@@ -149,7 +149,7 @@ def _between(construction: Construction, nodes: Nodes, data: tuple[Data, ...]) -
 
 
 def _misread(task: Task, angles: Mapping[str, float]) -> ExactDrawings | None:
-    """The own data with the crank at other angles, radians by how they came about; None without any."""
+    """Return the own data with the crank at misread angles, radians by the misreading; None without any."""
     if not angles:
         return None
     turned = {**task.parameters, CRANK: np.array(list(angles.values()))}
@@ -161,7 +161,7 @@ def _misread(task: Task, angles: Mapping[str, float]) -> ExactDrawings | None:
 
 
 def _own_otherwise(task: Task) -> ExactDrawings | None:
-    """The own data in other assemblies; None where the mechanism has one alone."""
+    """Return the own data in other assemblies; None if the mechanism has only one."""
     own = Data("own", task.variant)
     made = [
         _exact(task.construction.with_step(replace(step, side=-step.side)), task.parameters, (own,))
@@ -172,7 +172,7 @@ def _own_otherwise(task: Task) -> ExactDrawings | None:
 
 
 def mistakes_in_plans(task: Task) -> list[Mistake]:
-    """Each single mistake in a plan that changes its shape."""
+    """Return each single mistake in a plan that changes its shape."""
     construction = task.construction
     right = Drawing(construction, {**task.parameters, **AT_SCALE_ONE})
     return [
@@ -188,7 +188,7 @@ def mistakes_in_plans(task: Task) -> list[Mistake]:
 
 
 def drawn_with_mistakes(task: Task) -> ExactDrawings | None:
-    """The own data with each of `mistakes_in_plans`: all of them drawn together, step by step."""
+    """Draw the own data with each of `mistakes_in_plans`: all of them together, step by step."""
     made = mistakes_in_plans(task)
     construction, parameters = task.construction, {**task.parameters, **AT_SCALE_ONE}
     nodes: dict[str, ComplexArray] = {}
@@ -208,7 +208,7 @@ def drawn_with_mistakes(task: Task) -> ExactDrawings | None:
 
 
 def _letters_swapped(construction: Construction, figure: str) -> Iterator[Mistake]:
-    """Two images of a plan under each other's letters."""
+    """Yield two images of a plan with exchanged letters."""
     pole = construction.poles[figure]
     images = [v.head for v in construction.vectors_of(figure) if v.tail == pole and v.part not in {"n", "c"}]
     for pair in combinations(images, 2):
@@ -216,7 +216,7 @@ def _letters_swapped(construction: Construction, figure: str) -> Iterator[Mistak
 
 
 def _driven_along(construction: Construction, figure: str) -> Iterator[Mistake]:
-    """The driven link's vector drawn along the link instead of across it, or across instead of along."""
+    """Yield the driving link's vector along the link instead of across it, or across instead of along."""
     for step in construction.figures[figure]:
         for mistake in rarer_mistakes_of_step(step, construction):
             if mistake.code == "parallel_for_perpendicular":
@@ -233,7 +233,7 @@ def _together(made: Sequence[ExactDrawings]) -> ExactDrawings | None:
 
 
 def own_first(everybody: ExactDrawings, task: Task) -> ExactDrawings:
-    """The exact drawings of all variants, the student's own first."""
+    """Return the exact drawings of all variants, the student's own first."""
     own = next((index for index, one in enumerate(everybody.data) if one.variant == task.variant), 0)
     order = [own, *(index for index in range(len(everybody.data)) if index != own)]
     first, *others = (everybody.data[index] for index in order)
@@ -246,11 +246,11 @@ def own_first(everybody: ExactDrawings, task: Task) -> ExactDrawings:
 
 COPIED, HALF_COPIED, MISREAD, ELSEWHERE_SHARE, NOBODYS = 0.01, 0.002, 0.005, 2e-5, 0.002
 """Prior probabilities: that the whole drawing follows another variant's data; that one part does; that the
-crank's angle is misread; that the crank stands at any other angle; that a part follows no data at all."""
+crank's angle is misread; that the crank stands at any other angle; that a part follows no data."""
 IN_OTHER_ASSEMBLY, WITH_MISTAKE = 0.02, 0.3
-"""Of the own data: in another assembly; with a single mistake in a plan, if that is looked at."""
+"""Prior probabilities for the own data: another assembly; a single mistake in a plan, if considered."""
 QUARTER = 0.02
-"""Of the own data: that a plan is turned by a quarter as a whole."""
+"""Prior probability, with the own data, that a plan is turned by a quarter as a whole."""
 LEAST_TURNED_MM = 5.0
 """The direction of a shorter vector is too vague to tell anything."""
 
@@ -258,7 +258,7 @@ LEAST_TURNED_MM = 5.0
 def sets_of(
     task: Task, drawn: DrawnParts, everybody: ExactDrawings, *, mistakes: bool
 ) -> tuple[ExactDrawings, FloatArray]:
-    """All sets of data, the own one first, and their prior probabilities."""
+    """Return all sets of data, the own one first, and their prior probabilities."""
     exact, others = everybody, max(len(everybody.data) - 1, 1)
     prior = [1.0 - COPIED - MISREAD, *([COPIED / others] * (len(everybody.data) - 1))]
     assemblies = task.cached(("owner", "assemblies"), lambda: _own_otherwise(task))
@@ -276,7 +276,7 @@ def sets_of(
 def _with_plans_turned(
     task: Task, exact: ExactDrawings, prior: FloatArray
 ) -> tuple[ExactDrawings, FloatArray]:
-    """All sets, and the own ones with one or two of the plans turned by a quarter as a whole."""
+    """Return all sets, and the own ones with one or two of the plans turned by a quarter as a whole."""
     own = np.array([one.kind == "own" for one in exact.data])
     made, plans = [exact], tuple(task.construction.poles)
     for turned in chain.from_iterable(combinations(plans, count) for count in range(1, len(plans) + 1)):
@@ -292,11 +292,11 @@ def _with_plans_turned(
 
 
 SAME_RAD = math.radians(2.5)
-"""Cranks at angles nearer to each other are the same."""
+"""Crank angles closer than this are the same."""
 
 
 def _misread_angles(task: Task) -> dict[str, float]:
-    """The angles at which the crank may stand because its angle is misread; none without a crank."""
+    """Return the angles at which a misread crank may stand; none without a crank."""
     given = task.parameters.get(CRANK)
     if given is None:
         return {}
@@ -306,7 +306,7 @@ def _misread_angles(task: Task) -> dict[str, float]:
 
 
 def _drawn_angles(task: Task, drawn: DrawnParts) -> dict[str, float]:
-    """The angles at which the crank was drawn, or stands by its vectors, where they are others."""
+    """Return the angles at which the crank was drawn, or stands by its vectors, if they are others."""
     given = task.parameters.get(CRANK)
     if given is None:
         return {}
@@ -323,7 +323,7 @@ def _drawn_angles(task: Task, drawn: DrawnParts) -> dict[str, float]:
 
 
 def _images(task: Task) -> Iterable[str]:
-    """The heads of the driven link's vectors."""
+    """Return the heads of the driving link's vectors."""
     vectors = task.construction.vectors
     return [vectors[name].head for name in map(task.driven_vector, "va") if name in vectors]
 

@@ -1,4 +1,4 @@
-"""A grade for each student, or why there is none yet; options and result of an export."""
+"""A grade for each student, or the reason why there is none yet; options and result of an export."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -402,7 +402,7 @@ def gradebook(grades: Sequence[Grade], options: Options) -> Delivery:
         f"make the grade item in Moodle first, out of {maximum:g}, and map grade and feedback to it: {new}",
     ]
     if len(graded) < len(grades):
-        notes.append("who is withheld has no row: the import leaves their grade as it is")
+        notes.append("withheld students have no row: the import leaves their grades unchanged")
     if any(score > _USUAL_LIMIT for score in scores):
         notes.append("some grades are above 100: Moodle takes them only where the site allows it")
     return Delivery(csv_text([identity, item, f"{item} (feedback)"], rows), notes=tuple(notes))

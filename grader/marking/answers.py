@@ -1,4 +1,4 @@
-"""What people's verdicts say beyond themselves: where nodes lie that were read in doubt, which scale holds.
+"""Evidence in people's verdicts: positions of doubtful nodes, and the scale that was used.
 
 Only a verdict that waited is such an answer. One in the place of a verdict that was settled is a person's own
 decision on points, and says nothing of the reading.

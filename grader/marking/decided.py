@@ -1,4 +1,4 @@
-"""What people decided on a submission: verdicts in the place of the program's, nodes, points, a comment."""
+"""People's decisions on a submission: verdicts in place of the program's, nodes, points, a comment."""
 
 import math
 from collections import defaultdict

@@ -1,4 +1,4 @@
-"""What was drawn, as the diagnosis takes it: nodes and vectors with their errors, and what explains them."""
+"""The drawing as the diagnosis uses it: nodes and vectors with their errors, and their explanations."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Judging one submission: comparison, diagnosis and points, in their order."""
+"""Judge one submission: comparison, diagnosis and points, in this order."""
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What is settled once all verdicts and mistakes are known together.
+"""Settle verdicts once all verdicts and mistakes are known together.
 
 A verdict that waits is settled where so little is left open that no verdict changes the score by more than
 the rubric's `stake`. Another student's data are never marked without saying so.

@@ -1,4 +1,4 @@
-"""The audit of a class: how many settled verdicts may be wrong, and which ones are opened again.
+"""The audit of a class: how many settled verdicts may be wrong, and which ones are reopened.
 
 The settled verdicts of a class stand in an order that depends on nothing but their names: the ones checked
 first are a random sample, whatever their probability, and a review that is started again goes on with it.

@@ -1,1 +1,1 @@
-"""Pictures of a drawing with what was read on it."""
+"""Pictures of a drawing with the reading marked on it."""

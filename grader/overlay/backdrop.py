@@ -13,9 +13,9 @@ from grader.scan.pixels import averaged, cut_out, reduction
 
 WIDTH_PX = 2000
 INK_STRENGTH = 1.25
-"""Pencil is shown darker than it is, so that it can be followed under the overlay,"""
+"""Pencil is darkened, so that it can be followed under the overlay,"""
 DARKEST = 0.8
-"""and ink lighter, so that the overlay stands out."""
+"""and ink is lightened, so that the overlay stands out."""
 PAPER_FROM = 0.90
 """Share of the local paper's brightness from which everything is shown white."""
 _TONES = np.array(
@@ -25,11 +25,11 @@ _TONES = np.array(
     ],
     dtype=np.uint8,
 )
-"""What is shown for each share of the paper's brightness, 0..255."""
+"""The tone shown for each share of the paper's brightness, 0..255."""
 
 
 def backdrop(page: Page, sheet: Sheet | None, *, width_px: int = WIDTH_PX) -> Backdrop:
-    """The scan to draw on; `sheet` is None where the page could not be registered."""
+    """Return the scan to draw on; `sheet` is None if the page could not be registered."""
     if sheet is None:
         scan = _clean(_turned(page, width_px))
         height, width = scan.shape
@@ -39,7 +39,7 @@ def backdrop(page: Page, sheet: Sheet | None, *, width_px: int = WIDTH_PX) -> Ba
 
 
 def _turned(page: Page, width_px: int) -> GreyImage:
-    """The page turned as its file asks, at most so wide."""
+    """Return the page turned as its file asks, at most `width_px` wide."""
     grey = np.rot90(page.grey, page.turn_deg // 90)
     scale = min(1.0, width_px / grey.shape[1])
     size = (max(1, round(grey.shape[1] * scale)), max(1, round(grey.shape[0] * scale)))
@@ -47,7 +47,7 @@ def _turned(page: Page, width_px: int) -> GreyImage:
 
 
 def _upright(grey: GreyImage, sheet: Sheet, width_px: int) -> GreyImage:
-    """The sheet upright, the paper's width across `width_px`."""
+    """Return the upright sheet, `width_px` wide."""
     scale = width_px / sheet.page_mm[0]
     less = max(1, int(sheet.px_per_mm / scale))
     to_px = reduction(1.0 / less) @ sheet.mm_to_px
@@ -55,7 +55,7 @@ def _upright(grey: GreyImage, sheet: Sheet, width_px: int) -> GreyImage:
 
 
 def _clean(grey: GreyImage) -> GreyImage:
-    """Shadows evened out, paper white, strokes of one strength."""
+    """Even out shadows, make paper white and strokes equally strong."""
     height, width = grey.shape
     small = cv2.resize(grey, (max(1, width // 8), max(1, height // 8)), interpolation=cv2.INTER_AREA)
     paper = cv2.GaussianBlur(cv2.dilate(small, np.ones((7, 7), np.uint8)), (0, 0), 5)

@@ -1,4 +1,4 @@
-"""Close-ups of a sheet as SVG: the whole, each plan, what a mistake concerns."""
+"""Close-ups of a sheet as SVG: the whole, each plan, and the part that a mistake concerns."""
 
 import base64
 import math
@@ -15,17 +15,17 @@ from reference.drawing.canvas import FONTS, elements
 CLOSE_UP_MARGIN_MM = 12.0
 LEAST_CLOSE_UP_MM = 60.0
 CLOSE_UP_BELOW = 0.55
-"""A plan smaller than this share of the sheet is worth a close-up."""
+"""A plan smaller than this share of the sheet gets a close-up."""
 WIDE_TO_HIGH = (1.3, 1.9)
-"""Aspects of close-ups that sit well on a page."""
+"""Aspect ratios of close-ups that fit a page well."""
 DETAIL_MARGIN_MM = 8.0
 LEAST_DETAIL_MM = 36.0
 LONG_MM, LITTLE_SHARE = 30.0, 0.25
-"""Of vectors this long that are off by less than this share, only the ends are looked at."""
+"""For a vector this long with a smaller relative error, only the end is shown."""
 SAME_PLACE_MM = 0.05
 CUTS = 64
 MOST_DETAIL_SHARE = 0.8
-"""A detail as large as this share of the sheet shows nothing that the whole does not."""
+"""A detail as large as this share of the sheet shows no more than the whole."""
 WHOLE_SIZE_PER_MM = 0.0041
 CLOSE_UP_SIZE_PER_MM = 0.0105
 DETAIL_SIZE_PER_MM = 0.0145
@@ -44,7 +44,7 @@ class PageView:
     ----------
     kind : ``sheet``, ``velocity_plan``, ``acceleration_plan`` or ``detail``
     picture : index of the page among the submission's pictures, from 0
-    box : what of the page is seen
+    box : the visible part of the page
     names : the vectors that are named in it
     """
 
@@ -56,7 +56,7 @@ class PageView:
 
 
 def page_views(picture: Picture, index: int, names: Mapping[str, str] = _NO_NAMES) -> list[PageView]:
-    """The whole sheet, then each plan that is small on it close up; `names` as students know them."""
+    """Return the whole sheet, then close-ups of plans that are small on it; `names` as students know them."""
     scene = picture.scene
     close_ups = {
         figure: box
@@ -64,7 +64,7 @@ def page_views(picture: Picture, index: int, names: Mapping[str, str] = _NO_NAME
         if (box := _close_up(_part(scene, figure))) is not None
     }
     if not picture.scan:
-        # Nothing else is on the page than the plans themselves.
+        # The page contains only the plans themselves.
         figures = dict.fromkeys(arrow.figure for arrow in scene.arrows)
         boxes = {
             figure: _box(_arrows_of(scene, figure), scene, CLOSE_UP_MARGIN_MM, LEAST_CLOSE_UP_MM)
@@ -89,9 +89,9 @@ def _plan(scene: Scene, index: int, figure: str, box: Box, names: Mapping[str, s
 def detail(
     pictures: Collection[Picture], concerned: AbstractSet[str], names: Mapping[str, str] = _NO_NAMES
 ) -> PageView | None:
-    """A view of some vectors and the expected ones; None where none of them is drawn.
+    """Return a view of some vectors and the expected ones; None if none of them is drawn.
 
-    Of long vectors with a small error it shows the end of the first.
+    For a long vector with a small error it shows the end of the first.
     """
     for index, picture in enumerate(pictures):
         arrows = [arrow for arrow in picture.scene.arrows if arrow.name in concerned]
@@ -118,7 +118,7 @@ def detail(
 
 
 def _box_of_tips(part: Scene) -> Box | None:
-    """A box around the end of the first vector and where it should be, None where all of it tells more."""
+    """Return a box around the first vector's end and its right position, None if the whole shows more."""
     first = part.arrows[0]
     ends = [arrow for arrow in part.arrows if math.dist(arrow.tip, first.tip) < SAME_PLACE_MM]
     aims = [ghost for ghost in part.ghosts if ghost.name in {arrow.name for arrow in ends}]
@@ -131,7 +131,7 @@ def _box_of_tips(part: Scene) -> Box | None:
 
 
 def _within(arrow: Arrow, box: Box) -> Arrow | None:
-    """The part of an arrow that is in a box, to be named there; None where all of it is elsewhere."""
+    """Return the part of an arrow inside a box, to be named there; None if all of it is outside."""
     steps = [between(arrow.tail, arrow.tip, share / CUTS) for share in range(CUTS + 1)]
     inside = [step for step in steps if is_in(step, box)]
     return replace(arrow, tail=inside[0], tip=inside[-1]) if inside else None
@@ -142,7 +142,7 @@ def _arrows_of(scene: Scene, figure: str) -> list[Arrow]:
 
 
 def _part(scene: Scene, figure: str) -> Scene:
-    """A figure of a scene; what waits for a person has its ghost in close-ups of it alone."""
+    """Return a figure of a scene; ghosts of vectors under review appear only in its close-ups."""
     return replace(
         scene,
         arrows=tuple(_arrows_of(scene, figure)),
@@ -155,7 +155,7 @@ def _part(scene: Scene, figure: str) -> Scene:
 
 
 def _close_up(part: Scene) -> Box | None:
-    """A box around a plan, None where it would show hardly more than the whole sheet."""
+    """Return a box around a plan, None if it would show hardly more than the whole sheet."""
     if not part.arrows:
         return None
     box = _box([*part.arrows, *part.ghosts], part, CLOSE_UP_MARGIN_MM, LEAST_CLOSE_UP_MM)
@@ -166,13 +166,13 @@ def _close_up(part: Scene) -> Box | None:
 
 
 def _box(things: Collection[Arrow | Ghost], scene: Scene, margin_mm: float, least_mm: float) -> Box:
-    """A box around arrows and ghosts, of a shape that sits well on a page, inside the sheet."""
+    """Return a box around arrows and ghosts, of a shape that fits a page well, inside the sheet."""
     points = [point for one in things for point in (one.tail, one.tip)]
     return box_around(points, margin_mm, least_mm, scene.page_mm)
 
 
 def box_around(points: Collection[XY], margin_mm: float, least_mm: float, page_mm: XY) -> Box:
-    """A box around some points, of a shape that sits well on a page, inside the sheet."""
+    """Return a box around some points, of a shape that fits a page well, inside the sheet."""
     xs, ys = [x for x, _ in points], [y for _, y in points]
     wide, high = page_mm
     width = max(max(xs) - min(xs) + 2 * margin_mm, least_mm)
@@ -191,7 +191,7 @@ def _marks(
     names: Mapping[str, str],
     faint: Collection[Arrow] = (),
 ) -> tuple[Layer, ...]:
-    """The marks in a box, as large as suits its width on the page."""
+    """Return the marks in a box, in a size that suits its width on the page."""
     size = min(max(size_per_mm * box[2], LEAST_SIZE), LARGEST_SIZE)
     return layers_of(scene, box, named, names, size=size, faint=faint)
 
@@ -200,7 +200,7 @@ def _marks(
 
 
 def scan_element(picture: Picture, index: int) -> Markup:
-    """The scan itself, which every view of the page shows by its name; empty where there is none."""
+    """Return the scan, which every view of the page shows by its name; empty if there is none."""
     if not picture.scan:
         return Markup("")
     width, height = picture.scene.page_mm
@@ -212,7 +212,7 @@ def scan_element(picture: Picture, index: int) -> Markup:
 
 
 def svg(view: PageView, picture: Picture, description: str) -> Markup:
-    """A view as SVG; `description` is its text. The scan is taken from the page's `scan_element`."""
+    """Return a view as SVG; `description` is its text. The scan comes from the page's `scan_element`."""
     image = Markup('<use href="#scan-{}"/>').format(view.picture) if picture.scan else Markup("")
     return Markup(
         '<svg class="sheet" viewBox="{:.1f} {:.1f} {:.1f} {:.1f}" role="img" aria-label="{}"'
@@ -232,15 +232,15 @@ def _elements(view: PageView) -> Iterator[Markup]:
 LOOK_MARGIN_MM = 14.0
 LEAST_LOOK_MM = 45.0
 LOOK_SIZE_PER_MM = 0.0095
-"""A look fills a screen: its marks are smaller than those of details that stand three in a row."""
+"""A review view fills a screen: its marks are smaller than those of details shown three in a row."""
 
 
 def look(
     scene: Scene, name: str, ghost: Ghost | None, names: Mapping[str, str] = _NO_NAMES
 ) -> tuple[Box, Markup] | None:
-    """A box around a vector or link and the one expected, and the marks on its figure as SVG elements.
+    """Return a box around a vector or link and the expected one, and its figure's marks as SVG elements.
 
-    The others of its figure are faint. None where it is not drawn and nothing says where it should be.
+    The others of its figure are faint. None if it is not drawn and its expected position is unknown.
     """
     arrows = tuple(one for one in scene.arrows if one.name == name)[:1]
     ghosts = () if ghost is None else (ghost,)

@@ -1,7 +1,7 @@
-"""Pages of which nothing is left but the figures: everything else is painted over with paper.
+"""Pages with nothing left but the figures: everything else is painted over with paper.
 
-It is said what stays, not what goes: what was read as a figure, with the letters at its points. Within it,
-lines of writing and signs away from points and strokes are painted over; points and strokes stay whole.
+The caller says what stays, not what goes: what was read as a figure, with the letters at its points. Within
+it, lines of writing and signs away from points and strokes are painted over; points and strokes stay whole.
 """
 
 from collections.abc import Iterable, Sequence
@@ -18,29 +18,29 @@ from grader.scan.register.distortion import straighten
 from reference.drawing.canvas import A3_MM
 
 HULL_MM = 10.0
-"""Around a figure: letters, arrowheads, supports, the ends of lines of construction."""
+"""Margin around a figure: letters, arrowheads, supports, the ends of construction lines."""
 STROKE_MM = 0.8
-"""To each side of a stroke that was read: its own ink, where writing runs through it."""
+"""Margin on each side of a stroke that was read: its own ink, if writing runs through it."""
 POINT_MM = 6.0
-"""Around a point: its circle, its letter, the hatching of a support, which looks like a line of writing."""
+"""Margin around a point: its circle, its letter, the hatching of a support, which looks like writing."""
 AT_NODE_MM, AT_STROKE_MM = 10.0, 5.0
-"""Signs so near a point, or a stroke, are its name."""
+"""Signs this close to a point, or a stroke, are its name."""
 AROUND_MM = 1.0
-"""Painted around what is painted over: the blur of ink."""
+"""Margin around what is painted over: the blur of ink."""
 _REDUCED = 8
 _SOLID_MM, _SMOOTH_MM = 40.0, 8.0
-"""The paper's shade is the brightest within so much, smoothed: a code of 28 mm must leave no trace."""
+"""The paper's shade is the brightest within this distance, smoothed: a code of 28 mm must leave no trace."""
 
 
 @dataclass(slots=True)
 class Keep:
-    """What stays of a page, in sheet mm.
+    """The parts of a page that stay, in sheet mm.
 
     Attributes
     ----------
     figures : (n, 2) the points of each figure that was read
     strokes : (2, 2) the two ends of each stroke that was read
-    zones : the boxes that figures stay in; empty for the whole sheet
+    zones : the boxes in which figures stay; empty for the whole sheet
     writing : boxes of lines of writing
     signs : boxes of single signs
     block : the title block's box, or None; nothing of it stays
@@ -55,7 +55,7 @@ class Keep:
 
 
 def upright_pixels(image: Page, sheet: Sheet) -> tuple[GreyImage, FloatArray]:
-    """The picture without the camera's bend, cut to the sheet, and the (3, 3) map from mm to its pixels."""
+    """Return the picture without lens distortion, cut to the sheet, and the (3, 3) map from mm to pixels."""
     if sheet.lens is not None and sheet.lens.bend:
         image, sheet = straighten(image, sheet)
     wide, high = sheet.page_mm
@@ -68,12 +68,12 @@ def upright_pixels(image: Page, sheet: Sheet) -> tuple[GreyImage, FloatArray]:
 
 
 def covered(grey: GreyImage, mm_to_px: FloatArray, px_per_mm: float, keep: Keep) -> GreyImage:
-    """The picture in which all is paper but what stays."""
+    """Return the picture with everything but the kept parts painted over."""
     return _on_paper(grey, _mask(grey, mm_to_px, px_per_mm, keep))
 
 
 def painted(grey: GreyImage, boxes: Sequence[Box]) -> GreyImage:
-    """The picture with paper over boxes, which are in its pixels: x, y, width, height."""
+    """Return the picture with paper over boxes, which are in its pixels: x, y, width, height."""
     shows = np.ones(grey.shape, np.bool_)
     for x, y, wide, high in boxes:
         shows[max(0, int(y)) : max(0, round(y + high)), max(0, int(x)) : max(0, round(x + wide))] = False
@@ -81,7 +81,7 @@ def painted(grey: GreyImage, boxes: Sequence[Box]) -> GreyImage:
 
 
 def _on_paper(grey: GreyImage, shows: NDArray[np.bool_]) -> GreyImage:
-    """The picture with the paper's shade where it does not show; ink leaves no shadow in that shade."""
+    """Return the picture with the paper's shade where the mask is false; ink leaves no shadow in it."""
     size = max(1, grey.shape[1] // _REDUCED), max(1, grey.shape[0] // _REDUCED)
     small = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
     unit = max(small.shape) / A3_MM[0]
@@ -92,7 +92,7 @@ def _on_paper(grey: GreyImage, shows: NDArray[np.bool_]) -> GreyImage:
 
 
 def _mask(grey: GreyImage, mm_to_px: FloatArray, px_per_mm: float, keep: Keep) -> NDArray[np.bool_]:
-    """(h, w) whether a pixel stays as it is."""
+    """Return (h, w) whether a pixel stays as it is."""
 
     def blank() -> GreyImage:
         return np.zeros(grey.shape, np.uint8)
@@ -127,7 +127,7 @@ def _mask(grey: GreyImage, mm_to_px: FloatArray, px_per_mm: float, keep: Keep) -
 
 
 def _loose(keep: Keep) -> Iterable[Box]:
-    """The signs that are no name of a point or a stroke."""
+    """Yield the signs that do not name a point or a stroke."""
     nodes = np.concatenate([*keep.figures, np.zeros((0, 2))])
     for box in keep.signs:
         middle = np.array([box[0] + box[2] / 2.0, box[1] + box[3] / 2.0])
@@ -137,25 +137,25 @@ def _loose(keep: Keep) -> Iterable[Box]:
 
 
 def _distance(at: FloatArray, ends: FloatArray) -> float:
-    """From a point to a stroke."""
+    """Return the distance of a point from a stroke."""
     along = ends[1] - ends[0]
     share = float(np.clip((at - ends[0]) @ along / max(along @ along, 1e-12), 0.0, 1.0))
     return float(np.linalg.norm(at - ends[0] - share * along))
 
 
 def corners_of(box: Box) -> FloatArray:
-    """(4, 2) the corners of a box."""
+    """Return (4, 2) the corners of a box."""
     x, y, wide, high = box
     return np.array([(x, y), (x + wide, y), (x + wide, y + high), (x, y + high)])
 
 
 def bare_png(grey: GreyImage) -> bytes:
-    """A picture as PNG: size and pixels, nothing else."""
+    """Return a picture as PNG: size and pixels, nothing else."""
     return encode(".png", grey, [])
 
 
 def reopened(picture: bytes) -> GreyImage | None:
-    """The pixels of a PNG file, which a person may have painted on; None where it is none."""
+    """Return the pixels of a PNG file, which a person may have edited; None if it is none."""
     if not picture:
         return None
     grey = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_GRAYSCALE)

@@ -1,7 +1,7 @@
 """Plans as a student measured them: drawn from the entered lengths and directions, without a scan.
 
 Each vector starts at the end of the one before it, from the pole on, so that gaps are visible. A length
-without a direction can only be drawn along the expected direction, where that may be shown.
+without a direction can only be drawn along the expected direction, if that may be shown.
 """
 
 import cmath
@@ -37,13 +37,13 @@ def measured_picture(
     *,
     show_expected: bool,
 ) -> Picture | None:
-    """The plans as measured; None where too little was entered to draw them.
+    """Return the plans as measured; None if too little was entered to draw them.
 
     Arguments
     ---------
     reading : the entered lengths and directions
     outcomes : by vector name
-    show_expected : whether expected vectors may be seen: as ghosts, and as directions not entered
+    show_expected : whether expected vectors may be shown: as ghosts, and for missing directions
     """
     drawn = {}
     for figure, pole in construction.poles.items():
@@ -65,7 +65,7 @@ def _plan(
     *,
     show_expected: bool,
 ) -> Scene:
-    """One plan about its pole."""
+    """Return one plan about its pole."""
     entered = reading.figures[figure].vectors
     expected = {name: expected_vector(outcomes.get(name)) for name in entered} if show_expected else {}
     steps: dict[str, complex] = {}
@@ -92,7 +92,7 @@ def _plan(
 
 
 def _nodes(pole: str, vectors: list[Vector], steps: Mapping[str, complex]) -> dict[str, complex]:
-    """Where the vectors lead to, from the pole on."""
+    """Return the nodes that the vectors lead to, from the pole on."""
     nodes = {pole: 0j}
     for _ in vectors:
         for vector in vectors:
@@ -117,7 +117,7 @@ def _arrows(
 
 
 def _side_by_side(plans: list[Scene]) -> Scene:
-    """The plans beside each other on a page just large enough."""
+    """Place the plans beside each other on a page just large enough."""
     left, height = MARGIN_MM, 0.0
     arrows: list[Arrow] = []
     ghosts: list[Ghost] = []

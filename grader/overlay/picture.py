@@ -1,4 +1,4 @@
-"""Overlay pictures: what was read, drawn on the upright scan; and parts of a page as they were scanned."""
+"""Overlay pictures: the reading drawn on the upright scan; and parts of a page as scanned."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,16 +25,16 @@ PNG_COMPRESSION = 1
 _FEW_TONES = np.array([17 * round(tone / 17) for tone in range(256)], dtype=np.uint8)
 """Sixteen tones: pencil and ink look the same, and a PNG is half a JPEG."""
 _PNG_FILTER, _NO_FILTER = 19, 8
-"""OpenCV's IMWRITE_PNG_FILTER and its IMWRITE_PNG_FILTER_NONE; versions before 4.12 pass them over."""
+"""OpenCV's IMWRITE_PNG_FILTER and its IMWRITE_PNG_FILTER_NONE; versions before 4.12 ignore them."""
 _FLAT_PNG = [
     cv2.IMWRITE_PNG_COMPRESSION, PNG_COMPRESSION, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE,
     _PNG_FILTER, _NO_FILTER,
 ]  # fmt: skip
-"""Of pictures that are white for the most part: to try filters row by row takes four times as long."""
+"""Options for mostly white pictures: choosing filters row by row takes four times as long."""
 FRACTION_BITS = 4
 JPEG_QUALITY = 78
 CUT_QUALITY = 90
-"""Close up, the blocks of a coarser JPEG file are seen beside thin lines."""
+"""JPEG quality of close-ups: blocks of a coarser file show beside thin lines."""
 
 
 def overlay(
@@ -46,12 +46,12 @@ def overlay(
     *,
     show_expected: bool = False,
 ) -> Picture:
-    """A page with what was read on it.
+    """Return a page with the reading drawn on it.
 
     Arguments
     ---------
-    reading : None where the page could not be read: the scan alone is shown
-    vectors : the construction's vectors, which say from what node to what node each goes
+    reading : None if the page could not be read: the scan alone is shown
+    vectors : the construction's vectors, with the nodes that each connects
     outcomes : by vector name; read vectors without an outcome are shown as not judged
     links : the joints of the mechanism's links by name; those with an outcome are shown
     show_expected : whether wrong vectors have the expected one ghosted in
@@ -68,13 +68,13 @@ def overlay(
 
 
 def _smaller(scan: GreyImage, plain: GreyImage) -> bytes:
-    """A cleaned scan as a small file: pencil on white paper needs few tones, a photo's shades many."""
+    """Return a cleaned scan as a small file: pencil on white paper needs few tones, a photo's shades many."""
     jpeg = encode(".jpg", scan, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     return min(jpeg, encode(".png", plain, _FLAT_PNG), key=len)
 
 
 def encode(kind: str, image: NDArray[np.uint8], options: list[int]) -> bytes:
-    """A picture as a file of this kind, `.png` or `.jpg`, without any metadata."""
+    """Encode a picture as a file of this kind, `.png` or `.jpg`, without any metadata."""
     encoded, data = cv2.imencode(kind, image, options)
     if not encoded:
         raise ValueError(f"expected an image that can be stored as {kind}, got shape {image.shape}")
@@ -85,11 +85,11 @@ def encode(kind: str, image: NDArray[np.uint8], options: list[int]) -> bytes:
 
 
 def cut(page: Page, sheet: Sheet | None, box: Box, px_per_mm: float) -> bytes:
-    """A part of a page as it was scanned, as JPEG.
+    """Return a part of a page as scanned, as JPEG.
 
     Arguments
     ---------
-    sheet : of a page in the form that `straighten` gives; None where it was not registered
+    sheet : of a page in the form that `straighten` gives; None if it was not registered
     box : in sheet millimetres; in stored pixels without a sheet
     px_per_mm : wanted resolution of the picture; pixels per stored pixel without a sheet
     """
@@ -97,7 +97,7 @@ def cut(page: Page, sheet: Sheet | None, box: Box, px_per_mm: float) -> bytes:
     scale = min(px_per_mm, 2.0 * stored)
     less = max(1, int(stored / scale))
     part = cut_out(averaged(page.grey, less), reduction(1.0 / less) @ to_px, box, scale, outside=255)
-    if not part.size:  # nothing of the page is there
+    if not part.size:  # the box lies outside the page
         part = np.full((1, 1), 255, np.uint8)
     return encode(".jpg", part, [cv2.IMWRITE_JPEG_QUALITY, CUT_QUALITY])
 
@@ -106,10 +106,10 @@ def cut(page: Page, sheet: Sheet | None, box: Box, px_per_mm: float) -> bytes:
 
 
 def paint(scan: GreyImage, scene: Scene) -> ColourImage:
-    """The scene drawn on a scan that shows exactly its page; (h, w, 3) uint8, blue green red."""
+    """Paint the scene on a scan that shows exactly its page; (h, w, 3) uint8, blue green red."""
     image: ColourImage = np.asarray(cv2.cvtColor(scan, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
     px_per_mm = scan.shape[1] / scene.page_mm[0]
-    # What waits for a person may well be right: its ghost is for a closer look.
+    # A vector under review may well be right: its ghost appears only in close-ups.
     ghosts = tuple(ghost for ghost in scene.ghosts if ghost.verdict != "review")
     named = [arrow for arrow in scene.arrows if arrow.is_named]
     for layer in layers_of(replace(scene, ghosts=ghosts), (0.0, 0.0, *scene.page_mm), named, {}):
@@ -122,7 +122,7 @@ def paint(scan: GreyImage, scene: Scene) -> ColourImage:
 
 
 def _paint_shape(image: ColourImage, shape: Shape, px_per_mm: float) -> None:
-    """One shape with sub-pixel ends; the image is changed."""
+    """Paint one shape with sub-pixel ends, in place."""
     smooth = (cv2.LINE_AA, FRACTION_BITS)
 
     def thick(width_mm: float) -> int:
@@ -149,7 +149,7 @@ def _paint_shape(image: ColourImage, shape: Shape, px_per_mm: float) -> None:
 
 
 def _write(image: ColourImage, label: Label, px_per_mm: float) -> None:
-    """A text; the image is changed."""
+    """Paint a text, in place."""
     for piece in set_pieces(label.text, label.size):
         x = (label.left + piece.right) * px_per_mm - 0.5
         y = (label.at[1] - piece.above) * px_per_mm - 0.5
@@ -176,13 +176,13 @@ def _bgr(colour: str) -> Colour:
 
 
 def _fixed_point(points: Sequence[XY], px_per_mm: float) -> NDArray[np.int32]:
-    """(n, 2) pixels times 2**FRACTION_BITS, as cv2 takes them."""
+    """Return (n, 2) pixels times 2**FRACTION_BITS, as cv2 takes them."""
     pixels = (np.array(points) * px_per_mm - 0.5) * 2**FRACTION_BITS
     return np.asarray(np.rint(pixels), dtype=np.int32)
 
 
 def _dashes(start: XY, end: XY, dash: tuple[float, ...]) -> Iterator[tuple[XY, XY]]:
-    """The pieces of a line, of equal length, the first and last at its ends; cv2 has no dashed lines."""
+    """Split a line into dashes of equal length, the first and last at its ends; cv2 has no dashed lines."""
     length = math.dist(start, end)
     if not dash or length < dash[0]:
         yield start, end

@@ -1,8 +1,8 @@
-"""What an overlay shows, in sheet millimetres (x right, y down): arrows with verdicts, nodes, labels.
+"""The contents of an overlay, in sheet millimetres (x right, y down): arrows with verdicts, nodes, labels.
 
-Painters draw a scene on the scan: `grader.overlay.picture` as pixels, `grader.overlay.closeup` as SVG.
-Right and wrong differ by colour, mark *and* line: wrong ones are thick, nearly right ones have long
-dashes, doubtful ones short ones, expected ones dots. Nothing rests on colour alone.
+Painters draw a scene on the scan: `grader.overlay.picture` as pixels, `grader.overlay.closeup` as SVG. Right
+and wrong differ by colour, mark *and* line: wrong ones are thick, nearly right ones have long dashes,
+doubtful ones short ones, expected ones dots. Colour alone distinguishes nothing.
 """
 
 import cmath
@@ -59,15 +59,15 @@ MARK_STROKES: dict[str, tuple[tuple[XY, ...], ...]] = {
 ARROW_WIDTH_MM: Mapping[str, float] = {
     "full": 0.5, "partial": 0.75, "none": 0.95, "follow_through": 0.5, "review": 0.5, "not_judged": 0.3,
 }  # fmt: skip
-"""What is wrong is thicker: seen in a grey print, too."""
+"""Wrong arrows are thicker: they are visible in a grey print, too."""
 ARROWHEAD_MM = (3.2, 1.0)
 """Length and half width."""
 LEAST_ARROW_MM = 0.05
-"""Shorter ones are not drawn."""
+"""Shorter arrows are not drawn."""
 DASH_MM = (2.2, 1.5)
-"""Of doubtful arrows: dash, gap."""
+"""Doubtful arrows: dash, gap."""
 NEARLY_MM = (5.0, 1.0)
-"""Of nearly right ones."""
+"""Nearly right arrows: dash, gap."""
 GHOST_COLOUR = "#59626d"
 GHOST_DASH_MM = (0.35, 1.0)
 GHOST_WIDTH_MM = 0.5
@@ -79,9 +79,9 @@ HAS_GHOST = frozenset({"none", "partial", "review"})
 
 @dataclass(frozen=True, slots=True)
 class Arrow:
-    """A named vector as read; `verdict` is `not_judged` where the rubric does not ask for it.
+    """A named vector as read; `verdict` is `not_judged` if the rubric does not ask for it.
 
-    A link of the mechanism has no head (`is_link`), and its name stands beside it only where it is not right.
+    A link of the mechanism has no head (`is_link`), and its name is shown only if it is not right.
     """
 
     name: str
@@ -94,12 +94,12 @@ class Arrow:
 
     @property
     def is_named(self) -> bool:
-        """Whether its mark and name are shown."""
+        """True if its mark and name are shown."""
         return not self.is_link or self.verdict != "full"
 
     @property
     def length(self) -> float:
-        """Millimetres."""
+        """Length, mm."""
         return math.dist(self.tail, self.tip)
 
     @property
@@ -112,7 +112,7 @@ class Arrow:
 
 @dataclass(frozen=True, slots=True)
 class Ghost:
-    """The vector that was expected, laid off from where the drawn one starts; `verdict` on the drawn one."""
+    """The expected vector, drawn from the start of the drawn one; `verdict` is that of the drawn one."""
 
     name: str
     figure: str
@@ -123,7 +123,7 @@ class Ghost:
 
 @dataclass(frozen=True, slots=True)
 class Dot:
-    """A node as read; `lettered` where no drawing beneath has its letter."""
+    """A node as read; `lettered` if no drawing beneath has its letter."""
 
     name: str
     at: XY
@@ -134,7 +134,7 @@ class Dot:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Everything to be drawn on one sheet."""
+    """Everything drawn on one sheet."""
 
     page_mm: XY
     arrows: tuple[Arrow, ...] = ()
@@ -150,8 +150,8 @@ class Picture:
     ----------
     png : the overlay, painted
     scan : the cleaned scan alone, upright, for the page that draws the scene as SVG; a PNG or JPEG file,
-        whichever is smaller; empty where nothing was scanned
-    scene : what is drawn on it; its page_mm spans the whole picture
+        whichever is smaller; empty if nothing was scanned
+    scene : its marks; its page_mm spans the whole picture
     """
 
     source: str
@@ -165,19 +165,19 @@ _NO_LINKS: Mapping[str, tuple[str, str]] = {}
 
 
 class Drawn(Protocol):
-    """A length and a direction on paper, None where not known."""
+    """A length and a direction on paper, None if not known."""
 
     @property
     def length_mm(self) -> float | None:
-        """Millimetres."""
+        """Length, mm."""
 
     @property
     def direction_deg(self) -> float | None:
-        """Counter-clockwise from the sheet's +x."""
+        """Direction, counter-clockwise from the sheet's +x."""
 
 
 class Judged(Protocol):
-    """A verdict and what was expected: an outcome, or a criterion of a report."""
+    """A verdict and the expected vector: an outcome, or a criterion of a report."""
 
     @property
     def verdict(self) -> str:
@@ -185,7 +185,7 @@ class Judged(Protocol):
 
     @property
     def expected(self) -> Drawn:
-        """The vector that was expected."""
+        """The expected vector."""
 
 
 def scene_of(
@@ -197,7 +197,7 @@ def scene_of(
     show_expected: bool,
     links: Mapping[str, tuple[str, str]] = _NO_LINKS,
 ) -> Scene:
-    """The scene of one sheet's reading; `outcomes` by the vector's or link's name."""
+    """Return the scene of one sheet's reading; `outcomes` by the vector's or link's name."""
     arrows = [*_arrows(reading, vectors, outcomes), *_links(reading, links, outcomes)]
     dots = tuple(
         Dot(name, on_paper(node.at), node.confidence < LEAST_SURE, figure=kind)
@@ -209,12 +209,12 @@ def scene_of(
 
 
 def on_paper(at: complex) -> XY:
-    """A point of the plane, y up, in sheet millimetres, y down."""
+    """Convert a point of the plane, y up, to sheet millimetres, y down."""
     return (at.real, -at.imag)
 
 
 def between(start: XY, end: XY, share: float) -> XY:
-    """The point at a share of the way."""
+    """Return the point at a share of the way."""
     return (start[0] + share * (end[0] - start[0]), start[1] + share * (end[1] - start[1]))
 
 
@@ -238,7 +238,7 @@ def _arrows(
 def _links(
     reading: Reading, links: Mapping[str, tuple[str, str]], outcomes: Mapping[str, Judged]
 ) -> Iterator[Arrow]:
-    """The links of the sketch that were judged."""
+    """Yield the links of the sketch that were judged."""
     sketch = reading.figures.get(MECHANISM)
     for name, (tail, head) in links.items():
         outcome = outcomes.get(name)
@@ -251,7 +251,7 @@ def _links(
 
 
 def ghosts_of(arrows: Iterable[Arrow], outcomes: Mapping[str, Judged]) -> Iterator[Ghost]:
-    """The expected vectors beside those that are wrong or wait for a person."""
+    """Yield the expected vectors for those that are wrong or wait for a person."""
     for arrow in arrows:
         expected = expected_vector(outcomes.get(arrow.name))
         if arrow.verdict in HAS_GHOST and expected is not None:
@@ -259,14 +259,14 @@ def ghosts_of(arrows: Iterable[Arrow], outcomes: Mapping[str, Judged]) -> Iterat
 
 
 def expected_vector(outcome: Judged | None) -> complex | None:
-    """The drawn vector that was expected, complex millimetres, y up; None where that is not known."""
+    """Return the expected vector, complex mm, y up; None if it is not known."""
     if outcome is None or outcome.expected.length_mm is None or outcome.expected.direction_deg is None:
         return None
     return cmath.rect(outcome.expected.length_mm, math.radians(outcome.expected.direction_deg))
 
 
 def ghost_of(arrow: Arrow, expected: complex) -> Ghost:
-    """The expected vector, laid off from where the drawn one starts."""
+    """Return the expected vector, drawn from the start of the drawn one."""
     tip = (arrow.tail[0] + expected.real, arrow.tail[1] - expected.imag)
     return Ghost(arrow.name, arrow.figure, arrow.tail, tip, arrow.verdict)
 
@@ -275,16 +275,16 @@ def ghost_of(arrow: Arrow, expected: complex) -> Ghost:
 
 LABEL_HEIGHT_MM = 3.4
 NAME_MM, BOLD_SHARE = 3.1, 1.1
-"""Size of names; pages set them bold, which is wider than the font that `width_of` knows by so much."""
+"""Size of names; pages set them bold, wider by this factor than the font that `width_of` measures."""
 BADGE_MM = 3.8
 LEADER_FROM_MM = 3.0
 """A label farther than this from its arrow gets a thin line to it."""
 
 SHARES = (0.55, 0.4, 0.7, 0.25, 0.85)
 GAPS_MM = (1.2, 3.5, 6.0, 9.0, 12.0, 16.0, 21.0, 27.0)
-"""Where along an arrow and how far beside it a label may stand, the best first."""
+"""Possible distances of a label from its arrow, the best first."""
 OVERLAP_COST = 16.0
-"""Of a square millimetre on another label; a millimetre of distance costs a half,"""
+"""Cost of a square millimetre on another label; a millimetre of distance costs a half,"""
 CROSSING_COST = 2.0
 """and a millimetre of another arrow under the label this much."""
 ARROW_OPACITY, FAINT, GROUND_OPACITY = 0.85, 0.3, 0.82
@@ -295,7 +295,7 @@ _NO_NAMES: Mapping[str, str] = {}
 
 @dataclass(frozen=True, slots=True)
 class ArrowLabel:
-    """Where an arrow's mark and name stand; `size` as of `labels_of`."""
+    """Position of an arrow's mark and name; `size` as of `labels_of`."""
 
     arrow: Arrow
     text: Text
@@ -310,12 +310,12 @@ class ArrowLabel:
 
     @property
     def foot(self) -> XY:
-        """Where the name's line begins."""
+        """Start of the name's line."""
         return (self.box[0] + self.size * (BADGE_MM + 0.6), self.box[1] + self.box[3] - self.size * 1.25)
 
     @property
     def leader(self) -> tuple[XY, XY] | None:
-        """From a label that stands apart to its arrow."""
+        """Line from a distant label to its arrow."""
         x, y, width, height = self.box
         middle = between(self.arrow.tail, self.arrow.tip, 0.55)
         near = (min(max(middle[0], x), x + width), min(max(middle[1], y), y + height))
@@ -325,7 +325,7 @@ class ArrowLabel:
 def labels_of(
     arrows: Sequence[Arrow], within: Box, size: float = 1.0, names: Mapping[str, str] = _NO_NAMES
 ) -> list[ArrowLabel]:
-    """The position of each arrow's mark and name; `size` 1 suits a whole sheet, less a close-up.
+    """Return the position of each arrow's mark and name; `size` 1 suits a whole sheet, less a close-up.
 
     Greedy, long arrows first: each label takes the cheapest of its candidates.
     """
@@ -347,7 +347,7 @@ def labels_of(
 
 
 def _candidates(arrow: Arrow, within: Box, size: float, wide_mm: float) -> tuple[FloatArray, FloatArray]:
-    """Costs of a label's candidates by their distance, (p,), and the boxes, (p, 4): x, y, width, height."""
+    """Return costs of a label's candidates by distance, (p,), and boxes, (p, 4): x, y, width, height."""
     box = size * np.array([wide_mm, LABEL_HEIGHT_MM + 0.6])
     tail, along = np.array(arrow.tail), np.array([1.0, 0.0])
     step = np.array(arrow.tip) - tail
@@ -363,7 +363,7 @@ def _candidates(arrow: Arrow, within: Box, size: float, wide_mm: float) -> tuple
 
 
 def _overlaps(boxes: FloatArray, taken: FloatArray) -> FloatArray:
-    """Area that each of (p, 4) boxes shares with (t, 4) others."""
+    """Return the area that each of (p, 4) boxes shares with (t, 4) others."""
     low = np.maximum(boxes[:, None, :2], taken[:, :2])
     high = np.minimum(boxes[:, None, :2] + boxes[:, None, 2:], taken[:, :2] + taken[:, 2:])
     shared: FloatArray = np.prod(np.maximum(high - low, 0.0), axis=2).sum(axis=1)
@@ -375,7 +375,7 @@ def _overlaps(boxes: FloatArray, taken: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, slots=True)
 class Layer:
-    """Shapes that are equally opaque."""
+    """Shapes of equal opacity."""
 
     shapes: tuple[Shape, ...]
     opacity: float = 1.0
@@ -390,15 +390,15 @@ def layers_of(
     size: float = 1.0,
     faint: Collection[Arrow] = (),
 ) -> tuple[Layer, ...]:
-    """The marks of a scene as shapes, the undermost first.
+    """Return the marks of a scene as shapes, the lowest first.
 
     Arguments
     ---------
-    box : what of the page is seen
+    box : the visible part of the page
     named : the arrows that get a label
     names : from names of vectors and links to those that students know
     size : of marks and letters; 1 suits a whole sheet, less a close-up
-    faint : arrows that are there for orientation only
+    faint : arrows shown for orientation only
     """
     labels = labels_of(list(named), box, size, names)
     dots = [dot for dot in scene.dots if is_in(dot.at, box)]
@@ -414,7 +414,7 @@ def layers_of(
 
 
 def is_in(at: XY, box: Box) -> bool:
-    """Whether a point is inside a box."""
+    """Return whether a point is inside a box."""
     return box[0] <= at[0] <= box[0] + box[2] and box[1] <= at[1] <= box[1] + box[3]
 
 
@@ -452,7 +452,7 @@ def _ground(label: ArrowLabel) -> Shape:
 
 
 def _label(label: ArrowLabel) -> Iterator[Shape]:
-    """The mark in a disc and the name, with a thin line to an arrow far off."""
+    """Draw the mark in a disc and the name, with a thin line to a distant arrow."""
     arrow, size = label.arrow, label.size
     colour = COLOURS[arrow.verdict]
     if label.leader is not None:

@@ -1,1 +1,1 @@
-"""Whose page is it: by code, roster, file name or title block; a draft of the roster where none says so."""
+"""Owners of pages by code, roster, file name or title block; a draft of the roster for the rest."""

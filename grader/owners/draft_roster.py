@@ -1,13 +1,13 @@
-"""A draft of the roster's `scans` where nothing says whose page is whose, for a person to check.
+"""Draft the roster's `scans` for pages whose owner is not known, for a person to check.
 
-What is known for certain (QR code, the roster's own `scans`, file names) is taken over; the rest is
-suggested by what the drawing looks like (crank angle, directions of links and plans: the student's
-own variant) and by the roster's order, and marked to be checked. Nothing is assigned here: the draft
-counts only once a person hands it in as the roster. A contact sheet shows all pages small.
+What is known for certain (QR code, the roster's own `scans`, file names) is kept; the rest is suggested by
+the look of the drawing (crank angle, directions of links and plans: the student's own variant) and by the
+roster's order, and marked to be checked. Nothing is assigned here: the draft counts only once a person hands
+it in as the roster. A contact sheet shows all pages small.
 
 A variant's figure is laid on the strokes by an anchor, one of its longest lines: each stroke of about its
-direction and length proposes a pose and a scale. What the figure's lines then match is its similarity.
-Students who made mistakes match their own variant less well.
+direction and length proposes a pose and a scale. Its similarity is the length of the figure's lines that then
+match. Students who made mistakes match their own variant less well.
 """
 
 import base64
@@ -38,11 +38,11 @@ SURE, CHECK = "yes", "check"
 LIKE_MM = 150.0
 """Length of lines matched, less half of those missed, from which a suggestion is made."""
 CLEAR = 0.75
-"""The next best variant must match this share of it, or less, to be told apart."""
+"""A suggestion needs the next best variant to match this share of it, or less."""
 _NAMED = 6
 
 StrokesOf = Callable[[PageRef], FloatArray | None]
-"""The strokes (n, 2, 2) of a page in sheet millimetres, y down; None where there are none to be had."""
+"""Returns the strokes (n, 2, 2) of a page in sheet millimetres, y down; None if there are none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,11 +80,11 @@ def suggest(
     strokes_of: StrokesOf | None = None,
     pages_per_student: int | None = None,
 ) -> RosterDraft:
-    """Who each page may belong to.
+    """Suggest the owner of each page.
 
     Arguments
     ---------
-    strokes_of : gives the strokes of a page whose owner is not certain, to see whose variant they look like
+    strokes_of : returns the strokes of a page whose owner is not certain, to compare it with variants
     pages_per_student : how many pages each student has, if the file is in the roster's order
     """
     known = assign_pages(pages, roster, assignment.id, pages_per_student=pages_per_student)
@@ -116,7 +116,7 @@ def _certain(owned: Owned, roster: Roster) -> Suggestion:
 
 
 def _variants(roster: Roster, assignment: Assignment) -> dict[Variant, list[RosterRow]]:
-    """The rows of each variant; rows whose variant is unknown have none."""
+    """Return the rows of each variant; rows whose variant is unknown are left out."""
     variants: dict[Variant, list[RosterRow]] = {}
     for row in roster.rows:
         with contextlib.suppress(CallError):
@@ -131,7 +131,7 @@ def _by_similarity(
     variants: Mapping[Variant, list[RosterRow]],
     before: Suggestion | None,
 ) -> Suggestion | None:
-    """The row whose variant is drawn, where it stands out from those of all others."""
+    """Return the row whose variant is drawn, if it stands out from those of all others."""
     if strokes is None or len(variants) < 2:
         return None
     matched = figure_similarity(strokes, assignment, list(variants))
@@ -159,7 +159,7 @@ def _by_likely_order(
     assignment: Assignment,
     settled: Mapping[PageRef, Suggestion],
 ) -> dict[PageRef, Suggestion]:
-    """The roster's order, where the pages of one class file come out even and no code speaks against it."""
+    """Suggest by the roster's order, if the pages of one class file come out even and no code contradicts."""
     drawn = sum(page.pages > 1 and not page.blank for page in pages)
     each, rest = divmod(drawn, max(len(roster.rows), 1))
     if not each or rest:
@@ -171,7 +171,7 @@ def _by_likely_order(
 
 
 def _in_order(suggestions: list[Suggestion], roster: Roster) -> list[Suggestion]:
-    """Choices left open settled by the roster's order, where all pages that have a row follow it."""
+    """Settle open choices by the roster's order, if all pages that have a row follow it."""
     place = {id(row): index for index, row in enumerate(roster.rows)}
     reached = 0
     settled: list[Suggestion] = []
@@ -191,10 +191,10 @@ def _in_order(suggestions: list[Suggestion], roster: Roster) -> list[Suggestion]
 
 
 def draft_csv(roster: Roster, draft: RosterDraft) -> str:
-    """The roster with `scans` suggested, and the columns `why` and `sure` (`yes` or `check`).
+    """Return the roster with `scans` suggested, and the columns `why` and `sure` (`yes` or `check`).
 
-    Pages that nobody is suggested for stand on the contact sheet alone: a line without a student
-    would be no roster.
+    Pages without a suggestion are on the contact sheet alone: a line without a student would make the roster
+    invalid.
     """
     rows = [[*COLUMNS, *DRAFT_COLUMNS]]
     for row in roster.rows:
@@ -204,7 +204,7 @@ def draft_csv(roster: Roster, draft: RosterDraft) -> str:
 
 
 def _cells(row: RosterRow) -> list[str]:
-    """The roster's own columns as they were, but for `scans`."""
+    """Return the roster's own columns unchanged, except `scans`."""
     whole = ["" if value is None else str(value) for value in (row.n, row.position)]
     return [
         row.student_id,
@@ -217,7 +217,7 @@ def _cells(row: RosterRow) -> list[str]:
 
 
 def _judged(row: RosterRow, mine: list[Suggestion]) -> list[str]:
-    """`scans`, `why` and `sure` of a row."""
+    """Return `scans`, `why` and `sure` of a row."""
     pages = list(dict.fromkeys([*map(str, row.scans), *(str(suggestion.source) for suggestion in mine)]))
     whole = {ref.file for ref in row.scans if ref.page is None}
     pages = [page for page in pages if page in whole or page.rpartition("#")[0] not in whole]
@@ -237,26 +237,26 @@ def said(why: Sequence[Reason], speaker: Tongue) -> str:
 
 _ANCHOR_OFF_RAD = np.radians(2.5)
 _SCALES = (0.4, 1.6)
-"""Drawn size over the one that the assignment proposes."""
+"""Range of the drawn size relative to the size that the assignment proposes."""
 _LEAST_ANCHOR_MM = 15.0
 _LEAST_LINE_MM = 8.0
 """Shorter lines are found anywhere."""
 _OFF_MM = 0.6
-"""Of a line's ends, across: a usual hand."""
+"""Usual drafting error of a line's ends, across."""
 _COVERED = 0.6
 _AMISS = 0.5
-"""What a line without a stroke takes off, as a share of what one with a stroke adds."""
+"""Cost of a line without a stroke, as a share of the gain of one with a stroke."""
 _ANCHORS = 4
 _TRIED = 24
 """Strokes tried as the anchor, those nearest in direction."""
 
 
 def figure_similarity(ends_mm: FloatArray, assignment: Assignment, variants: Sequence[Variant]) -> FloatArray:
-    """How well a sheet's strokes match each variant's figures.
+    """Return how well a sheet's strokes match each variant's figures.
 
-    Arguments: `ends_mm` (n, 2, 2) strokes in sheet millimetres, y down. Returns (variants,), the
-    length of lines that lie on strokes less half of that of lines that do not, mm, summed over the
-    figures: what a dead point's few lines match counts less than a whole plan.
+    Arguments: `ends_mm` (n, 2, 2) strokes in sheet millimetres, y down. Returns (variants,), the length of
+    lines that lie on strokes less half of that of lines that do not, mm, summed over the figures: a dead
+    point's few matched lines count less than a whole plan.
     """
     strokes = ends_mm[..., 0] - 1j * ends_mm[..., 1]
     strokes = strokes[np.abs(strokes[:, 1] - strokes[:, 0]) >= _LEAST_LINE_MM]
@@ -284,7 +284,7 @@ def _outlines(assignment: Assignment, variants: list[Variant]) -> list[ComplexAr
 
 
 def _pairs(construction: Construction) -> list[list[tuple[str, str]]]:
-    """The lines of each figure by their ends."""
+    """Return the lines of each figure by their ends."""
     plans = [
         [(vector.tail, vector.head) for vector in construction.vectors_of(plan)]
         for plan in construction.poles
@@ -293,7 +293,7 @@ def _pairs(construction: Construction) -> list[list[tuple[str, str]]]:
 
 
 def _most_matched(outline: ComplexArray, strokes: FloatArray) -> float:
-    """What the figure's lines match in the best of all places that its anchors propose; 0 at least."""
+    """Return the best match of the figure's lines over all poses that its anchors propose; 0 at least."""
     tails, heads = outline.T
     size = np.abs(heads - tails)
     if not np.isfinite(size).all():
@@ -315,7 +315,7 @@ def _most_matched(outline: ComplexArray, strokes: FloatArray) -> float:
 
 
 def _proposed(anchor: complex, strokes: FloatArray) -> FloatArray:
-    """(places, 2) where the anchor begins, and its scale, for strokes of about its direction and length."""
+    """Return (poses, 2) start and scale of the anchor, for strokes of about its direction and length."""
     run = strokes[:, 1] - strokes[:, 0]
     off = np.abs(np.angle((run / anchor) ** 2)) / 2.0
     scale = np.abs(run) / abs(anchor)
@@ -333,7 +333,7 @@ def _proposed(anchor: complex, strokes: FloatArray) -> FloatArray:
 
 
 def _on_strokes(tail: FloatArray, head: FloatArray, strokes: FloatArray) -> FloatArray:
-    """(places, lines) how well the best stroke lies under each line, 0..1."""
+    """Return (poses, lines) how well the best stroke matches each line, 0..1."""
     start, run = strokes[:, 0], strokes[:, 1] - strokes[:, 0]
     length = np.abs(run)
     along = run / length
@@ -354,7 +354,7 @@ _QUALITY = 60
 
 
 def thumbnail(grey: GreyImage) -> bytes:
-    """A page reduced, as JPEG."""
+    """Return a page reduced, as JPEG."""
     small = shrink(grey, min(1.0, _THUMBNAIL_PX / max(grey.shape)))
     picture = io.BytesIO()
     Image.fromarray(small).save(picture, "JPEG", quality=_QUALITY)

@@ -1,9 +1,9 @@
-"""Whose page is whose: every page goes to one student and position, or to "unmatched", never lost.
+"""Assign pages to owners: every page goes to one student and position, or to "unmatched", never lost.
 
-Sources, the first that speaks decides: the page's QR code; the roster's `scans`; the roster's order
-over one class file (`--pages-per-student`); the file's name. All that speak must agree: a page on
-which two disagree is unmatched, and the problem names both. Where none of them speaks, a name of the
-roster that surely stands on the page decides. What a person decided goes before all.
+Sources, in order of precedence: the page's QR code; the roster's `scans`; the roster's order over one class
+file (`--pages-per-student`); the file's name. All sources that give an owner must agree: a page on which two
+disagree is unmatched, and the problem names both. If none gives one, a name of the roster that surely stands
+on the page decides. A person's decision takes precedence over all.
 Codes of the problems:
 
 | code | meaning |
@@ -46,7 +46,7 @@ class How(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Owned:
-    """A page that has its owner."""
+    """A page with its owner."""
 
     source: PageRef
     student_id: str
@@ -57,7 +57,7 @@ class Owned:
 
 @dataclass(frozen=True, slots=True)
 class Unmatched:
-    """A page without an owner, why, and the students whose it may be."""
+    """A page without an owner, why, and its possible owners."""
 
     source: PageRef
     problem: Reason
@@ -66,12 +66,12 @@ class Unmatched:
 
 @dataclass(frozen=True, slots=True)
 class PageOwners:
-    """What becomes of every page.
+    """The assignment of every page.
 
     Attributes
     ----------
     owned, unmatched, blank : each page is in exactly one of them, in the order given
-    problems : what concerns no single page: files that the roster names and that are not there
+    problems : those that concern no single page: files that the roster names and that are missing
     """
 
     owned: tuple[Owned, ...]
@@ -82,7 +82,7 @@ class PageOwners:
 
 @dataclass(frozen=True, slots=True)
 class _Claim:
-    """What one source says of a page: the rows it may belong to, and what it names."""
+    """One source's claim about a page: the rows it may belong to, and the name given."""
 
     how: How
     rows: tuple[RosterRow, ...]
@@ -108,8 +108,8 @@ def assign_pages(  # noqa: PLR0913 - a source of owners each
 
     Arguments
     ---------
-    roster : None where there is none; students are then those whom codes, file names and
-        `student_ids` (of measurement files, for example) name
+    roster : None if there is none; students are then those named by codes, file names and `student_ids` (of
+        measurement files, for example)
     pages_per_student : pages that each student has in the one class file, blank ones not counted
     decided : the owners that a person gave, by file and page
     written : the students whose names stand on pages, by file and page
@@ -145,7 +145,7 @@ def assign_pages(  # noqa: PLR0913 - a source of owners each
 
 
 def student_of_name(file: str, student_ids: Container[str]) -> str | None:
-    """The student whom a file's name tells: its stem, or its longest part before a ``_``, is an id."""
+    """Return the student named by a file's name: its stem, or its longest part before a ``_``, is an id."""
     part = PurePath(file).stem
     while part:
         if part in student_ids:
@@ -155,9 +155,9 @@ def student_of_name(file: str, student_ids: Container[str]) -> str | None:
 
 
 def _improvised(pages: Sequence[PageRef], student_ids: Iterable[str]) -> Roster:
-    """A roster from what the pages say, for a folder that has none.
+    """Return a roster made from the pages, for a folder that has none.
 
-    Nobody is on it under an id that could not name a folder of its own.
+    Students whose id could not name a folder are left out.
     """
     rows: dict[tuple[str, int | None], RosterRow] = {}
     spelled: dict[str, str] = {}
@@ -179,14 +179,14 @@ def _improvised(pages: Sequence[PageRef], student_ids: Iterable[str]) -> Roster:
             add(RosterRow(student))
     stems = {PurePath(page.file).stem for page in pages if page.identity is None and not page.blank}
     for stem in sorted(stems, key=lambda stem: (len(stem), stem)):
-        # A second sheet's s07_2 belongs to s07 where there is one.
+        # A second sheet's s07_2 belongs to s07, if there is an s07.
         if student_of_name(f"{stem}.x", ids) is None:
             add(RosterRow(stem))
     return Roster("", tuple(rows.values()))
 
 
 def _certain_claims(page: PageRef, roster: Roster) -> list[_Claim]:
-    """What the code, the roster's scans and the file's name say."""
+    """Return the claims of the code, the roster's scans and the file's name."""
     claims: list[_Claim] = []
     if page.identity is not None:
         claims.append(_code_claim(page.identity, roster))
@@ -218,7 +218,7 @@ def _code_claim(identity: Identity, roster: Roster) -> _Claim:
 def _order_claims(
     pages: Sequence[PageRef], roster: Roster, certain: Sequence[Sequence[_Claim]], each: int | None
 ) -> tuple[dict[int, _Claim], dict[str, Reason]]:
-    """What the roster's order says of the one class file's pages, by index; or why not, by file."""
+    """Return the claims of the roster's order on the class file's pages, by index; or why not, by file."""
     if each is None:
         return {}, {}
     named = {
@@ -256,14 +256,14 @@ def _order_claims(
         for other in certain[index]:
             if not pages[index].blank and not _common([claim, other]):
                 claims = {**other.parameter, **claim.parameter}
-                # Pages with no other source may be shifted just as well; those that agree may stay.
+                # Pages without another source may be shifted as well; those that agree keep their owner.
                 agreeing = {i: c for i, c in claims_by_index.items() if certain[i]}
                 return agreeing, {file: _no_order("disproved", at=pages[index].page, **claims)}
     return claims_by_index, {}
 
 
 def _common(claims: Sequence[_Claim]) -> tuple[RosterRow, ...]:
-    """The rows that all claims allow, in the first one's order."""
+    """Return the rows that all claims allow, in the first one's order."""
     first, *others = claims
     allowed = [{(row.student_id, row.position) for row in claim.rows} for claim in others]
     return tuple(row for row in first.rows if all((row.student_id, row.position) in rows for rows in allowed))
@@ -272,7 +272,7 @@ def _common(claims: Sequence[_Claim]) -> tuple[RosterRow, ...]:
 def _settle(
     page: PageRef, claims: list[_Claim], roster: Roster, assignment_id: str, refusal: Reason | None
 ) -> Owned | Reason:
-    """The owner on whom all claims agree, or the problem."""
+    """Return the owner on whom all claims agree, or the problem."""
     claims = sorted(claims, key=lambda claim: list(How).index(claim.how))
     identity = page.identity
 
@@ -301,7 +301,7 @@ def _settle(
 def _owned(
     page: PageRef, row: RosterRow, claims: list[_Claim], problem: Callable[..., Reason]
 ) -> Owned | Reason:
-    """The row's page, unless the code's number is another."""
+    """Return the row's page, unless the code's number is another."""
     identity = page.identity
     n, position = row.n, row.position
     if identity is not None:
@@ -319,7 +319,7 @@ def who(row: RosterRow) -> str:
 
 
 def _near(file: str, roster: Roster) -> dict[str, Value]:
-    """A hint for a name that is almost an id; never more than a hint."""
+    """Return a hint for a name that is almost an id; never more than a hint."""
     stem = PurePath(file).stem
     by_lower = {student.lower(): student for student in roster.student_ids}
     student = student_of_name(f"{stem.lower()}.x", by_lower)
@@ -342,7 +342,7 @@ def _missing_scans(pages: Sequence[PageRef], roster: Roster) -> Iterable[Reason]
 
 
 def _missing_parts(ref: ScanRef, there: Mapping[str, int]) -> dict[str, Value] | None:
-    """What is there in the place of a scan: a file of nearly this name, or fewer pages; None for the scan."""
+    """Describe what exists in place of a scan: a similar file name, or fewer pages; None for the scan."""
     if ref.file not in there:
         return _nearest(ref.file, there)
     if ref.page is not None and ref.page > there[ref.file]:
@@ -358,13 +358,13 @@ Row = TypeVar("Row")
 def deal(
     blank: Sequence[bool], rows: Sequence[Row], waiting: Sequence[Row], each: int
 ) -> dict[int, Row] | Reason:
-    """The row of each page, by the page's place in the file from 0; blank pages are dealt to nobody.
+    """Return the row of each page, by its index in the file; blank pages have none.
 
     Arguments
     ---------
     blank : for each page of the file
     rows : the roster's rows in order
-    waiting : those of them that have no pages elsewhere; dealt to where all `rows` do not come out even
+    waiting : those of them that have no pages elsewhere; used if all `rows` do not come out even
     each : pages per row
     """
     if each < 1:

@@ -1,7 +1,7 @@
-"""What stands in the title block of plain paper: whose page it is, and the number of the variant.
+"""Read the title block of plain paper: the page's owner, and the number of the variant.
 
-Writing alone decides nothing: a name counts where it is surely one of the roster's, a number where the
-drawing looks like that number's variant. Codes of the problems:
+Handwriting alone decides nothing: a name counts if it is surely one of the roster's, a number if the drawing
+looks like that number's variant. Codes of the problems:
 
 | code | meaning |
 |---|---|
@@ -36,14 +36,14 @@ from reference.authored.assignment import Assignment, Variant
 
 
 class Pages(Protocol):
-    """What knows pages as they were scanned."""
+    """A source of pages as they were scanned."""
 
     def page(self, ref: PageRef) -> ScannedPage:
-        """The page."""
+        """Return the page."""
 
 
 Run = Callable[[Callable[..., Any], Sequence[tuple[Any, ...]]], Iterable[tuple[int, Any]]]
-"""Makes many calls of a function, wherever that may be: the number of each, and what it returned."""
+"""Runs a function on many argument tuples, and yields the index and result of each."""
 
 # Whose page it is ---------------------------------------------------------------------------------
 
@@ -56,9 +56,9 @@ _LEAST_LETTERS = 4
 def written_owners(
     unmatched: Sequence[Unmatched], roster: Roster | None, cache: Pages, run: Run
 ) -> dict[tuple[str, int], str]:
-    """The students whose names surely stand on pages of which nothing else says whose they are.
+    """Return the students whose names surely stand on pages of otherwise unknown owner.
 
-    By file and page. A name that two students of the roster share is nobody's.
+    By file and page. A name that two students of the roster share belongs to nobody.
     """
     names = {} if roster is None else names_of(roster)
     pages = [
@@ -75,7 +75,7 @@ def written_owners(
 
 
 def _owner(cache: Pages, ref: PageRef, names: Mapping[str, Collection[str]]) -> str | None:
-    """The student whose name surely stands on a plain page."""
+    """Return the student whose name surely stands on a plain page."""
     for closely in (False, True):
         student, chance = written_name(writing_on(cache.page(ref), closely=closely), names)
         if chance >= SURELY:
@@ -84,14 +84,14 @@ def _owner(cache: Pages, ref: PageRef, names: Mapping[str, Collection[str]]) -> 
 
 
 def names_of(roster: Roster) -> dict[str, list[str]]:
-    """The ways in which each student may write the name, or the id, by student."""
+    """Return the ways in which each student may write the name, or the id, by student."""
     rows: dict[str, RosterRow] = {row.student_id: row for row in roster.rows}
     spelt = {student: [*dict.fromkeys(_spellings(row))] for student, row in rows.items()}
     return {student: ways for student, ways in spelt.items() if ways}
 
 
 def _spellings(row: RosterRow) -> Iterator[str]:
-    """First names before and behind the surname, in full and by initials, without diacritic signs."""
+    """Yield first names before and behind the surname, in full and by initials, without diacritics."""
     plain = "".join(
         sign for sign in unicodedata.normalize("NFKD", row.name) if not unicodedata.combining(sign)
     )
@@ -112,11 +112,11 @@ def _spellings(row: RosterRow) -> Iterator[str]:
 # Which number -------------------------------------------------------------------------------------
 
 _LIKELY = 0.2
-"""Probability of a number that counts where the drawing looks more like its variant than like any other."""
+"""Probability from which a number counts if the drawing looks more like its variant than like any other."""
 _AGREES = 0.5
-"""What a number's variant must match of the best one's lines: neighbours may lie a degree apart."""
+"""Share of the best variant's matched lines that a number's must match: neighbours may lie a degree apart."""
 _MOST = 400
-"""Variants that a drawing is compared with, those likeliest by the writing: 1.5 ms each."""
+"""Most variants that a drawing is compared with, the likeliest by the writing: 1.5 ms each."""
 _NAMED = 4
 _MISSING = frozenset({"n_needed", "position_needed"})
 """Problems that a number read on the sheet solves."""
@@ -129,7 +129,7 @@ def with_written_numbers(
     cache: Pages,
     run: Run,
 ) -> list[StudentSubmission]:
-    """The submissions, those without a number with the number on their sheets, or why it does not count."""
+    """Give submissions without a number the one on their sheets, or a problem that says why not."""
     lacking = [index for index, student in enumerate(students) if _lacks_number(student)]
     calls = [
         (cache, students[index].pages, assignment, _possible(students[index], roster, assignment))
@@ -147,14 +147,14 @@ def with_written_numbers(
 
 
 def _lacks_number(student: StudentSubmission) -> bool:
-    """Whether a number is missing that may stand on the student's pages, and none is disputed."""
+    """Return whether a number is missing that may stand on the student's pages, and none is disputed."""
     codes = {problem.code for problem in student.problems}
     disputed = any(code.endswith("_disagrees") for code in codes)
     return student.variant is None and bool(student.pages) and bool(codes & _MISSING) and not disputed
 
 
 def _possible(student: StudentSubmission, roster: Roster | None, assignment: Assignment) -> list[Variant]:
-    """The variants that the roster leaves open."""
+    """Return the variants that the roster leaves open."""
     rows = () if roster is None else roster.rows_of(student.student_id)
     row = rows[0] if len(rows) == 1 else RosterRow(student.student_id)
     return [
@@ -167,7 +167,7 @@ def _possible(student: StudentSubmission, roster: Roster | None, assignment: Ass
 def _number(
     cache: Pages, refs: Sequence[PageRef], assignment: Assignment, possible: Sequence[Variant]
 ) -> tuple[Variant | None, Reason]:
-    """As `chosen_variant`, of what is written and drawn on some pages."""
+    """Apply `chosen_variant` to what is written and drawn on some pages."""
     numbers = {variant.n for variant in possible}, {variant.position for variant in possible}
     both = all(len(each) > 1 for each in numbers)
     words = NUMBER_WORDS, POSITION_WORDS if both else (*NUMBER_WORDS, *POSITION_WORDS)
@@ -189,7 +189,7 @@ def _number(
 def _read_numbers(
     pages: Sequence[ScannedPage], numbers: Sequence[Collection[int | None]], words: Sequence[Sequence[str]]
 ) -> dict[int, Written | None]:
-    """What is written behind the words, by their row; looked at closely where in doubt."""
+    """Read the numbers behind the words, by their row; look closely at doubtful ones."""
     read: dict[int, Written | None] = {row: None for row, choice in enumerate(numbers) if len(choice) > 1}
     for closely in (False, True):
         doubtful = [row for row, one in read.items() if one is None or one.confidence < SURE]
@@ -202,7 +202,7 @@ def _read_numbers(
 
 
 def _chance(read: Written | None, number: int | None, numbers: Collection[int | None]) -> float:
-    """The probability that this number is written; 1 where there is but one."""
+    """Return the probability that this number is written; 1 if there is only one."""
     if len(numbers) == 1:
         return 1.0
     known = () if read is None else ((read.text, read.confidence), *read.others)
@@ -212,12 +212,12 @@ def _chance(read: Written | None, number: int | None, numbers: Collection[int | 
 def chosen_variant(
     variants: Sequence[Variant], chances: Sequence[float], similar: FloatArray
 ) -> tuple[Variant | None, Reason]:
-    """The variant whose number is written and drawn, None where that is open; and what is to be told.
+    """Return the variant whose number is written and drawn, None if open; and the problems.
 
     Arguments
     ---------
     chances : the probability of each variant's number by the writing
-    similar : how much the drawing looks like each variant, as `figure_similarity` has it
+    similar : how much the drawing looks like each variant, as returned by `figure_similarity`
     """
     likely = int(np.argmax(chances))
     drawn = int(np.argmax(similar))

@@ -1,1 +1,1 @@
-"""What planmark prints: answer sheets, their markers, zones and cells."""
+"""Printed answer sheets: their markers, zones and cells."""

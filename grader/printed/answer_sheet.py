@@ -79,7 +79,7 @@ _TICK_MM = 5.0
 _POLE_MM = (2.0, 4.5)
 """Ends of the arms of the cross for a pole: open in the middle, where lines are to begin."""
 _FAINT, _FAINT_PEN_MM = 0.9, 0.25
-"""Lighter than any pencil: people see it, and no stroke is found in it on a scan."""
+"""Lighter than any pencil: people see it, but no stroke is found in it on a scan."""
 _CELL_GREY = 0.6
 """Light enough that the digits' ink stands out."""
 _RULER_MM = (24.0, 291.0, 100.0)
@@ -90,12 +90,12 @@ _PT = 1.0 / mm
 
 @dataclass(frozen=True, slots=True)
 class PageText:
-    """What is the student's own on a page.
+    """The student's own texts on a page.
 
     Attributes
     ----------
     sheet, sheets : this page's number among the student's, from 1, and how many there are
-    poles : where a plan is best begun, x, y in sheet mm by figure
+    poles : best position of each plan's pole, x, y in sheet mm by figure
     """
 
     identity: Identity
@@ -107,7 +107,7 @@ class PageText:
 
 @dataclass(frozen=True, slots=True)
 class PageForm:
-    """What is alike on a page for every student.
+    """The part of a page that is the same for every student.
 
     Attributes
     ----------
@@ -174,7 +174,7 @@ def _student(drawing: PdfDrawing, assignment: Assignment, text: PageText, tongue
 
 
 def _task(drawing: PdfDrawing, assignment: Assignment, identity: Identity, tongue: Tongue) -> None:
-    """The task in words at the largest size that leaves room for the data below it."""
+    """Draw the task in words at the largest size that leaves room for the data below it."""
     x, y, wide, high = _TASK_MM
     task = assignment.file.task.in_language(tongue.lang)
     data = given_data(assignment, Variant(identity.n, identity.position), tongue)
@@ -200,7 +200,7 @@ _SPACE_MM = 3.0
 
 
 def given_data(assignment: Assignment, variant: Variant, tongue: Tongue) -> list[tuple[Piece, ...]]:
-    """The given data, each as label = value unit."""
+    """Return the given data, each as label = value unit."""
     data = []
     for datum, given in assignment.given(variant):
         is_side = given if isinstance(given, str) else None
@@ -212,7 +212,7 @@ def given_data(assignment: Assignment, variant: Variant, tongue: Tongue) -> list
 
 
 def _flow(data: list[tuple[Piece, ...]], size_pt: float, wide_mm: float) -> list[list[tuple[Piece, ...]]]:
-    """Data side by side in as many rows as they need."""
+    """Set data side by side in as many rows as they need."""
     rows: list[list[tuple[Piece, ...]]] = []
     used = wide_mm + 1.0
     for datum in data:
@@ -226,14 +226,14 @@ def _flow(data: list[tuple[Piece, ...]], size_pt: float, wide_mm: float) -> list
 
 
 def _advice(drawing: PdfDrawing, tongue: Tongue) -> None:
-    """What makes a drawing easy to read, and what the registration of the scan needs."""
+    """Draw advice on making a drawing easy to read, and on what the registration of the scan needs."""
     for texts, box in ((_ADVICE, _ADVICE_MM), ((_CLEAR,), _CLEAR_MM)):
         words = [tongue.gettext(text) for text in texts]
         drawing.paragraphs(box, words, (7.5, 7.0, 6.5, 6.0, 5.5), lines_down=1)
 
 
 def _zone(drawing: PdfDrawing, zone: Box, title: str) -> None:
-    """Ticks just outside the zone's corners: no ink of ours where strokes are looked for."""
+    """Draw ticks just outside the zone's corners: no printed ink where strokes are looked for."""
     x, y, w, h = zone
     for cx, across in ((x - 0.6, 1.0), (x + w + 0.6, -1.0)):
         for cy, down in ((y - 0.6, 1.0), (y + h + 0.6, -1.0)):
@@ -243,7 +243,7 @@ def _zone(drawing: PdfDrawing, zone: Box, title: str) -> None:
 
 
 def _pole(drawing: PdfDrawing, at: tuple[float, float], name: str) -> None:
-    """A faint cross, open in the middle, with the pole's letter."""
+    """Draw a faint cross, open in the middle, with the pole's letter."""
     x, y = at
     near, far = _POLE_MM
     for dx, dy in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)):
@@ -269,7 +269,7 @@ def _fields(drawing: PdfDrawing, assignment: Assignment, fields: dict[str, Box],
 
 
 def _comb(drawing: PdfDrawing, box: Box, tongue: Tongue) -> None:
-    """A cell for each digit, light so that digits stand out, and the decimal mark."""
+    """Draw a cell for each digit, light so that digits stand out, and the decimal mark."""
     cells = comb_cells(box)
     for cell in cells:
         drawing.box(cell, 0.18, _CELL_GREY)
@@ -280,7 +280,7 @@ def _comb(drawing: PdfDrawing, box: Box, tongue: Tongue) -> None:
 
 
 def draw_ruler(drawing: PdfDrawing, tongue: Tongue) -> None:
-    """A line of exactly 100 mm below the frame, to see at a glance whether the printer shrank the page."""
+    """Draw a line of exactly 100 mm below the frame, which shows whether the printer shrank the page."""
     x, y, long = _RULER_MM
     drawing.line((x, y, x + long, y), 0.2, GREY)
     for end in (x, x + long):
@@ -299,8 +299,8 @@ class Sheets:
     Attributes
     ----------
     pdf : the file's bytes
-    layout : what `layout.json` says
-    problems : what the instructor should know: figures that are too large for their zones
+    layout : the contents of `layout.json`
+    problems : for the instructor: figures that are too large for their zones
     """
 
     pdf: bytes
@@ -316,15 +316,15 @@ def make_sheets(
     roster: str = "roster.csv",
     asked: Collection[str] | None = None,
 ) -> Sheets:
-    """Answer sheets for every row of a roster: a page per page of the assignment, in the rows' order.
+    """Make answer sheets for every row of a roster: a page per page of the assignment, in the rows' order.
 
     Arguments
     ---------
-    rows : their `lang`, where given, goes before `lang`
+    rows : their `lang`, if given, overrides `lang`
     roster : the file's name, for messages
     asked : the vectors that have a box for the measured length, all by default
 
-    Raises AuthoredFileError with every row whose n or position does not suit the assignment.
+    Raises AuthoredFileError with every row whose n or position the assignment does not have.
     """
     variants = variants_of(assignment, rows, roster)
     forms, problems = _forms(assignment, asked)
@@ -349,7 +349,7 @@ def _unprintable(rows: Sequence[RosterRow], roster: str) -> Iterator[Reason]:
 
 
 def variants_of(assignment: Assignment, rows: Sequence[RosterRow], roster: str) -> list[Variant]:
-    """The variant of each row; raises AuthoredFileError with every row that the assignment has none for."""
+    """Return the variant of each row; raises AuthoredFileError with every row without one."""
     findings: list[Finding] = []
     variants: list[Variant] = []
     for row in rows:
@@ -412,7 +412,7 @@ _CALIBRATION_TEXT = N_(
 
 
 def make_calibration(lang: str = "en") -> Sheets:
-    """The page that `planmark sheet --calibration` prints."""
+    """Make the page that `planmark sheet --calibration` prints."""
     words = tongue(lang)
     drawing = PdfDrawing.begin(words.gettext(N_("Calibration page")))
     drawing.frame()

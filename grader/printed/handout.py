@@ -1,4 +1,4 @@
-"""Task sheets: what a student is given and the tables to fill in, without any of the solution."""
+"""Task sheets: the given data and the tables to fill in, without any of the solution."""
 
 import io
 from collections.abc import Iterable, Iterator, Sequence
@@ -46,17 +46,17 @@ SIGNS = N_(
 )
 
 WIDE_MM = 182.0
-"""Of A4 between margins of 14 mm."""
+"""Width of A4 between margins of 14 mm."""
 FRAME_PT = 6.0
-"""What reportlab leaves free at each side of a page's text."""
+"""Space that reportlab leaves on each side of a page's text."""
 SCHEME_MM = (104.0, 78.0)
 """Room for the scheme: the data stand beside it."""
 SYMBOLS_MM = 34.0
-"""Of that room, what grounds, guides and letters need around the joints."""
+"""Part of that room for grounds, guides and letters around the joints."""
 ROW_MM, GAP_MM = 6.2, 6.0
 """Rows are high enough to write in by hand."""
 MOST_ROWS = 38
-"""In a column of tables: as many as a page is high; longer tables stand below one another."""
+"""Rows in a column of tables: as many as a page is high; longer tables stand below one another."""
 
 
 def make_handout(
@@ -67,15 +67,15 @@ def make_handout(
     *,
     roster: str = "roster.csv",
 ) -> bytes:
-    """A4 task sheets as PDF, in the rows' order; a row without a student has lines to write a name on.
+    """Make A4 task sheets as PDF, in the rows' order; a row without a student has lines for a name.
 
     Arguments
     ---------
-    rows : their `lang`, where given, goes before `lang`
+    rows : their `lang`, if given, overrides `lang`
     roster : the file's name, for messages
 
-    Raises AuthoredFileError with every row whose n or position does not suit the assignment, and
-    MechanismError where no variant assembles.
+    Raises AuthoredFileError with every row whose n or position the assignment does not have, and
+    MechanismError if no variant assembles.
     """
     embed_fonts()
     variants = variants_of(assignment, rows, roster)
@@ -97,7 +97,7 @@ def make_handout(
 def _sheet(
     assignment: Assignment, rubric: RubricFile, row: RosterRow, variant: Variant, speaker: Tongue
 ) -> Iterator[Flowable]:
-    """All that one student is given."""
+    """Yield everything that one student is given."""
     file = assignment.file
     yield _text(file.title.in_language(speaker.lang), 14, BOLD)
     yield Spacer(1, 1.5 * mm)
@@ -119,7 +119,7 @@ def _sheet(
 
 
 def _whose(row: RosterRow, variant: Variant, speaker: Tongue) -> str:
-    """The student and the variant; lines to write on where there is no student."""
+    """Return the student and the variant; lines to write on if there is no student."""
     blank = "_" * 14
     parts = [
         f"{speaker.gettext(NUMBER[name])} {value}"
@@ -136,7 +136,7 @@ def _whose(row: RosterRow, variant: Variant, speaker: Tongue) -> str:
 
 
 class _Picture(Flowable):  # type: ignore[misc]  # reportlab has no types
-    """A figure in the middle of the room for it."""
+    """A figure centred in its room."""
 
     def __init__(self, subject: Subject) -> None:
         super().__init__()
@@ -152,11 +152,11 @@ class _Picture(Flowable):  # type: ignore[misc]  # reportlab has no types
 
 
 def _scheme(assignment: Assignment, variant: Variant) -> tuple[Flowable, str]:
-    """The mechanism in a position that is not the student's own, where the assignment has another.
+    """Return the mechanism in a position that is not the student's own, if the assignment has another.
 
-    Drawing the mechanism is part of the task: the scheme shows which joints and links there are and how
-    they are assembled, but not where they lie. The variant farthest in the list that assembles with the
-    same sides is taken.
+    Drawing the mechanism is part of the task: the scheme shows which joints and links there are and how they
+    are assembled, but not their positions. It uses the variant farthest in the list that assembles with the
+    same sides.
     """
     every = assignment.variants()
     own = every.index(variant)
@@ -178,7 +178,7 @@ def _sides(assignment: Assignment, variant: Variant) -> list[float]:
 
 
 def _fitted(assignment: Assignment, variant: Variant) -> Subject:
-    """The mechanism at the scale at which it fills the room for the scheme."""
+    """Return the mechanism at the scale at which it fills the room for the scheme."""
     plan = exact_plan(assignment, [variant], accelerations=False)
     at = np.array([np.ravel(place)[0] for place in plan.nodes_mm["mechanism"].values()])
     needed = max(
@@ -195,7 +195,7 @@ LENGTH_UNITS = {"mm": 1e3, "cm": 1e2, "m": 1.0}
 
 
 def _fixed(assignment: Assignment, variant: Variant, speaker: Tongue) -> Iterator[Markup]:
-    """Where the ground's joints and guides lie, in the unit of the given lengths."""
+    """Yield the positions of the ground's joints and guides, in the unit of the given lengths."""
     mechanism = assignment.mechanism([variant])
     unit = next((one.unit for one in assignment.file.given if one.unit in LENGTH_UNITS), "m")
 
@@ -228,7 +228,7 @@ def _fixed(assignment: Assignment, variant: Variant, speaker: Tongue) -> Iterato
 
 
 def _tables(assignment: Assignment, rubric: RubricFile, speaker: Tongue) -> Iterator[Flowable]:
-    """An empty table for each kind of quantity that the rubric asks for."""
+    """Yield an empty table for each kind of quantity that the rubric asks for."""
     names = assignment.file.names
     asked: dict[str, list[str]] = {title: [] for title in TABLES}
     for criterion in rubric.criterion:
@@ -302,7 +302,7 @@ def _side_by_side(left: list[Flowable], right: list[Flowable], left_mm: float) -
 
 
 def _letters(pieces: Iterable[Piece]) -> Markup:
-    """A name with its indices, as reportlab reads it."""
+    """Return a name with its indices, as reportlab reads it."""
     marks = {0: "{}", -1: '<sub rise="2" size="70%">{}</sub>', 1: '<super rise="3" size="70%">{}</super>'}
     return Markup("").join(Markup(marks[piece.height]).format(piece.text) for piece in pieces)  # noqa: S704
 

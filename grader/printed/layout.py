@@ -1,4 +1,4 @@
-"""Where everything stands on a printed answer sheet: markers, zones, boxes, cells, the QR code's text.
+"""The layout of a printed answer sheet: markers, zones, boxes, cells, the QR code's text.
 
 The zones are as large as the assignment's figures need over all its variants. Millimetres from the
 sheet's top left corner, x right, y down.
@@ -34,7 +34,7 @@ _CODE = re.compile(
 
 
 def code_of(identity: Identity) -> str:
-    """The text of the code. Raises ValueError for an identity that could not be read back."""
+    """Return the text of the code. Raises ValueError for an identity that could not be read back."""
     n = "" if identity.n is None else identity.n
     position = "" if identity.position is None else identity.position
     code = f"{VERSION}|{identity.assignment}|{identity.student_id}|n={n}|p={position}|{identity.kind}"
@@ -44,7 +44,7 @@ def code_of(identity: Identity) -> str:
 
 
 def identity_of(code: str) -> Identity | None:
-    """The identity in a code's text, None for anything that is no code of a printed page."""
+    """Return the identity in a code's text, None for anything that is no code of a printed page."""
     match = _CODE.fullmatch(code) if len(code) <= MAX_LENGTH else None
     if match is None or set(match["student"]) == {"."}:
         return None
@@ -58,11 +58,11 @@ PAGE_MM = A3_MM
 FRAME_MM: Box = (20.0, 10.0, 390.0, 277.0)
 """ISO 5457: 20 mm at the left for filing, 10 mm elsewhere."""
 DRAWING_MM: Box = (23.0, 51.0, 384.0, 212.0)
-"""Between the head and the foot of the sheet; the zones divide it."""
+"""Area between the head and the foot of the sheet; the zones divide it."""
 
 MARKER_MM = 12.0
 MARKER_CELLS = 6
-"""Along a marker's side, its black border included."""
+"""Cells along a marker's side, its black border included."""
 MARKER_DICTIONARY: Literal["DICT_4X4_250"] = "DICT_4X4_250"
 """OpenCV's name of it (Garrido-Jurado et al., Pattern Recognition 47, 2014)."""
 MARKERS_PER_TEMPLATE = 8
@@ -70,7 +70,7 @@ _MARKER_X_MM = (24.0, 144.0, 274.0, 394.0)
 _MARKER_Y_MM = (14.0, 271.0)
 
 CODE_MM: Box = (363.0, 13.0, 28.0, 28.0)
-"""Where the QR code is printed, quiet zone included."""
+"""Position of the QR code, quiet zone included."""
 SCALE_BOXES: dict[str, Box] = {
     name: (306.0, 13.0 + 9.5 * row, 53.0, 8.0) for row, name in enumerate(SCALE_NAMES)
 }
@@ -83,9 +83,9 @@ _FIELD_TIERS = ((1, 3), (2, 3), (3, 3), (3, 4), (4, 4))
 """Rows, and boxes side by side in a stretch."""
 _FIELD_GAP_MM, _FIELD_MOST_MM = 0.9, 7.5
 EASY_FIELDS, MAX_FIELDS = 27, 48
-"""Up to how many boxes a cell is large enough for anybody's digits, and to be written in at all."""
+"""Most boxes for which a cell fits anybody's digits, and most for which it can be written in at all."""
 WHOLE_CELLS, TENTH_CELLS = 3, 1
-"""Of a measured length: hundreds, tens and ones of millimetres, then tenths after the printed mark."""
+"""Cells of a measured length: hundreds, tens and ones of millimetres, then tenths after the printed mark."""
 _CELL_GAP_MM, _MARK_GAP_MM = 0.6, 2.2
 _CELL_MOST_MM = 5.2
 
@@ -116,7 +116,7 @@ class Template:
 
 
 def _marker_corners() -> FloatArray:
-    """(8, 4, 2) corners from the top left, clockwise on the sheet: the upper row, then the lower."""
+    """Return (8, 4, 2) corners from the top left, clockwise on the sheet: the upper row, then the lower."""
     lefts = np.array([(x, y) for y in _MARKER_Y_MM for x in _MARKER_X_MM])
     square = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]) * MARKER_MM
     return np.asarray(lefts[:, None, :] + square[None, :, :])
@@ -143,7 +143,7 @@ def _zones(figures: tuple[str, ...], box: Box, shares: tuple[float, ...], across
 
 
 def _divisions() -> list[dict[str, Box]]:
-    """Every division there is. Its place in this list is printed on paper: append, never reorder."""
+    """Return all divisions. Their places in this list are printed on paper: append, never reorder."""
     m, v, a = MECHANISM, VELOCITY_PLAN, ACCELERATION_PLAN
     columns, rows = True, False
     divisions = [_zones((figure,), DRAWING_MM, (1.0,), columns) for figure in (m, v, a)]
@@ -167,7 +167,7 @@ CALIBRATION = Template(30, {})
 
 
 def template_of(marker_id: int) -> Template | None:
-    """The template that a marker belongs to, None for an id that is not in use."""
+    """Return the template that a marker belongs to, None for an unused id."""
     number = marker_id // MARKERS_PER_TEMPLATE
     if number == CALIBRATION.number:
         return CALIBRATION
@@ -178,9 +178,10 @@ def template_of(marker_id: int) -> Template | None:
 
 
 def field_boxes(names: tuple[str, ...]) -> dict[str, Box]:
-    """Boxes for measured lengths in the sheet's foot, as large as their number allows.
+    """Return boxes for measured lengths in the sheet's foot, as large as their number allows.
 
-    The label is printed left of the box, within the same cell. Beyond `MAX_FIELDS` names none is given.
+    The label is printed left of the box, within the same cell. For more than `MAX_FIELDS` names there are
+    none.
     """
     if len(names) > MAX_FIELDS:
         return {}
@@ -206,7 +207,7 @@ def field_boxes(names: tuple[str, ...]) -> dict[str, Box]:
 
 
 def comb_cells(box: Box) -> tuple[Box, ...]:
-    """The cells of a box for a measured length, a digit each, from the left; the last is the tenths'."""
+    """Return the cells of a box for a measured length, a digit each, from the left, tenths last."""
     x, y, wide, high = box
     count = WHOLE_CELLS + TENTH_CELLS
     cell = (wide - _MARK_GAP_MM - (count - 1 - TENTH_CELLS) * _CELL_GAP_MM) / count
@@ -218,14 +219,14 @@ def comb_cells(box: Box) -> tuple[Box, ...]:
 
 
 def combs_of(fields: Mapping[str, Box]) -> dict[str, tuple[Box, ...]]:
-    """The cells of every box for a measured length among a page's boxes; scales are written freely."""
+    """Return the cells of every box for a measured length among a page's boxes; scales are written freely."""
     return {name: comb_cells(box) for name, box in fields.items() if name not in SCALE_BOXES}
 
 
 def cells_of(
     assignment: Assignment, figures: Sequence[str], asked: Collection[str] | None = None
 ) -> dict[str, tuple[Box, ...]]:
-    """The cells for measured lengths on a page with these figures, in the order of its zones; by vector."""
+    """Return the cells for measured lengths on a page with these figures, by vector, in zone order."""
     table = next((page for page in assignment.file.page if set(page.figures) == set(figures)), None)
     if table is None:
         return {}
@@ -235,11 +236,10 @@ def cells_of(
 
 
 def boxes_of(names: Sequence[str], asked: Collection[str] | None) -> dict[str, Box]:
-    """The boxes for the lengths asked for.
+    """Return the boxes for the requested lengths.
 
-    A vector's box is where it would be if all had one: a rubric that asks for others tomorrow finds
-    those printed today in their places. Only where all would be too small are those asked for alone
-    counted.
+    A vector's box is where it would be if all had one: a rubric that asks for others tomorrow finds those
+    printed today in their places. Only if all would be too small, the requested ones alone are counted.
     """
     if asked is None:
         return field_boxes(tuple(names))
@@ -255,10 +255,10 @@ _ANGLES_DEG = tuple(range(0, 180, 15))
 
 
 def calibration_segments() -> FloatArray:
-    """(n, 2, 2) ends of the printed segments in mm, y down: stars of directions, ladders of lengths.
+    """Return (n, 2, 2) ends of the printed segments, mm, y down: stars of directions, ladders of lengths.
 
-    A star has twelve diameters of 60 mm, 15 degrees apart, with its middle left free; a ladder has
-    horizontal or vertical segments of 5 to 80 mm.
+    A star has twelve diameters of 60 mm, 15 degrees apart, with its middle left free; a ladder has horizontal
+    or vertical segments of 5 to 80 mm.
     """
     segments: list[tuple[complex, complex]] = []
     for centre in (85.0 + 100.0j, 215.0 + 100.0j, 345.0 + 100.0j):
@@ -290,10 +290,10 @@ class MarkerPlace(_Document):
 
 
 class PageLayout(_Document):
-    """Where everything is on the pages of one kind. `zones` holds the figures' boxes and `fields`.
+    """The positions of everything on the pages of one kind. `zones` holds the figures' boxes and `fields`.
 
-    `cells` holds, for each box of `fields` that a measured length is written in (millimetres), its
-    cells from the left: three digits, then the tenths.
+    `cells` holds, for each box of `fields` in which a measured length is written (millimetres), its cells
+    from the left: three digits, then the tenths.
     """
 
     kind: PageKind | Literal["calibration"]
@@ -312,7 +312,7 @@ class Layout(_Document):
 
 
 def marker_places(template: Template) -> list[MarkerPlace]:
-    """The markers of a template as they stand in `layout.json`."""
+    """Return the markers of a template as they stand in `layout.json`."""
     return [
         MarkerPlace(id=number, corners_mm=[(float(x), float(y)) for x, y in corners])
         for number, corners in zip(template.marker_ids, MARKER_CORNERS, strict=True)
@@ -322,7 +322,7 @@ def marker_places(template: Template) -> list[MarkerPlace]:
 # Room for an assignment's figures -----------------------------------------------------------------
 
 MARGIN_MM = 12.0
-"""Around a figure: letters, arrowheads, hatching of the guides."""
+"""Margin around a figure: letters, arrowheads, hatching of the guides."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -332,7 +332,7 @@ class TemplateFit:
     Attributes
     ----------
     template : the best of all
-    room : zone over need by figure, the lesser of width and height; below 1 it is too small in some variant
+    room : zone over need by figure, the smaller of width and height; below 1 it is too small in some variant
     need_mm : widest and highest of any variant by figure, margins included
     """
 
@@ -342,14 +342,14 @@ class TemplateFit:
 
 
 def page_construction(assignment: Assignment, figures: Sequence[str]) -> Construction:
-    """The construction of an assignment, without accelerations where no figure needs them."""
+    """Return the construction of an assignment, without accelerations if no figure needs them."""
     return construction_for(assignment, assignment.variants(), accelerations=ACCELERATION_PLAN in figures)
 
 
 def places_mm(
     assignment: Assignment, figures: Sequence[str], variants: list[Variant]
 ) -> dict[str, ComplexArray]:
-    """Where the nodes of each figure are about its pole, at the assignment's own scales.
+    """Return the positions of each figure's nodes about its pole, at the assignment's own scales.
 
     (nodes, variants) complex millimetres by figure, y up; a sketch's about its own origin.
     """
@@ -368,7 +368,7 @@ def places_mm(
 def extents_mm(
     assignment: Assignment, figures: Sequence[str], variants: list[Variant]
 ) -> dict[str, tuple[float, float]]:
-    """Largest width and height of each figure over variants, at the assignment's own scales."""
+    """Return the largest width and height of each figure over variants, at the assignment's own scales."""
     return {
         figure: (float(np.ptp(places.real, axis=0).max()), float(np.ptp(places.imag, axis=0).max()))
         for figure, places in places_mm(assignment, figures, variants).items()
@@ -378,10 +378,10 @@ def extents_mm(
 def poles_mm(
     assignment: Assignment, template: Template, variants: list[Variant]
 ) -> dict[str, list[tuple[float, float]]]:
-    """Where the poles of a template's plans are best put, sheet millimetres for each variant.
+    """Return the best positions of the poles of a template's plans, sheet millimetres for each variant.
 
-    A plan begun there is in the middle of its zone. None of a plan that is larger than its zone, at
-    least in one variant: the student will choose another scale.
+    A plan begun there is in the middle of its zone. A plan that is larger than its zone in some variant has
+    none: the student will choose another scale.
     """
     plans = [figure for figure in template.zones if figure != MECHANISM]
     poles = {}
@@ -397,12 +397,12 @@ def poles_mm(
 
 
 def best_template(assignment: Assignment, figures: Sequence[str]) -> TemplateFit:
-    """The division with the most room for the figure that has the least; a sketch may be drawn smaller."""
+    """Return the division with the most room for the tightest figure; a sketch may be drawn smaller."""
     return template_for(extents_mm(assignment, figures, assignment.variants()))
 
 
 def template_for(extents: Mapping[str, tuple[float, float]]) -> TemplateFit:
-    """The same for figures whose largest width and height (millimetres) are known already."""
+    """Return that division for figures whose largest width and height (mm) are known already."""
     figures = tuple(extents)
     need = {figure: (wide + 2 * MARGIN_MM, high + 2 * MARGIN_MM) for figure, (wide, high) in extents.items()}
 

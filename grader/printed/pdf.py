@@ -32,7 +32,7 @@ from reference.drawing.canvas import SLANT, Area, Curve, Label, Piece, Point, Ri
 
 
 def cells(marker_id: int) -> NDArray[np.bool_]:
-    """(6, 6), True where a marker's cell is white, upright, rows downwards."""
+    """Return (6, 6), True where a marker's cell is white, upright, rows downwards."""
     dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, MARKER_DICTIONARY))
     image = cv2.aruco.generateImageMarker(dictionary, marker_id, MARKER_CELLS, borderBits=1)
     return np.asarray(image > 127)
@@ -52,13 +52,13 @@ def embed_fonts() -> None:
 
 
 def width_mm(text: str, font: str, size_pt: float) -> float:
-    """How wide a text is printed."""
+    """Return the width of a text."""
     embed_fonts()
     return float(pdfmetrics.stringWidth(text, font, size_pt) / mm)
 
 
 def unprintable(text: str) -> str:
-    """Letters of a text that the font does not have."""
+    """Return the letters of a text that the font does not have."""
     embed_fonts()
     known = pdfmetrics.getFont(BOLD).face.charToGlyph
     return "".join(
@@ -67,7 +67,7 @@ def unprintable(text: str) -> str:
 
 
 def number(value: float, decimal_mark: str) -> str:
-    """A datum to six significant digits, as it is written in a language with this decimal mark."""
+    """Format a datum to six significant digits, with a language's decimal mark."""
     text = f"{value:.6g}"
     if "e" in text and 1e-6 < abs(value) < 1e9:
         text = f"{value:.6f}".rstrip("0").rstrip(".") if abs(value) < 1.0 else f"{value:.0f}"
@@ -75,12 +75,12 @@ def number(value: float, decimal_mark: str) -> str:
 
 
 def pieces_width_mm(pieces: Iterable[Piece], font: str, size_pt: float) -> float:
-    """How wide a name is printed."""
+    """Return the width of a name."""
     return sum(width_mm(piece.text, font, piece.size(size_pt)) for piece in pieces)
 
 
 def wrap(text: str, font: str, size_pt: float, wide_mm: float) -> list[str]:
-    """Lines that are no wider than `wide_mm`; a single long word is cut."""
+    """Break a text into lines no wider than `wide_mm`; a single long word is cut."""
     lines: list[str] = []
     line = ""
     for word in text.split():
@@ -105,7 +105,7 @@ def wrap(text: str, font: str, size_pt: float, wide_mm: float) -> list[str]:
 def fitted(
     texts: list[str], font: str, sizes_pt: tuple[float, ...], box_mm: tuple[float, float]
 ) -> tuple[float, list[str]]:
-    """The largest of some sizes at which paragraphs fit a box, and their lines; cut at the smallest."""
+    """Return the largest of some sizes at which paragraphs fit a box, and their lines; the smallest cuts."""
     wide, high = box_mm
     for size in sizes_pt:
         lines = [line for text in texts for line in wrap(text, font, size, wide)]
@@ -132,14 +132,14 @@ def put_shapes(canvas: Canvas, shapes: Iterable[Shape], origin: tuple[float, flo
 
 @cache
 def ink(colour: str) -> Color:
-    """A colour that leaves the canvas as opaque as it is set."""
+    """Return a colour that leaves the canvas's opacity unchanged."""
     made = HexColor(colour)
     made.alpha = None
     return made
 
 
 def _put(canvas: Canvas, shape: Shape) -> None:
-    """One shape; the canvas' unit is the millimetre, y up."""
+    """Draw one shape; the canvas's unit is the millimetre, y up."""
     match shape:
         case Stroke(start=(x1, y1), end=(x2, y2)):
             _pen(canvas, shape.width, shape.colour, shape.dash)
@@ -172,7 +172,7 @@ def _path(canvas: Canvas, points: Sequence[Point], *, closed: bool) -> PDFPathOb
 
 
 def _write(canvas: Canvas, label: Label) -> None:
-    """A text: each of its pieces in its own place."""
+    """Draw a text, each of its pieces positioned."""
     canvas.setFillColor(ink(label.colour))
     for piece in set_pieces(label.text, label.size):
         canvas.saveState()
@@ -204,7 +204,7 @@ class PdfDrawing:
 
     @classmethod
     def begin(cls, title: str) -> "PdfDrawing":
-        """An empty A3 landscape document. It says the same, byte for byte, for the same input."""
+        """Start an empty A3 landscape document, whose bytes depend on its contents alone."""
         embed_fonts()
         buffer = io.BytesIO()
         canvas = Canvas(buffer, pagesize=(PAGE_MM[0] * mm, PAGE_MM[1] * mm), pageCompression=1, invariant=1)
@@ -215,7 +215,7 @@ class PdfDrawing:
         return cls(canvas, buffer)
 
     def finish(self) -> bytes:
-        """The document."""
+        """Return the document."""
         self.canvas.save()
         return self.buffer.getvalue()
 
@@ -224,14 +224,14 @@ class PdfDrawing:
         self.canvas.showPage()
 
     def line(self, ends: tuple[float, float, float, float], pen_mm: float, grey: float = BLACK) -> None:
-        """A line from x, y to x, y."""
+        """Draw a line from x, y to x, y."""
         x0, y0, x1, y1 = ends
         self.canvas.setLineWidth(pen_mm * mm)
         self.canvas.setStrokeGray(grey)
         self.canvas.line(x0 * mm, _up(y0), x1 * mm, _up(y1))
 
     def box(self, box: Box, pen_mm: float, grey: float = BLACK) -> None:
-        """A rectangle, its pen centred on the edge."""
+        """Draw a rectangle, its pen centred on the edge."""
         x, y, w, h = box
         self.canvas.setLineWidth(pen_mm * mm)
         self.canvas.setStrokeGray(grey)
@@ -240,7 +240,7 @@ class PdfDrawing:
     def cells(
         self, corner: tuple[float, float], cell_mm: float, filled: Iterable[tuple[int, int, int]], grey: float
     ) -> None:
-        """Rows of filled cells (row, first column, number of columns), as one path without seams."""
+        """Fill rows of cells (row, first column, number of columns), as one path without seams."""
         path = self.canvas.beginPath()
         x, y = corner
         for row, first, count in filled:
@@ -253,7 +253,7 @@ class PdfDrawing:
     def text(
         self, at: tuple[float, float], text: str, size_pt: float, font: str = REGULAR, grey: float = BLACK
     ) -> None:
-        """Text whose base line begins at a point."""
+        """Draw text whose base line begins at a point."""
         self.canvas.setFillGray(grey)
         self.canvas.setFont(font, size_pt)
         self.canvas.drawString(at[0] * mm, _up(at[1]), text)
@@ -268,10 +268,10 @@ class PdfDrawing:
         lines_down: int = 0,
         pitch: float = 1.2,
     ) -> None:
-        """Wrapped texts at the largest size that fits a box.
+        """Draw wrapped texts at the largest size that fits a box.
 
-        The first base line is `lines_down` lines below the box's upper side; lines are `pitch` times
-        their size apart.
+        The first base line is `lines_down` lines below the box's upper side; lines are `pitch` times their
+        size apart.
         """
         x, y, wide, high = box
         size, lines = fitted(texts, font, sizes_pt, (wide, high))
@@ -281,7 +281,7 @@ class PdfDrawing:
     def pieces(
         self, at: tuple[float, float], pieces: Iterable[Piece], size_pt: float, font: str = REGULAR
     ) -> float:
-        """A name with its indices; gives the x where it ends. An index above stands over one below."""
+        """Draw a name with its indices; return its right end. An index above stands over one below."""
         x, y = at
         begin, below = x, x
         for piece in pieces:
@@ -295,11 +295,11 @@ class PdfDrawing:
         return x
 
     def frame(self) -> None:
-        """The drawing frame of ISO 5457."""
+        """Draw the drawing frame of ISO 5457."""
         self.box(FRAME_MM, _FRAME_PEN_MM)
 
     def markers(self, template: Template) -> None:
-        """All markers of a template."""
+        """Draw all markers of a template."""
         side = MARKER_MM / MARKER_CELLS
         for number, corners in zip(template.marker_ids, MARKER_CORNERS, strict=True):
             corner = (float(corners[0, 0]), float(corners[0, 1]))
@@ -308,7 +308,7 @@ class PdfDrawing:
 
 
 def runs(rows: Iterable[Iterable[bool]]) -> Iterable[tuple[int, int, int]]:
-    """Stretches of True in a grid: row, first column, number of columns."""
+    """Yield stretches of True in a grid: row, first column, number of columns."""
     for number, row in enumerate(rows):
         cells = [*row, False]
         first = None
@@ -321,5 +321,5 @@ def runs(rows: Iterable[Iterable[bool]]) -> Iterable[tuple[int, int, int]]:
 
 
 def _up(y_mm: float) -> float:
-    """PDF points from the bottom edge."""
+    """Convert to PDF points from the bottom edge."""
     return float((PAGE_MM[1] - y_mm) * mm)

@@ -1,1 +1,1 @@
-"""Strokes to named vectors: what is drawn where, and how surely."""
+"""Identify the named vectors among strokes, with standard errors and confidences."""

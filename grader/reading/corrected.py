@@ -1,4 +1,4 @@
-"""Nodes that a person has put in their place: read again from the ink there, and the vectors between them."""
+"""Read again the nodes that a person has moved, from the ink there, and the vectors between them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -19,30 +19,31 @@ REACH_MM = 2.0
 ON_MM = 0.6
 """A stroke this near to a node belongs to it: a pencil line and a half."""
 THROUGH_MM = 0.3
-"""Each further stroke at a place makes it as good as one that is nearer by this much."""
+"""Each further stroke at a point compensates for this much distance."""
 MOST_THROUGH = 3
-"""Strokes beyond the first that count so."""
+"""Largest number of further strokes that count so."""
 POINTED_MM = 0.3
-"""Standard error of a place that a person points at, where no ink says it better."""
+"""Standard error of a point marked by a person, if no ink determines it better."""
 BEYOND_MM, BEYOND_JOINT_MM = 1.0, 3.0
-"""How far a stroke may stop short of its node, and a link of its joint, at the circle drawn around it."""
+"""Distance by which a stroke may stop short of its node, and a link of its joint, at the circle around it."""
 LEAST_STROKE_MM = 5.0
-"""Shorter strokes are those of letters and arrowheads; they count where there are no others."""
+"""Shorter strokes are those of letters and arrowheads; they count only if there are no others."""
 LEAST_SINE = 0.17
-"""Of 10 degrees: strokes at a smaller angle do not show where they cross."""
+"""Sine of 10 degrees: strokes at a smaller angle do not determine their intersection."""
 DOUBT = 3.0
-"""Factor of the fit's covariance, which holds for strokes that surely belong: with it, the errors' squares on
-simulated scans have the median that the covariance says (pointed at within half a millimetre)."""
+"""Factor of the fit's covariance, which is valid for strokes that surely belong: with it, squared errors on
+simulated scans have the median of the covariance (pointed at within half a millimetre)."""
 DRAWN_SHARE = 0.5
 """A vector with ink along less of it is not drawn."""
 
 
 def snapped(ink: Ink | None, x_mm: float, y_mm: float, figure: str = "") -> ReadNode:
-    """The node that a person points at, fitted to the strokes that meet or end there.
+    """Return the node at which a person points, fitted to the strokes that meet or end there.
 
-    Arguments: a place on the sheet, mm, y down; the figure: in a sketch strokes stop short of their joints.
+    Arguments: a position on the sheet, mm, y down; the figure: in a sketch strokes stop short of their
+    joints.
 
-    Returns the place as pointed at where no ink within `REACH_MM` says it better.
+    Returns the position as pointed at if no ink within `REACH_MM` determines it better.
     """
     at, is_sketch = complex(x_mm, -y_mm), figure == MECHANISM
     pointed = ReadNode(at, np.eye(2) * POINTED_MM**2, 1.0)
@@ -61,7 +62,7 @@ def snapped(ink: Ink | None, x_mm: float, y_mm: float, figure: str = "") -> Read
 
 
 def _near(lines: Lines, at: complex, beyond_mm: float) -> Lines:
-    """The single strokes within reach of a place; short ones only where there are no others."""
+    """Return the single strokes within reach of a point; short ones only if there are no others."""
     single = (lines.members == lines.members[:, :1]).all(axis=1)
     near = single & (_distance(lines, at, beyond_mm) < REACH_MM)
     long = near & (lines.length >= LEAST_STROKE_MM)
@@ -69,20 +70,20 @@ def _near(lines: Lines, at: complex, beyond_mm: float) -> Lines:
 
 
 def _distance(lines: Lines, at: complex, beyond_mm: float) -> FloatArray:
-    """(n,) mm from a place to the nearest point of each stroke, lengthened at both ends."""
+    """Return (n,) mm from a point to the nearest point of each stroke, lengthened at both ends."""
     along = np.clip(_along(lines, at), -beyond_mm, lines.length + beyond_mm)
     return np.abs(lines.start + along * lines.along - at)
 
 
 def _along(lines: Lines, at: complex) -> FloatArray:
-    """(n,) mm from the start of each stroke to the foot of a place on its line."""
+    """Return (n,) mm from the start of each stroke to the foot of a point on its line."""
     return np.asarray(((at - lines.start) * np.conj(lines.along)).real)
 
 
 def _likeliest(lines: Lines, centres: ComplexArray, at: complex, beyond_mm: float) -> complex | None:
-    """The place within reach that is meant: the centre of a circle; else where strokes cross or end.
+    """Return the likeliest point within reach: the centre of a circle; else where strokes cross or end.
 
-    The nearest one, by the strokes that it has; else the nearest point of a stroke.
+    Of several the nearest one, adjusted by the number of its strokes; else the nearest point of a stroke.
     """
     circled = centres[np.abs(centres - at) < REACH_MM]
     if len(circled):
@@ -97,7 +98,7 @@ def _likeliest(lines: Lines, centres: ComplexArray, at: complex, beyond_mm: floa
 
 
 def _crossings(lines: Lines, beyond_mm: float) -> list[complex]:
-    """Where two strokes cross, or would if they went on a little."""
+    """Return the intersections of two strokes, lengthened a little."""
     sine = (np.conj(lines.along)[:, None] * lines.along[None, :]).imag
     first, second = np.nonzero(np.triu(np.abs(sine) > LEAST_SINE, 1))
     between = lines.start[second] - lines.start[first]
@@ -111,7 +112,7 @@ def _crossings(lines: Lines, beyond_mm: float) -> list[complex]:
 
 
 def _star(lines: Lines, at: complex) -> StrokeAssignment:
-    """The strokes as edges from one node to their far ends."""
+    """Return the strokes as edges from one node to their far ends."""
     far = np.where(np.abs(lines.start - at) > np.abs(lines.end - at), lines.start, lines.end)
     places = np.array([at, *far], dtype=complex)
     edges = tuple(Edge(str(row), 0, row) for row in range(1, len(places)))
@@ -128,12 +129,12 @@ def corrected(
     places: Mapping[tuple[str, str], tuple[float, float]],
     construction: Construction,
 ) -> tuple[list[ScannedPage], list[tuple[str, str]]]:
-    """A student's pages with nodes put in their places, and those that lie on none of the pages.
+    """Return a student's pages with moved nodes, and the nodes that lie on none of the pages.
 
     Arguments: `places` by figure and node, mm on the sheet, y down.
 
-    A moved node has confidence 1. The vectors that start or end there are those between the nodes as they now
-    lie, as sure as their other end; one that was not read before is read where ink lies along it.
+    A moved node has confidence 1. The vectors that start or end there are recomputed, as sure as their other
+    end; one that was not read before is read if ink lies along it.
     """
     changed, astray = list(pages), []
     moved: dict[int, dict[str, dict[str, ReadNode]]] = {}
@@ -154,7 +155,7 @@ def corrected(
 
 
 def _page_of(pages: Sequence[ScannedPage], figure: str, node: str) -> int | None:
-    """The page on which a node lies: where it was read, else its figure; else the only page there is."""
+    """Return the page of a node: where it was read, else its figure's page; else the only page there is."""
     with_figure = [index for index, page in enumerate(pages) if figure in page.reading.figures]
     with_node = [index for index in with_figure if node in pages[index].reading.figures[figure].nodes]
     registered = [index for index, page in enumerate(pages) if page.sheet is not None]
@@ -194,7 +195,7 @@ def _with_nodes(
 
 
 def _between(tail: ReadNode, head: ReadNode, scale_se: float, least: float) -> ReadVector:
-    """The vector between two nodes, as sure as the less sure of them, and no less than `least`."""
+    """Return the vector between two nodes, as sure as the less sure of them, and no less than `least`."""
     span = head.at - tail.at
     scaled = scale_se * np.array([span.real, span.imag])
     cov = tail.cov + head.cov + np.outer(scaled, scaled)
@@ -202,7 +203,7 @@ def _between(tail: ReadNode, head: ReadNode, scale_se: float, least: float) -> R
 
 
 def _is_drawn(ink: Ink | None, tail: complex, head: complex) -> bool:
-    """Whether strokes lie along a vector; one too short to be drawn counts as drawn."""
+    """Return whether strokes lie along a vector; one too short to be drawn counts as drawn."""
     length = abs(head - tail)
     if length <= LEAST_VECTOR_MM:
         return True

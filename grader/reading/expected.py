@@ -15,7 +15,7 @@ from reference.construction.uncertainty import acts_of
 from reference.geometry import ComplexArray
 
 STEP_OF_DERIVATIVE = 1e-5
-"""Millimetres or radians: small against any curvature, large against the digits of a length."""
+"""Step of numerical derivatives, mm or rad: small against any curvature, large against rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,10 +36,10 @@ class DraftingErrors:
     mark_mm: float = 0.15
 
     def of(self, step: Step, kind: str, size_mm: float) -> float:
-        """The standard error of one act of a step, mm or rad.
+        """Return the standard error of one act of a step, mm or rad.
 
         Arguments: `kind` as in `reference.construction.elements.Errors`; `size_mm` is the length that the
-        step lays off.
+        step draws.
         """
         match kind:
             case "angle":
@@ -58,7 +58,7 @@ class DraftingErrors:
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where a figure lies on the sheet.
+    """The pose of a figure on the sheet.
 
     Attributes
     ----------
@@ -111,11 +111,11 @@ class Expected:
     tied: tuple[tuple[int, int], ...] = ()
 
     def length_mm(self, edge: Edge) -> float:
-        """The expected length of an edge."""
+        """Return the expected length of an edge."""
         return float(abs(self.at[edge.head] - self.at[edge.tail]))
 
     def placed(self, pose: Pose, slack: Slack) -> "Expected":
-        """The same figure at a pose on the sheet, with the errors that the pose may have."""
+        """Return the figure at a pose on the sheet, with the possible errors of the pose."""
         spin = pose.size * np.exp(1j * pose.turn_rad)
         arm = spin * self.at
         rotate = np.kron(np.eye(len(arm)), np.array([[spin.real, -spin.imag], [spin.imag, spin.real]]))
@@ -132,7 +132,7 @@ def expect(
     errors: DraftingErrors,
     edges: Iterable[Edge],
 ) -> Expected:
-    """The nodes of one figure, from the known nodes of others, with the covariance of drafting errors.
+    """Return the nodes of one figure, from known nodes of others, with the covariance of drafting errors.
 
     Arguments: `given` are nodes that are already read, complex mm, by name.
     """
@@ -158,23 +158,23 @@ def expect(
 
 
 def _size_mm(step: Step, place: Mapping[str, complex]) -> float:
-    """The length that a step lays off."""
+    """Return the length that a step draws."""
     return abs(place[step.node] - place[step.start]) if isinstance(step, Given) else 0.0
 
 
 def xy(values: ComplexArray) -> FloatArray:
-    """(2n,) x and y in turn of (n,) complex numbers."""
+    """Return (2n,) x and y in turn of (n,) complex numbers."""
     return np.column_stack([values.real, values.imag]).ravel()
 
 
 def links_of(construction: Construction) -> tuple[Edge, ...]:
-    """The links of a mechanism sketch: every bar that its steps lay between two joints."""
+    """Return the links of a mechanism sketch: every bar that its steps draw between two joints."""
     index = {step.node: row for row, step in enumerate(construction.figures[MECHANISM])}
     return tuple(Edge(f"{tail}{head}", index[tail], index[head]) for tail, head in bars(construction))
 
 
 def vectors_of(construction: Construction, figure: str, absent: Iterable[str] = ()) -> tuple[Edge, ...]:
-    """The vectors of a plan, without those at nodes that are not drawn."""
+    """Return the vectors of a plan, without those at nodes that are not drawn."""
     index = {step.node: row for row, step in enumerate(construction.figures[figure])}
     gone = set(absent)
     return tuple(
@@ -189,13 +189,13 @@ def vectors_of(construction: Construction, figure: str, absent: Iterable[str] = 
 REGULAR = ("as constructed", "plates by similarity")
 """Labels of the hypotheses without a mistake."""
 COST_OF_SIMILARITY = 0.7
-"""Nats: odds of one in two, against perpendiculars throughout."""
+"""Nats for odds of one in two, against perpendiculars throughout."""
 COST_OF_MISTAKE = 8.0
-"""Nats: a third of plans have a mistake, one of some forty; and strokes of one student err alike."""
+"""Nats: a third of plans have a mistake, one of some forty; strokes of one student err alike."""
 LEFT_OUT = {"n": Reason("normal_left_out"), "k": Reason("coriolis_left_out")}
-"""By the first letter of the node in which the component ends."""
+"""Reason by the first letter of the node at the end of a component left out."""
 OF_THE_WHOLE = {"figure_rotated", "scale_wrong", "rpm_not_converted", "vector_missing"}
-"""Mistakes that the search for the plan's pose finds anyway, as it turns and scales the plan."""
+"""Mistakes that the search for the plan's pose finds anyway, because it turns and scales the plan."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,7 +207,7 @@ class PlanHypothesis:
     label : for people
     drawing : the construction as this student would follow it
     absent : nodes that are not drawn then, with the reason
-    cost : nats, how unlikely before strokes are considered
+    cost : nats, the prior cost before strokes are considered
     """
 
     label: str
@@ -217,7 +217,7 @@ class PlanHypothesis:
 
 
 def regular(drawing: Drawing, figure: str) -> list[PlanHypothesis]:
-    """As it should be: by perpendiculars throughout, and with plates by similarity."""
+    """Return the right hypotheses: by perpendiculars throughout, and with plates by similarity."""
     hypotheses = [PlanHypothesis(REGULAR[0], drawing, {}, 0.0)]
     changed, absent = _by_similarity(drawing.construction, figure)
     if changed is not drawing.construction:
@@ -227,7 +227,7 @@ def regular(drawing: Drawing, figure: str) -> list[PlanHypothesis]:
 
 
 def mistaken(base: PlanHypothesis, figure: str) -> Iterator[tuple[PlanHypothesis, Mistake]]:
-    """Every single mistake that can be made on top of a hypothesis."""
+    """Yield every single mistake that can be made on top of a hypothesis."""
     for mistake in single_mistakes(base.drawing, figure):
         if mistake.code in OF_THE_WHOLE or mistake.at in base.absent:
             continue
@@ -244,7 +244,7 @@ def mistaken(base: PlanHypothesis, figure: str) -> Iterator[tuple[PlanHypothesis
 
 
 def _by_similarity(construction: Construction, figure: str) -> tuple[Construction, dict[str, Reason]]:
-    """The construction with every plate's image by similarity, and the nodes that vanish."""
+    """Return the construction with every plate's image by similarity, and the nodes that vanish."""
     steps = {step.node: step for step in construction.figures[figure]}
     changed, absent = construction, {}
     for node, image in construction.images.items():
@@ -259,7 +259,7 @@ def _by_similarity(construction: Construction, figure: str) -> tuple[Constructio
 
 
 def tied(hypothesis: PlanHypothesis) -> Construction:
-    """Vectors that would start from a normal component left out start where it would have started."""
+    """Start vectors from the start of a normal component that was left out."""
     construction = hypothesis.drawing.construction
     vectors = dict(construction.vectors)
     for node, reason in hypothesis.absent.items():
@@ -273,7 +273,7 @@ def tied(hypothesis: PlanHypothesis) -> Construction:
 
 
 def resized(drawing: Drawing, figure: str, size: float) -> dict[str, FloatArray]:
-    """The parameters at the scale at which the plan comes out `size` times as large."""
+    """Return the parameters at the scale at which the plan is `size` times as large."""
     scale = next(v.scale for v in drawing.construction.vectors_of(figure))
     return {**drawing.parameters, scale: np.asarray(drawing.parameters[scale] / size)}
 
@@ -283,30 +283,30 @@ def resized(drawing: Drawing, figure: str, size: float) -> dict[str, FloatArray]
 RESIDUAL_MM = 1.6
 """Standard residual of strokes at a roughly placed figure: a few drafting errors."""
 RESIDUAL_PER_MM = 0.03
-"""The same for each mm from where the figure was aligned: a degree of turn, and scale."""
+"""The same for each mm from the anchor of the figure: a degree of turn, and scale."""
 HIGHEST_WEIGHT_MM = 40.0
 """Longer edges count no more than this: one long stroke must not decide alone."""
 LEAST_EDGE_MM = 8.0
 """Shorter edges fit letters and arrowheads as well."""
 OVERRUN_MM = 25.0
-"""How much longer a stroke may be than its edge: lines run on past nodes."""
+"""Largest excess of a stroke's length over its edge: lines extend past nodes."""
 PROPOSING_EDGES = 4
-"""Of a figure: one of so many long edges is nearly always drawn."""
+"""Number of long edges of a figure that propose poses: one of them is nearly always drawn."""
 SHORT_LIST = 60
 """Poses judged by all edges, by the rough score: the right one is far up."""
 SAME_POSE_MM = 4.0
 """Poses that differ at no node by more than this are the same."""
 PAIRS = 1 << 13
-"""Of segments and strokes compared at a time: their arrays stay in a processor's own cache."""
+"""Segments and strokes compared at a time: their arrays stay in a processor's own cache."""
 FARTHEST_SQUARED = 40.0
-"""Of sigma: the fit of a stroke so far off is less than 3e-9."""
+"""Squared sigmas: the fit of a stroke this far off is less than 3e-9."""
 SPECK_MM = 2.0
-"""Shorter edges have no direction to speak of."""
+"""Shorter edges have no usable direction."""
 
 
 @dataclass(frozen=True, slots=True)
 class Search:
-    """Which poses to try.
+    """The poses to try.
 
     Attributes
     ----------
@@ -314,7 +314,7 @@ class Search:
     give_rad : freedom about each
     sizes : sizes relative to the expected; 0 stands for "as long as the stroke"
     smallest, largest : bounds of free sizes
-    short_mm : how much shorter a stroke may be than its edge (links stop at joint circles)
+    short_mm : how much shorter than its edge a stroke may be (links stop at joint circles)
     """
 
     turns_rad: tuple[float, ...] = (0.0,)
@@ -326,12 +326,12 @@ class Search:
 
 
 def poses(expected: Expected, lines: Lines, search: Search, count: int = 3) -> list[Pose]:
-    """The best poses of a figure among the strokes, best first."""
+    """Return the best poses of a figure among the strokes, best first."""
     longest = _longest(expected)
     proposed = _proposals(expected, lines, search, longest)
     if not len(proposed):
         return []
-    # The longest edges, on long strokes alone, leave few proposals for a look at everything.
+    # The longest edges on long strokes give few proposals, which are then checked in full.
     rough = _scores(expected, lines, proposed, longest)
     proposed = proposed[np.argsort(-rough)[:SHORT_LIST]]
     scores = _scores(expected, lines, proposed, range(len(expected.edges)))
@@ -339,14 +339,14 @@ def poses(expected: Expected, lines: Lines, search: Search, count: int = 3) -> l
 
 
 def _longest(expected: Expected) -> list[int]:
-    """Indices of the longest edges."""
+    """Return indices of the longest edges."""
     size = np.nan_to_num([expected.length_mm(edge) for edge in expected.edges], posinf=0.0)
     order = np.argsort(-size)[:PROPOSING_EDGES]
     return [int(edge) for edge in order if size[edge] >= LEAST_EDGE_MM]
 
 
 def _proposals(expected: Expected, lines: Lines, search: Search, edges: Sequence[int]) -> FloatArray:
-    """(m, 4) origin x, y, size, turn: each of the edges laid on each stroke."""
+    """Return (m, 4) origin x, y, size, turn: each of the edges laid on each stroke."""
     proposed = [np.zeros((0, 4))]
     for edge in (expected.edges[index] for index in edges):
         tail, head = complex(expected.at[edge.tail]), complex(expected.at[edge.head])
@@ -364,7 +364,7 @@ def _proposals(expected: Expected, lines: Lines, search: Search, edges: Sequence
 def _laid(
     edge: tuple[complex, complex], strokes: tuple[ComplexArray, ComplexArray], size: float, search: Search
 ) -> list[FloatArray]:
-    """Proposals with the edge's tail on the stroke's start, and with its head on the stroke's end."""
+    """Return poses with the edge's tail on the stroke's start, and with its head on the stroke's end."""
     (tail, head), (start, end) = edge, strokes
     span = head - tail
     drawn = np.abs(end - start)
@@ -383,7 +383,7 @@ def _laid(
 
 
 def _scores(expected: Expected, lines: Lines, proposed: FloatArray, edges: Sequence[int]) -> FloatArray:
-    """(m,) share of the figure's edges (by length, capped) that have a stroke, for every proposal."""
+    """Return (m,) share of the figure's edges (by length, capped) that have a stroke, for every pose."""
     origin = proposed[:, 0] + 1j * proposed[:, 1]
     spin = proposed[:, 2] * np.exp(1j * proposed[:, 3])
     total, weights = np.zeros(len(proposed)), np.zeros(len(proposed))
@@ -407,7 +407,7 @@ def _support(
     head: ComplexArray,
     sigma: FloatArray,
 ) -> FloatArray:
-    """How well the best stroke lies under each segment, 0..1.
+    """Return how well the best stroke matches each segment, 0..1.
 
     Arguments: strokes' starts, directions and lengths (n,); segments (m,) with sigma mm (m,).
     """
@@ -433,7 +433,7 @@ def _support(
 
 
 def _apart(proposed: FloatArray, scores: FloatArray, radius: float, count: int) -> list[Pose]:
-    """The best proposals with different poses."""
+    """Return the best poses that differ from each other."""
     chosen: list[int] = []
     origin = proposed[:, 0] + 1j * proposed[:, 1]
     spin = proposed[:, 2] * np.exp(1j * proposed[:, 3])

@@ -1,9 +1,9 @@
-"""A plan as a lettered graph: junctions of strokes, letters beside them, strokes with heads between them.
+"""Read a plan as a lettered graph: junctions of strokes, letters beside them, strokes with heads between.
 
-The nodes of a plan are looked for one after the other, in the order of its construction: each may be any
-junction of the sheet. What speaks for a junction is its letter, the strokes with arrowheads that join it to
-the nodes found before, and, as a prior that explains but is no condition, the place where the construction
-puts the node from those nodes. So a plan is read also where no known mistake explains it.
+The nodes of a plan are searched one after another, in the order of its construction: each may be any junction
+of the sheet. The evidence for a junction is its letter, the strokes with arrowheads that join it to the nodes
+found before, and, as a prior but no condition, the position where the construction puts the node. So a plan
+is read even if no known mistake explains it.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -24,57 +24,57 @@ LEAST_STROKE_MM, MOST_STROKE_MM = 2.0, 260.0
 CLEAR_TIP = 0.3
 """Probability from which a tip is a junction."""
 SAME_MM = 1.2
-"""Ends of strokes that are nearer to one another meet in one node: a hand misses a node by less."""
+"""Ends of strokes closer than this meet in one node: drafting errors are smaller."""
 MOST_JUNCTIONS = 500
 """A drawing has 100 to 300; of more, those with letters and long strokes come first."""
 ON_LINE_MM, PAST_END_MM = 0.9, 1.5
-"""How far a junction may lie beside a stroke, and beyond its end, that passes through it."""
+"""Largest distance of a junction beside a stroke, and beyond its end, for the stroke to pass through it."""
 HEAD_MM = 1.0
 """A head within this of a junction points to it."""
 DRAWN = 0.95
 """Share of vectors that have a stroke from node to node."""
 HEADED = 0.75
-"""Share of vectors whose head is told as a head at the right end."""
+"""Probability that a head is reported at the head."""
 WRONG_HEAD = 0.06
-"""The same at the wrong end."""
+"""Probability that a head is reported at the tail."""
 CHANCE_OF_HEAD = 0.2
 """Share of ends of other strokes that have a head."""
 ENDS_HERE, RUNS_ON = 0.4, -0.7
 """Nats for a stroke that ends at the node, and for one that runs on."""
 EXPECTED, NEAR_LINE, ANYWHERE = 0.6, 0.2, 0.2
-"""Shares of nodes about the place that the construction gives, in its direction alone, and anywhere."""
+"""Shares of nodes near the position that the construction gives, in its direction alone, and anywhere."""
 PLACE_MM, PLACE_SHARE = 1.5, 0.05
-"""Standard error of that place: two drafting errors, and this share of the distance to the node before."""
+"""Standard error of that position: two drafting errors, and this share of the distance to the node before."""
 DIRECTION_RAD = float(np.radians(2.0))
 """Standard error of a direction of a short vector."""
 AREA_MM2 = 120.0**2
-"""Of a plan: the other places where a node may be."""
+"""Area of a plan: the other possible positions of a node."""
 HIDDEN_NATS = 0.7
-"""For a node where the construction puts it, without a junction: half of what speaks for one that is seen."""
+"""Nats for a node without a junction at its expected position: half the evidence for a visible one."""
 ABSENT_NATS = -5.0
-"""For a component that is left out: one normal of a hundred."""
+"""Nats for a component that is left out: one normal in a hundred."""
 SAME_POINT_NATS = -1.0
 """For two nodes at one junction: vectors of length zero are rare."""
 FIRST_MM = (5.0, 210.0)
 """Length of the first vector: its scale was chosen so that it can be measured on a sheet."""
 BEST = 6
-"""Graphs that are tried with strokes: they differ in a node or two."""
+"""Number of graphs compared with strokes: they differ in a node or two."""
 BEAM = 60
-"""Partial graphs that are continued: a letter not read costs one rank, a crossing line some ten."""
+"""Partial graphs that are continued: an unread letter costs one rank, a crossing line some ten."""
 SHORT_MM = 3.0
 """A shorter vector may have no stroke of its own."""
 
 
 @dataclass(frozen=True, slots=True)
 class LetteredGraph:
-    """Nodes of a plan by letters, strokes and heads.
+    """The nodes of a plan, found by letters, strokes and heads.
 
     Attributes
     ----------
     at : complex mm, by node
     absent : components that are left out
-    unexpected : how many nodes lie where the construction does not put them
-    nats : for it, against junctions taken at random
+    unexpected : number of nodes that are not where the construction puts them
+    nats : evidence, against junctions taken at random
     """
 
     at: Mapping[str, complex]
@@ -85,7 +85,7 @@ class LetteredGraph:
 
 @dataclass(frozen=True, slots=True)
 class _Junctions:
-    """Where strokes end or meet: places (j,), and nats of a vector from each to each (j, j)."""
+    """Points where strokes end or meet: positions (j,), and nats of a vector from each to each (j, j)."""
 
     at: ComplexArray
     joined: FloatArray
@@ -93,7 +93,7 @@ class _Junctions:
 
 @dataclass(frozen=True, slots=True)
 class _Graphs:
-    """Partial graphs, a row each: places of nodes by name (b,), their junctions (-1: none), and scores."""
+    """Partial graphs, a row each: positions of nodes by name (b,), their junctions (-1: none), and scores."""
 
     places: Mapping[str, ComplexArray]
     junction: Mapping[str, IntArray]
@@ -101,13 +101,13 @@ class _Graphs:
     nats: FloatArray
 
     def take(self, rows: IntArray) -> "_Graphs":
-        """Some of the rows, also repeated."""
+        """Return some of the rows, also repeated."""
         places = {name: at[rows] for name, at in self.places.items()}
         junction = {name: index[rows] for name, index in self.junction.items()}
         return _Graphs(places, junction, self.unexpected[rows], self.nats[rows])
 
     def with_node(self, name: str, at: ComplexArray, junction: IntArray) -> "_Graphs":
-        """The same with one node more."""
+        """Return the graphs with one node more."""
         places, junctions = {**self.places, name: at}, {**self.junction, name: junction}
         return replace(self, places=places, junction=junctions)
 
@@ -120,14 +120,14 @@ def lettered_graphs(
     given: Mapping[str, ComplexArray],
     left_out: Collection[str] = (),
 ) -> list[LetteredGraph]:
-    """The likeliest graphs of a plan, best first.
+    """Return the likeliest graphs of a plan, best first.
 
     Arguments
     ---------
-    letter_nats : what the letters say for each of some places (j,) as the node of a name
+    letter_nats : evidence of the letters for each of some points (j,) as the node of a name
     drawing : its construction with the student's parameters
     given : nodes of other figures that are already read, complex mm
-    left_out : nodes that this construction does without
+    left_out : nodes that this construction omits
     """
     steps = drawing.construction.figures[figure]
     junctions = _junctions(lines)
@@ -160,12 +160,12 @@ def _graph(graphs: _Graphs, row: int, steps: Sequence[Step]) -> LetteredGraph:
 # One node more -------------------------------------------------------------------------------------
 
 HIDDEN, ABSENT = -1, -2
-"""In place of a junction: where none is seen, and for a component that is left out."""
+"""Replace a junction: none is visible; the component is left out."""
 
 
 @dataclass(frozen=True, slots=True)
 class _GraphSearch:
-    """What stays: the drawing, nodes of other figures, the plan's vectors, the junctions."""
+    """The constants of the search: the drawing, nodes of other figures, the plan's vectors, the junctions."""
 
     drawing: Drawing
     known: Mapping[str, ComplexArray]
@@ -173,14 +173,14 @@ class _GraphSearch:
     junctions: _Junctions
 
     def start(self, step: Step, graphs: _Graphs) -> ComplexArray:
-        """(b,) the node that the step's node is drawn from."""
+        """Return (b,) the node from which the step's node is drawn."""
         if isinstance(step, Given):
             return graphs.places[step.start]
         tails = [v.tail for v in self.vectors if v.head == step.node and v.tail in graphs.places]
         return graphs.places[tails[0]] if tails else next(iter(graphs.places.values()))
 
     def continued(self, graphs: _Graphs, step: Step, letter_nats: FloatArray) -> _Graphs:
-        """The best graphs with the step's node: at any junction, where it is expected, or left out."""
+        """Return the best graphs with the step's node: at any junction, where it is expected, or left out."""
         at, count = self.junctions.at, len(graphs.nats)
         here = {
             **{name: np.broadcast_to(place, count) for name, place in self.known.items()},
@@ -214,7 +214,7 @@ class _GraphSearch:
         return replace(chosen, unexpected=chosen.unexpected + odd, nats=everything.ravel()[best])
 
     def _ended(self, graphs: _Graphs, node: str) -> Iterator[tuple[str, bool]]:
-        """The other ends of vectors that join a node to the graphs, and whether the node is their head."""
+        """Return the other ends of vectors that join a node to the graphs, and whether it is the head."""
         for vector in self.vectors:
             if vector.head == node and vector.tail in graphs.places:
                 yield vector.tail, True
@@ -222,7 +222,7 @@ class _GraphSearch:
                 yield vector.head, False
 
     def _joined(self, graphs: _Graphs, node: str) -> FloatArray:
-        """(b, j) nats of the strokes that join each junction, as this node, to the graphs."""
+        """Return (b, j) nats of the strokes that join each junction, as this node, to the graphs."""
         total = np.zeros((len(graphs.nats), len(self.junctions.at)))
         for other, is_head in self._ended(graphs, node):
             index = graphs.junction[other]
@@ -232,20 +232,20 @@ class _GraphSearch:
         return total
 
     def _bare(self, graphs: _Graphs, node: str, at: ComplexArray) -> FloatArray:
-        """(b,) nats of the node's vectors without any stroke, the node at its place."""
+        """Return (b,) nats of the node's vectors without any stroke, the node at its position."""
         ends = [graphs.places[other] for other, _ in self._ended(graphs, node)]
         return sum((_without_stroke(at - end) for end in ends), np.zeros(len(at)))
 
 
 def _without_stroke(span: ComplexArray) -> FloatArray:
-    """Nats of vectors that have no stroke; short ones have none more often."""
+    """Return nats of vectors that have no stroke; short ones have none more often."""
     return np.asarray(
         np.log(1.0 - DRAWN) * np.minimum(np.nan_to_num(np.abs(span), nan=SHORT_MM) / SHORT_MM, 1.0)
     )
 
 
 def _of_place(at: ComplexArray, expected: ComplexArray, start: ComplexArray) -> FloatArray:
-    """(b, j) nats of a node's place against a place at random, from where it is expected."""
+    """Return (b, j) nats of a node's position relative to the expected one, against a random position."""
     away = np.abs(at - expected[:, None])
     reach = np.abs(expected - start)[:, None]
     sigma2 = PLACE_MM**2 + (PLACE_SHARE * reach) ** 2
@@ -264,7 +264,7 @@ def _of_place(at: ComplexArray, expected: ComplexArray, start: ComplexArray) -> 
 
 
 def _junctions(lines: Lines) -> _Junctions:
-    """Places where strokes end or meet, and what joins them."""
+    """Return points where strokes end or meet, and the strokes that join them."""
     usable = lines.take((lines.length > LEAST_STROKE_MM) & (lines.length < MOST_STROKE_MM))
     row, column = np.nonzero(usable.tip_sure > CLEAR_TIP)
     tips = usable.start[row] + usable.tip_along[row, column] * usable.along[row]
@@ -273,7 +273,7 @@ def _junctions(lines: Lines) -> _Junctions:
 
 
 def _clusters(points: ComplexArray) -> ComplexArray:
-    """Means of points that are near one another, the fullest first."""
+    """Return means of points that are close to one another, the largest groups first."""
     near = np.abs(points[:, None] - points) < SAME_MM
     count, left, means = near.sum(axis=1), np.ones(len(points), dtype=bool), []
     while left.any():
@@ -285,7 +285,7 @@ def _clusters(points: ComplexArray) -> ComplexArray:
 
 
 def _joined(at: ComplexArray, lines: Lines) -> FloatArray:
-    """(j, j) nats of a vector from one junction to another by the best stroke between them; -inf without."""
+    """Return (j, j) nats of a vector between junctions by the best stroke between them; -inf without one."""
     joined = np.full((len(at), len(at)), -np.inf)
     from_start = (at - lines.start[:, None]) * np.conj(lines.along)[:, None]
     on = (np.abs(from_start.imag) < ON_LINE_MM) & (from_start.real > -PAST_END_MM)
@@ -306,7 +306,7 @@ def _joined(at: ComplexArray, lines: Lines) -> FloatArray:
 
 
 def _heads(place: FloatArray, lines: Lines, row: int) -> FloatArray:
-    """(n, n) nats of the heads on a stroke for vectors from and to places along it (mm from its start)."""
+    """Return (n, n) nats of the heads on a stroke for vectors between positions along it (mm)."""
     tip, kind, sure = lines.tip_along[row], lines.tip_kind[row], lines.tip_sure[row]
     near = np.abs(tip - place[:, None]) < HEAD_MM
     ahead, back = (
@@ -320,6 +320,6 @@ def _heads(place: FloatArray, lines: Lines, row: int) -> FloatArray:
 
 
 def _odds(sure: FloatArray, share: float) -> FloatArray:
-    """Nats of a head seen with a probability, where this share of vectors shows one."""
+    """Return nats of a head seen with a probability, if this share of vectors shows one."""
     seen, unseen = share / CHANCE_OF_HEAD, (1.0 - share) / (1.0 - CHANCE_OF_HEAD)
     return np.asarray(np.log(sure * seen + (1.0 - sure) * unseen))

@@ -21,13 +21,13 @@ from reference.geometry import ComplexArray
 REACH_MM = 8.0
 """Writing farther from every node is no label of one."""
 FALL_MM = 1.4
-"""Letters become fewer by 1/e with so much more of a gap between their box and their node."""
+"""The density of letters falls by 1/e for each such increase of the gap between their box and their node."""
 STRAY = 0.03
 """Density of other letters, relative to that of a node's own letter at no gap."""
 LEAST_MM, MOST_MM = 1.0, 7.5
 """Heights of letters; primes and points are lower, words run together are wider."""
 SHARED = 0.5
-"""Pieces that share so much of the smaller one's box are the same ink."""
+"""Pieces that share this much of the smaller one's box are the same ink."""
 RARE_NATS = 5.0
 """Two given letters of a plan are swapped in one plan of 150."""
 PRIOR_OF_SWAP = 1.0 / (1.0 + math.exp(RARE_NATS))
@@ -35,27 +35,27 @@ PRIOR_OF_SWAP = 1.0 / (1.0 + math.exp(RARE_NATS))
 REPORTED = 0.6
 """Probability from which a swap is reported; whoever judges the drawing weighs it."""
 COMPONENTS = ("n_", "k_")
-"""How names of ends of normal and Coriolis components begin: few write them, and they share a letter."""
+"""Initials of ends of normal and Coriolis components: few people write them, and they share a letter."""
 USUAL_SHARE = 0.04
-"""Of a sign among the pieces of a sheet: one in some 25."""
+"""Usual share of a sign among the pieces of a sheet: one in some 25."""
 LEGIBLE, LEGIBLE_COMPONENT = 0.6, 0.2
 """Shares of nodes whose letters are written and read."""
 LIKELY_PRIME = 0.5
 """Probability from which a sign counts as a prime."""
 POLE_SIGNS = ("o", "p", "π")
-"""What the pole of a plan is called in different schools."""
+"""Letters for the pole of a plan in different schools."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lettering:
-    """Pieces of writing about the nodes of a sheet.
+    """Pieces of writing near the nodes of a sheet.
 
     Attributes
     ----------
     nodes : (figure, node) of each column below
     share : (k, n) probability that a piece, if it is a letter, is the label of the node
     stray : (k,) probability that it is no node's; with `share` a row sums to 1
-    fits : (k, n) how much likelier the piece is as the letter of the node than as a letter at random
+    fits : (k, n) likelihood ratio of the piece as the letter of the node and as a random letter
     letter : (k,) probability that the piece is a letter that some node may have
     """
 
@@ -66,7 +66,7 @@ class Lettering:
     letter: FloatArray
 
     def log(self, named: IntArray | None = None) -> float:
-        """Log likelihood of the writing, nats against writing at random.
+        """Return the log likelihood of the writing, nats against random writing.
 
         Arguments: `named` (n,) the column whose letter stands at each node; each its own by default.
         """
@@ -75,7 +75,7 @@ class Lettering:
         return float(np.log(1.0 - self.letter + self.letter * likelihood).sum())
 
     def swaps(self) -> Iterator[tuple[int, int, float]]:
-        """Pairs of nodes of one figure, with the nats by which the writing is likelier with them swapped."""
+        """Yield pairs of nodes of one figure, with the nats by which swapping makes the writing likelier."""
         own = self.log()
         usual = np.arange(len(self.nodes))
         for first, second in combinations(range(len(self.nodes)), 2):
@@ -88,7 +88,7 @@ class Lettering:
 def support(
     joints: Mapping[str, complex], letters: Letters | None, renamed: Mapping[str, str] | None = None
 ) -> float:
-    """What letters say of a mechanism's joints, nats against letters at random; 0 without letters."""
+    """Return the letters' evidence for a mechanism's joints, nats against random ones; 0 without letters."""
     nodes = {(MECHANISM, name): at for name, at in joints.items()}
     writing = lettering(nodes, letters, renamed=renamed)
     return 0.0 if writing is None else writing.log()
@@ -97,10 +97,10 @@ def support(
 def lettered(
     reading: Reading, letters: Letters | None, construction: Construction, renamed: Mapping[str, str]
 ) -> Reading:
-    """A sheet's reading with the likely swaps of letters, less certain where letters may be swapped.
+    """Return a sheet's reading with likely swaps of letters, less certain if letters may be swapped.
 
-    The names stay those of the construction. A swap that is reported leaves the confidences as they are:
-    these tell whether the strokes were read rightly, and one doubt counts once.
+    The names stay those of the construction. A reported swap leaves the confidences unchanged: they refer to
+    the strokes, and one doubt counts once.
     """
     poles = frozenset(construction.poles.values())
     nodes = {
@@ -127,7 +127,7 @@ def lettered(
 
 
 def _doubted(figure: Figure, names: Collection[str], construction: Construction, share: float) -> Figure:
-    """The figure with that share of the confidence left to some nodes and to the vectors that end there."""
+    """Return the figure with reduced confidence at some nodes and at the vectors that end there."""
     nodes = {
         name: replace(node, confidence=share * node.confidence) if name in names else node
         for name, node in figure.nodes.items()
@@ -148,7 +148,7 @@ def fitting_letters(
     poles: Collection[str],
     renamed: Mapping[str, str],
 ) -> FloatArray:
-    """(j,) nats of each of some places for being the node of this name, by the letters near them."""
+    """Return (j,) nats of each point for being the node of this name, by the letters near it."""
     if letters is None or not len(letters):
         return np.zeros(len(at))
     signs = _signs(name, poles, renamed, letters)
@@ -165,7 +165,7 @@ def fitting_letters(
 
 
 def primes_beside(at: ComplexArray, letters: Letters | None) -> int:
-    """How many primes stand about some nodes: those of an acceleration plan have them, others have not."""
+    """Count the primes near some nodes: those of an acceleration plan have them, others have not."""
     if letters is None or "'" not in letters.column or not len(letters):
         return 0
     primes = _gaps(letters.box_mm[letters.chance("'") > LIKELY_PRIME], at)
@@ -178,13 +178,13 @@ def lettering(
     poles: Collection[str] = (),
     renamed: Mapping[str, str] | None = None,
 ) -> Lettering | None:
-    """The writing about named nodes of a sheet; None where there is none.
+    """Return the writing near named nodes of a sheet; None if there is none.
 
     Arguments
     ---------
     nodes : by figure and name, complex sheet mm, y up
     poles : names of the plans' poles, whose letter differs from school to school
-    renamed : what students write for a node, by name, where it is not the name
+    renamed : what students write for a node, by name, if it is not the name
     """
     if letters is None or not nodes:
         return None
@@ -210,14 +210,14 @@ def lettering(
 
 
 def _signs(name: str, poles: Collection[str], renamed: Mapping[str, str], letters: Letters) -> list[int]:
-    """The columns of the letters that may be written at a node: its name's first, any school's at a pole."""
+    """Return the columns of a node's possible letters: its name's first, any school's at a pole."""
     written = renamed.get(name, name)[:1]
     signs = (written, *POLE_SIGNS) if name in poles else (written,)
     return sorted({letters.column[sign] for sign in signs if sign in letters.column})
 
 
 def _gaps(box_mm: FloatArray, at: ComplexArray) -> FloatArray:
-    """(k, n) distances from boxes to points, 0 inside."""
+    """Return (k, n) distances from boxes to points, 0 inside."""
     x, y, w, h = (side[:, None] for side in box_mm.T)
     across = np.maximum(np.maximum(x - at.real, at.real - x - w), 0.0)
     along = np.maximum(np.maximum(y + at.imag, -at.imag - y - h), 0.0)
@@ -225,7 +225,7 @@ def _gaps(box_mm: FloatArray, at: ComplexArray) -> FloatArray:
 
 
 def _apart(rows: IntArray, box_mm: FloatArray, known: FloatArray) -> IntArray:
-    """One row for each piece of ink: the one that is likeliest a letter of those that overlap."""
+    """Return one row for each piece of ink: of overlapping ones the likeliest letter."""
     order = rows[np.argsort(-known[rows], kind="stable")]
     overlap = _overlaps(box_mm[order]) >= SHARED
     chosen = np.zeros(len(order), dtype=bool)
@@ -235,7 +235,7 @@ def _apart(rows: IntArray, box_mm: FloatArray, known: FloatArray) -> IntArray:
 
 
 def _overlaps(box_mm: FloatArray) -> FloatArray:
-    """(k, k) share of the smaller of two boxes that the other covers."""
+    """Return (k, k) share of the smaller of two boxes that the other covers."""
     low, size = box_mm[:, :2], box_mm[:, 2:]
     far = low + size
     shared = np.maximum(np.minimum(far[:, None], far) - np.maximum(low[:, None], low), 0.0).prod(axis=2)

@@ -18,12 +18,12 @@ LEAST_MM = 1.2
 SE_OFFSET_MM = 0.04
 """Least standard error of a line: paper and pen are not ideal."""
 CLEAR_END_MM, HIDDEN_END_MM = 0.2, 1.0
-"""Standard error of a stroke's end, clear or hidden in other ink. The error that the ink stage states is
-mostly the part for strokes that run on past nodes, which is modelled separately."""
+"""Standard error of a stroke's end, clear or hidden in other ink. The error stated by the ink stage mostly
+concerns strokes that extend past nodes, which is modelled separately."""
 HIDDEN = 1.8
-"""Ends stated this many times worse than the sheet's good ones are hidden."""
+"""Ends stated to be this many times worse than the sheet's good ones are hidden."""
 LONG_MM = 12.0
-"""Longer strokes show how much ink the pen leaves: they are no letters."""
+"""Longer strokes show how much ink the pen leaves: they are not letters."""
 ENOUGH = 6
 """With fewer long strokes no stroke is called thin."""
 THIN = 0.62
@@ -37,16 +37,16 @@ JOIN_OFFSET_MM = 0.45
 JOIN_GAP_MM = 14.0
 """The widest gap: a label or another figure's strokes over the line."""
 JOIN_TURN_RAD = 0.03
-"""How far two pieces of one line may differ in direction."""
+"""Largest difference in direction of two pieces of one line."""
 JOIN_BEYOND_MM = 1.0
 """A piece that adds less to another's length lies on it."""
 PART = 256
 """Strokes compared with all others at a time, so that memory does not grow with their square."""
 OTHER_SORT = 0.5
-"""Weight of a head's tip where a tail's is looked for, and the reverse: a drawing without arrowheads shows
-where vectors end, but not which end it is."""
+"""Weight of a head's tip for a tail, and the reverse: a drawing without arrowheads shows where vectors end,
+but not which end it is."""
 TIP_MM = 0.2
-"""Standard error of an arrowhead's tip, or of what else marks a node, along its vector."""
+"""Standard error of an arrowhead's tip, or of another mark of a node, along its vector."""
 
 BoolArray = NDArray[np.bool_]
 
@@ -95,13 +95,13 @@ class Lines:
     def tips_towards(
         self, rows: IntArray, forward: BoolArray, *, head: bool | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Tips that may mark one end of a vector on each of some lines.
+        """Return tips that may mark one end of a vector on each of some lines.
 
         Arguments
         ---------
         rows, forward : lines (r,), and whether the vector's end in question is its farther one along it
         head : whether that end is the vector's head: tips of the other sort then count for `OTHER_SORT`.
-            Without it both sorts count alike, as where the strokes are given and only the place is asked
+            Without it both sorts count alike, as if the strokes are given and only the position is asked
 
         Returns the distances from `start` (r, t), mm, and the probabilities (r, t).
         """
@@ -113,12 +113,12 @@ class Lines:
         return self.tip_along[rows], self.tip_sure[rows] * share
 
     def take(self, chosen: BoolArray | IntArray) -> "Lines":
-        """Some of the rows; `members` keep their numbers."""
+        """Return some of the rows; `members` keep their numbers."""
         return Lines(*(getattr(self, name)[chosen] for name in self.__slots__))
 
 
 def lines_of(ink: Ink) -> Lines:
-    """The strokes of a sheet as lines, with joined ones added."""
+    """Return the strokes of a sheet as lines, with joined ones added."""
     strokes = ink.strokes
     inked = strokes.ends[..., 0] - 1j * strokes.ends[..., 1]
     span = (inked[:, 1] - inked[:, 0]).ravel()
@@ -149,7 +149,7 @@ def lines_of(ink: Ink) -> Lines:
 
 
 def _tips(tips: Tips, number: IntArray, cap: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
-    """`tip_along`, `tip_kind` and `tip_sure` of some strokes, measured from their ends without caps."""
+    """Return `tip_along`, `tip_kind` and `tip_sure` of some strokes, measured from their uncapped ends."""
     of_stroke = [np.flatnonzero(tips.stroke == stroke) for stroke in number]
     shape = (len(number), max((len(chosen) for chosen in of_stroke), default=0))
     along, kind, sure = np.zeros(shape), np.zeros(shape, np.int64), np.zeros(shape)
@@ -161,13 +161,13 @@ def _tips(tips: Tips, number: IntArray, cap: FloatArray) -> tuple[FloatArray, In
 
 
 def _end_errors(stated: FloatArray) -> FloatArray:
-    """Standard errors of ends, mm, from which of them are stated to be much worse than others."""
+    """Return standard errors of ends, mm, according to which are stated to be much worse than others."""
     good = float(np.quantile(stated, 0.1)) if stated.size else 0.0
     return np.where(stated > HIDDEN * good, HIDDEN_END_MM, CLEAR_END_MM)
 
 
 def _thin(ink: FloatArray, length: FloatArray) -> BoolArray:
-    """Strokes with much less ink per length than the heavier long ones have."""
+    """Return which strokes have much less ink per length than the heavier long ones."""
     long = length > LONG_MM
     if np.count_nonzero(long) < ENOUGH:
         return np.zeros(len(ink), dtype=bool)
@@ -188,7 +188,7 @@ def _with_joined(single: Lines) -> Lines:
 
 
 def _stacked(first: NDArray[Any], second: NDArray[Any]) -> NDArray[Any]:
-    """Rows of both; the narrower ones are filled with zeros."""
+    """Stack the rows of both; narrower ones are filled with zeros."""
     if first.ndim == 1:
         return np.concatenate([first, second])
     wide = max(first.shape[1], second.shape[1])
@@ -196,7 +196,7 @@ def _stacked(first: NDArray[Any], second: NDArray[Any]) -> NDArray[Any]:
 
 
 def _longest_chains(pairs: list[list[int]]) -> list[list[int]]:
-    """Pieces that are linked by pairs, where more than two are."""
+    """Return pieces that are linked by pairs, if more than two are."""
     group: dict[int, set[int]] = {}
     for first, second in pairs:
         merged = group.get(first, {first}) | group.get(second, {second})
@@ -207,7 +207,7 @@ def _longest_chains(pairs: list[list[int]]) -> list[list[int]]:
 
 
 def _joined(single: Lines, chains: list[list[int]]) -> Lines:
-    """For each chain of pieces, one stroke from the one far end to the other."""
+    """Return for each chain of pieces one stroke from the one far end to the other."""
     pieces = np.array([np.resize(chain, MOST_PIECES) for chain in chains])
     repeated = np.arange(MOST_PIECES) >= np.array([len(chain) for chain in chains])[:, None]
     rows = np.arange(len(pieces))
@@ -241,7 +241,7 @@ def _joined(single: Lines, chains: list[list[int]]) -> Lines:
 def _joined_tips(
     single: Lines, pieces: IntArray, repeated: BoolArray, start: ComplexArray, along: ComplexArray
 ) -> tuple[FloatArray, IntArray, FloatArray]:
-    """`tip_along`, `tip_kind` and `tip_sure` of joined strokes: the tips of all their pieces."""
+    """Return `tip_along`, `tip_kind` and `tip_sure` of joined strokes: the tips of all their pieces."""
     at = single.start[pieces, None] + single.tip_along[pieces] * single.along[pieces, None]
     places = ((at - start[:, None, None]) * np.conj(along)[:, None, None]).real
     same_way = (single.along[pieces] * np.conj(along)[:, None]).real > 0
@@ -256,7 +256,7 @@ def _joined_tips(
 
 
 def _pairs_in_line(single: Lines) -> IntArray:
-    """(p, 2) strokes that continue one another, the one whose line decides first."""
+    """Return (p, 2) strokes that continue one another, the one that determines the line first."""
     long = np.flatnonzero(single.length >= JOINABLE_MM)
     pairs = [np.zeros((0, 2), dtype=np.int64)]
     for start in range(0, len(long), PART):
@@ -265,14 +265,14 @@ def _pairs_in_line(single: Lines) -> IntArray:
         pairs.append(np.column_stack([start + first, second]))
     first, second = np.concatenate(pairs).T
     length = single.length[long]
-    # Of two strokes of one length, each continues the other: the pair is taken once.
+    # Two strokes of equal length continue each other: the pair is used once.
     once = (length[first] != length[second]) | (first < second)
     once &= first != second
     return np.column_stack([long[first[once]], long[second[once]]])
 
 
 def _continues(single: Lines, rows: IntArray, others: IntArray) -> BoolArray:
-    """(r, n) whether each of the `others` lies on the line of each of the `rows` and goes on from it."""
+    """Return (r, n) whether each of the `others` lies on the line of each of the `rows` and continues it."""
     start, along, length = single.start[rows, None], single.along[rows, None], single.length[rows, None]
     turn = np.abs((along * np.conj(single.along[others])).imag)
     near = turn < JOIN_TURN_RAD + np.minimum(JOIN_OFFSET_MM / single.length[others], 0.05)

@@ -13,18 +13,18 @@ from reference.geometry import ComplexArray
 REDRAW_MM = 0.3
 """Standard error of a stroke's distance from the nodes that it joins."""
 SHARED_MM = 0.4
-"""Added to it where one stroke serves two edges."""
+"""Added to it if one stroke serves two edges."""
 END_MM, END_SHARE = 0.3, 0.4
-"""Of the ink's end as the mark of a node: standard error along, and share of vectors that end with it."""
+"""The ink's end as the mark of a node: standard error along, and share of vectors that end with it."""
 RUN_ON_FAR = 4e-4
-"""Density per mm of ends anywhere: the stroke goes on as another edge, or as a line drawn through."""
+"""Density per mm of ends elsewhere: the stroke continues as another edge, or as a line drawn through."""
 UNKNOWN_MM = 1e5
 """Standard error along a stroke that does not end at the node: nothing is known."""
 
 
 @dataclass(frozen=True, slots=True)
 class EndPrior:
-    """How strokes end at nodes: shares of ends at, beyond and short of the node, and their distances."""
+    """Prior for ends of strokes at nodes: shares of ends at, beyond and short of the node, and distances."""
 
     at_mm: float = 0.3
     at_share: float = 0.57
@@ -36,7 +36,7 @@ class EndPrior:
 
 @dataclass(frozen=True, slots=True)
 class Spans:
-    """Beliefs of the two nodes that an edge joins, a row each.
+    """Beliefs about the two nodes that an edge joins, a row each.
 
     Attributes
     ----------
@@ -50,13 +50,13 @@ class Spans:
     cov: FloatArray
 
     def take(self, rows: IntArray) -> "Spans":
-        """Some of the rows, also repeated."""
+        """Return some of the rows, also repeated."""
         return Spans(self.tail[rows], self.head[rows], self.cov[:, rows])
 
 
 @dataclass(frozen=True, slots=True)
 class Beliefs:
-    """Beliefs of a figure's nodes, a row each.
+    """Beliefs about a figure's nodes, a row each.
 
     Attributes
     ----------
@@ -68,11 +68,11 @@ class Beliefs:
     cov: FloatArray
 
     def take(self, rows: IntArray) -> "Beliefs":
-        """Some of the rows, also repeated."""
+        """Return some of the rows, also repeated."""
         return Beliefs(self.at[rows], self.cov[rows])
 
     def spans(self, tail: int, head: int) -> Spans:
-        """The beliefs of an edge's two nodes."""
+        """Return the beliefs about an edge's two nodes."""
         cov = np.empty((3, len(self.cov), 3))
         for pair, (p, q) in enumerate(((tail, tail), (tail, head), (head, head))):
             cov[pair, :, 0] = self.cov[:, 2 * p, 2 * q]
@@ -82,7 +82,7 @@ class Beliefs:
 
 
 def _squares(direction: ComplexArray) -> FloatArray:
-    """(s, 3) of unit vectors: x^2, x y, y^2."""
+    """Return (s, 3) products of unit vectors: x^2, x y, y^2."""
     x, y = direction.real, direction.imag
     squares = np.empty((len(x), 3))
     squares[:, 0], squares[:, 1], squares[:, 2] = x * x, x * y, y * y
@@ -90,7 +90,7 @@ def _squares(direction: ComplexArray) -> FloatArray:
 
 
 def line_residuals(spans: Spans, lines: Lines) -> tuple[FloatArray, FloatArray]:
-    """Distances of both nodes from each line (2, s, lines), and their covariances (3, s, lines).
+    """Return distances of both nodes from each line (2, s, lines), and covariances (3, s, lines).
 
     The covariances are those of the tail, of tail with head, and of the head.
     """
@@ -105,7 +105,7 @@ def line_residuals(spans: Spans, lines: Lines) -> tuple[FloatArray, FloatArray]:
 
 
 def mahalanobis(residual: FloatArray, spread: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Squared distances of pairs (2, ...) by their covariances (3, ...), and log determinants."""
+    """Return squared distances of pairs (2, ...) by their covariances (3, ...), and log determinants."""
     a, b, c = spread
     det = np.maximum(a * c - b * b, 1e-9)
     distance = (c * residual[0] ** 2 - 2 * b * residual[0] * residual[1] + a * residual[1] ** 2) / det
@@ -113,10 +113,10 @@ def mahalanobis(residual: FloatArray, spread: FloatArray) -> tuple[FloatArray, F
 
 
 def ends_at(spans: Spans, lines: Lines, prior: EndPrior) -> tuple[FloatArray, BoolArray, BoolArray]:
-    """How each stroke ends about the nodes of the edge that it is taken for; arguments of n rows each.
+    """Return how each stroke ends near the nodes of its edge; arguments of n rows each.
 
-    Returns log densities (n,), whether it ends at the tail and at the head (n, 2), and whether it covers
-    the edge (n,).
+    Returns log densities (n,), whether it ends at the tail and at the head (n, 2), and whether it covers the
+    edge (n,).
     """
     span = spans.head - spans.tail
     forward = (lines.along * np.conj(span)).real > 0
@@ -139,13 +139,13 @@ def ends_at(spans: Spans, lines: Lines, prior: EndPrior) -> tuple[FloatArray, Bo
 def _tips_from(
     lines: Lines, node: ComplexArray, ahead: BoolArray, *, head: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """How far tips lie from nodes along their strokes (n, t), mm, and their probabilities."""
+    """Return distances of tips from nodes along their strokes (n, t), mm, and their probabilities."""
     tips, sure = lines.tips_towards(np.arange(len(lines)), ahead, head=head)
     return tips + ((lines.start - node) * np.conj(lines.along)).real[:, None], sure
 
 
 def _tip_density(tips: FloatArray, sure: FloatArray, variance: FloatArray) -> FloatArray:
-    """Density per mm of tips (n, t) mm from a node, with their probabilities."""
+    """Return the density per mm of tips (n, t) mm from a node, with their probabilities."""
     spread = (variance + TIP_MM**2)[:, None]
     each = sure * np.exp(-0.5 * tips**2 / spread) / np.sqrt(2.0 * np.pi * spread)
     return np.asarray(each.sum(axis=1))
@@ -154,7 +154,7 @@ def _tip_density(tips: FloatArray, sure: FloatArray, variance: FloatArray) -> Fl
 def _end_score(
     gap: FloatArray, variance: FloatArray, prior: EndPrior, marked: FloatArray
 ) -> tuple[FloatArray, BoolArray]:
-    """Log density per mm of an end `gap` mm beyond its node, and whether it is likely the node's.
+    """Return the log density per mm of an end `gap` mm beyond its node, and whether it is the node's.
 
     Arguments: `marked` is the density of tips there.
     """
@@ -169,7 +169,7 @@ def _end_score(
 
 
 def _vector_ends(spans: Spans, lines: Lines, slot: int) -> tuple[FloatArray, FloatArray]:
-    """How far from its node a vector ends on its stroke (s,), mm, with the standard error.
+    """Return how far from its node a vector ends on its stroke (s,), mm, with the standard error.
 
     The end is the likeliest of the ink's end and of tips. `slot` is 0 for the tail, 1 for the head.
     """
@@ -193,14 +193,14 @@ def _vector_ends(spans: Spans, lines: Lines, slot: int) -> tuple[FloatArray, Flo
 def updated(
     beliefs: Beliefs, edge: tuple[int, int], lines: Lines, shared: BoolArray, ended: BoolArray, at_mm: float
 ) -> Beliefs:
-    """The beliefs after a stroke was taken for an edge, one for each belief (a Kalman update).
+    """Return the beliefs after assigning a stroke to an edge, one for each belief (a Kalman update).
 
     Arguments
     ---------
     edge : its tail and head, as indices of nodes
     lines, shared : (s,) the strokes, and whether each serves another edge already
     ended : (s, 2) whether the stroke ends at the edge's tail and at its head
-    at_mm : standard error of such an end beside that of the ink
+    at_mm : standard error of such an end in addition to that of the ink
     """
     along, spans = lines.along, beliefs.spans(*edge)
     nodes = np.column_stack([spans.tail, spans.head])
@@ -219,7 +219,7 @@ def updated(
 
 
 def _design(along: ComplexArray) -> FloatArray:
-    """(s, 4, 4): tail and head (x, y each) across the line, then along it."""
+    """Return (s, 4, 4): tail and head (x, y each) across the line, then along it."""
     design = np.zeros((len(along), 4, 4))
     for first, direction in ((0, 1j * along), (2, along)):
         for slot in (0, 1):
@@ -247,27 +247,27 @@ BEAM = 10
 GATE = 18.0
 """Squared Mahalanobis distance (two degrees of freedom) beyond which a stroke is not the edge."""
 FIRST_GATE = 60.0
-"""The same before any stroke is assigned: those of other edges move what is expected of this one."""
+"""The same before any stroke is assigned: strokes of other edges change the expectation."""
 TURN_SINE, FIRST_TURN_SINE = 0.7, 0.85
 """Sine of the angle to the edge at which a stroke is not the edge, later and at first."""
 PENALTY_OF_THIN = 2.0
-"""Nats against a line drawn thinner than vectors are: it is likelier one that they were constructed by."""
+"""Nats against a line drawn thinner than vectors are: it is more likely a construction line."""
 INVISIBLE_MM = 0.8
 """A shorter edge is a dot under its nodes."""
 COST_OF_SHARING = 0.3
 """Nats for an edge on a stroke that serves another: two vectors in line are not rare."""
 COST_OF_BARENESS = 1e3
-"""Nats for leaving an edge without the stroke that is fixed to be its own: more than any evidence."""
+"""Nats for leaving an edge without the stroke that is fixed to it: more than any evidence."""
 RUN_ON_EXPLAINED = 3.0
-"""Nats given back when a second edge explains why a stroke runs on past the first."""
+"""Nats given back if a second edge explains why a stroke extends past the first."""
 LITTLE_COMMON = 0.4
-"""Share of an edge that may lie on what its stroke already serves, where it explains the rest."""
+"""Share of an edge that may lie on ink its stroke already serves, if it explains the rest."""
 BAND_MM = 0.3
-"""How far from the middle of a band of ink either of two lines in it may lie."""
+"""Distance of a line from the middle of a band of ink, if two lines lie in it."""
 SHARED_RADIUS2_MM2 = 1.0
-"""Two edges share one stroke where their lines are within about half a millimetre of each other."""
+"""Two edges share one stroke if their lines are within about half a millimetre of each other."""
 CHANCE_RADIUS_MM = 8.0
-"""Strokes are counted at least this far about an edge: letters and arrowheads crowd about nodes."""
+"""Strokes are counted at least this far around an edge: letters and arrowheads crowd near nodes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -290,7 +290,7 @@ class StrokeAssignment:
 
 @dataclass(frozen=True, slots=True)
 class Constraint:
-    """What is known before the search.
+    """The knowledge before the search.
 
     Attributes
     ----------
@@ -303,7 +303,7 @@ class Constraint:
 
 
 UNCONSTRAINED = Constraint()
-"""Nothing is known before."""
+"""No prior knowledge."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -319,7 +319,7 @@ class _States:
 
 @dataclass(frozen=True, slots=True)
 class _Choices:
-    """Continuations of states, a row each: the state, the row of `Lines` taken (-1 for none), and how."""
+    """Continuations of states, a row each: the state, the row of `Lines` taken (-1 for none), its kind."""
 
     state: IntArray
     row: IntArray
@@ -328,7 +328,7 @@ class _Choices:
     score: FloatArray
 
     def take(self, rows: BoolArray | IntArray) -> "_Choices":
-        """Some of them."""
+        """Return some of them."""
         return _Choices(*(getattr(self, name)[rows] for name in self.__slots__))
 
     def __add__(self, other: "_Choices") -> "_Choices":
@@ -339,7 +339,7 @@ class _Choices:
 
 @dataclass(frozen=True, slots=True)
 class _AssignmentProblem:
-    """What does not change during the search.
+    """The constants of the search.
 
     Attributes
     ----------
@@ -362,9 +362,9 @@ def assign_strokes(
     beam: int = BEAM,
     constraints: Sequence[Constraint] | None = None,
 ) -> list[list[StrokeAssignment]]:
-    """The best assignments of each of several placed figures with the same edges, best first.
+    """Return the best assignments of each of several placed figures with the same edges, best first.
 
-    The figures are searched side by side, not against one another: each has `beam` of its own.
+    The figures are searched side by side, not against one another: each has its own `beam`.
 
     Arguments: `constraints`, one for each figure.
     """
@@ -397,12 +397,12 @@ def assign_groups(
     beam: int = BEAM,
     constrain: Callable[[Sequence[int], Lines], list[Constraint]] | None = None,
 ) -> Iterator[tuple[int, list[StrokeAssignment], Lines]]:
-    """As `assign_strokes`, of figures with different edges: those with the same are searched together.
+    """Assign strokes to figures with different edges: those with the same edges are searched together.
 
     Arguments
     ---------
-    near : which lines lie about any of some figures
-    constrain : what is known before of some figures (by index) among some of the lines
+    near : which lines lie near any of some figures
+    constrain : knowledge about some figures (by index) among some of the lines
 
     Yields each figure's index, its assignments, and the lines whose rows they name.
     """
@@ -421,7 +421,7 @@ def assign_groups(
 def _most_certain_first(
     beliefs: Beliefs, edges: Sequence[Edge], constraints: Sequence[Constraint]
 ) -> list[int]:
-    """Order of the edges: fixed ones, then long ones, which are mistaken for others least."""
+    """Return the order of the edges: fixed ones, then long ones, which are mistaken for others least."""
     size = [np.nan_to_num(abs(beliefs.at[:, edge.head] - beliefs.at[:, edge.tail])).mean() for edge in edges]
     fixed = [sum(index in constraint.fixed for constraint in constraints) for index in range(len(edges))]
     return sorted(range(len(edges)), key=lambda index: (-fixed[index], -size[index]))
@@ -430,7 +430,7 @@ def _most_certain_first(
 def _allowed(
     beliefs: Beliefs, edges: Sequence[Edge], lines: Lines, constraints: Sequence[Constraint]
 ) -> tuple[BoolArray, BoolArray]:
-    """`allowed` and `may_be_bare` of a problem: strokes within reach that the constraints leave."""
+    """Return `allowed` and `may_be_bare` of a problem: strokes within reach that the constraints leave."""
     allowed = np.zeros((len(constraints), len(edges), len(lines)), dtype=bool)
     bare = np.ones((len(constraints), len(edges)), dtype=bool)
     for index, edge in enumerate(edges):
@@ -449,7 +449,7 @@ def _allowed(
 
 
 def _along(spans: Spans, lines: Lines, turn_sine: float) -> BoolArray:
-    """(s, lines) which lines run about along each edge; none along an edge too short to be visible."""
+    """Return (s, lines) which lines run roughly along each edge; none if the edge is too short to see."""
     span = (spans.head - spans.tail)[:, None]
     size = np.abs(span)
     turned = np.abs((lines.along * np.conj(span)).imag)
@@ -457,7 +457,7 @@ def _along(spans: Spans, lines: Lines, turn_sine: float) -> BoolArray:
 
 
 def _nothing_taken(states: _States, edge: int, problem: _AssignmentProblem) -> _Choices:
-    """Every state with no stroke for the edge."""
+    """Return every state without a stroke for the edge."""
     count = len(states.score)
     tail, head = problem.edges[edge].tail, problem.edges[edge].head
     size = np.abs(states.beliefs.at[:, head] - states.beliefs.at[:, tail])
@@ -468,7 +468,7 @@ def _nothing_taken(states: _States, edge: int, problem: _AssignmentProblem) -> _
 
 
 def _strokes_taken(states: _States, edge: int, problem: _AssignmentProblem) -> _Choices:
-    """Every state with each of the strokes that the edge may be in it."""
+    """Return every state with each of the strokes that the edge may have in it."""
     allowed = problem.allowed[states.figure, edge]
     rows = np.flatnonzero(allowed.any(axis=0))
     spans = states.beliefs.spans(problem.edges[edge].tail, problem.edges[edge].head)
@@ -492,14 +492,14 @@ def _strokes_taken(states: _States, edge: int, problem: _AssignmentProblem) -> _
 
 
 def _log_of_sharing(residual: FloatArray, spread: FloatArray) -> FloatArray:
-    """Log likelihood of edges lying on strokes that serve others already."""
+    """Return the log likelihood of edges lying on strokes that serve others already."""
     distance, log_det = mahalanobis(residual, spread + np.array([BAND_MM**2, 0.0, BAND_MM**2])[:, None])
     density = np.exp(-0.5 * (distance + log_det)) / (2 * np.pi)
     return np.asarray(np.log(np.minimum(1.0, density * SHARED_RADIUS2_MM2) + 1e-12) - COST_OF_SHARING)
 
 
 def _in_use(states: _States, lines: Lines) -> BoolArray:
-    """Which strokes, by their number, serve an edge already (s, strokes)."""
+    """Return which strokes, by their number, serve an edge already (s, strokes)."""
     used = np.zeros((len(states.score), int(lines.members.max(initial=0)) + 1), dtype=bool)
     state, edge = np.nonzero(states.stroke >= 0)
     used[state[:, None], lines.members[states.stroke[state, edge]]] = True
@@ -507,7 +507,7 @@ def _in_use(states: _States, lines: Lines) -> BoolArray:
 
 
 def _explains_run_on(states: _States, state: int, edge: int, row: int, problem: _AssignmentProblem) -> bool:
-    """Whether the edge lies where a stroke runs on past the edges that it was taken for."""
+    """Return whether the edge lies where a stroke extends past the edges assigned to it."""
     place = (states.beliefs.at[state] * np.conj(problem.lines.along[row])).real.tolist()
     stroke, pieces = states.stroke[state].tolist(), set(problem.lines.members[row].tolist())
     low, high = sorted((place[problem.edges[edge].tail], place[problem.edges[edge].head]))
@@ -520,7 +520,7 @@ def _explains_run_on(states: _States, state: int, edge: int, row: int, problem: 
 
 
 def _log_chance(spans: Spans, lines: Lines) -> FloatArray:
-    """(s,) log density of strokes of about an edge's length that lie there for other reasons.
+    """Return (s,) log density of chance strokes of about an edge's length in its position.
 
     Per mm across, per mm along, per radian and per mm of length: letters and arrowheads crowd about
     nodes, so that a short stroke in the right place is weak evidence.
@@ -536,12 +536,12 @@ def _log_chance(spans: Spans, lines: Lines) -> FloatArray:
 
 
 def _missed(size_mm: FloatArray) -> FloatArray:
-    """Probability that a drawn edge of this length has no stroke of its own."""
+    """Return the probability that a drawn edge of this length has no stroke of its own."""
     return np.interp(size_mm, [1.0, 2.0, 4.0, 8.0], [0.7, 0.4, 0.12, 0.04])
 
 
 def _after(states: _States, edge: int, choices: _Choices, beam: int, problem: _AssignmentProblem) -> _States:
-    """The best states of each figure after the choices, best first, each set of strokes once."""
+    """Return the best states of each figure after the choices, best first, each set of strokes once."""
     figure = states.figure[choices.state]
     order = np.lexsort((-choices.score, figure))
     order = order[_first_of_each(figure[order], 2 * beam)]
@@ -566,6 +566,6 @@ def _after(states: _States, edge: int, choices: _Choices, beam: int, problem: _A
 
 
 def _first_of_each(sorted_figures: IntArray, count: int) -> BoolArray:
-    """Which rows are among the first so many of their figure."""
+    """Return which rows are among the first `count` of their figure."""
     rank = np.arange(len(sorted_figures)) - np.searchsorted(sorted_figures, sorted_figures)
     return np.asarray(rank < count)

@@ -16,39 +16,39 @@ from reference.geometry import ComplexArray
 Float32Array = NDArray[np.float32]
 
 ROUNDS = 6
-"""Of the fit, each with half a step of the ends' moments."""
+"""Rounds of the fit, each with half a step of the ends' moments."""
 LEAST_REDRAW_MM, MOST_REDRAW_MM = 0.12, 0.6
 """Bounds of the redraw error, a stroke's distance from its nodes: a sharp pencil, a careless student."""
 USUAL_REDRAW_MM = 0.25
-"""The redraw error as long as nothing is known of the sheet."""
+"""The redraw error while nothing is known about the sheet."""
 REDRAW_WEIGHT = 4.0
 """The usual redraw error counts as much as this many spare observations."""
 SHARED_MM = 0.5
 """Standard error of a stroke that serves two edges, as a distance from their nodes."""
 WIDE_MM = 0.7
-"""An end's density that is wider than this has several maxima, and its mean lies between them."""
+"""An end's density wider than this has several maxima, with its mean between them."""
 AT_MM = 0.2
-"""Standard error of an end at its node, beside the error of the end in the ink."""
+"""Standard error of an end at its node, in addition to the error of the end in the ink."""
 HIDDEN_MM = 0.5
-"""Standard errors above this say that other ink goes on beyond the end."""
+"""Standard errors above this mean that other ink continues beyond the end."""
 END_REACH_MM = 5.0
-"""An end that is farther from a node is not about it."""
+"""An end farther from a node does not belong to it."""
 CENTRE_MM = 0.2
-"""Standard error of a node by the centre of the circle drawn around it, on each axis: on real drawings lines
-miss the centres by 0.26 mm in the median, which is 0.22 mm on each axis."""
+"""Standard error of a node by the centre of the circle around it, on each axis: on real drawings lines miss
+the centres by 0.26 mm in the median, which is 0.22 mm on each axis."""
 SUREST = 0.9
-"""Largest probability of all tips near a node together: with 0.97, and as much for each tip, six instead
-of four of 1,042 vectors were misread."""
+"""Largest probability of all tips near a node together: with 0.97, and as much for each tip, six instead of
+four of 1,042 vectors were misread."""
 TIP_REACH_MM = 3.5
-"""A tip that is farther from a node is not about it."""
+"""A tip farther from a node does not belong to it."""
 THROUGH = 0.02
-"""Density per mm of strokes that run on past a node, beyond reach."""
+"""Density per mm of strokes that extend past a node, beyond reach."""
 TIED_MM = 0.02
 """Standard error of the distance between nodes that lie at one point."""
 BUNDLE_COSINE = 0.87
-"""Of 30 degrees: strokes at less lie on one another for 1 mm and more from their node."""
+"""Cosine of 30 degrees: strokes at less overlap for 1 mm and more from their node."""
 SPREAD = 0.7
-"""Factor of the model's standard errors: with it, errors of rightly read lengths have a root mean square of
+"""Factor of the model's standard errors: with it, errors of correctly read lengths have a root mean square of
 0.8 to 0.95 of their standard errors on sheets drawn by two simulations."""
 LOOSE_MM = 6.0
 """Standard error of the prior, which is needed only for nodes without strokes."""
@@ -59,14 +59,14 @@ NORMAL = np.exp(-0.5 * GRID**2).astype(np.float32)
 
 @dataclass(frozen=True, slots=True)
 class EndDensity:
-    """Where strokes end about their nodes: at it, run on a little or far, or short of it.
+    """The density of strokes' ends near their nodes: at it, a little or far beyond, or short of it.
 
     Attributes
     ----------
     at_mm : standard error of an end at its node
-    shares : of ends at the node, run on a little, run on far, and short of it
+    shares : of ends at the node, a little beyond, far beyond, and short of it
     reach_mm : mean lengths of the last three
-    merged_shares, merged_reach_mm : the same two where other ink hides the end
+    merged_shares, merged_reach_mm : the same two if other ink hides the end
     """
 
     at_mm: float = AT_MM
@@ -94,9 +94,9 @@ class EndDensity:
 
 
 PLAN_ENDS = EndDensity()
-"""Of a plan's vectors, whose strokes end at their nodes or run on past them."""
+"""For a plan's vectors, whose strokes end at their nodes or extend past them."""
 LINK_ENDS = EndDensity(1.5, (0.7, 0.1, 0.1, 0.1), (2.0, 6.0, 3.0), (0.7, 0.1, 0.1, 0.1), (2.0, 6.0, 3.0))
-"""Of a sketch's links, which stop at joint circles, short of the joint by the circle's radius."""
+"""For a sketch's links, which stop at joint circles, short of the joint by the circle's radius."""
 
 
 def _columns(values: tuple[float, ...]) -> FloatArray:
@@ -128,16 +128,16 @@ class _Taken:
     shared: BoolArray
 
     def from_middle(self, at: ComplexArray) -> ComplexArray:
-        """(k, 2) tail and head as seen from the stroke's middle: x along the stroke, y to its left, mm."""
+        """Return (k, 2) tail and head relative to the stroke's middle: x along it, y to its left, mm."""
         from_middle = at[self.nodes] - self.lines.middle[:, None]
         return np.asarray(from_middle * np.conj(self.lines.along)[:, None])
 
 
 @dataclass(frozen=True, slots=True)
 class _LineRows:
-    """Observations (r,): a node lies on a stroke's line: `design` @ nodes should equal `goal`, to `sigma` mm.
+    """Observations (r,) that a node lies on a stroke's line: `design` @ nodes equals `goal`, to `sigma` mm.
 
-    `own` where the stroke is this edge's alone: then the redraw error is added.
+    `own` if the stroke serves this edge alone: then the redraw error is added.
     """
 
     design: FloatArray
@@ -148,10 +148,10 @@ class _LineRows:
 
 @dataclass(frozen=True, slots=True)
 class _EndRows:
-    """Observations (r,): a stroke ends about a node: along its outward direction, `design`, it ends at `end`.
+    """Observations (r,) that a stroke ends near a node: along its outward direction, `design`, at `end`.
 
-    `end` is nan where the stroke runs on beyond reach. `tip` and `sure` (r, t): where the vector itself
-    seems to end, by an arrowhead or what else marks the node.
+    `end` is nan if the stroke extends beyond reach. `tip` and `sure` (r, t): possible ends of the vector
+    itself, by an arrowhead or another mark of the node.
     """
 
     design: FloatArray
@@ -175,11 +175,11 @@ def fit_nodes(
     density: EndDensity = PLAN_ENDS,
     centres: Mapping[int, complex] | None = None,
 ) -> NodeFit:
-    """Weighted least squares over all strokes taken, with large residuals held back.
+    """Fit nodes by weighted least squares over all strokes taken, with large residuals down-weighted.
 
-    A stroke's end near its node may be the node or a line run on past it. Each end's own density is
-    replaced by a Gaussian with the moments that it has in the light of everything else (expectation
-    propagation; Minka 2001), so that the covariance contains the doubt about ends.
+    A stroke's end near its node may be the node or a line extended past it. Each end's own density is
+    replaced by a Gaussian with its moments given everything else (expectation propagation; Minka 2001), so
+    that the covariance contains the doubt about ends.
 
     Arguments: `centres` of circles drawn around nodes, by node.
     """
@@ -209,17 +209,17 @@ def fit_nodes(
 
 
 def _repeated(ends: _EndRows) -> FloatArray:
-    """Share of each end's evidence that other ends of its bundle give already.
+    """Return the share of each end's evidence that other ends of its bundle already give.
 
-    Strokes that reach a node side by side run into one another's ink, and end by mistake together:
-    for the covariance all their ends count as one.
+    Strokes that reach a node side by side merge their ink, and end wrongly together: for the covariance all
+    their ends count as one.
     """
     bundled = ends.design @ ends.design.T > BUNDLE_COSINE
     return np.asarray(1.0 - 1.0 / np.maximum(bundled.sum(axis=1), 1))
 
 
 def _redraw(residual_mm: FloatArray, unknowns: int) -> float:
-    """The redraw error of this figure, mm, from the residuals beyond the unknowns."""
+    """Return the redraw error of this figure, mm, from the residuals beyond the unknowns."""
     spare = len(residual_mm) - unknowns
     if spare <= 0:
         return USUAL_REDRAW_MM
@@ -233,7 +233,7 @@ def _redraw(residual_mm: FloatArray, unknowns: int) -> float:
 def _renewed(
     sites: _Sites, ends: _EndRows, state: FloatArray, cov: FloatArray, density: EndDensity
 ) -> _Sites:
-    """Half a step towards the moments of each end's own density in the light of everything else."""
+    """Return half a step towards the moments of each end's own density given everything else."""
     if not len(ends.end):
         return sites
     mean = ends.design @ state
@@ -279,14 +279,14 @@ def _taken(assignment: StrokeAssignment, lines: Lines) -> _Taken:
 
 
 def _design(nodes: IntArray, direction: ComplexArray, count: int) -> FloatArray:
-    """(r, 2n) rows that give the coordinate of a node along a direction, of x and y of n nodes in turn."""
+    """Return (r, 2n) rows that give a node's coordinate along a direction, of x and y of n nodes in turn."""
     design, row = np.zeros((len(nodes), 2 * count)), np.arange(len(nodes))
     design[row, 2 * nodes], design[row, 2 * nodes + 1] = direction.real, direction.imag
     return design
 
 
 def _line_rows(assignment: StrokeAssignment, taken: _Taken, centres: Mapping[int, complex]) -> _LineRows:
-    """Nodes on their strokes' lines, tied nodes at one point, nodes at the centres of their circles."""
+    """Return rows for nodes on their strokes' lines, tied nodes, and nodes at their circles' centres."""
     at, lines = assignment.expected.at, taken.lines
     across = np.repeat(1j * lines.along, 2)
     loose = np.where(taken.shared, SHARED_MM, 0.0)
@@ -313,12 +313,12 @@ def _line_rows(assignment: StrokeAssignment, taken: _Taken, centres: Mapping[int
 
 
 def _both_axes(nodes: IntArray, count: int) -> FloatArray:
-    """(2r, 2n) rows that give the coordinates of nodes, along x and along y of each node in turn."""
+    """Return (2r, 2n) rows that give the coordinates of nodes, along x and along y of each node in turn."""
     return _design(np.repeat(nodes, 2), np.tile([1.0 + 0j, 1j], len(nodes)), count)
 
 
 def _end_rows(taken: _Taken, at: ComplexArray) -> _EndRows:
-    """Ends of strokes that serve one edge, and tips on any stroke, that lie within reach of a node."""
+    """Return rows for ends of strokes that serve one edge, and tips on any stroke, within reach of a node."""
     lines, rows, slots = taken.lines, np.arange(len(taken.edge)), []
     for slot in (0, 1):
         node, other = at[taken.nodes[:, slot]], at[taken.nodes[:, 1 - slot]]
@@ -341,7 +341,7 @@ def _end_rows(taken: _Taken, at: ComplexArray) -> _EndRows:
         ))  # fmt: skip
     every = _EndRows(*(np.concatenate(parts) for parts in zip(*slots, strict=True)))
     near = np.flatnonzero(np.isfinite(every.end) | every.sure.any(axis=1))
-    # Columns of tips that say nothing are left out.
+    # Columns of tips without evidence are left out.
     most = int(np.count_nonzero(every.sure[near], axis=1).max(initial=0))
     first = np.argsort(-every.sure[near], axis=1, kind="stable")[:, :most]
     tip, sure = (np.take_along_axis(values[near], first, axis=1) for values in (every.tip, every.sure))

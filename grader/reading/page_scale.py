@@ -1,8 +1,7 @@
-"""What a drawing tells of its page: the scale, and which way up it is.
+"""Infer from a drawing its page's scale and orientation.
 
 The links of the sketch, v_A and a_A are known from the variant and the declared scales. Each may be drawn
-wrongly; all of them longer or shorter by one factor say that the page's millimetres are not what its
-registration takes them for.
+wrongly; if all are longer or shorter by one factor, the registration's millimetres are wrong.
 """
 
 import cmath
@@ -17,47 +16,47 @@ from reference.construction.graph import evaluate, pair
 from reference.construction.mistakes import Drawing
 
 DRAWN_MM = 0.35
-"""Standard error of a length set off and drawn by a student, beside that of its reading: its two ends."""
+"""Standard error of a length drawn by a student, in addition to that of its reading: its two ends."""
 SAME_DEVICE = 0.002
-"""Pages that registration has at so nearly the same resolution went through one scanner or copier."""
+"""Pages whose registered resolutions differ by no more than this went through one scanner or copier."""
 LEAST_MM = 15.0
-"""A shorter length tells less than other evidence."""
+"""A shorter length is weaker than other evidence."""
 SAME_LINKS = 0.002
-"""Links of one sketch are drawn with one ruler, and at one scale: together they are no surer than this."""
+"""Links of one sketch are drawn with one ruler, at one scale: together they are no surer than this."""
 STRAY, STRAY_DENSITY = 0.1, 2.0
-"""Probability that a length is off by a mistake of its own, and its density over the factor's logarithm."""
+"""Probability that a length is wrong by its own mistake, and its density over the factor's logarithm."""
 TOGETHER, TOGETHER_SPREAD = 0.01, 0.02
-"""The same of all of them by one factor, as by compasses that the crank's length set; how far off."""
+"""Probability that all are wrong by one factor, as by compasses set to the crank's length; its spread."""
 WRONG, WRONG_SPREAD = 0.002, 0.03
-"""Probability that a plain page's registration is off by more than its standard error says; how far."""
+"""Probability that a plain page's registration is wrong by more than its standard error; its spread."""
 WIDEST, STEP = 0.15, 0.0005
-"""Factors that are tried, by their logarithm: a page off by more has no figure that is read."""
+"""Factors to try, by their logarithm: a page outside the range has no readable figure."""
 CLUSTER = 0.01
-"""Factors that differ by less are of one explanation."""
+"""Factors that differ by less belong to one explanation."""
 RIVAL = 0.05
-"""Other factors of such a probability together are what lengths may be off by: half-way is none of them."""
+"""If other factors together are this probable, lengths may be off by as much; no factor is half-way."""
 UNKNOWN, SURELY = "scale_unknown", 0.008
-"""A problem of registration, and the standard error at which a drawing answers it."""
+"""A problem of registration, and the standard error at which a drawing settles it."""
 ENOUGH = 2
-"""So many lengths of different figures answer it; one alone may be drawn wrongly."""
+"""Number of lengths of different figures that settle it; one alone may be drawn wrongly."""
 NEGLIGIBLE = 0.001
-"""Scales that differ by less are one: 0.1 mm in 100 mm."""
+"""Scales that differ by less are the same: 0.1 mm in 100 mm."""
 TELLING = 1.4
-"""The scale's standard error counts as another from this factor on."""
+"""Factor from which the scale's standard error counts as changed."""
 UPRIGHT_UNSURE = "upright_unsure"
-"""A problem of registration: neither title block nor letters tell which way up the page is."""
+"""A problem of registration: neither title block nor letters show which way up the page is."""
 UPSIDE_DOWN_RAD = math.radians(135.0)
-"""Figures turned by more lie the other way up: nobody turns a drawing so far on its sheet."""
+"""Figures turned by more are upside down: nobody turns a drawing so far on its sheet."""
 BY_PLANS = 0.85
-"""Most confidence in what is read on a page whose plans alone tell which way up it is: a person looks."""
+"""Highest confidence on a page whose plans alone show which way up it is: a person checks it."""
 
 
 def is_upside_down(reading: Reading, drawing: Drawing | None) -> bool:
-    """Whether two figures of a page lie as on a sheet turned by half.
+    """Return whether two figures of a page lie as on a sheet turned by half.
 
-    One alone may have been drawn so: a sense is easily reversed.
+    A single one may have been drawn so: a sense is easily reversed.
 
-    Arguments: `drawing` is what the student was to draw; without it nothing tells.
+    Arguments: `drawing` is the student's right drawing; without it the answer is False.
     """
     if drawing is None:
         return False
@@ -72,12 +71,12 @@ def is_upside_down(reading: Reading, drawing: Drawing | None) -> bool:
 
 
 def turn_doubts(page: ScannedPage) -> tuple[Reason, ...]:
-    """What registration says of not knowing which way up a page is."""
+    """Return registration's doubts about which way up a page is."""
     return tuple(problem for problem in page.problems if problem.code == UPRIGHT_UNSURE)
 
 
 def no_surer_than_turn(reading: Reading, page: ScannedPage) -> Reading:
-    """A page's reading, with nothing asserted where its plans alone told which way up the page is."""
+    """Limit the confidences of a page whose plans alone showed which way up it is."""
     if page.ref.turn_deg is None or not turn_doubts(page):
         return reading
     figures = {}
@@ -93,11 +92,11 @@ def no_surer_than_turn(reading: Reading, page: ScannedPage) -> Reading:
 
 
 OTHER_RAD = math.radians(4.0)
-"""A link turned by more against the others is another variant's, or drawn wrongly: no hand misses so far."""
+"""A link turned by more against the others is another variant's, or drawn wrongly."""
 
 
 def is_drawn_otherwise(reading: Reading, drawing: Drawing) -> bool:
-    """Whether the sketch has a link in another direction than it should, against the others."""
+    """Return whether the sketch has a link in another direction than it should, relative to the others."""
     sketch = reading.figures.get(MECHANISM)
     links = drawing.construction.links
     turns = [] if sketch is None else [cmath.phase(turn) for turn in _turns(sketch, links, drawing)]
@@ -106,7 +105,7 @@ def is_drawn_otherwise(reading: Reading, drawing: Drawing) -> bool:
 
 
 def _turns(figure: Figure, ends: Mapping[str, tuple[str, str]], drawing: Drawing) -> list[complex]:
-    """Of each line between nodes that were read: drawn times the conjugate of expected."""
+    """Return for each line between read nodes: drawn times the conjugate of expected."""
     nodes = evaluate(drawing.construction, drawing.parameters)
     return [
         (figure.nodes[head].at - figure.nodes[tail].at)
@@ -118,13 +117,13 @@ def _turns(figure: Figure, ends: Mapping[str, tuple[str, str]], drawing: Drawing
 
 @dataclass(frozen=True, slots=True)
 class PageScale:
-    """What the drawing says of a page's scale.
+    """The scale of a page according to the drawing.
 
     Attributes
     ----------
-    factor : by which lengths on the page are longer than they were taken for
-    se : relative standard error of lengths after that
-    by : the lengths that tell it
+    factor : ratio of the true lengths on the page to the registered ones
+    se : relative standard error of lengths after correction
+    by : the lengths that determine it
     """
 
     factor: float
@@ -134,7 +133,7 @@ class PageScale:
 
 @dataclass(frozen=True, slots=True)
 class _Length:
-    """A length's logarithm of the right one to the one drawn, with its standard error."""
+    """The log ratio of a right length to the drawn one, with its standard error."""
 
     name: str
     off: float
@@ -147,15 +146,15 @@ def at_drawn_scales(
     drawing: Drawing | None,
     declared: Collection[str],
 ) -> list[ScannedPage] | None:
-    """The pages at the scales that their drawings tell, to be read again; None where nothing changes.
+    """Return the pages at the scales of their drawings, to be read again; None if nothing changes.
 
-    A page of which registration does not know the scale is refused where its drawing does not tell it.
+    A page of unknown scale is refused if its drawing does not determine it.
 
     Arguments
     ---------
     readings : of each page, at the scale of its registration
-    drawing : what the student was to draw, at the declared scales; None where that is not known
-    declared : the scales that were surely declared, by name; the lengths of others tell nothing
+    drawing : the student's right drawing, at the declared scales; None if that is not known
+    declared : the scales that were surely declared, by name; lengths at other scales are not used
     """
     result = []
     for page in pages:
@@ -170,7 +169,7 @@ def at_drawn_scales(
 
 
 def _at_drawn_scale(page: ScannedPage, sheet: Sheet, shown: PageScale | None) -> ScannedPage:
-    """A page with what the drawing says of its scale; the page itself where that is nothing new."""
+    """Return a page with the scale of its drawing; the page itself if that changes nothing."""
     unknown = next((problem for problem in page.problems if problem.code == UNKNOWN), None)
     if unknown is not None and (shown is None or shown.se > SURELY or len(shown.by) < ENOUGH):
         why = {**unknown.parameters, "advice": "not_by_drawing"}
@@ -192,7 +191,7 @@ def _at_drawn_scale(page: ScannedPage, sheet: Sheet, shown: PageScale | None) ->
 
 
 def _is_news(shown: PageScale, sheet: Sheet) -> bool:
-    """Whether a page is to be read again with this scale."""
+    """Return whether a page must be read again with this scale."""
     is_other = abs(shown.factor - 1.0) > max(NEGLIGIBLE, 0.5 * shown.se)
     ratio = max(shown.se, NEGLIGIBLE) / max(sheet.scale_se, NEGLIGIBLE)
     return is_other or not 1.0 / TELLING < ratio < TELLING
@@ -205,7 +204,7 @@ def _lengths(
     drawing: Drawing,
     declared: Collection[str],
 ) -> list[_Length]:
-    """The lengths that tell a page's scale: its own, and those of pages made in the same way."""
+    """Return the lengths that determine a page's scale: its own, and those of pages made in the same way."""
     found: list[_Length] = []
     for page, reading in zip(pages, readings, strict=True):
         other = page.sheet
@@ -216,7 +215,7 @@ def _lengths(
 
 
 def _page_scale(lengths: Sequence[_Length], scale_se: float) -> PageScale:
-    """By Bayes: the registration's scale, or any other, with lengths of which some may be drawn wrongly."""
+    """Infer by Bayes the registration's scale, or another, from lengths that may be drawn wrongly."""
     off = np.arange(-WIDEST, WIDEST + STEP / 2.0, STEP)
     likely = np.ones_like(off)
     for one in lengths:
@@ -239,7 +238,7 @@ def _normal(off: FloatArray, se: float) -> FloatArray:
 
 
 def _links(reading: Reading, drawing: Drawing) -> Iterator[tuple[str, _Length]]:
-    """The sketch's links of given length, as one: a scale of their own moves them all."""
+    """Yield the sketch's links of given length, as one: a scale of their own changes them all."""
     nodes = reading.figures[MECHANISM].nodes if MECHANISM in reading.figures else {}
     found: list[_Length] = []
     for name, (tail, head) in drawing.construction.links.items():
@@ -258,7 +257,7 @@ def _links(reading: Reading, drawing: Drawing) -> Iterator[tuple[str, _Length]]:
 
 
 def _givens(reading: Reading, drawing: Drawing, scale_se: float) -> Iterator[tuple[str, _Length]]:
-    """The vectors that are given at the start of each plan; `scale_se` is the page's, which theirs have."""
+    """Yield the given vectors at the start of each plan; `scale_se` is the page's, which they share."""
     for vector in drawing.construction.vectors.values():
         real = given_length(drawing.parameters, vector.name)
         for figure in reading.figures.values():
@@ -271,7 +270,7 @@ def _givens(reading: Reading, drawing: Drawing, scale_se: float) -> Iterator[tup
 
 
 def given_length(parameters: Mapping[str, FloatArray], vector: str) -> float | None:
-    """The size of a vector that is given at the start of a plan, SI; None of one that is to be found."""
+    """Return the size of a vector given at the start of a plan, SI; None for one that must be found."""
     if vector in parameters:
         return abs(_scalar(parameters[vector]))
     if f"{vector}_n" in parameters:
@@ -284,6 +283,6 @@ def _scalar(value: FloatArray) -> float:
 
 
 def _length(name: str, expected_mm: float, drawn_mm: float, se_mm: float) -> Iterator[_Length]:
-    """A length long enough to tell the scale."""
+    """Yield a length if it is long enough to determine the scale."""
     if min(expected_mm, drawn_mm) > LEAST_MM:
         yield _Length(name, math.log(expected_mm / drawn_mm), math.hypot(se_mm, DRAWN_MM) / expected_mm)

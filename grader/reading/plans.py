@@ -1,4 +1,4 @@
-"""A velocity or acceleration plan: each hypothesis of how it was drawn is compared with the strokes."""
+"""Read a velocity or acceleration plan by comparing each hypothesis of how it was drawn with the strokes."""
 
 import math
 from collections.abc import Collection, Hashable, Mapping, Sequence
@@ -49,38 +49,38 @@ BY_LETTERS = "by letters"
 """Label of the hypotheses that follow letters and strokes instead of the construction."""
 COST_OF_GRAPH = 6.0
 LETTERED_MM = 2.0
-"""Nats for such a hypothesis, and standard error of its nodes along x and y before strokes are assigned."""
+"""Standard error of the nodes of such a hypothesis along x and y before strokes are assigned."""
 COST_OF_ODD_NODE = 4.0
-"""Nats for a node that is not where the construction puts it from the student's own: one of fifty."""
+"""Nats for a node that is not where the construction puts it from the student's own nodes: one in fifty."""
 EXPLAINED = 0.85
-"""A regular plan supported over more of its length is what was drawn."""
+"""A regular plan supported over more of its length is taken as drawn."""
 ODD_NODE_NATS = 1.5
-"""Nats of letters that each such node needs: without letters, others would do as well."""
+"""Nats of letters that each such node needs: without letters, others would fit as well."""
 FOREIGN_PRIMES = 2
-"""So many primes beside the nodes of a velocity plan say that it is the acceleration plan: of 30 simulated
+"""This many primes beside the nodes of a velocity plan mean that it is the acceleration plan: of 30 simulated
 ones one had a prime near it, of 30 acceleration plans 26 had two and more."""
 FAR_WORSE = 30.0
-"""Nats: letters do not make up for more."""
+"""Largest deficit in nats that letters make up for."""
 QUARTERS = (np.pi / 2, -np.pi / 2, np.pi)
 """A plan may be turned as a whole: velocities are perpendicular to links."""
 COST_OF_TURN = 6.0
 COST_OF_SIZE = 4.0
 """Nats for a plan turned by quarters, and for one at a scale that was not declared."""
 SAME_SIZE = 0.06
-"""Of a size's logarithm: a drawn crank and a ruler agree no better."""
+"""Tolerance of a size's logarithm: a drawn crank and a ruler agree no better."""
 POOR = 0.7
 """A plan supported over less of its length may be another one, drawn with a mistake."""
 CLEARLY = 0.08
-"""Share of the length by which a mistaken plan must be supported better to be laid elsewhere."""
+"""Share of the length by which a mistaken plan must be better supported to be placed elsewhere."""
 BEAM_OF_MISTAKES = 4
-"""Beam of the search where all vectors that the mistake does not affect are fixed."""
+"""Beam of the search if all vectors that the mistake does not affect are fixed."""
 SMALLEST_MM, LARGEST_MM = 20.0, 280.0
 LEAST_FIRST_MM = 15.0
-"""Of a plan's longest vector, and of its first one: what fits on a sheet and can be measured."""
+"""Least length of a plan's longest vector, and of its first one: it fits on a sheet and can be measured."""
 LEAST_LAID_MM = 4.0
-"""A plan is not laid on shorter strokes: they are letters."""
+"""A plan is not placed on shorter strokes: they are letters."""
 SPECK_MM = 1e-6
-"""A plan no larger is a point: there is nothing to lay."""
+"""A smaller plan is a point: there is nothing to place."""
 FARTHEST_MM = 2000.0
 """Nodes farther away are on no sheet: with a mistake, lines may be nearly parallel."""
 VAGUE_MM = 500.0
@@ -92,17 +92,17 @@ LEAST_VISIBLE_MM = 2.5
 LONG_MM = 8.0
 """A vector that is too long to be overlooked."""
 RIVALS = 25
-"""Explanations that the confidences are computed from; the others weigh next to nothing."""
+"""Number of explanations used for the confidences; the others weigh next to nothing."""
 BEAM_OF_DOUBTS = 3
 LEAST_DOUBT = 15.0
-"""Nats: an explanation without a stroke that is worse by more is no rival."""
+"""Nats: an explanation without a stroke that is worse by more is not a rival."""
 SURE_MM = 30.0
 """Longer vectors are not taken for others when a neighbour's stroke is doubted."""
 ALTERNATIVES = 4
 NEARLY = 8.0
-"""So many explanations of one pose are rivals, and none that is worse by more nats."""
+"""Most explanations of one pose that are rivals, and none that is worse by more nats."""
 ASTRAY_MM = 0.8
-"""A node this far off its stroke may be another node."""
+"""A node this far from its stroke may be another node."""
 MARGIN_MM = 12.0
 """Lines whose middle is farther from a plan's box are not its strokes."""
 
@@ -116,8 +116,8 @@ class PlanProblem:
     lines : of the sheet
     figure : which plan
     given : nodes already read (mechanism, velocity plan), complex mm, y up
-    letters : of the sheet, None where they were not looked for
-    renamed : what students write for a node, by name, where it is not the name
+    letters : of the sheet, None if they were not looked for
+    renamed : what students write for a node, by name, if it is not the name
     elsewhere : strokes, by their number, that belong to the sketch
     look : tells where nodes lie by the sheet's ink
     """
@@ -136,7 +136,7 @@ class PlanProblem:
         return self.lines.take(np.flatnonzero(~np.isin(self.lines.members, self.elsewhere).any(axis=1)))
 
     def expected(self, hypothesis: PlanHypothesis) -> Expected | None:
-        """The plan about its own pole; None where it cannot be drawn."""
+        """Return the plan about its own pole; None if it cannot be drawn."""
         edges = vectors_of(tied(hypothesis), self.figure, hypothesis.absent)
         expected = expect(hypothesis.drawing, self.figure, self.given, DRAFTING_ERRORS, edges)
         known = np.abs(expected.at).max() < FARTHEST_MM and expected.cov.max() < VAGUE_MM**2
@@ -150,7 +150,7 @@ class PlanReading:
     Attributes
     ----------
     hypothesis, pose : how it was drawn and where
-    placed : what was expected there before strokes were assigned
+    placed : the expectation there before strokes were assigned
     assignment, lines : strokes by vector, and the lines whose rows it names
     score : log likelihood ratio less costs, nats
     rivals : other explanations, best first
@@ -175,13 +175,13 @@ class PlanReading:
 
     @property
     def members(self) -> IntArray:
-        """The strokes that it takes, by their number."""
+        """The numbers of the strokes that it takes."""
         stroke = self.assignment.stroke
         return np.unique(self.lines.members[stroke[stroke >= 0]])
 
     @property
     def strokes(self) -> Hashable:
-        """Which stroke it takes for which vector."""
+        """The assignment of strokes to vectors, as a key."""
         stroke = self.assignment.stroke
         taken = np.full((len(stroke), self.lines.members.shape[1]), -1)
         taken[stroke >= 0] = self.lines.members[stroke[stroke >= 0]]
@@ -189,7 +189,7 @@ class PlanReading:
 
 
 def regular_plans(problem: PlanProblem, drawing: Drawing) -> list[PlanReading]:
-    """Readings of a plan as it should be drawn, best first.
+    """Return readings of a plan as it should be drawn, best first.
 
     Arguments: `drawing` has the construction and the parameters of the student's variant.
     """
@@ -206,12 +206,12 @@ def regular_plans(problem: PlanProblem, drawing: Drawing) -> list[PlanReading]:
 
 
 def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) -> PlanReading | None:
-    """The best reading of a plan; the others are its rivals.
+    """Return the best reading of a plan; the others are its rivals.
 
-    Where the regular plans leave something open, mistakes are made in the best of them, and the plan is
-    read as a lettered graph.
+    If the regular plans leave something open, mistakes are tried in the best of them, and the plan is read as
+    a lettered graph.
 
-    Arguments: `plans`, the regular ones, best first; `drawing`, what the student was to draw.
+    Arguments: `plans`, the regular ones, best first; `drawing`, the student's right drawing.
     """
     everything = list(plans)
     if plans:
@@ -235,7 +235,7 @@ def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) 
 
 
 def _anywhere(problem: PlanProblem, hypotheses: Sequence[PlanHypothesis]) -> list[PlanReading]:
-    """Readings of some hypotheses wherever they may lie, best first."""
+    """Return readings of some hypotheses in any position, best first."""
     cases: list[_PlanCase] = []
     for hypothesis in hypotheses:
         expected = problem.expected(hypothesis)
@@ -245,9 +245,9 @@ def _anywhere(problem: PlanProblem, hypotheses: Sequence[PlanHypothesis]) -> lis
 
 
 def _poses(expected: Expected, lines: Lines) -> list[Pose]:
-    """Where the plan may lie: upright at the size expected, upright at any size, turned by quarters.
+    """Return possible poses: upright at the expected size, upright at any size, turned by quarters.
 
-    Each search has poses of its own: a plan of nearly parallel vectors fits a bundle at any size.
+    Each search has its own poses: a plan of nearly parallel vectors fits a bundle at any size.
     """
     largest = max(expected.length_mm(edge) for edge in expected.edges)
     if largest < SPECK_MM:
@@ -265,7 +265,7 @@ def _poses(expected: Expected, lines: Lines) -> list[Pose]:
 
 
 def _better_poses(expected: Expected, lines: Lines, than: Pose) -> list[Pose]:
-    """Poses at which a mistaken plan has clearly more support by strokes than the regular one."""
+    """Return poses at which a mistaken plan has clearly more support by strokes than the regular one."""
     search = Search(turns_rad=tuple({0.0, than.turn_rad}), sizes=tuple({1.0, than.size}))
     laid = poses(expected, lines.take(lines.length > LEAST_LAID_MM), search, count=2)
     return [pose for pose in laid if pose.score > than.score + CLEARLY]
@@ -275,7 +275,7 @@ def _better_poses(expected: Expected, lines: Lines, than: Pose) -> list[Pose]:
 
 
 def _leaves_long_ones(plan: PlanReading) -> bool:
-    """Whether a vector too long to be overlooked has no stroke."""
+    """Return whether a vector too long to be overlooked has no stroke."""
     expected = plan.assignment.expected
     return any(
         row < 0 and expected.length_mm(edge) > LONG_MM
@@ -286,10 +286,10 @@ def _leaves_long_ones(plan: PlanReading) -> bool:
 def _with_mistakes(
     problem: PlanProblem, best: PlanReading, bases: Sequence[PlanHypothesis]
 ) -> list[PlanReading]:
-    """The same plan with a mistake made, where the best one lies; elsewhere too if that is poor."""
+    """Return the plan with a mistake, in the best one's position; elsewhere too if that is poor."""
     poor = best.pose.score < POOR and best.hypothesis.label in REGULAR
     suspect = None if poor else _suspects(best)
-    # By its strokes the plan's pole is known better than by its pose.
+    # The strokes give the plan's pole more exactly than the pose does.
     here = replace(best.pose, at=complex(best.assignment.expected.at[0]))
     in_place: list[_PlanCase] = []
     elsewhere: list[_PlanCase] = []
@@ -308,7 +308,7 @@ def _with_mistakes(
 
 
 def _suspects(plan: PlanReading) -> frozenset[str]:
-    """The nodes at which a mistake could explain edges without a stroke, and large residuals."""
+    """Return the nodes at which a mistake could explain edges without a stroke, and large residuals."""
     fit, expected = plan.fit, plan.assignment.expected
     odd: set[str] = set()
     for index, edge in enumerate(expected.edges):
@@ -322,7 +322,7 @@ def _suspects(plan: PlanReading) -> frozenset[str]:
 
 
 def _without_each_stroke(plan: PlanReading) -> list[PlanReading]:
-    """For every edge the best explanation in which the stroke taken for it is not it."""
+    """Return for every edge the best explanation in which it does not have its stroke."""
     assignment = plan.assignment
     edges = assignment.expected.edges
     size = [assignment.expected.length_mm(edge) for edge in edges]
@@ -351,7 +351,7 @@ def _without_each_stroke(plan: PlanReading) -> list[PlanReading]:
 
 
 def _by_letters(problem: PlanProblem, base: PlanHypothesis) -> list[PlanReading]:
-    """Readings of the plan as a lettered graph, whatever the construction says of it."""
+    """Return readings of the plan as a lettered graph, even if the construction contradicts it."""
     construction = base.drawing.construction
     poles = frozenset(construction.poles.values())
     nats = partial(fitting_letters, letters=problem.letters, poles=poles, renamed=problem.renamed)
@@ -376,13 +376,13 @@ def _by_letters(problem: PlanProblem, base: PlanHypothesis) -> list[PlanReading]
 
 
 def _named_by(letters_nats: float, hypothesis: PlanHypothesis) -> float:
-    """Probability that letters tell the names of a graph's nodes: strokes alone fit other names as well."""
+    """Return the probability that letters name a graph's nodes: strokes alone fit other names as well."""
     odd = int((hypothesis.cost - COST_OF_GRAPH) / COST_OF_ODD_NODE) if hypothesis.label == BY_LETTERS else 0
     return 1.0 / (1.0 + math.exp(ODD_NODE_NATS * odd - letters_nats)) if odd else 1.0
 
 
 def _with_letters(problem: PlanProblem, plans: Sequence[PlanReading]) -> list[PlanReading]:
-    """The best readings, what the letters say in their scores, best first, each set of strokes once."""
+    """Return the best readings with the letters in their scores, best first, each set of strokes once."""
     poles = frozenset(plans[0].hypothesis.drawing.construction.poles.values())
     least = max(plan.score for plan in plans) - FAR_WORSE
     scored: dict[Hashable, PlanReading] = {}
@@ -403,7 +403,7 @@ def _with_letters(problem: PlanProblem, plans: Sequence[PlanReading]) -> list[Pl
 
 @dataclass(frozen=True, slots=True)
 class _PlanCase:
-    """A hypothesis at a pose: what is expected of the plan, and the nodes that a mistake affects."""
+    """A hypothesis at a pose: the expected plan, and the nodes that a mistake affects."""
 
     hypothesis: PlanHypothesis
     expected: Expected
@@ -412,26 +412,26 @@ class _PlanCase:
 
     @property
     def has_expected_size(self) -> bool:
-        """Whether the pose has the size that is expected."""
+        """True if the pose has the expected size."""
         return abs(math.log(self.pose.size)) < SAME_SIZE
 
     @property
     def cost(self) -> float:
-        """Nats, how unlikely it is before strokes are considered."""
+        """The prior cost, nats, before strokes are considered."""
         cost = self.hypothesis.cost + (0.0 if self.has_expected_size else COST_OF_SIZE)
         return cost + (0.0 if abs(self.pose.turn_rad) < np.pi / 4 else COST_OF_TURN)
 
     def placed(self) -> Expected:
-        """What is expected there, with the errors that the pose may have."""
+        """The expected plan there, with the possible errors of the pose."""
         if self.hypothesis.label == BY_LETTERS:
             return self.expected
         return self.expected.placed(self.pose, Slack(relative=0.03 if self.has_expected_size else 0.08))
 
 
 def _read(cases: Sequence[_PlanCase], lines: Lines, base: PlanReading | None = None) -> list[PlanReading]:
-    """The best explanations of plans at their poses: several of each, where they are nearly as good.
+    """Return the best explanations of plans at their poses: several of each if they are nearly as good.
 
-    Arguments: `base` is the plan that mistakes were made in; its strokes stay where they do not affect it.
+    Arguments: `base` is the plan in which mistakes were made; its strokes stay if they do not affect it.
     """
     placed = [case.placed() for case in cases]
 
@@ -454,7 +454,7 @@ def _read(cases: Sequence[_PlanCase], lines: Lines, base: PlanReading | None = N
 
 
 def _strokes_among(lines: Lines, plan: PlanReading) -> dict[str, int]:
-    """The strokes of a plan's vectors, by name, as rows of other lines; -1 for none."""
+    """Return the strokes of a plan's vectors, by name, as rows of other lines; -1 for none."""
     row_of = {tuple(pieces): row for row, pieces in enumerate(lines.members.tolist())}
     strokes = {}
     for edge, row in zip(plan.placed.edges, plan.assignment.stroke.tolist(), strict=True):
@@ -465,7 +465,7 @@ def _strokes_among(lines: Lines, plan: PlanReading) -> dict[str, int]:
 
 
 def _unaffected(strokes: Mapping[str, int], placed: Expected, affected_: Collection[str]) -> Constraint:
-    """The strokes of the vectors that a mistake does not affect stay theirs."""
+    """Fix the strokes of the vectors that a mistake does not affect."""
     return Constraint(
         {
             index: strokes[edge.name]
@@ -478,7 +478,7 @@ def _unaffected(strokes: Mapping[str, int], placed: Expected, affected_: Collect
 
 
 def _near(lines: Lines, placed: Sequence[Expected]) -> BoolArray:
-    """Which lines lie about any of the figures."""
+    """Return which lines lie near any of the figures."""
     middle = lines.middle
     near = np.zeros(len(lines), dtype=bool)
     for figure in placed:

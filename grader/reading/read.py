@@ -1,4 +1,4 @@
-"""The reading of a student's sheets: from strokes in millimetres to named vectors with standard errors."""
+"""Read a student's sheets: from strokes in millimetres to named vectors with standard errors."""
 
 import cmath
 import math
@@ -44,11 +44,11 @@ LEAST_PLAN = 12.0
 SURE_PLAN = 40.0
 """Nats from which a plan's strokes belong to no other plan."""
 LEAST_DRAWN_MM, MOST_DRAWN_MM = 15.0, 200.0
-"""Of the vectors given at the start of a plan: what fits on a sheet and can be measured."""
+"""Lengths of the vectors given at the start of a plan: they fit on a sheet and can be measured."""
 SAME_SCALE = 0.95
 """Ratio of the declared scale and the drawn one from which they are the same."""
 WILD = 3.0
-"""Where the drawn scale differs by more than this factor, the declared one was surely not followed."""
+"""If the drawn scale differs by more than this factor, the declared one was surely not followed."""
 Nodes = dict[str, ComplexArray]
 """Nodes already read, complex mm on the sheet, by name."""
 
@@ -73,7 +73,7 @@ def read_figures(
     wanted: Collection[str],
     places: Callable[[InkMap, Sequence[NodeView]], NodePlaces] | None = None,
 ) -> list[Reading]:
-    """Name what was drawn on a student's sheets.
+    """Name the drawn vectors of a student's sheets.
 
     Arguments
     ---------
@@ -115,7 +115,7 @@ def read_figures(
 def _drawings(
     assignment: Assignment, variant: Variant | None, scales: Scales | None
 ) -> tuple[list[Drawing], Callable[[], list[Drawing]]]:
-    """The student's own drawing (any variant's, when it is not known), and other students', if asked for."""
+    """Return the student's own drawing (any variant's, if it is not known), and others' if requested."""
     everybody = assignment.variants()
     if variant is None:
         return drawings(assignment, everybody, scales), list
@@ -124,7 +124,7 @@ def _drawings(
 
 
 def _measurable(drawing: Drawing, assignment: Assignment, variant: Variant | None) -> Drawing:
-    """The drawing at the declared scales, or at the assignment's own where those would not fit the paper."""
+    """Return the drawing at the declared scales, or at the assignment's own if those do not fit the paper."""
     usual = assignment.scales([variant or assignment.variants()[0]])
     parameters = dict(drawing.parameters)
     for vector in drawing.construction.vectors.values():
@@ -143,9 +143,9 @@ def _asks_accelerations(wanted: Collection[str], drawing: Drawing) -> bool:
 
 
 def _at_velocity_scales(drawing: Drawing, at: Nodes) -> list[Drawing]:
-    """The drawing at the velocity scale that the drawn plan follows, and at the one declared.
+    """Return the drawing at the velocity scale of the drawn plan, and at the declared one.
 
-    Normal components are taken from drawn velocities: with a wrong scale they come out wrong.
+    Normal components are taken from drawn velocities: with a wrong scale they become wrong.
     """
     vectors = [v for v in drawing.construction.vectors_of(VELOCITY_PLAN) if v.name in drawing.parameters]
     declared = float(np.ravel(drawing.parameters["kv"])[0])
@@ -171,12 +171,12 @@ def _find_plan(
     known: Nodes,
     renamed: Mapping[str, str],
 ) -> PlanReading | None:
-    """The plan on the sheet that explains it best; it is added to that page.
+    """Find the plan on the sheet that explains it best, and add it to that page.
 
     Arguments: `at_scales`, the drawing at likely scales; `known`, nodes of the plan before.
     """
     laid: list[_LaidPlan] = []
-    # A printed sheet has a place for the plan: there it is looked for first.
+    # A printed sheet has a zone for the plan: it is searched first.
     for page in sorted(pages, key=lambda page: figure not in page.sheet.zones):
         joints, guide_turn = _sketched(page, pages)
         links = page.sketch.members if page.sketch is not None else np.zeros(0, np.int64)
@@ -188,7 +188,7 @@ def _find_plan(
         if figure in page.sheet.zones and any(one.is_explained for one in laid):
             break
     laid.sort(key=lambda one: -one.score)
-    # Where no sheet shows the plan as it should be, a mistaken one may be on either.
+    # If no sheet shows the right plan, a mistaken one may be on either.
     if laid and laid[0].is_explained:
         laid = laid[:1]
     elif figure == VELOCITY_PLAN:
@@ -215,17 +215,17 @@ class _LaidPlan:
 
     @property
     def score(self) -> float:
-        """Of the best one."""
+        """Score of the best one."""
         return self.plans[0].score if self.plans else -math.inf
 
     @property
     def is_explained(self) -> bool:
-        """Whether the best one is what was drawn."""
+        """True if the best one is taken as drawn."""
         return bool(self.plans) and self.plans[0].pose.score > EXPLAINED
 
 
 def _without_accelerations(laid: _LaidPlan) -> _LaidPlan:
-    """The same where the strokes of a surely read acceleration plan are no velocities."""
+    """Exclude the strokes of a surely read acceleration plan from the velocities."""
     accelerations = regular_plans(replace(laid.problem, figure=ACCELERATION_PLAN), laid.drawing)
     if not accelerations or accelerations[0].score < max(SURE_PLAN, laid.score):
         return laid
@@ -234,9 +234,9 @@ def _without_accelerations(laid: _LaidPlan) -> _LaidPlan:
 
 
 def _sketched(page: _PageReading, pages: Sequence[_PageReading]) -> tuple[Nodes, float]:
-    """The joints as drawn and the turn of the guides: of the same sheet's sketch, else of another sheet's.
+    """Return the drawn joints and the turn of the guides: of the same sheet's sketch, else of another's.
 
-    Without a sketch there are no joints, so that the exact ones are taken.
+    Without a sketch there are no joints, and the exact ones are used.
     """
     sketch = next((other.sketch for other in (page, *pages) if other.sketch is not None), None)
     if sketch is None:
@@ -265,7 +265,7 @@ def _nodes(plan: PlanReading) -> Nodes:
 
 
 def _readings(pages: Sequence[_PageReading], drawing: Drawing, wanted: Collection[str]) -> list[Reading]:
-    """One Reading per sheet; what is nowhere is unread on the last sheet."""
+    """Return one Reading per sheet; requested items found nowhere are unread on the last sheet."""
     readings = []
     for page in pages:
         figures: dict[str, Figure] = {}
@@ -298,17 +298,17 @@ def _nowhere(drawing: Drawing, names: Sequence[str]) -> Iterator[Unread]:
 # Named nodes and vectors with their errors ---------------------------------------------------------
 
 BLANK = 0.25
-"""Share of a vector's length that other lines may ink where the vector itself is not drawn."""
+"""Share of a vector's length that other lines may ink if the vector itself is not drawn."""
 INKED = 0.9
-"""Share from which it is drawn, though its stroke is another's too; it is read from its nodes."""
+"""Share from which it is drawn, even if its stroke is another's too; it is read from its nodes."""
 ON_IT_PX = 1
-"""How far beside it such a stroke's ink may begin: of vectors a degree apart only one may be drawn."""
+"""Offset at which such a stroke's ink may begin: of vectors a degree apart only one may be drawn."""
 LEAST_VECTOR_MM = 2.0
 """A shorter vector is read from its nodes, with or without a stroke."""
 
 
 def figure_of_sketch(sketch: SketchReading) -> Figure:
-    """Joints of the mechanism."""
+    """Return joints of the mechanism."""
     fit = sketch.fit
     names = sketch.assignment.expected.names
     nodes = {name: _node(fit, row, within(_node_cov(fit, row))) for row, name in enumerate(names)}
@@ -316,7 +316,7 @@ def figure_of_sketch(sketch: SketchReading) -> Figure:
 
 
 def figure_of_plan(plan: PlanReading, scale_se: float, where: InkMap) -> tuple[Figure, list[Unread]]:
-    """Nodes and vectors of a plan; what is not drawn, with the reason.
+    """Return nodes and vectors of a plan; for those not drawn, the reason.
 
     Arguments: `scale_se` is the sheet's relative standard error of lengths, `where` its ink.
     """
@@ -342,7 +342,7 @@ def figure_of_plan(plan: PlanReading, scale_se: float, where: InkMap) -> tuple[F
 def _no_surer(
     nodes: Mapping[str, ReadNode], vectors: Mapping[str, ReadVector], plan: PlanReading
 ) -> dict[str, ReadNode]:
-    """Nodes with a confidence no higher than that of the surest vector that starts or ends there."""
+    """Limit the nodes' confidence to that of the surest vector that starts or ends there."""
     best = dict.fromkeys(nodes, 0.0)
     for name, read in vectors.items():
         vector = plan.hypothesis.drawing.construction.vectors[name]
@@ -352,7 +352,7 @@ def _no_surer(
 
 
 def _node_cov(fit: NodeFit, index: int) -> FloatArray:
-    """(2, 2) covariance of one node."""
+    """Return (2, 2) covariance of one node."""
     rows = slice(2 * index, 2 * index + 2)
     return fit.cov[rows, rows]
 
@@ -385,7 +385,7 @@ def _vectors(
         if row >= 0:
             off_mm = float(np.abs(fit.residual_mm[index]).max())
             signs = replace(signs, off_mm=off_mm, marked=_marked(plan, fit, edge, row))
-        # No sign on the sheet makes a long vector surer than the sheet's scale.
+        # A long vector is never more certain than the sheet's scale.
         most = math.erf(NEAR_MM / max(math.sqrt(2.0) * scale_se * abs(span), 1e-9))
         read = vector_of(span, cov, min(signs.confidence(), most))
         rivals = (
@@ -397,7 +397,7 @@ def _vectors(
 
 
 def _difference_cov(fit: NodeFit, edge: Edge, span: complex, scale_se: float) -> FloatArray:
-    """Covariance (2, 2) of a vector, from both its nodes and the sheet's scale."""
+    """Return the covariance (2, 2) of a vector, from both its nodes and the sheet's scale."""
     difference = np.zeros((2, fit.cov.shape[0]))
     for axis in (0, 1):
         difference[axis, 2 * edge.head + axis], difference[axis, 2 * edge.tail + axis] = 1.0, -1.0
@@ -406,7 +406,7 @@ def _difference_cov(fit: NodeFit, edge: Edge, span: complex, scale_se: float) ->
 
 
 def vector_of(span: complex, cov: FloatArray, confidence: float) -> ReadVector:
-    """Length and direction with their standard errors."""
+    """Return length and direction with their standard errors."""
     length = float(abs(span))
     along = np.array([span.real, span.imag]) / max(length, 1e-9)
     across = np.array([-along[1], along[0]])
@@ -425,11 +425,11 @@ def _degrees(span: complex) -> float:
 MARKED_MM = 0.5
 """A tip within this of a node marks it."""
 NEAR_MM = 0.5
-"""A node is right within this of what was drawn: a pencil stroke's width."""
+"""Largest error of a right node: a pencil stroke's width."""
 RIVAL_NATS = 12.0
 """Rivals with a score lower by more are left out."""
 MOST_OTHERS = 3
-"""Others of one vector that are told: what remains has a share of a few hundredths."""
+"""Most alternatives of one vector that are reported: the rest has a share of a few hundredths."""
 TEMPERATURE = 3.0
 """Scores are divided by this: errors of one student's strokes are not independent."""
 WEIGHTS = {"placed": 0.2, "named": 0.5, "off_mm": -2.2, "marked": 2.4}
@@ -438,16 +438,16 @@ CONSTANT = -1.85
 constant lowered by 0.6, since a wrong mark costs more than a look. A line's thinness, a mistaken plan,
 further tips, and how surely the ink has a node at both ends add nothing to them."""
 PLACED_AND = 0.3
-"""A confidence exceeds the geometric probability by no more than this: its standard errors are wide."""
+"""Largest excess of a confidence over the geometric probability, whose standard errors are wide."""
 HIGHEST = 0.985
-"""Of confidences: where more was said, 98 of 100 were right."""
+"""Highest confidence: of those predicted higher, 98 of 100 were right."""
 WORST_MM = 1.5
 """Larger residuals lower the confidence no further."""
 
 
 @dataclass(frozen=True, slots=True)
 class Signs:
-    """What the confidence in a vector (or node) is computed from.
+    """The features from which the confidence in a vector (or node) is computed.
 
     Attributes
     ----------
@@ -463,7 +463,7 @@ class Signs:
     marked: float = 0.4
 
     def confidence(self) -> float:
-        """Probability that the name is right and the vector read within half a millimetre."""
+        """Return the probability that the name is right and the vector read within half a millimetre."""
         inputs = asdict(self) | {
             "placed": _log_odds(self.placed),
             "named": _log_odds(self.named),
@@ -478,7 +478,7 @@ def _log_odds(probability: float) -> float:
 
 
 def within(cov: FloatArray, radius_mm: float = NEAR_MM) -> float:
-    """Probability that a Gaussian error of this covariance (2, 2) is shorter than the radius."""
+    """Return the probability that a Gaussian error of this covariance (2, 2) is shorter than the radius."""
     spread = np.sqrt(np.maximum(np.linalg.eigvalsh(cov), 1e-12))
     first, second = (math.erf(radius_mm / (s * math.sqrt(2.0))) for s in spread)
     return float(first * second)
@@ -488,7 +488,7 @@ def within(cov: FloatArray, radius_mm: float = NEAR_MM) -> float:
 class _Explanations:
     """A plan and its rivals: weights by their scores (k,), the plan's own 1 first, and nodes (k, n), mm.
 
-    A node that an explanation does not have is nan.
+    A node that an explanation lacks is nan.
     """
 
     weight: FloatArray
@@ -496,10 +496,10 @@ class _Explanations:
     named: float
 
     def of(self, values: ComplexArray) -> list[tuple[complex, float]]:
-        """What they say of something (k,): the plan's own value, then others, likeliest first.
+        """Return the alternatives for a value (k,): the plan's own, then others, likeliest first.
 
-        With each stands the probability of it and those before it, among all explanations, those without
-        it too; values within `NEAR_MM` are one.
+        Each has the probability of it and those before it, among all explanations, including those that lack
+        it; values within `NEAR_MM` are one.
         """
         left = np.isfinite(values)
         total, together = self.weight.sum(), 0.0
@@ -531,7 +531,7 @@ def _explanations(plan: PlanReading, fit: NodeFit) -> _Explanations:
 
 
 def _marked(plan: PlanReading, fit: NodeFit, edge: Edge, row: int) -> float:
-    """How clearly tips mark a vector's two ends on its stroke."""
+    """Return how clearly tips mark a vector's two ends on its stroke."""
     marked = []
     along = complex(plan.lines.along[row])
     for node, other in ((edge.tail, edge.head), (edge.head, edge.tail)):

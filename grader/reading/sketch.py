@@ -1,4 +1,4 @@
-"""The reading of the mechanism sketch: the strokes of its links, its joints, and its turn."""
+"""Read the mechanism sketch: the strokes of its links, its joints, and its turn."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,18 +18,18 @@ from reference.construction.mistakes import Drawing, commit, single_mistakes
 from reference.construction.steps import ArcAndLine, OnGuide, Step, TwoLines
 
 LEAST_LINK_MM = 6.0
-"""A sketch is not laid on shorter strokes: they are letters and hatching."""
+"""A sketch is not placed on shorter strokes: they are letters and hatching."""
 HARDLY = 0.4
 """A sketch supported over less of its length may be turned on the sheet."""
 SURE = 0.7
-"""A sketch supported so well over its length ends the search among other students' variants."""
+"""A sketch with this much support ends the search among other students' variants."""
 SHORT_LIST = 8
-"""Sketches whose strokes are assigned, by their support."""
+"""Number of best supported sketches whose strokes are assigned."""
 COST_IN_SUPPORT = 0.05
-"""For another assembly, another student's variant, a turn: an edge more must be there."""
+"""Cost of another assembly, another student's variant, a turn: one more edge must be supported."""
 WEIGHT_OF_CIRCLES = 0.25
 ROUGHLY_MM = 4.0
-"""Share of the support that hangs on joint circles, and how near to a joint a circle is its own."""
+"""Share of the support that depends on joint circles, and the largest distance of a joint's own circle."""
 END_PRIOR = EndPrior(
     at_mm=1.5, at_share=0.7, beyond_mm=4.0, beyond_share=0.15, short_mm=3.0, short_share=0.15
 )
@@ -39,23 +39,23 @@ DRAFTING_ERRORS = DraftingErrors(angle_rad=float(np.radians(0.6)), length_mm=0.8
 COST_OF_OTHER = 8.0
 """Nats for a construction that is not the student's: as for a mistake in a plan."""
 WORTH_OF_CIRCLE = 3.0
-"""Nats for a circle where a joint is expected."""
+"""Nats for a circle at an expected joint."""
 UPRIGHT_RAD = float(np.radians(2.0))
 """A sketch turned by less is meant to be upright."""
 GUIDE_DOUBT_MM = 8.0
-"""Weight of the sketch's own turn among strokes along guides, as a length of stroke."""
+"""Weight of the sketch's own turn relative to strokes along guides, as a length of stroke."""
 GUIDE_REACH_MM, GUIDE_LEAST_MM = 8.0, 12.0
 """A stroke along a guide passes its joint within this, and is no shorter than this."""
 GUIDE_TILT_RAD = float(np.radians(2.5))
 """Strokes that are turned further are no guides."""
 LEAST_RADIUS_MM, LARGEST_RADIUS_MM = 0.4, 4.0
-"""Of joint circles: smaller ones are dots of letters, larger ones wheels."""
+"""Radii of joint circles: smaller ones are dots of letters, larger ones wheels."""
 NEAR_CIRCLE_MM = 1.5
-"""How far a joint's circle may lie from where its links say, beside two standard errors."""
+"""Largest distance of a joint's circle from its position by the links, besides two standard errors."""
 LEAST_VISIBLE_MM, REACH_MM = 4.0, 30.0
 """Lines that may be links: their least length, and how far they may lie outside the sketch."""
 ANY_TURN = tuple(float(np.radians(angle)) for angle in range(0, 360, 5))
-"""Turns at twice the freedom about each, so that none is left out."""
+"""Turns at a spacing of twice the freedom about each, so that none is left out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +67,8 @@ class SketchReading:
     drawing : the construction and parameters of the variant that the sketch follows
     assignment, fit : its strokes and its joints
     members : the strokes of its links, by their number
-    guide_turn_rad : how its guides are turned, by the guides where they are drawn
-    score : nats for it: strokes, circles, less what is unlikely beforehand
+    guide_turn_rad : turn of its guides, by the guides if they are drawn
+    score : nats for it: strokes and circles, less the prior cost
     """
 
     drawing: Drawing
@@ -80,7 +80,7 @@ class SketchReading:
 
 
 def drawings(assignment: Assignment, variants: list[Variant], scales: Scales | None) -> list[Drawing]:
-    """What the given variants are to draw, each with its own parameters of shape (1,)."""
+    """Return the right drawings of the given variants, each with its own parameters of shape (1,)."""
     result = []
     for variant in variants:
         mechanism = assignment.mechanism([variant])
@@ -97,10 +97,10 @@ def find_sketch(
     others: Callable[[], list[Drawing]],
     letters_nats: Callable[[Mapping[str, complex]], float],
 ) -> SketchReading | None:
-    """The sketch that explains most strokes: the student's own variant first, then others.
+    """Return the sketch that explains most strokes: the student's own variant first, then others.
 
-    Arguments: `circles` (k, 3) as in `records.Ink`; `letters_nats` says how well letters fit joints by
-    name: it decides among near ties.
+    Arguments: `circles` (k, 3) as in `records.Ink`; `letters_nats` returns how well letters fit joints by
+    name: it decides between nearly equal sketches.
     """
     upright = Search(sizes=(1.0, 0.0), smallest=0.4, largest=2.0)
     sheet = _SketchSearch(lines, lines.take(lines.length > LEAST_LINK_MM), circles)
@@ -118,7 +118,7 @@ def find_sketch(
 
 
 def _candidates(own: list[Drawing]) -> Iterator[tuple[Drawing, float]]:
-    """Each drawing, and each with one group assembled the other way; with the cost in support."""
+    """Yield each drawing, and each with one group assembled the other way; with the cost in support."""
     for drawing in own:
         yield drawing, 0.0
         for mistake in single_mistakes(drawing, MECHANISM):
@@ -132,7 +132,7 @@ def _expected(drawing: Drawing) -> Expected:
 
 @dataclass(frozen=True, slots=True)
 class _SketchCase:
-    """A drawing laid at a pose; its support by strokes and by joint circles, less its cost."""
+    """A drawing placed at a pose; its support by strokes and by joint circles, less its cost."""
 
     drawing: Drawing
     pose: Pose
@@ -155,7 +155,7 @@ class _Assigned:
 
     @property
     def joints(self) -> dict[str, complex]:
-        """Where the joints are to be expected, by name."""
+        """Expected positions of the joints, by name."""
         expected = self.assignment.expected
         return {
             name: self.centres.get(row, complex(expected.at[row])) for row, name in enumerate(expected.names)
@@ -164,14 +164,14 @@ class _Assigned:
 
 @dataclass(frozen=True, slots=True)
 class _SketchSearch:
-    """The lines and circles in which a sketch is sought: all lines, the long ones, circles (k, 3)."""
+    """The lines and circles in which a sketch is searched: all lines, the long ones, circles (k, 3)."""
 
     lines: Lines
     long: Lines
     circles: FloatArray
 
     def laid(self, drawing: Drawing, search: Search, cost: float) -> list[_SketchCase]:
-        """The poses of a drawing."""
+        """Return the poses of a drawing."""
         expected = _expected(drawing)
         centres = self.circles[:, 0] - 1j * self.circles[:, 1]
         cases = []
@@ -183,7 +183,7 @@ class _SketchSearch:
         return cases
 
     def assigned(self, cases: Sequence[_SketchCase], usual: Sequence[Construction]) -> Iterator[_Assigned]:
-        """Each case with its strokes; constructions other than the usual ones cost more."""
+        """Yield each case with its strokes; unusual constructions cost more."""
         slack = Slack(relative=0.03)
         placed = [_expected(case.drawing).placed(case.pose, slack) for case in cases]
         for index, (best, *_), around in assign_groups(placed, self.lines, _near, END_PRIOR):
@@ -194,7 +194,7 @@ class _SketchSearch:
             yield _Assigned(drawing, best, around, centres, score)
 
     def centres(self, joints: Expected) -> dict[int, complex]:
-        """Circles that stand for joints, by the joint's index: the nearest one, where it is near enough."""
+        """Return circles that stand for joints, by the joint's index: the nearest one, if near enough."""
         radius = self.circles[:, 2]
         circles = self.circles[(radius > LEAST_RADIUS_MM) & (radius < LARGEST_RADIUS_MM)]
         at = circles[:, 0] - 1j * circles[:, 1]
@@ -208,7 +208,7 @@ class _SketchSearch:
 
 
 def _near(lines: Lines, placed: Sequence[Expected]) -> BoolArray:
-    """Which lines are long enough for a link and lie about any of the figures."""
+    """Return which lines are long enough for a link and lie near any of the figures."""
     near = np.zeros(len(lines), dtype=bool)
     for figure in placed:
         reach = np.ptp(figure.at.real) + np.ptp(figure.at.imag) + REACH_MM
@@ -217,7 +217,7 @@ def _near(lines: Lines, placed: Sequence[Expected]) -> BoolArray:
 
 
 def _fitted(sketch: _Assigned, lines: Lines) -> SketchReading:
-    """The sketch with its joints fitted."""
+    """Return the sketch with its joints fitted."""
     fit = fit_nodes(sketch.assignment, sketch.lines, LINK_ENDS, sketch.centres)
     guide_turn = _guide_turn(sketch.drawing, fit, lines)
     stroke = sketch.assignment.stroke
@@ -226,9 +226,9 @@ def _fitted(sketch: _Assigned, lines: Lines) -> SketchReading:
 
 
 def _guide_turn(drawing: Drawing, fit: NodeFit, lines: Lines) -> float:
-    """The mean turn (rad) of strokes along the guides near their joints.
+    """Return the mean turn (rad) of strokes along the guides near their joints.
 
-    Where no such stroke is visible: the turn of all joints together, or none where that is small.
+    If no such stroke is visible: the turn of all joints together, or none if that is small.
     """
     exact = _expected(drawing).at
     turn = float(np.angle(np.sum((fit.at - fit.at.mean()) * np.conj(exact - exact.mean()))))
@@ -250,7 +250,7 @@ def _guide_turn(drawing: Drawing, fit: NodeFit, lines: Lines) -> float:
 
 
 def _fixed_guide(step: Step) -> FixedLine | None:
-    """The guide on the ground along which a joint slides."""
+    """Return the guide on the ground along which a joint slides."""
     match step:
         case ArcAndLine(guide=FixedLine() as guide) | OnGuide(guide=guide):
             return guide

@@ -1,1 +1,1 @@
-"""The review of a class on a web page: a person settles what waits, one question after the other."""
+"""The review of a class on a web page: a person decides open questions one after the other."""

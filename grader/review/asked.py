@@ -32,7 +32,7 @@ from reference.quantities import SCALE_OF
 WHOSE = N_("Whose data were drawn?")
 WHICH = N_("Which stroke is meant: %(vectors)s?")
 WHERE = N_("Is %(joint)s here? If it lies elsewhere, drag its ring.")
-WHICH_SCALE = N_("Which scale was drawn with: %(scale)s?")
+WHICH_SCALE = N_("Which scale does the drawing use: %(scale)s?")
 ARE_RIGHT = N_("Read in doubt: %(vectors)s")
 NEITHER = N_("none of these: wrong")
 PLACE = N_("stroke %(letter)s")

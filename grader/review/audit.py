@@ -25,7 +25,7 @@ TEXTS = {
     "gone": questions.TEXTS["gone"],
     "no_scan": questions.TEXTS["no_scan"],
     "instead": N_("What is right instead?"),
-    "opened": N_("Verdicts like it wait in the review now."),
+    "opened": N_("Similar verdicts are in the review now."),
     "undone": N_("Nothing was decided in this window."),
 }
 

@@ -1,4 +1,4 @@
-"""What to ask a person about a submission: one question for one doubt, whatever it touches.
+"""Questions to a person about a submission: one for each doubt, however many criteria it concerns.
 
 Whose drawing it is comes first, then scales, then where a node lies, then single verdicts. A question has
 choices; each is a bundle of rows for the file of decisions, and judging the submission with them shows what

@@ -1,4 +1,4 @@
-"""What the page is told: a student's criteria as rows, and one question with all that is to be seen of it."""
+"""Data for the review page: a student's criteria as rows, and one question with all that it shows."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -47,7 +47,9 @@ TEXTS = {
     "page_saved": N_("Saved. The page counts when the class is brought up to date."),
     "still_open": N_("Still open: {open}"),
     "all_settled": N_("Everything is settled."),
-    "can_finish": N_("You may export now; what is open has no grade yet. Or go on with what is open."),
+    "can_finish": N_(
+        "You may export now: open submissions have no grade yet. Or continue with the open ones."
+    ),
     "now_finish": N_("Bring the pages up to date and export the grades; then look through the class's page."),
 }
 """What the script says, in braces what it fills in itself."""
@@ -56,7 +58,7 @@ TAKEN_BACK = N_("Somebody has taken this decision back in the meantime. Yours wa
 SOMEBODY = N_("somebody")
 CHECKED = N_("decided by %(who)s")
 ASKED = N_("The student asks to look again: %(text)s")
-STALE = N_("%(who)s decided: %(verdict)s; what that was about has changed since")
+STALE = N_("%(who)s decided: %(verdict)s; the submission or the criterion has changed since")
 PROPOSED = N_("proposed: %(verdict)s")
 ACCEPT = N_("Accept: %(verdict)s")
 NO_PROPOSAL = N_("No proposal: choose a verdict")

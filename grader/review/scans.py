@@ -1,4 +1,4 @@
-"""Pages of a class as pictures, cut out on demand; the pages looked at last stay decoded."""
+"""Pages of a class as pictures, cut out on demand; recently viewed pages stay decoded."""
 
 import threading
 from collections import OrderedDict

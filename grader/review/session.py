@@ -1,4 +1,4 @@
-"""A class under review: its questions, the decisions on them, and what follows from these at once.
+"""A class under review: its questions, the decisions on them, and their immediate consequences.
 
 The file of decisions is the only thing that is kept. Reports in memory are of the decisions in it; results
 and pages on the disk are of the last run, and `bring_up_to_date` makes them anew.

@@ -1,4 +1,4 @@
-"""What of a picture spoils the reading of a sheet: cut corners, blur, bad light, too few pixels.
+"""Flaws of a picture that impair the reading of a sheet: cut corners, blur, bad light, too few pixels.
 
 Each flaw has its measured figure and the limit that it passes:
 
@@ -47,9 +47,9 @@ _ROWS, _COLUMNS = ("upper", "middle", "lower"), ("left", "middle", "right")
 
 
 def flaws(page: Page, sheet: Sheet | None) -> tuple[Reason, ...]:
-    """What spoils the reading of a decoded page, the worst first.
+    """Return the flaws of a decoded page, the worst first.
 
-    Arguments: `sheet` is its registration, None where it was refused: the paper's outline must do then.
+    Arguments: `sheet` is its registration; if None, the paper's outline is used.
     """
     flat = flatten(page.grey)
     outline = None if sheet is not None else _paper(page)
@@ -77,32 +77,32 @@ def _flaw(code: str, measured: float, limit: float, **places: tuple[str, ...]) -
 # Where the sheet lies -----------------------------------------------------------------------------
 
 _OUTLINE_PX = 480
-"""Long side of the picture in which paper is told from the table: 1 px is a millimetre or two."""
+"""Long side of the picture in which paper is separated from the table: 1 px is a millimetre or two."""
 _LEAST_PAPER = 0.15
-"""Of the picture: a smaller bright patch is no sheet that could be read."""
+"""Least share of the picture: a smaller bright patch is no readable sheet."""
 _FULL = 0.9
-"""Of its hull: a bright patch with more holes or bays is no sheet."""
+"""Least share of its hull: a bright patch with more holes or bays is no sheet."""
 _RIM_PX = 1
-"""A patch that comes so near to the picture's rim runs on beyond it."""
+"""A patch this close to the picture's rim continues beyond it."""
 _LEAST_SIDE = 0.12
-"""Of the patch's size: a side's line needs so many points."""
+"""A side's line needs points along this share of the patch's size."""
 _BEYOND = 0.1
-"""Of the sheet: a side that is not in the picture is taken to lie so far beyond the rim."""
+"""A side outside the picture is assumed to lie this share of the sheet beyond the rim."""
 _NO_VIEW = 4.0
-"""Largest over smallest resolution: nobody photographs a sheet from so far aside."""
+"""Largest over smallest resolution: nobody photographs a sheet from such an angle."""
 _SLACK = 0.01
-"""Of the long side, 4 mm on A3: corners by the sides' lines are known no better where a lens bends them."""
+"""Share of the long side, 4 mm on A3: where a lens bends the sides, corners are known no better."""
 _PARALLEL = 1e-9
-"""Of lines in pixels that have no crossing."""
+"""Cross product of lines in pixels that have no crossing."""
 _BESIDE_MM = 2.0
-"""The map's own error, and a frame's that was ruled by hand."""
+"""The map's own error, and that of a frame ruled by hand."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Outline:
-    """The paper in a picture by its brightness; corners beyond the picture are where its sides meet.
+    """The paper in a picture by its brightness; corners outside the picture are where its sides meet.
 
-    `share`: of the picture that it fills; `cut`: numbers of the corners that are not in the picture.
+    `share`: the share of the picture that it fills; `cut`: numbers of the corners outside the picture.
     """
 
     mm_to_px: FloatArray
@@ -111,7 +111,7 @@ class _Outline:
 
 
 def _whole_picture(page: Page) -> FloatArray:
-    """The map of a sheet that fills the picture."""
+    """Return the map of a sheet that fills the picture."""
     high, wide = page.grey.shape
     corners = np.array([(0.0, 0.0), (wide, 0.0), (wide, high), (0.0, high)]) - 0.5
     if high > wide:
@@ -120,7 +120,7 @@ def _whole_picture(page: Page) -> FloatArray:
 
 
 def _paper(page: Page) -> _Outline | None:
-    """The paper's outline, None where no bright patch has the shape of a sheet."""
+    """Return the paper's outline, None if no bright patch has the shape of a sheet."""
     scale = min(1.0, _OUTLINE_PX / max(page.grey.shape))
     small = shrink(page.grey, scale)
     soft = cv2.medianBlur(small, 5)
@@ -152,9 +152,9 @@ def _paper(page: Page) -> _Outline | None:
 
 
 def _four_corners(hull: FloatArray, size: FloatArray) -> tuple[FloatArray, BoolArray] | None:
-    """Where the sides of a convex patch (n, 2) meet, (4, 2) around it, and which corners were not seen.
+    """Return the corners of a convex patch (n, 2) where its sides meet, (4, 2), and which were not seen.
 
-    None where no side is in the picture, or the patch is no quadrangle.
+    None if no side is in the picture, or the patch is no quadrangle.
     """
     span = np.roll(hull, -1, axis=0) - hull
     length = np.hypot(*span.T)
@@ -184,7 +184,7 @@ def _four_corners(hull: FloatArray, size: FloatArray) -> tuple[FloatArray, BoolA
             )
             lines[k] = -vy, vx, vy * x - vx * y
         else:
-            # It lies beyond the rim, nobody knows how far.
+            # It lies beyond the rim, at an unknown distance.
             lines[k] = *outward[k], -(outward[k] @ (box[k] + _BEYOND * np.hypot(*sides[k - 1]) * outward[k]))
     if not seen.any():
         return None
@@ -200,7 +200,7 @@ def _four_corners(hull: FloatArray, size: FloatArray) -> tuple[FloatArray, BoolA
 
 
 def _upright(corners: FloatArray, cut: BoolArray, turn_deg: int) -> tuple[FloatArray, BoolArray]:
-    """Corners around a sheet, from the upper left one of the picture as it is shown, clockwise."""
+    """Order corners around a sheet, from the upper left one of the picture as shown, clockwise."""
     x, y = (corners - corners.mean(axis=0)).T
     order = np.argsort(np.arctan2(y, x))
     # Shown turned counter-clockwise, another corner is the upper left one.
@@ -214,7 +214,7 @@ def _upright(corners: FloatArray, cut: BoolArray, turn_deg: int) -> tuple[FloatA
 
 
 def _cut_corners(page: Page, sheet: Sheet | None, outline: _Outline | None) -> Iterator[Reason]:
-    """The corners that are not in the picture."""
+    """Report the corners outside the picture."""
     size = np.array(page.grey.shape[::-1], dtype=np.float64)
     if sheet is None:
         if outline is not None and outline.cut:
@@ -224,7 +224,7 @@ def _cut_corners(page: Page, sheet: Sheet | None, outline: _Outline | None) -> I
                 "corner_cut", float(beyond.max()), 0.0, corners=tuple(_CORNERS[k] for k in outline.cut)
             )
         return
-    # The frame, or the markers, of which all four corners are to be seen.
+    # The frame, or the markers: all four corners must be visible.
     must = _INNER_MM if not sheet.zones else MARKER_CORNERS[[0, 3, 7, 4]].reshape(4, 4, 2)
     at = mapped(sheet.mm_to_px, must)
     beyond = np.maximum(-at, at - (size - 1.0)).max(axis=(1, 2)) / sheet.px_per_mm
@@ -236,17 +236,17 @@ def _cut_corners(page: Page, sheet: Sheet | None, outline: _Outline | None) -> I
 # Resolution ---------------------------------------------------------------------------------------
 
 LEAST_DPI = 150.0
-"""What students are asked for. Usual pencils are read at 110, thin and faint ones are not."""
+"""Resolution that students are asked for. Usual pencils are read at 110, thin and faint ones are not."""
 _DPI_SHARE = 0.97
-"""Of that: a scan at 150 dpi may come out at 149, and a photo's resolution is known to a few per cent."""
+"""Tolerated share of it: a scan at 150 dpi may come out at 149; a photo's resolution is less certain."""
 _FAR = 0.5
-"""Of the picture: a sheet that fills less can be photographed from nearer."""
+"""Share of the picture: a sheet that fills less can be photographed from nearer."""
 _MOST_UNEVEN = 2.0
 """Largest over smallest resolution: one side of the sheet then has half the pixels of the other."""
 
 
 def _axes(mm_to_px: FloatArray) -> FloatArray:
-    """(4,) pixels per mm at the sheet's corners."""
+    """Return (4,) pixels per mm at the sheet's corners."""
     right, down = local_axes(mm_to_px, _INNER_MM[:, 0])
     return np.asarray(np.sqrt(np.abs(right[:, 0] * down[:, 1] - right[:, 1] * down[:, 0])))
 
@@ -256,7 +256,7 @@ def _px_per_mm(mm_to_px: FloatArray) -> float:
 
 
 def _resolution(page: Page, mm_to_px: FloatArray) -> Iterator[Reason]:
-    """Too few pixels on the sheet, or on a part of it."""
+    """Report too few pixels on the sheet, or on a part of it."""
     axes = _axes(mm_to_px)
     dpi = _px_per_mm(mm_to_px) * MM_PER_INCH
     if dpi < _DPI_SHARE * LEAST_DPI:
@@ -270,30 +270,30 @@ def _resolution(page: Page, mm_to_px: FloatArray) -> Iterator[Reason]:
 # Light --------------------------------------------------------------------------------------------
 
 _PART = 0.2
-"""Of a shadow or reflection: a ninth of the sheet that holds less is not named."""
+"""Share of a shadow or reflection: a ninth of the sheet that holds less is not named."""
 _MAP_PX_PER_MM = 0.25
-"""Of the map of the light: shadows and glare are larger than 4 mm."""
+"""Resolution of the map of the light: shadows and glare are larger than 4 mm."""
 _LEAST_PAPER_LEVEL = 85.0
-"""Of 255: with a phone's noise nearly all vectors were right at 120, a quarter at 73."""
+"""Least paper level of 255: with a phone's noise nearly all vectors were right at 120, a quarter at 73."""
 _SHADE, _LEAST_SHADE = 0.2, 0.04
-"""Light in a shadow over that beside it (nearly all vectors were right at 0.18, a quarter at 0.1), and
-share of the sheet: a hand's breadth."""
+"""Light in a shadow over that beside it (nearly all vectors were right at 0.18, a quarter at 0.1), and its
+least share of the sheet: a hand's breadth."""
 _WHITE = 253
-"""Of 255: a sensor that has reached it tells no lighter from lightest."""
+"""Level of 255 at which a sensor is saturated."""
 _MOST_WHITE = 0.5
-"""Of the sheet: what is whiter is no reflection."""
+"""Largest share of the sheet: a larger white area is no reflection."""
 _LEAST_INK = 0.3
-"""Contrast of the ink where the paper is white: where it was 0.24, a quarter of the vectors was right."""
+"""Least contrast of the ink where the paper is white: at 0.24, a quarter of the vectors was right."""
 _INK_QUANTILE = 0.995
 """A drawing's ink covers about a hundredth of its paper."""
 _GLARE, _AROUND_GLARE = 0.005, 247.0
-"""Share of the sheet that is white, within paper that is darker than this around it."""
+"""Share of the sheet that is white, and the level below which the paper around it must be."""
 _AROUND_MM = 16.0
 """The paper's brightness beside a reflection."""
 
 
 def _light(flat: Flat, mm_to_px: FloatArray, sheet: Sheet | None) -> Iterator[Reason]:
-    """Too little light, too much of it, or uneven light."""
+    """Report too little light, too much of it, or uneven light."""
     step = np.array(flat.step)
     to_paper = np.array(
         [[1 / step[0], 0, 0.5 / step[0] - 0.5], [0, 1 / step[1], 0.5 / step[1] - 0.5], [0, 0, 1.0]]
@@ -311,7 +311,7 @@ def _light(flat: Flat, mm_to_px: FloatArray, sheet: Sheet | None) -> Iterator[Re
         yield _flaw("shadow", float(np.quantile(light, 0.02) / level), _SHADE, areas=_areas(shaded))
     is_scanned = sheet is not None and not sheet.mm_to_px[2, :2].any()
     if is_scanned or is_black_and_white(flat.grey):
-        return  # its brightness was settled by the scanner, which may have made the paper white
+        return  # the scanner sets the brightness, and may have made the paper white
     white = light >= _WHITE
     if white.mean() > _MOST_WHITE:
         boxes = [inner] if sheet is None or not sheet.zones else list(sheet.zones.values())
@@ -326,7 +326,7 @@ def _light(flat: Flat, mm_to_px: FloatArray, sheet: Sheet | None) -> Iterator[Re
 
 
 def _darkest(flat: Flat, mm_to_px: FloatArray, box: Box) -> float:
-    """Contrast of the ink in a box of the sheet, away from the line around it, 0..1."""
+    """Return the contrast of the ink in a box of the sheet, away from the line around it, 0..1."""
     scale = min(1.0, _INK_PX / max(flat.grey.shape))
     x, y, wide, high = box
     edge = ZONE_SLACK_MM
@@ -337,7 +337,7 @@ def _darkest(flat: Flat, mm_to_px: FloatArray, box: Box) -> float:
 
 
 def _areas(mask: BoolArray) -> tuple[str, ...]:
-    """Where most of a mask of the sheet lies: the ninths that hold a fifth of it at least."""
+    """Return the ninths of the sheet that hold at least a fifth of a mask."""
     rows, columns = (np.minimum(np.arange(side) * 3 // side, 2) for side in mask.shape)
     counts = np.zeros((3, 3))
     np.add.at(counts, (rows[:, None], columns[None, :]), mask)
@@ -354,23 +354,23 @@ def _areas(mask: BoolArray) -> tuple[str, ...]:
 # Blur ---------------------------------------------------------------------------------------------
 
 _INK_PX = 1200
-"""Long side of the picture on which ink is looked for."""
+"""Long side of the picture in which ink is looked for."""
 _INK = 38
-"""Contrast of 255: paper's texture and show-through stay below."""
+"""Least contrast of 255: paper's texture and show-through stay below."""
 _TILE_PX = 24
-"""Of that picture: 8 mm of the sheet."""
+"""Side of a piece in that picture: 8 mm of the sheet."""
 _TILES, _EVERY = 48, 4
-"""Those with most ink, and how many of them stand for one: some hundred edges in every direction."""
+"""Pieces with most ink, of which every fourth is used: some hundred edges in every direction."""
 _ACROSS_MM = 1.2
-"""To either side of an edge: past the stroke's middle, and to the paper beside it."""
+"""Distance to either side of an edge: past the stroke's middle, and to the paper beside it."""
 _LEAST_STEP = 0.15
-"""Of the paper's brightness: texture and noise make smaller steps."""
+"""Least step, as a share of the paper's brightness: texture and noise make smaller ones."""
 _LEAST_EDGES = 60
-"""In a direction, for its width to be known to a tenth."""
+"""Fewest edges in a direction for which its width is known to a tenth."""
 _SHARPEST = 0.25
-"""Of the edges in one direction: a soft pencil's are wider than the lens made them."""
+"""Share of the edges in one direction that is used: a soft pencil's are wider than the lens made them."""
 _SECTORS = 4
-"""Directions by 45 degrees: a shake blurs the edges across it alone."""
+"""Directions by 45 degrees: a shake blurs only the edges across it."""
 MOST_BLUR_MM = 0.6
 """Sharp photos have 0.3 to 0.4; from 0.6 the share of right vectors falls, and sureness at 0.8."""
 _MOST_BLUR_PX = 3.0
@@ -378,7 +378,7 @@ _MOST_BLUR_PX = 3.0
 
 
 def _blur(flat: Flat, mm_to_px: FloatArray) -> Iterator[Reason]:
-    """Edges of the ink wider than the reader can follow."""
+    """Report edges of ink that are wider than the reader can follow."""
     px_per_mm = _px_per_mm(mm_to_px)
     width = _edge_width_px(flat, mm_to_px, px_per_mm)
     if width > max(MOST_BLUR_MM * px_per_mm, _MOST_BLUR_PX):
@@ -386,7 +386,7 @@ def _blur(flat: Flat, mm_to_px: FloatArray) -> Iterator[Reason]:
 
 
 def _edge_width_px(flat: Flat, mm_to_px: FloatArray, px_per_mm: float) -> float:
-    """Width of the sharpest edges of ink in the direction in which they are widest; 0 without edges."""
+    """Return the width of the sharpest edges of ink in the direction where it is largest; 0 without edges."""
     reach = max(4, round(_ACROSS_MM * px_per_mm))
     angles: list[FloatArray] = []
     widths: list[FloatArray] = []
@@ -405,7 +405,7 @@ def _edge_width_px(flat: Flat, mm_to_px: FloatArray, px_per_mm: float) -> float:
 
 
 def _inked_tiles(flat: Flat, mm_to_px: FloatArray, reach: int) -> Iterator[tuple[Float32Array, float]]:
-    """Pieces of the page at full resolution with most ink, and the paper's brightness there."""
+    """Yield pieces of the page at full resolution with most ink, and the paper's brightness there."""
     scale = min(1.0, _INK_PX / max(flat.grey.shape))
     ink = (flat.reduced(scale) > _INK).astype(np.float32)
     outline = np.zeros(ink.shape, np.uint8)
@@ -431,7 +431,7 @@ def _inked_tiles(flat: Flat, mm_to_px: FloatArray, reach: int) -> Iterator[tuple
 
 
 def _edges(tile: Float32Array, paper: float, reach: int) -> tuple[FloatArray, FloatArray]:
-    """(n,) direction across each edge of a piece, radians 0..pi, and its width in pixels."""
+    """Return (n,) direction across each edge of a piece, radians 0..pi, and its width in pixels."""
     soft = np.asarray(cv2.GaussianBlur(tile, (0, 0), 0.7), dtype=np.float32)
     gx, gy = (cv2.Sobel(soft, cv2.CV_32F, dx, 1 - dx, scale=0.125) for dx in (1, 0))
     slope = np.asarray(np.hypot(gx, gy), dtype=np.float32)

@@ -1,1 +1,1 @@
-"""A student's own check of values or a photo: right, off or open, and the answer not given away."""
+"""A student's own check of values or a photo: right, off or open, without giving the answer away."""

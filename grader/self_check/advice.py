@@ -1,6 +1,6 @@
-"""What a self-check says of a value: in which way it is off, and what to look at; never the answer.
+"""Hints of a self-check on a value: how it is off, and what to look at; never the answer.
 
-A mistake that the diagnosis names with certainty is told by the law that it breaks.
+A mistake that the diagnosis names with certainty is explained by the law that it breaks.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -24,12 +24,14 @@ RESULTS: Mapping[Result, tuple[str, str]] = {
 """Mark and word of each result."""
 
 OWN_HINTS: dict[str, str] = {
-    "follows": N_("It follows rightly from your own earlier work."),
-    "hand_may_miss": N_("Its lines meet at so small an angle that a careful hand may be off by as much."),
-    "near_limit": N_("It lies so near the limit of the tolerance that it cannot be told."),
-    "entry_refused": N_("An entry that it rests on cannot be used."),
+    "follows": N_("It is consistent with your own earlier work."),
+    "hand_may_miss": N_(
+        "Its lines meet at so small an angle that even careful drawing can miss by this much."
+    ),
+    "near_limit": N_("It is too close to the limit of the tolerance to decide."),
+    "entry_refused": N_("It depends on an unusable entry."),
 }
-"""In place of the sentences that speak of points or of a person who must look."""
+"""Replaces sentences that mention points or a person who must look."""
 
 _LINES = N_(
     "Look at the two lines that meet in its end: from which point, and along or across what, is each?"
@@ -46,14 +48,14 @@ SIZE = {
     "": _LINES,
 }
 TURN = {
-    "driven": N_("Look at the driven link on your sketch: how does this vector lie to it?"),
+    "driven": N_("Look at the driving link on your sketch: how does this vector lie to it?"),
     "n": N_("Look at the link that it lies along."),
     "t": N_("Look at the link that it stands perpendicular to."),
     "c": N_("Look at the sliding velocity that it is turned from."),
     "": N_("Look at what sets the direction of its lines: which link, or which guide?"),
 }
 SENSE = {
-    "driven": N_("Look at the sense in which the driven link moves."),
+    "driven": N_("Look at the sense in which the driving link moves."),
     "n": N_("Look at the point that it must point towards."),
     "c": N_("Look at the sense in which the guide turns."),
     "": _LETTERS,
@@ -85,7 +87,7 @@ ADVICE: dict[str, Mapping[str, str]] = {
     "scale_refused": {"": _SCALE},
     "scale_assumed": {"": _SCALE},
 }
-"""What to look at, by code of the reason and kind of the value; `""` for every other kind."""
+"""Advice by code of the reason and kind of the value; `""` for every other kind."""
 _SCALE_ON_SHEET = N_("Write the scale that you used on the sheet, with its unit, such as 1:5 or 0.005 m/mm.")
 ON_SHEET = {
     "unread": N_("Draw it clearly, with its arrow and letters, and photograph the sheet again."),
@@ -95,7 +97,7 @@ ON_SHEET = {
     "scale_refused": _SCALE_ON_SHEET,
     "scale_assumed": _SCALE_ON_SHEET,
 }
-"""The same of a drawing, by code, where it differs from that of a file of measurements."""
+"""Advice on a drawing, by code, if it differs from that on a file of measurements."""
 
 LAWS: dict[str, str] = {
     "parallel_for_perpendicular": N_(
@@ -152,7 +154,7 @@ _SAME = N_("The same mistake as at %(name)s.")
 
 @dataclass(frozen=True, slots=True)
 class CheckedLine:
-    """What a self-check tells of one value, in a language; `advice` is empty where there is none."""
+    """The result of a self-check for one value, in a language; `advice` may be empty."""
 
     checked: Checked
     name: str
@@ -173,19 +175,19 @@ def checked_lines(
     driven: str,
     unread: Collection[str] | None = None,
 ) -> list[CheckedLine]:
-    """The values that were handed in, each with its hint and one line of advice as the level allows.
+    """Return the submitted values, each with its hint and one line of advice as the level allows.
 
     Arguments
     ---------
     names : renames what students know by another name
-    driven : the driven link's pin
+    driven : the driving link's pin
     unread : of a drawing, the vectors that could not be read on it; None for entered measurements
     """
     values = checked_values(judgement, level, unread or ())
     other = next((one for one in judgement.mistakes if one.code == "other_variant"), None)
     of_other = [one for one in values if any(reason.code == "other_variant" for reason in one.reasons[:1])]
     if other is not None and of_other and level == "hint":
-        # Said once: what each value would be worth by those data is of no use here.
+        # Said once: the verdict on each value by those data is of no use here.
         hint = _hint(of_other[0].reasons[0], speaker, level, names)
         advice = speaker.gettext(advice_on(of_other[0].reasons[:1], "", driven))
         return [CheckedLine(of_other[0], ", ".join(other.detail), hint, advice)]
@@ -198,7 +200,7 @@ def checked_lines(
     own = {} if unread is None else ON_SHEET
     for one in values:
         name = names.get(one.name, one.name)
-        # What is right needs one reason: the others say what would be off, had it not been accepted.
+        # A right value needs one reason: the others describe errors that were accepted.
         shown = one.reasons[:1] if one.result == "right" else one.reasons
         hint = " ".join(dict.fromkeys(_hint(reason, speaker, level, names) for reason in shown))
         advice = ""
@@ -221,13 +223,13 @@ def _hint(reason: Reason, speaker: Tongue, level: Level, names: Mapping[str, str
 
 
 def advice_on(reasons: Sequence[Reason], name: str, driven: str) -> str:
-    """What to look at, a key of the catalogues; empty where no reason has any."""
+    """Return the advice, a key of the catalogues; empty if no reason has any."""
     known = next((ADVICE[reason.code] for reason in reasons if reason.code in ADVICE), {})
     return known.get(_kind(name, driven), known.get("", ""))
 
 
 def _kind(name: str, driven: str) -> str:
-    """The kind of a value: scale, rate, driven, a part of an acceleration (n, t, c, r), or none of these."""
+    """Return the kind of a value: scale, rate, driven, part of an acceleration (n, t, c, r), or none."""
     if name in SCALE_NAMES:
         return "scale"
     if name.startswith(("omega", "epsilon")):
@@ -237,7 +239,7 @@ def _kind(name: str, driven: str) -> str:
 
 
 def law_of(mistake: NamedMistake) -> str:
-    """The law that a mistake breaks, a key of the catalogues; empty for one without."""
+    """Return the law that a mistake breaks, a key of the catalogues; empty for one without."""
     usual = LAWS.get(mistake.code, "")
     if mistake.at.startswith(CORIOLIS_END):
         return _CORIOLIS.get(mistake.code, usual)

@@ -1,4 +1,4 @@
-"""The page of a self-check: what is right, off, or cannot be told, and the plans as measured; no points."""
+"""The page of a self-check: values that are right, off or open, and the plans as measured; no points."""
 
 from collections.abc import Sequence
 
@@ -21,13 +21,13 @@ def check_page(
     lang: str,
     about: About,
 ) -> str:
-    """The page as HTML.
+    """Return the page as HTML.
 
     Arguments
     ---------
-    report : its variant, its problems and the names of its criteria are shown, no verdict of it
-    lines : what is said of each value, as `grader.self_check.advice.checked_lines` gives it
-    mistakes : what is said of mistakes; empty where nothing may be
+    report : its variant, its problems and the names of its criteria are shown, none of its verdicts
+    lines : the result for each value, from `grader.self_check.advice.checked_lines`
+    mistakes : sentences on mistakes; empty if none may be shown
     """
     speaker = tongue(lang)
     page = StudentPage(report, tuple(pictures), speaker, about=about)

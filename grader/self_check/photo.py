@@ -1,4 +1,4 @@
-"""The check of a photo: what is right, off or not read, and what spoils the picture."""
+"""The check of a photo: values that are right, off or not read, and flaws that impair reading."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -22,7 +22,7 @@ from reference.errors import InputFileError
 def photo_check(
     path: Path, assignment: Assignment, rubric: RubricFile, variant: Variant, lang: str, level: Level = "hint"
 ) -> SelfCheck:
-    """What a student's own check of a photo, a scan, or a PDF of several tells.
+    """Check a student's photo, scan, or PDF of several.
 
     Raises InputFileError for a file that is not there, CallError for an unknown language.
     """
@@ -67,7 +67,7 @@ PLANS_UNSEEN = {
     VELOCITY_PLAN: N_("No velocity plan was found: if it is on another sheet, check that one, too."),
     ACCELERATION_PLAN: N_("No acceleration plan was found: if it is on another sheet, check that one, too."),
 }
-"""Of a photo on which the plan of this name was not found."""
+"""Shown for a photo on which the plan of this name was not found."""
 _OF_NO_USE = frozenset(
     {"resolution_wrong", "resolution_assumed", "paper_assumed", "upright_unsure", "title_block_unsure"}
 )
@@ -75,7 +75,7 @@ _OF_NO_USE = frozenset(
 
 
 def _said(problems: Sequence[Reason], speaker: Tongue) -> tuple[str, ...]:
-    """What a student is told of problems, each once."""
+    """Return the problems as a student reads them, each once."""
     told = [
         sentence(one, speaker, brief=True) or message(one) for one in problems if one.code not in _OF_NO_USE
     ]
@@ -83,7 +83,7 @@ def _said(problems: Sequence[Reason], speaker: Tongue) -> tuple[str, ...]:
 
 
 def _other_number(page: ScannedPage, variant: Variant) -> Iterator[Reason]:
-    """Where the code of a printed sheet says another number or position than the student does."""
+    """Report a number or position in a printed sheet's code that differs from the student's."""
     code = page.ref.identity
     for what in ("n", "position"):
         printed = None if code is None else getattr(code, what)

@@ -1,8 +1,7 @@
-"""A student's check of their own measurements, without the answer.
+"""The results of a student's check of their own measurements, without the answer.
 
-Three levels: ``symbol`` says right or off; ``hint`` also in which way (too long, turned left); ``full``,
-for instructors, has the numbers and the most likely mistake. A result holds nothing that its level must
-not show.
+There are three levels: ``symbol`` says right or off; ``hint`` also how (too long, turned left); ``full``, for
+instructors, has the numbers and the most likely mistake. A result holds nothing that its level must not show.
 """
 
 from collections.abc import Collection
@@ -25,12 +24,12 @@ TELLING = frozenset({"what", "of"})
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """One value checked.
+    """The check of one value.
 
     Attributes
     ----------
     criterion, name : as in the rubric
-    result : right, off, or open where the verdict is open
+    result : right, off, or open if the verdict is open
     reasons : the most important first; without numbers at level ``hint``, empty at ``symbol``
     measured, expected, tolerance, mistake : the evidence, at level ``full`` only
     """
@@ -46,7 +45,7 @@ class Checked:
 
 
 def checked_values(judgement: Judgement, level: Level, unread: Collection[str] = ()) -> tuple[Checked, ...]:
-    """The part of a judgement that a level may show.
+    """Return the part of a judgement that a level may show.
 
     Arguments: `unread` are vectors of a drawing: those that could not be read are open, at any level.
     """
@@ -58,20 +57,20 @@ def checked_values(judgement: Judgement, level: Level, unread: Collection[str] =
 
 
 def likely_mistakes(judgement: Judgement | None, level: Level) -> tuple[NamedMistake, ...]:
-    """The mistakes that explain what is off, at level `full`; what was left out is no mistake of a check."""
+    """Return the mistakes that explain errors, at level `full`; values left out are no mistake here."""
     mistakes = () if judgement is None or level != "full" else judgement.mistakes
     return tuple(one for one in mistakes if one.code != "vector_missing")
 
 
 def certain_mistakes(judgement: Judgement) -> tuple[NamedMistake, ...]:
-    """The mistakes that nothing else explains nearly as well: a hint may tell the law that they break."""
+    """Return the mistakes that nothing else explains nearly as well: a hint may state the law they break."""
     return tuple(one for one in judgement.mistakes if one.confidence >= NEARLY_CERTAIN and not one.rivals)
 
 
 def _is_handed_in(outcome: Outcome) -> bool:
     absent = {"not_measured", "optional", "unread", "scale_assumed"}
     if outcome.measured == Quantity() and outcome.name not in SCALE_NAMES:
-        # What rests on a refused entry alone was not handed in.
+        # A value that depends only on a refused entry was not handed in.
         absent.add("entry_refused")
     return outcome.verdict not in {"not_judged", "review", "none"} or not (
         absent & {reason.code for reason in outcome.reasons[:1]}
@@ -106,7 +105,7 @@ def _result(outcome: Outcome) -> Result:
 
 
 def _without_numbers(reason: Reason) -> Reason:
-    """A reason without the numbers that give the answer away; a refused scale keeps its text."""
+    """Return a reason without the numbers that give the answer away; a refused scale keeps its text."""
     if reason.code in {"scale_refused", "unread"}:
         return reason
     return Reason(reason.code, {key: value for key, value in reason.parameters.items() if key in TELLING})

@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class SelfCheck:
-    """What a self-check tells, in the student's language; nothing in it gives the answer away.
+    """The results of a self-check, in the student's language; nothing in it gives the answer away.
 
     Attributes
     ----------
-    lines : of every value that was asked for and handed in, or could not be read on a photo (`open`)
+    lines : one for every requested value that was handed in, or could not be read on a photo (`open`)
     problems : what else a student should know
-    judgement : None where nothing was read on a photo
-    flaws : what spoils a photo, by code, with what to do
-    pictures : each page of a photo with what was read on it, without expected vectors
+    judgement : None if nothing was read on a photo
+    flaws : flaws of a photo, by code, with what to do
+    pictures : each page of a photo with the reading on it, without expected vectors
     """
 
     lines: tuple[CheckedLine, ...] = ()
@@ -41,14 +41,14 @@ class SelfCheck:
 
     @property
     def is_all_right(self) -> bool:
-        """Whether something was handed in and read, and nothing is off or open."""
+        """True if something was handed in and read, and nothing is off or open."""
         return bool(self.lines) and all(line.result == "right" for line in self.lines)
 
 
 def check_values(
     entered: Measurements, assignment: Assignment, variant: Variant, speaker: Tongue, level: Level
 ) -> SelfCheck:
-    """What a student's own check of measured values tells.
+    """Check a student's measured values.
 
     Raises MechanismError for a variant whose mechanism does not assemble.
     """

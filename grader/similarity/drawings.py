@@ -41,29 +41,28 @@ from reference.plan import construction_for, exact_plan
 USUAL_SHARE = 0.45
 """Share of the drafting errors that is independent; a large class gives its own share,"""
 LARGEST_SHARE = 0.7
-"""up to this."""
+"""and at most this."""
 RARE = -9.0
-"""Log of the chance of two placements below which each drawing is also compared with the other's variant."""
+"""Below this log chance of two placements, each drawing is also compared with the other's variant."""
 GROSS = 4.0
-"""An error so many times as large as the student's usual one is a mistake or a misreading."""
+"""An error this many times as large as the student's usual one is a mistake or a misreading."""
 TAIL = 2.5
 """Larger errors count as this: one large error does not make two drawings similar."""
 LEAST_SPREAD = 0.1
 """Least usual error of a student, as a share of the usual drafting errors."""
 LEAST_CLASS = 10
-"""So many of one variant show what they have in common (a copier's scale, a table's rounding)."""
+"""This many submissions of one variant show what they share (a copier's scale, a table's rounding)."""
 NEAR_MM = 0.5
 """Smaller distances count as this."""
 RINGS_MM = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 """Radii within which the class's own placements are counted."""
 LAYOUT_MM, LAYOUT_SHARE = 16.0, 0.15
-"""A class follows a layout where this share of its pairs has all figures so near. Figures of different
-variants on the same poles have it (0.28), free ones do not (0.003), nor does one copy among ten pairs.
-"""
+"""A class follows a layout if in this share of its pairs all figures are this close. Figures of different
+variants on the same poles reach it (0.28), free ones do not (0.003), nor does one copy among ten pairs."""
 LEAST_PAIRS = 10
 """Fewer pairs do not show what a class has in common."""
 TRUSTED = 3000.0
-"""So many times the class's pairs the rarest placement may be: rarer ones no class can vouch for."""
+"""Largest rarity of a placement, as a multiple of the class's pairs: the class cannot show rarer ones."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,13 +75,13 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class DrawingSimilarity:
-    """Every two students' drawings; arrays (students, students).
+    """Similarity of every two students' drawings; arrays (students, students).
 
     Attributes
     ----------
-    log_chance : natural logarithm of the chance of so much similarity without copying; 0 where not compared
+    log_chance : natural logarithm of the chance of so much similarity without copying; 0 if not compared
     log_errors, log_places : the same by drafting errors and by positions on the sheet alone
-    log_layout : as `log_places`, of those who follow a layout; nan for others
+    log_layout : as `log_places`, for those who follow a layout; nan for others
     cosine, count : agreement of the errors, and how many there are
     pairs : of different students
     fits : another variant of the class that a drawing fits, and the residual in mm
@@ -136,7 +135,7 @@ def _rows(
     fits: Sequence[tuple[Variant, float] | None],
     places: FloatArray,
 ) -> list[Row]:
-    """Each drawing with its own variant, with those that it fits, and with those of drawings placed alike."""
+    """Return each drawing with its own variant, those it fits, and those of similarly placed drawings."""
     known = {each.variant for each in submissions}
     rows = [Row(k, each.variant) for k, each in enumerate(submissions)]
     rows += [Row(k, fit[0]) for k, fit in enumerate(fits) if fit is not None]
@@ -148,7 +147,7 @@ def _rows(
 
 
 def _compared_rows(rows: Sequence[Row], submissions: Sequence[ComparedSubmission]) -> NDArray[np.bool_]:
-    """(rows, rows) which rows are compared: of one variant, and of two people."""
+    """Return (rows, rows) which rows are compared: of one variant, and of two people."""
     variants = list(dict.fromkeys(row.variant for row in rows))
     variant = np.array([variants.index(row.variant) for row in rows])
     person = np.array([submissions[row.owner].student_id for row in rows])
@@ -158,7 +157,7 @@ def _compared_rows(rows: Sequence[Row], submissions: Sequence[ComparedSubmission
 def _by_student(
     rows: Sequence[Row], students: int, log_chance: FloatArray, *others: FloatArray
 ) -> list[FloatArray]:
-    """For every two students the least chance of their rows, and the other values of those rows."""
+    """Return for every two students the least chance of their rows, and the other values of those rows."""
     owner = np.array([row.owner for row in rows])
     pair = owner[:, None] * students + owner[None, :]
     order = np.argsort(-log_chance, axis=None, kind="stable")
@@ -172,7 +171,7 @@ def _by_student(
 
 
 def _fisher_combined(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Fisher's rule: log of the chance that two independent pieces of evidence are so rare together."""
+    """Combine evidence by Fisher's rule: log of the chance that two independent pieces are so rare."""
     both = scipy.special.gammaincc(2.0, -(first + second))
     with np.errstate(divide="ignore"):
         return np.where(second < 0.0, np.maximum(np.log(both), -690.0), first)
@@ -187,9 +186,9 @@ def drafting_errors(
     drawn: Mapping[str, Drawn],
     rows: Sequence[Row],
 ) -> FloatArray:
-    """Errors of drawings compared with variants, (rows, acts), in units of the student's usual error.
+    """Return errors of drawings compared with variants, (rows, acts), in the student's usual errors.
 
-    nan where not known.
+    nan if not known.
     """
     owner = np.array([row.owner for row in rows], np.int64)
     variants = [row.variant for row in rows]
@@ -206,7 +205,7 @@ def _raw_errors(
     variants: list[Variant],
     drawn: Mapping[str, ComplexArray],
 ) -> tuple[FloatArray, FloatArray]:
-    """Errors of each node by the student's own earlier nodes, in usual errors, (rows, 2 nodes).
+    """Return errors of each node given the student's own earlier nodes, in usual errors, (rows, 2 nodes).
 
     The second array, of the same shape, is their derivative by an enlargement (of printers, copiers).
     """
@@ -238,7 +237,7 @@ def _own_nodes(
     exact: Mapping[str, Mapping[str, ComplexArray]],
     drawn: Mapping[str, ComplexArray],
 ) -> dict[str, ComplexArray]:
-    """The students' nodes in the assignment's frame, nan where not read: plans about their pole."""
+    """Return the students' nodes in the assignment's frame, nan if not read: plans about their pole."""
     own: dict[str, ComplexArray] = {}
     turn = np.ones(len(drawn[MECHANISM]), np.complex128)
     for figure, at in drawn.items():
@@ -254,7 +253,7 @@ def _own_nodes(
 
 
 def _laid_over(drawn: ComplexArray, proper: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-    """Sketches turned and shifted onto the right ones, and their turn (1 where not known)."""
+    """Turn and shift sketches onto the right ones; return them and their turn (1 if not known)."""
     known = np.isfinite(drawn) & np.isfinite(proper)
     count = np.maximum(known.sum(axis=1, keepdims=True), 1)
     here = np.where(known, drawn, 0.0)
@@ -269,7 +268,7 @@ def _laid_over(drawn: ComplexArray, proper: ComplexArray) -> tuple[ComplexArray,
 
 
 def _covariance(step: Step, view: View, expected: ComplexArray) -> FloatArray:
-    """(rows, 2, 2) covariance of a node by usual errors in the acts that make it, mm^2."""
+    """Return (rows, 2, 2) covariance of a node by usual errors in the acts that make it, mm^2."""
     errors = step_errors(step, USUAL)
     placed = np.asarray(step.place(View(view.nodes, view.parameters, errors)))
     count = len(next(iter(errors.values())))
@@ -279,13 +278,13 @@ def _covariance(step: Step, view: View, expected: ComplexArray) -> FloatArray:
 
 
 def _whitened(error: ComplexArray, covariance: FloatArray) -> FloatArray:
-    """(rows, 2) an error in units of its spread."""
+    """Return (rows, 2) an error in units of its standard deviation."""
     root = np.linalg.cholesky(covariance)
     return np.linalg.solve(root, np.stack([error.real, error.imag], axis=-1)[..., None])[..., 0]
 
 
 def _normed(errors: FloatArray) -> FloatArray:
-    """Errors in units of the student's usual one; mistakes are nan, large errors are limited to `TAIL`."""
+    """Return errors in units of the student's usual one; mistakes are nan, large errors limited to `TAIL`."""
     with np.errstate(invalid="ignore"):
         usual = _median(np.abs(errors))[:, None] / 0.6745
         scaled = errors / np.maximum(usual, LEAST_SPREAD)
@@ -294,7 +293,7 @@ def _normed(errors: FloatArray) -> FloatArray:
 
 
 def _enlargement(errors: FloatArray, by_scale: FloatArray) -> FloatArray:
-    """(rows, 1) the common enlargement: the median of the enlargements of all lengths, by their weight."""
+    """Return (rows, 1) the common enlargement: the weighted median of the enlargements of all lengths."""
     weight = np.where(np.isfinite(errors) & np.isfinite(by_scale), np.abs(by_scale), 0.0)
     with np.errstate(invalid="ignore", divide="ignore"):
         each = np.where(weight > 0.0, errors / by_scale, 0.0)
@@ -305,7 +304,7 @@ def _enlargement(errors: FloatArray, by_scale: FloatArray) -> FloatArray:
 
 
 def _without(errors: FloatArray, by_scale: FloatArray) -> FloatArray:
-    """Errors without the part that a common enlargement explains."""
+    """Return errors without the part that a common enlargement explains."""
     known = np.isfinite(errors) & np.isfinite(by_scale)
     along = np.where(known, by_scale, 0.0)
     size = np.maximum((along**2).sum(axis=1, keepdims=True), 1e-12)
@@ -314,7 +313,7 @@ def _without(errors: FloatArray, by_scale: FloatArray) -> FloatArray:
 
 
 def _median(values: FloatArray) -> FloatArray:
-    """Lower medians of the finite values along the last axis; 0 where there are none."""
+    """Return lower medians of the finite values along the last axis; 0 if there are none."""
     known = np.isfinite(values)
     count = known.sum(axis=-1)
     if not values.shape[-1]:
@@ -325,7 +324,7 @@ def _median(values: FloatArray) -> FloatArray:
 
 
 def _centred(errors: FloatArray, variants: Sequence[Variant]) -> FloatArray:
-    """Errors without the median of those with the same variant, where they are many enough."""
+    """Subtract from errors the median of those with the same variant, if they are many enough."""
     errors = errors.copy()
     for variant in set(variants):
         same = np.array([each == variant for each in variants])
@@ -335,7 +334,7 @@ def _centred(errors: FloatArray, variants: Sequence[Variant]) -> FloatArray:
 
 
 def _agreement(errors: FloatArray, together: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """How the errors of every two rows agree: cosines, how many errors both have, log of the chance.
+    """Return the agreement of every two rows' errors: cosines, number of common errors, log of the chance.
 
     Arguments: `together` (rows, rows) are the pairs that are compared.
 
@@ -356,7 +355,7 @@ def _agreement(errors: FloatArray, together: NDArray[np.bool_]) -> tuple[FloatAr
 
 
 def _share(cosines: FloatArray, counts: FloatArray) -> float:
-    """The share of the errors that is independent, from the spread of the cosines of this class."""
+    """Return the share of the errors that is independent, from the spread of this class's cosines."""
     if len(cosines) < LEAST_CLASS * (LEAST_CLASS - 1) // 2:
         return USUAL_SHARE
     low, high = np.percentile(cosines, [15.87, 84.13])
@@ -364,7 +363,7 @@ def _share(cosines: FloatArray, counts: FloatArray) -> float:
 
 
 def log_chance(cosine: FloatArray, dimensions: FloatArray) -> FloatArray:
-    """Log of P(cos >= c) for a random direction in d dimensions, 0 below two dimensions.
+    """Return the log of P(cos >= c) for a random direction in d dimensions, 0 below two dimensions.
 
     The half of a regularised incomplete beta function, I_{1 - c^2}((d - 1) / 2, 1 / 2) / 2.
     """
@@ -380,13 +379,14 @@ def log_chance(cosine: FloatArray, dimensions: FloatArray) -> FloatArray:
 def position_chance(
     drawn: Mapping[str, Drawn], printed: NDArray[np.bool_], variant: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Log of the chance that two placements come so near, and the part that a layout explains.
+    """Return the log chance that two placements are so close, and the part that a layout explains.
 
-    Two arrays (students, students). The first is 0 where positions are not known. The second equals the
-    first where the class, or those of one variant, follow a layout; else it is nan.
+    Two arrays (students, students). The first is 0 where positions are not known. The second equals the first
+    if the class, or those of one variant, follow a layout; else it is nan.
 
-    Arguments: which students drew on a `printed` sheet, whose crosses say for each variant where poles
-    are best put: there the sketch alone is placed freely. `variant` is each student's, as a number.
+    Arguments: `printed` says which students drew on printed sheets, whose crosses mark for each variant the
+    best position of the poles: there the sketch alone is placed freely. `variant` is each student's, as a
+    number.
 
     The shift of one figure between two sheets is compared with the shift of the next figure, so that the
     position of the sheets in the scanner does not matter.
@@ -401,7 +401,7 @@ def position_chance(
         known = np.isfinite(between) & together[:, None] & together[None, :] & free[:, None] & free[None, :]
         apart = np.maximum(apart, np.where(known, between, 0.0))
         freedom += 2 * known
-    # Of three figures' distances two are free, beside prescribed poles one.
+    # Of three figures' distances, two are independent; with prescribed poles, one.
     most = np.where(printed[:, None] | printed[None, :], 2, 2 * (len(drawn) - 1))
     freedom = np.minimum(freedom, most)
     apart = np.maximum(apart, NEAR_MM)
@@ -419,14 +419,14 @@ def position_chance(
 
 
 def _shift(at: ComplexArray) -> ComplexArray:
-    """(students, students) shift of a figure, complex mm: the median over the nodes that both have."""
+    """Return (students, students) shift of a figure, complex mm: the median over the nodes that both have."""
     between = at[None, :, :] - at[:, None, :]
     shift = _median(between.real) + 1j * _median(between.imag)
     return np.asarray(np.where(np.isfinite(between).any(axis=2), shift, UNKNOWN))
 
 
 def _chance(apart: FloatArray, freedom: IntArray, among: NDArray[np.bool_] | None = None) -> FloatArray:
-    """Log chances by the densest ring about each placement in the class (or in some pairs of it).
+    """Return log chances by the densest ring about each placement in the class (or in some pairs of it).
 
     With too few pairs they are 0 for the whole class, and -inf (no limit) for some pairs of it.
     """
@@ -451,7 +451,7 @@ def _chance(apart: FloatArray, freedom: IntArray, among: NDArray[np.bool_] | Non
 
 
 def _without_both(near: NDArray[np.bool_]) -> FloatArray:
-    """(students, students) how many pairs there are among all others than these two.
+    """Return (students, students) the number of pairs among all students except these two.
 
     The pair itself is no evidence on how others place their figures, nor is a third copy of its sheet.
     """

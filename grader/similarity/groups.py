@@ -1,4 +1,4 @@
-"""Similar sheets: pairs that are more similar than independent drawings are by chance.
+"""Find similar sheets: pairs that are more similar than independent drawings are by chance.
 
 This is no accusation: a person should look at both. Well-drawn plans of one variant are similar anyway,
 and so are the values of all who work exactly; the evidence is in the errors. Each kind of evidence gives
@@ -28,21 +28,21 @@ from reference.authored.assignment import Assignment, Variant
 FALSE_ALARMS = 0.001
 """Mean number of independent pairs that each kind of evidence names in a class by chance."""
 NOTED = log(0.05)
-"""Chance below which a part of the evidence is named."""
+"""A part of the evidence is named below this log chance."""
 MOST_OWNERS = 3
-"""A number that more students share does not show whose drawing it is."""
+"""If more students share a number, it does not show whose drawing it is."""
 MOST_TOGETHER = 1000
-"""Sheets that are compared with each other: time and memory grow with the square of their number."""
+"""Most sheets compared with each other: time and memory grow with the square of their number."""
 Maps = Sequence[Sequence[NDArray[np.uint8]]]
 
 
 @dataclass(frozen=True, slots=True)
 class PictureSimilarity:
-    """Every two students' sheets; arrays (students, students).
+    """Similarity of every two students' sheets; arrays (students, students).
 
     Attributes
     ----------
-    log_chance : natural logarithm of the chance of so much similarity in this class; 0 where not compared
+    log_chance : natural logarithm of the chance of so much similarity in this class; 0 if not compared
     overlap : correlation of the ink, the largest of any two sheets
     pairs : compared
     """
@@ -69,7 +69,7 @@ class _Pair:
 
 
 def compared_together(variants: Sequence[Variant]) -> list[list[int]]:
-    """Which sheets are compared with each other: all of a class, of a very large one those of like variants.
+    """Return which sheets are compared: all of a class; of a very large one, those of like variants.
 
     Returns: indices, in parts of `MOST_TOGETHER` at most, in which the sheets of a variant stay together.
     """
@@ -88,7 +88,7 @@ def compared_together(variants: Sequence[Variant]) -> list[list[int]]:
 def find_similar(
     assignment: Assignment, submissions: Sequence[ComparedSubmission], maps: Maps = ()
 ) -> list[AlikeDocument]:
-    """The groups of similar sheets that a person should compare, the most similar first.
+    """Return the groups of similar sheets that a person should compare, the most similar first.
 
     Arguments: `maps` are each submission's ink maps (see `ink_map`), in the order of `submissions`.
     """
@@ -115,12 +115,12 @@ def find_similar(
 
 
 def by_chance(entry: AlikeDocument) -> tuple[bool, float, list[str]]:
-    """The order of entries: the least expected of independent hands first."""
+    """Sort key of entries: the least expected from independent work first."""
     return entry.measure is None, entry.measure or 0.0, entry.students
 
 
 def _rare(log_chance: FloatArray, pairs: int) -> Iterator[tuple[int, int, float]]:
-    """The pairs whose evidence is rarer than `FALSE_ALARMS`, with their expected number in the class."""
+    """Yield the pairs with evidence rarer than `FALSE_ALARMS`, and their expected number in the class."""
     expected = log_chance + log(max(pairs, 1))
     for i, j in np.argwhere(np.triu(expected < log(FALSE_ALARMS), 1)):
         yield int(i), int(j), exp(max(float(expected[i, j]), -600.0))
@@ -144,7 +144,7 @@ def _add_numbers(pairs: dict[tuple[int, int], _Pair], numbers: NumberSimilarity)
 def _add_pictures(
     pairs: dict[tuple[int, int], _Pair], pictures: PictureSimilarity, drawings: DrawingSimilarity
 ) -> None:
-    # Good drawings that follow one layout have the same ink: that is no rarer than their positions.
+    # Good drawings in one layout have the same ink: that is no rarer than their positions.
     log_chance = np.fmax(pictures.log_chance, drawings.log_layout)
     for i, j, measure in _rare(log_chance, pictures.pairs):
         share = float(np.clip(pictures.overlap[i, j], 0.0, 1.0))
@@ -177,7 +177,7 @@ def _add_other_numbers(
 
 
 def _groups(pairs: Sequence[tuple[int, int]]) -> list[list[int]]:
-    """The students who are connected by pairs."""
+    """Return the students who are connected by pairs."""
     groups: list[set[int]] = []
     for pair in pairs:
         joined = set(pair).union(*(group for group in groups if not group.isdisjoint(pair)))
@@ -190,7 +190,7 @@ def _document(
     members: Sequence[int],
     strangers: Sequence[tuple[int, int, _Pair]],
 ) -> AlikeDocument:
-    """An entry for a group of students, with the measure of its weakest pair that has a measure."""
+    """Return an entry for a group of students, with the measure of its weakest pair that has one."""
     of_these = [pair for i, j, pair in strangers if i in members and j in members]
     weakest = max(of_these, key=lambda pair: -1.0 if pair.measure is None else pair.measure)
     return AlikeDocument(
@@ -208,15 +208,15 @@ def _document(
 CELL_MM = 2.5
 """Side of a map's cell."""
 CELLS = (118, 168)
-"""Rows and columns of an A3 sheet's map; what lies outside is left out."""
+"""Rows and columns of an A3 sheet's map; anything outside is left out."""
 COMMON = 0.3
-"""Share of the sheets with ink in a cell from which it belongs to the sheet, not to the drawing."""
+"""If this share of the sheets has ink in a cell, the ink belongs to the sheet, not to the drawing."""
 INKED = 3
-"""Of 255: darker cells have ink, of a hard pencil too."""
+"""Cells darker than this, of 255, have ink, of a hard pencil too."""
 DARKEST = 60.0
 """A darker cell counts as this one: ink and pencil weigh alike."""
 RUN, RUN_INKED = 32, 0.8
-"""Cells of a straight run (80 mm) that is the page's, and the share of them that have ink."""
+"""Cells of a straight run (80 mm) that belongs to the page, and the share of them that have ink."""
 PART = 12
 """Side of a part in cells: 30 mm, a letter or line with its surroundings, less than a figure."""
 FAINT = 20.0
@@ -224,21 +224,21 @@ FAINT = 20.0
 LEAST_PARTS = 8
 """A sheet with ink in fewer parts shows too little to be recognised by."""
 LEAST_SHEETS = 7
-"""Of six sheets two are a third: what they share would be taken for the page's."""
+"""Fewer sheets are not compared: of six, two are a third, and common ink would count as the page's."""
 LEAST_OVERLAP = 0.5
 """Mean correlation of the parts below which two sheets are never the same drawing."""
 LEAST_SPREAD = 0.015
-"""Least scale of the tail, in inverse hyperbolic tangents: where all pairs are equal there is none."""
+"""Least scale of the tail, in inverse hyperbolic tangents: if all pairs are equal there is none."""
 QUANTILES = 0.84, 0.95
-"""The upper one leaves a copied pair out in a class of seven."""
+"""The upper quantile excludes a copied pair in a class of seven."""
 TAIL_DROP = float(np.log((1.0 - QUANTILES[0]) / (1.0 - QUANTILES[1])))
-"""How far the logarithm of an exponential tail falls between the two quantiles."""
+"""Fall of the logarithm of an exponential tail between the two quantiles."""
 
 
 def ink_map(scan: GreyImage, page_mm: tuple[float, float]) -> NDArray[np.uint8]:
-    """(118, 168) mean darkness of an upright sheet's cells, 0 = paper.
+    """Return (118, 168) mean darkness of an upright sheet's cells, 0 = paper.
 
-    Arguments: `scan` (h, w) uint8, 255 = paper, that shows the whole page of `page_mm`.
+    Arguments: `scan` (h, w) uint8, 255 = paper, shows the whole page of `page_mm`.
     """
     ink = np.zeros(CELLS, np.uint8)
     high, wide = scan.shape
@@ -262,7 +262,7 @@ def compare_pictures(
 ) -> PictureSimilarity:
     """Compare the sheets of a class.
 
-    Arguments: `owners` tells whose each map is, an index of `printed`: who drew on printed answer sheets.
+    Arguments: `owners` gives the owner of each map, an index of `printed`: who drew on printed answer sheets.
     """
     students = len(printed)
     overlap = np.zeros((students, students))
@@ -281,10 +281,10 @@ def compare_pictures(
 
 
 def _log_tail(values: FloatArray, known: FloatArray) -> FloatArray:
-    """Log of the chance of values as large, by an exponential tail through upper quantiles of the known ones.
+    """Return the log chance of such values, by an exponential tail through upper quantiles of the known ones.
 
-    The tail is heavier than a normal one, and no steeper than in the class: where all follow one layout,
-    some pairs are much more similar than others.
+    The tail is heavier than a normal one, and no steeper than in the class: if all follow one layout, some
+    pairs are much more similar than others.
     """
     middle, high, higher = np.quantile(known, [0.5, *QUANTILES])
     scale = max((high - middle) / 2.0, (higher - high) / TAIL_DROP, LEAST_SPREAD)
@@ -292,10 +292,10 @@ def _log_tail(values: FloatArray, known: FloatArray) -> FloatArray:
 
 
 def _agreement(maps: NDArray[np.uint8], printed: NDArray[np.bool_]) -> FloatArray:
-    """(sheets, sheets) correlation of the ink in one part of the page, the mean over parts that have ink.
+    """Return (sheets, sheets) correlation of the ink in a part of the page, the mean over inked parts.
 
-    A part counts once, however dark it is: a block, a stain or an edge that two sheets share cannot
-    stand for the whole of them.
+    A part counts once, however dark it is: a block, a stain or an edge that two sheets share cannot stand for
+    the whole of them.
     """
     ink = np.minimum(maps.astype(np.float32), DARKEST) * ~_of_the_page(maps, printed)
     parts = _parts(_blurred(ink))
@@ -310,11 +310,10 @@ def _agreement(maps: NDArray[np.uint8], printed: NDArray[np.bool_]) -> FloatArra
 
 
 def _of_the_page(maps: NDArray[np.uint8], printed: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(sheets, rows, columns) ink of the page, not of the drawing.
+    """Return (sheets, rows, columns) ink of the page, not of the drawing.
 
-    It is what many printed or many plain sheets have in common, and straight runs along an edge that
-    are longer than a figure's lines: frame, rows of a title block, folds, squares, the desk beside
-    the paper.
+    It is ink that many printed or many plain sheets have in common, and straight runs along an edge that are
+    longer than a figure's lines: frame, rows of a title block, folds, squares, the desk beside the paper.
     """
     inked = maps > INKED
     runs = _long_runs(inked) | _long_runs(inked.transpose(0, 2, 1)).transpose(0, 2, 1)
@@ -325,9 +324,9 @@ def _of_the_page(maps: NDArray[np.uint8], printed: NDArray[np.bool_]) -> NDArray
 
 
 def _long_runs(inked: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Cells of straight runs along the last axis.
+    """Return cells of straight runs along the last axis.
 
-    A run may step aside by a cell, for the page lies askew, and have gaps, for pencil is faint.
+    A run may shift by a cell, because the page is askew, and have gaps, because pencil is faint.
     """
     # A row has fewer than 256 cells: counts fit into bytes.
     wide = _with_neighbours(inked).astype(np.uint8)
@@ -339,7 +338,7 @@ def _long_runs(inked: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _with_neighbours(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Cells and those beside them across the last axis."""
+    """Return cells and those beside them across the last axis."""
     wide = cells.copy()
     wide[:, 1:] |= cells[:, :-1]
     wide[:, :-1] |= cells[:, 1:]
@@ -347,7 +346,7 @@ def _with_neighbours(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _parts(ink: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(parts, sheets, cells) squares of `PART` cells, those at the end filled up with paper."""
+    """Return (parts, sheets, cells) squares of `PART` cells, those at the end filled up with paper."""
     sheets, rows, columns = ink.shape
     down, across = -(-rows // PART), -(-columns // PART)
     whole = np.zeros((sheets, down * PART, across * PART), np.float32)
@@ -357,7 +356,7 @@ def _parts(ink: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _blurred(ink: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Each cell with its neighbours: a sheet lies a little otherwise at every scan."""
+    """Blur each cell with its neighbours: a sheet shifts a little with every scan."""
     down = 0.5 * ink
     down[:, 1:] += 0.25 * ink[:, :-1]
     down[:, :-1] += 0.25 * ink[:, 1:]

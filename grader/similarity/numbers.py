@@ -1,9 +1,9 @@
-"""Equal entered values: how likely they are for two students who measured their own drawings.
+"""Equal entered values: their chance for two students who measured their own drawings.
 
-Lengths and directions spread about the exact ones by the propagated drafting errors, all vectors of a
-drawing together: one inaccurate line shifts many values, which is one coincidence, not many. Nearly exact
-values are no evidence, since everybody who works exactly has them. Values that are far off are mistakes,
-which two students may make independently, and are left out.
+Lengths and directions spread about the exact ones by the propagated drafting errors, all vectors of a drawing
+together: one inaccurate line shifts many values, which is one coincidence, not many. Nearly exact values are
+no evidence, since everybody who works exactly has them. Grossly wrong values are mistakes, which two students
+may make independently, and are left out.
 """
 
 from collections.abc import Sequence
@@ -23,12 +23,12 @@ from reference.geometry import ComplexArray
 from reference.plan import exact_plan
 
 READ_OFF_MM = 0.15
-"""Standard deviation of reading a ruler, beside the rounding of what is written down."""
+"""Standard deviation of reading a ruler, besides the rounding of the written value."""
 SCALE_OFF = 0.015
-"""Of each plan as a whole: rounded scales and speeds, the same for all its vectors."""
+"""Standard deviation of each plan as a whole: rounded scales and speeds, common to all its vectors."""
 GRAINS = (1.0, 0.5, 0.1)
-"""Steps of rulers and protractors, mm and degrees. Finer ones are calculated, not measured: no finer
-coincidence counts."""
+"""Steps of rulers and protractors, mm and degrees. Finer values are calculated, not measured: finer
+coincidences do not count."""
 NEARLY_ALL = 0.75
 """Share of the values that must be multiples of a step."""
 LEAST_MM = 8.0
@@ -36,20 +36,20 @@ LEAST_MM = 8.0
 GROSS = 4.0
 """An error of more standard deviations is a mistake, not a drafting error."""
 ROUNDED_MM = 0.05
-"""Residual that counts as exact, beside the step of the values."""
+"""Residual that counts as exact, besides the step of the values."""
 OWN_SHARE = 0.6
-"""Share of a student's values that must be near the exact ones; else they are of another drawing."""
+"""Share of a student's values that must be near the exact ones; otherwise they are of another drawing."""
 LEAST_EQUAL = 5
 """Fewer equal values are not examined,"""
 LEAST_TELLING = 3
-"""nor are values of which fewer differ from the exact ones by more than rounding."""
+"""nor are values of which fewer than this differ from the exact ones by more than rounding."""
 SKILLS = (0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0)
-"""Drafting errors that are tried, as multiples of the usual ones."""
+"""Drafting errors to try, as multiples of the usual ones."""
 
 
 @dataclass(frozen=True, slots=True)
 class NumberSimilarity:
-    """Every two students' entered values; arrays (students, students).
+    """Similarity of every two students' entered values; arrays (students, students).
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class NumberSimilarity:
 
 @dataclass(frozen=True, slots=True)
 class _Table:
-    """Entered values and the values expected of each student; nan where there is none.
+    """Entered values and the values expected of each student; nan if there is none.
 
     Attributes
     ----------
@@ -117,7 +117,7 @@ def compare_numbers(assignment: Assignment, submissions: Sequence[ComparedSubmis
 
 
 def _counted(table: _Table, single: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Counts for every two students, arrays (students, students).
+    """Return counts for every two students, arrays (students, students).
 
     The usable values of the first that the second has, too; the telling ones of them; the sum of the logs
     of their single chances; the number of values that both have.
@@ -135,7 +135,7 @@ def _counted(table: _Table, single: FloatArray) -> tuple[FloatArray, FloatArray,
 
 
 def _choices(both: FloatArray, equal: FloatArray) -> FloatArray:
-    """Log of the number of combinations in which so many of the values can be the equal ones."""
+    """Return the log of the number of combinations in which so many of the values can be the equal ones."""
     log = scipy.special.gammaln
     return np.asarray(log(both + 1.0) - log(equal + 1.0) - log(both - equal + 1.0))
 
@@ -176,14 +176,14 @@ def _table(assignment: Assignment, submissions: Sequence[ComparedSubmission]) ->
 
 
 def _spread(by_act: FloatArray, grain_mm: FloatArray) -> FloatArray:
-    """(students, fields) standard deviation of values with usual drafting errors, mm."""
+    """Return (students, fields) standard deviation of values with usual drafting errors, mm."""
     return np.asarray(np.sqrt((by_act**2).sum(axis=2) + READ_OFF_MM**2 + grain_mm**2 / 12.0))
 
 
 def _exact(
     assignment: Assignment, submissions: Sequence[ComparedSubmission], variants: list[Variant]
 ) -> tuple[dict[str, ComplexArray], dict[str, ComplexArray]]:
-    """Exact vectors (students,) in mm, and their shifts by usual errors of all acts (students, acts)."""
+    """Return exact vectors (students,) in mm, and shifts by usual errors of all acts (students, acts)."""
     plan = exact_plan(assignment, variants, scales_used(assignment, submissions, variants))
     vectors = {
         name: np.broadcast_to(plan.drawn_mm(name), len(submissions)) for name in plan.construction.vectors
@@ -206,7 +206,7 @@ def _exact(
 
 
 def _common(residual_mm: FloatArray, variants: Sequence[Variant]) -> FloatArray:
-    """(students, fields) mean residual of those with the same variant, where they are many enough.
+    """Return (students, fields) mean residual of those with the same variant, if they are many enough.
 
     A protractor or a rounded table that all share gives all values the same error. A median of values in
     whole millimetres would be one of them.
@@ -222,7 +222,7 @@ def _common(residual_mm: FloatArray, variants: Sequence[Variant]) -> FloatArray:
 
 
 def _grain(values: FloatArray) -> FloatArray:
-    """(students, 1) the coarsest step of which nearly all the values are multiples, the finest for none."""
+    """Return (students, 1) the coarsest step of which nearly all values are multiples; else the finest."""
     count = np.isfinite(values).sum(axis=1, keepdims=True)
     coarsest = np.full((len(values), 1), GRAINS[-1])
     for grain in sorted(GRAINS[:-1]):
@@ -236,7 +236,7 @@ def _grain(values: FloatArray) -> FloatArray:
 
 
 def _single(table: _Table) -> FloatArray:
-    """Log chance of each value by itself: roughly an upper bound of the evidence, quickly computed."""
+    """Return the log chance of each value by itself: a rough upper bound of the evidence."""
     spread = _spread(table.by_act, table.grain_mm)
     with np.errstate(divide="ignore", invalid="ignore"):
         log = np.log(table.grain_mm / spread / np.sqrt(2.0 * np.pi)) - 0.5 * (table.residual_mm / spread) ** 2
@@ -244,7 +244,7 @@ def _single(table: _Table) -> FloatArray:
 
 
 def _chance(table: _Table, student: int, chosen: np.ndarray) -> float:
-    """Log of the chance that an independent student with the same variant has these values.
+    """Return the log chance that an independent student with the same variant has these values.
 
     The density of all the values together times their steps, at the likeliest size of drafting errors.
     """

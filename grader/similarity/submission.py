@@ -34,8 +34,8 @@ class ComparedSubmission:
     ----------
     sheets : the nodes read on each sheet
     numbers : entered lengths (mm), ``NAME_deg`` directions and ``NAME_value`` SI values
-    used : scales used for marking, real units per millimetre; empty where marking came to none
-    fits : the variant that diagnosis says was drawn instead, with its confidence, or None
+    used : scales used for marking, real units per millimetre; empty if marking did not happen
+    fits : the variant drawn instead, according to the diagnosis, with its confidence, or None
     printed : whether it is drawn on printed answer sheets, which have a cross for each pole
     excused : nodes and vectors at which a mistake was named: residuals there are no drafting errors
     """
@@ -53,7 +53,7 @@ class ComparedSubmission:
 def compared_submission(
     report: ReportDocument, variant: Variant, measured: Measurements | None
 ) -> ComparedSubmission:
-    """The data of a marked submission."""
+    """Return the data of a marked submission."""
     return ComparedSubmission(
         student_id=report.student_id,
         variant=variant,
@@ -76,7 +76,7 @@ def compared_submission(
 
 
 def _fits(variant: Variant, report: ReportDocument) -> tuple[Variant, float] | None:
-    """The other variant that the diagnosis names, and its confidence; None without one."""
+    """Return the other variant that the diagnosis names, and its confidence; None without one."""
     for mistake in report.mistakes:
         if mistake.code == "other_variant":
             named = dict(part.split(" = ", 1) for part in mistake.detail.split(", ") if " = " in part)
@@ -96,8 +96,8 @@ class Drawn:
     Attributes
     ----------
     names : (nodes,)
-    at : (students, nodes) x - i y in sheet millimetres, nan where not read
-    sheet : (students,) index of the sheet that it was taken from, -1 where it was on none
+    at : (students, nodes) x - i y in sheet millimetres, nan if not read
+    sheet : (students,) index of the sheet with the figure, -1 if there was none
     """
 
     names: tuple[str, ...]
@@ -108,7 +108,7 @@ class Drawn:
 def drawn_of(
     submissions: Sequence[ComparedSubmission], nodes: Mapping[str, Sequence[str]]
 ) -> dict[str, Drawn]:
-    """Each figure's nodes from the sheet with most of them; a student may hand in two sketches."""
+    """Return each figure's nodes from the sheet with most of them; a student may hand in two sketches."""
     drawn = {}
     for figure, names in nodes.items():
         chosen = [_fullest(each, figure) for each in submissions]
@@ -128,7 +128,7 @@ def _fullest(submission: ComparedSubmission, figure: str) -> int:
 def fitting(
     assignment: Assignment, submissions: Sequence[ComparedSubmission], drawn: Mapping[str, Drawn]
 ) -> list[tuple[Variant, float] | None]:
-    """For each student another variant of the class that the drawing fits, and the residual in mm."""
+    """Return for each student another variant of the class that the drawing fits, and the residual in mm."""
     variants = list(dict.fromkeys(each.variant for each in submissions))
     plan = exact_plan(assignment, variants)
     square, count = np.zeros((len(submissions), len(variants))), np.zeros((len(submissions), 1))
@@ -147,7 +147,7 @@ def fitting(
 
 
 def _misfit(at: ComplexArray, known: np.ndarray, exact: ComplexArray) -> FloatArray:
-    """(students, variants) sums of squares, mm^2, of figures shifted, turned and scaled onto exact ones."""
+    """Return (students, variants) sums of squares, mm^2, of figures moved and scaled onto exact ones."""
     weight = known.astype(np.float64)
     count = np.maximum(weight.sum(axis=1), 1.0)
     sum_at, sum_exact = at.sum(axis=1), weight @ exact.T
@@ -162,7 +162,7 @@ def _misfit(at: ComplexArray, known: np.ndarray, exact: ComplexArray) -> FloatAr
 def scales_used(
     assignment: Assignment, submissions: Sequence[ComparedSubmission], variants: list[Variant]
 ) -> Scales:
-    """The scales that each submission was marked with, (submissions,); the proposed ones where unknown."""
+    """Return the scales used for marking each submission, (submissions,); the proposed ones if unknown."""
     proposed = assignment.scales(variants)
     scales = {
         name: [each.used.get(name, usual) for each, usual in zip(submissions, values, strict=True)]

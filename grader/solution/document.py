@@ -20,15 +20,15 @@ from reference.quantities import unit_of
 # Centres and poles --------------------------------------------------------------------------------
 
 NO_TURN = 1e-12
-"""A link that turns so slowly, over the mechanism's reach and relative to its largest speed, does not."""
+"""A link that turns more slowly, relative to the mechanism's reach and largest speed, does not turn."""
 
 
 def instantaneous_centres(
     mechanism: Mechanism, construction: Construction, motion: Motion
 ) -> dict[str, ComplexArray]:
-    """Centres ``I3`` of links about the ground, ``I34`` of two links; complex metres, shape (N,).
+    """Return centres ``I3`` of links relative to the ground, ``I34`` of two links; complex metres, (N,).
 
-    nan where there is none: links that do not turn, or turn alike.
+    nan if there is none: links that do not turn, or turn alike.
     """
     joints = _joints_of_links(mechanism, construction)
     fields = {link: _spin(motion, joint, motion.omega[link]) for link, joint in joints.items()}
@@ -43,7 +43,7 @@ def instantaneous_centres(
 def acceleration_poles(
     mechanism: Mechanism, construction: Construction, motion: Motion
 ) -> dict[str, ComplexArray]:
-    """``J3`` of every link that turns; complex metres, nan where it neither turns nor speeds up."""
+    """Return ``J3`` of every link that turns; complex metres, nan if it neither turns nor accelerates."""
     poles = {}
     least = NO_TURN * _largest(motion.acceleration) / _largest(motion.position)
     for link, joint in _joints_of_links(mechanism, construction).items():
@@ -57,7 +57,7 @@ def _largest(of_joints: Mapping[str, ComplexArray]) -> FloatArray:
 
 
 def _joints_of_links(mechanism: Mechanism, construction: Construction) -> Mapping[str, str]:
-    """A joint of each link that turns."""
+    """Return a joint of each link that turns."""
     driver = mechanism.driver
     links = {driver.link: driver.pin} if isinstance(driver, Crank) else {}
     rates = {name.partition("_")[2]: rate for name, rate in construction.rates.items()}
@@ -65,7 +65,7 @@ def _joints_of_links(mechanism: Mechanism, construction: Construction) -> Mappin
 
 
 def _spin(motion: Motion, joint: str, omega: FloatArray) -> tuple[ComplexArray, FloatArray]:
-    """A link's velocities as c + i omega z: c and omega."""
+    """Return a link's velocities as c + i omega z: c and omega."""
     at, velocity = motion.position[joint], motion.velocity[joint]
     return np.asarray(velocity - 1j * omega * at), omega
 
@@ -108,8 +108,8 @@ class PlanVector(_Document):
 class PlanDocument(_Document):
     """The exact plan of one variant; plan nodes relative to their pole, y up.
 
-    `centres_m`: instantaneous centres (``I3``, of two links ``I34``) and acceleration poles (``J3``) in
-    the mechanism's coordinates; null where a link does not turn.
+    `centres_m`: instantaneous centres (``I3``, of two links ``I34``) and acceleration poles (``J3``) in the
+    mechanism's coordinates; null if a link does not turn.
     """
 
     schema_version: Literal[1] = 1
@@ -126,27 +126,27 @@ class PlanDocument(_Document):
 
 
 def variant_numbers(variant: Variant) -> dict[str, int]:
-    """The ``variant`` of documents: n where the assignment has one."""
+    """Return the ``variant`` of documents: n if the assignment has one."""
     return {} if variant.n is None else {"n": variant.n}
 
 
 def plan_document(assignment: Assignment, plan: Plan, index: int = 0) -> PlanDocument:
-    """The plan of the variant at an index of a plan's arrays."""
+    """Return the plan of the variant at an index of a plan's arrays."""
     return _document(assignment, plan, _columns(plan), index)
 
 
 def plan_documents(assignment: Assignment, plan: Plan) -> list[PlanDocument]:
-    """The plans of all variants; everything is evaluated once."""
+    """Return the plans of all variants; everything is evaluated once."""
     columns = _columns(plan)
     return [_document(assignment, plan, columns, index) for index in range(len(plan.variants))]
 
 
 @dataclass(frozen=True, slots=True)
 class _Columns:
-    """Everything that a plan's documents tell, a list over variants each."""
+    """The contents of a plan's documents, each a list over variants."""
 
     numbers: Mapping[str, Mapping[str, list[float]]]
-    """By what it is (``value``, ``drawn_mm``, ``direction_deg``, ``rate``, ...) and name."""
+    """By quantity (``value``, ``drawn_mm``, ``direction_deg``, ``rate``, ...) and name."""
     points: Mapping[str, Mapping[str, list[complex]]]
     """By figure (``mechanism``, ``centres``, the plans) and node."""
 
@@ -212,7 +212,7 @@ def _centres(plan: Plan) -> dict[str, ComplexArray]:
 
 
 def _grouped(values: Mapping[str, float]) -> dict[str, float | dict[str, float]]:
-    """``transmission B`` and its like gathered under ``transmission``."""
+    """Group ``transmission B`` and similar names under ``transmission``."""
     groups: dict[str, float | dict[str, float]] = {}
     for name, value in values.items():
         kind, _, node = name.partition(" ")

@@ -40,7 +40,7 @@ from reference.drawing.subject import DrawnFigure, Subject
 
 
 def pdf(sheets: Sequence[Sequence[Shape]], title: str, page_mm: tuple[float, float] = A3_MM) -> bytes:
-    """The sheets as the pages of a PDF document; `page_mm` is their width and height."""
+    """Return the sheets as the pages of a PDF document; `page_mm` is their width and height."""
     embed_fonts()
     buffer = io.BytesIO()
     canvas = Canvas(buffer, pagesize=(page_mm[0] * mm, page_mm[1] * mm), invariant=1)
@@ -60,19 +60,19 @@ MARGIN_MM = 2.5
 LEAST_PICTURE_MM = (40.0, 12.0)
 COLUMN_MM, GAP_MM, TALLEST_MM = 88.0, 6.0, 105.0
 MODEL_SHARE, MODEL_TALLEST_MM = 0.45, 45.0
-"""The mechanism beside a plan's step is drawn at this part of its size on the printed page, at most."""
+"""Largest share of its printed size, and largest height, of the mechanism beside a plan's step."""
 
 
 @dataclass(frozen=True, slots=True)
 class Cutout:
-    """Shapes and the box they are seen in, sheet millimetres."""
+    """Shapes and their visible box, sheet millimetres."""
 
     shapes: tuple[Shape, ...]
     box: Bounds
 
     @property
     def svg(self) -> Markup:
-        """As an element of a page."""
+        """It as an SVG element of a page."""
         return Markup(picture_svg(self.shapes, self.box))  # noqa: S704 - written by the canvas
 
     @property
@@ -83,7 +83,7 @@ class Cutout:
 
 @dataclass(frozen=True, slots=True)
 class Illustrated:
-    """A step's words, its figure so far, and what it takes from the mechanism."""
+    """A step's words, its figure so far, and the parts of the mechanism that it uses."""
 
     explanation: ExplainedStep
     picture: Cutout | None
@@ -99,7 +99,7 @@ class Chapter:
 
 
 def chapters(subject: Subject, tongue: Tongue) -> list[Chapter]:
-    """Every figure's steps with their pictures."""
+    """Return every figure's steps with their pictures."""
     figures = figures_of(subject)
     return [
         Chapter(section, tuple(_illustrated(subject, figures, section)))
@@ -128,7 +128,7 @@ def _illustrated(
 
 
 def _centres(subject: Subject, mechanism: DrawnFigure, section: PlanSection) -> Iterator[Illustrated]:
-    """Each centre with its triangle on the finished sketch; one far off the sheet has no picture."""
+    """Yield each centre with its triangle on the finished sketch; one far off the sheet has no picture."""
     base = sheets.grey(mechanism)
     for explanation in section.steps:
         shapes = (*base, *sheets.centre(subject, explanation.step.node))
@@ -138,7 +138,7 @@ def _centres(subject: Subject, mechanism: DrawnFigure, section: PlanSection) -> 
 
 
 def _box(shapes: Sequence[Shape]) -> Bounds:
-    """The box that shapes fill, with a margin; a single point has some paper around it."""
+    """Return the box that shapes fill, with a margin; a single point has some paper around it."""
     left, top, right, bottom = bounds(shapes)
     across, down = (
         MARGIN_MM + max(0.0, least - size) / 2.0
@@ -159,7 +159,7 @@ def _environment() -> Environment:
 
 
 def html_page(subject: Subject, tongue: Tongue) -> str:
-    """The steps as one self-contained page."""
+    """Return the steps as one self-contained page."""
     return (
         _environment()
         .get_template("steps.html")
@@ -196,7 +196,7 @@ class _Drawn(Flowable):  # type: ignore[misc]  # reportlab has no types
 
 
 def pdf_pages(subject: Subject, tongue: Tongue) -> bytes:
-    """The steps as an A4 document."""
+    """Return the steps as an A4 document."""
     embed_fonts()
     buffer = io.BytesIO()
     title = subject.title
@@ -244,7 +244,7 @@ def _style(size: float, indent: float = 0.0) -> ParagraphStyle:
 
 
 def _printed(text: Markup) -> str:
-    """Markup as reportlab reads it; the embedded font has no slanted letters."""
+    """Return markup as reportlab reads it; the embedded font has no slanted letters."""
     marks: Sequence[tuple[str, str]] = (
         ("<i>", ""),
         ("</i>", ""),

@@ -65,11 +65,11 @@ TOO_LARGE = N_("does not fit A3 at these scales")
 OTHER_UNITS = (N_("rev/min"), N_("cm"), N_("rad"))
 DIGITS = 5
 NEXT_TO_NOTHING = 1e-9
-"""Of a figure's size: shorter lengths are told as zero; triangles flatter than this as lines."""
+"""Share of a figure's size below which lengths are stated as zero, and triangles as lines."""
 
 
 def wording_of(tongue: Tongue) -> Wording:
-    """The drawing's words in a language."""
+    """Return the drawing's words in a language."""
     _ = tongue.gettext
     first, second, third, fourth, fifth = (_(column) for column in COLUMNS)
     return Wording(
@@ -85,25 +85,25 @@ def wording_of(tongue: Tongue) -> Wording:
 
 
 def markup_of(pieces: tuple[Piece, ...]) -> Markup:
-    """A name with its indices, its letter slanted."""
+    """Return a name with its indices, its letter slanted."""
     marks = {0: "<i>{}</i>", -1: "<sub>{}</sub>", 1: "<sup>{}</sup>"}
     return Markup("").join(Markup(marks[piece.height]).format(piece.text) for piece in pieces)  # noqa: S704
 
 
 Value = Markup | str | tuple[str, ...] | complex | float
-"""Of a sentence: a text, a name, names side by side, a direction, a drawn length in millimetres."""
+"""A value in a sentence: a text, a name, names side by side, a direction, a drawn length in millimetres."""
 
 
 @dataclass(frozen=True, slots=True)
 class Speaker:
-    """Says a variant's names and numbers in a language; `view` has all nodes, the centres too."""
+    """Writes a variant's names and numbers in a language; `view` has all nodes, including the centres."""
 
     subject: Subject
     tongue: Tongue
     view: View
 
     def say(self, text: str, **values: Value) -> Markup:
-        """A sentence of the catalogue with its values in place, each as `Value` says."""
+        """Return a sentence of the catalogue with its values filled in, each as `Value` says."""
         placed = {name: self._set(value) for name, value in values.items()}
         return Markup(escape(self.tongue.gettext(text))) % placed  # noqa: S704 - just escaped
 
@@ -121,83 +121,83 @@ class Speaker:
                 return self.mm(value)
 
     def name(self, *names: str) -> Markup:
-        """A node, a vector, or several nodes side by side."""
+        """Return the name of a node, a vector, or several nodes side by side."""
         return Markup("").join(markup_of(self.subject.letter(name)) for name in names)
 
     def names(self, names: tuple[str, ...]) -> Markup:
-        """Nodes one by one."""
+        """Return a list of nodes."""
         return Markup(", ").join(self.name(name) for name in names)
 
     def scale(self, scale: str) -> Markup:
-        """A scale's name."""
+        """Return a scale's name."""
         return markup_of(scale_pieces(self.subject.shown(scale)))
 
     def rate(self, name: str) -> Markup:
-        """An angular velocity or acceleration."""
+        """Return the name of an angular velocity or acceleration."""
         return markup_of(pieces_of(self.subject.shown(name)))
 
     def bare(self, value: float) -> str:
-        """A number with five significant digits, or all of a shorter one."""
+        """Format a number with five significant digits, or all of a shorter one."""
         text = f"{value:.{DIGITS}g}"
         if float(text) == round(value, 12):
             return self.tongue.trimmed(value, 12)
         return self.tongue.significant(value, DIGITS)
 
     def real(self, value: float, unit: str) -> Markup:
-        """A real value with its unit."""
+        """Format a real value with its unit."""
         return escape(f"{self.bare(value)}\N{NO-BREAK SPACE}{self.tongue.unit(unit)}")
 
     def mm(self, value: float) -> str:
-        """A drawn length."""
+        """Format a drawn length."""
         return self.tongue.quantity(value, 2, "mm")
 
     def degrees(self, direction: complex) -> str:
-        """A direction counter-clockwise from +x."""
+        """Format a direction counter-clockwise from +x."""
         angle = float(np.degrees(np.angle(direction))) % 360.0
         return f"{self.tongue.number(0.0 if round(angle, 2) == 360.0 else angle, 2)}°"
 
     def place(self, node: str) -> complex:
-        """Where a node is, complex millimetres."""
+        """Return the position of a node, complex millimetres."""
         return complex(self.view.nodes[node])
 
     def distance(self, p: str, q: str) -> float:
-        """The drawn distance of two nodes, mm."""
+        """Return the drawn distance of two nodes, mm."""
         return abs(self.place(q) - self.place(p))
 
     def is_nothing(self, node: str, mm: float) -> bool:
-        """Whether a length is zero against the size of the figure that a node is in."""
+        """Return whether a length is zero compared with the size of the figure that a node is in."""
         figure = self.subject.plan.construction.figure_of(node)
         size = float(np.max(np.abs(list(self.subject.nodes(figure).values()))))
         return abs(mm) <= NEXT_TO_NOTHING * size
 
     def vector(self, tail: str, head: str) -> Markup:
-        """The vector between two nodes of a plan."""
+        """Return the vector between two nodes of a plan."""
         vectors = self.subject.plan.construction.vectors.values()
         return next(
             self.name(vector.name) for vector in vectors if (vector.tail, vector.head) == (tail, head)
         )
 
     def link_of(self, node: str) -> Markup:
-        """The link of the normal component that ends in a node."""
+        """Return the link of the normal component that ends in a node."""
         vectors = self.subject.plan.construction.vectors.values()
         return next(self.name(*vector.link) for vector in vectors if vector.head == node and vector.link)
 
     def carrier_of(self, node: str) -> str:
-        """The link that carries the guide of the Coriolis component that ends in a node."""
+        """Return the link that carries the guide of the Coriolis component that ends in a node."""
         vectors = self.subject.plan.construction.vectors.values()
         return next(vector.turning or "" for vector in vectors if vector.head == node)
 
     def scale_value(self, scale: str) -> float:
-        """A scale, real units per millimetre."""
+        """Return a scale, real units per millimetre."""
         return self.subject.number(getattr(self.subject.plan.scales, scale))
 
     def scale_with_value(self, scale: str) -> Markup:
-        """A scale with its value."""
+        """Return a scale with its value."""
         value = self.real(self.scale_value(scale), unit_of(scale))
         return Markup("{} = {}").format(self.scale(scale), value)
 
     def line_direction(self, along: Direction) -> Markup:
-        """Where a line runs, without a sense."""
+        """Describe the direction of a line, without a sense."""
         if isinstance(along, Along):
             text = PERPENDICULAR if along.quarters % 2 else PARALLEL
             return self.say(text, link=(along.tail, along.head))
@@ -207,7 +207,7 @@ class Speaker:
         return self.say(ACROSS_GUIDE if along.quarters % 2 else GUIDE, joint=joint)
 
     def vector_direction(self, along: Direction, sign: float) -> Markup:
-        """Where a vector points: a negative length turns it about."""
+        """Describe the direction of a vector: a negative length reverses it."""
         if not isinstance(along, Along):
             angle = complex(along.at(self.view)) * (-1.0 if sign < 0.0 else 1.0)
             kind, joint = _guided(along)
@@ -222,14 +222,14 @@ class Speaker:
 
 
 def speaker_of(subject: Subject, tongue: Tongue) -> Speaker:
-    """Who says a variant's steps."""
+    """Return the speaker for a variant's steps."""
     view = subject.view
     nodes = {**view.nodes, **{name: np.asarray(at) for name, at in subject.centres.items()}}
     return Speaker(subject, tongue, View(nodes, view.parameters))
 
 
 def _guided(along: Fixed) -> tuple[str, str]:
-    """Guide or slot, and whose: of the angle's name among the parameters."""
+    """Return guide or slot, and its joint, from the angle's name among the parameters."""
     kind, _, joint = along.angle.removeprefix("angle ").partition(" ")
     return kind, joint
 
@@ -305,7 +305,7 @@ LOCAL_ON_AXIS = N_("From %(origin)s lay off %(x)s in the direction %(x_direction
 
 
 def sentence(speaker: Speaker, step: Step) -> Markup:
-    """What a step draws; raises ValueError for a kind of step without words."""
+    """Describe a step; raises ValueError for a kind of step without words."""
     match step:
         case Pole(node=node):
             return speaker.say(
@@ -363,7 +363,7 @@ def _given(speaker: Speaker, step: Given) -> Markup:
 
 
 def direction_of(speaker: Speaker, step: Given) -> Markup:
-    """Where the vector of a step points."""
+    """Describe the direction of a step's vector."""
     if isinstance(step.length, Coriolis):
         rate = speaker.rate(f"omega_{speaker.carrier_of(step.node)}")
         return speaker.say(CORIOLIS_DIRECTION, slide=speaker.vector(*step.length.slide), rate=rate)
@@ -382,7 +382,7 @@ def _two_lines(speaker: Speaker, step: TwoLines) -> Markup:
 
 
 def _line(speaker: Speaker, line: AnyLine) -> Markup:
-    """Which line of the sketch it is."""
+    """Describe a line of the sketch."""
     if isinstance(line, FixedLine):
         return speaker.say(LINE_ON_GUIDE, joint=line.guide.removeprefix("guide "))
     if isinstance(line.along, Along) and line.along.tail == line.through:
@@ -445,7 +445,7 @@ def _similar(speaker: Speaker, step: Similar) -> Markup:
 
 
 def _link_under(speaker: Speaker, node: str) -> str:
-    """The link of a point that lies under another only at this moment."""
+    """Return the link of a point that lies under another only at this moment."""
     groups = speaker.subject.plan.mechanism.groups
     links = {group.node: group.link for group in groups if isinstance(group, SlottedLink)}
     links |= {guide.coincident: guide.link for group in groups for guide in moving_guides(group)}
@@ -464,7 +464,7 @@ def _local(speaker: Speaker, step: Local) -> Markup:
 
 
 def scaled_names(step: Step) -> Iterator[Scaled]:
-    """The lengths of a step that are real data drawn at a scale."""
+    """Yield the lengths of a step that are real data drawn at a scale."""
     match step:
         case (
             Given(length=length) | OnGuide(length=length) | ArcAndLine(radius=length) | Tangent(radius=length)

@@ -1,4 +1,4 @@
-"""The whole construction told step by step: sentences, the numbers behind them, what then follows."""
+"""Explain the whole construction step by step: sentences, the numbers behind them, and the results."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ LENGTHS_MM = N_("Directions count counter-clockwise from the horizontal to the r
 
 @dataclass(frozen=True, slots=True)
 class ExplainedStep:
-    """One step: what is computed before, what is drawn, what can be read off afterwards."""
+    """One step: what is computed before, what is drawn, what can be measured afterwards."""
 
     number: int
     step: Step
@@ -46,7 +46,7 @@ class ExplainedStep:
 
     @property
     def text(self) -> Markup:
-        """All of it, line by line."""
+        """The whole text, line by line."""
         return Markup("\n").join((*self.before, self.sentence, *self.after))
 
 
@@ -61,7 +61,7 @@ class PlanSection:
 
 
 def explain(subject: Subject, tongue: Tongue) -> list[PlanSection]:
-    """Every figure's steps, in the order in which they are drawn."""
+    """Return every figure's steps, in the order in which they are drawn."""
     speaker = speaker_of(subject, tongue)
     sections, number = [], 0
     for figure, steps in subject.plan.construction.figures.items():
@@ -82,7 +82,7 @@ def explain(subject: Subject, tongue: Tongue) -> list[PlanSection]:
 
 
 def _centre_steps(speaker: Speaker) -> list[Step]:
-    """The steps of the centres that lie on any paper at all."""
+    """Return the steps of the centres that lie on the paper."""
     on_paper = speaker.subject.centres
     return [step for name, step in speaker.subject.plan.construction.centres.items() if name in on_paper]
 
@@ -94,7 +94,7 @@ def _explanation(speaker: Speaker, number: int, step: Step) -> ExplainedStep:
 
 
 def computed(speaker: Speaker, step: Step) -> Iterator[Markup]:
-    """The lengths that the step draws, from data or from earlier figures."""
+    """Yield the lengths that the step draws, from data or from earlier figures."""
     if isinstance(step, Given) and not isinstance(step.length, Scaled):
         yield from _component(speaker, step)
         return
@@ -109,7 +109,7 @@ def computed(speaker: Speaker, step: Step) -> Iterator[Markup]:
 
 
 def _datum(speaker: Speaker, step: Step, length: Scaled) -> tuple[Markup, float]:
-    """A given quantity's name and the amount of it."""
+    """Return a given quantity's name and value."""
     real = abs(float(speaker.view.parameters[length.quantity]))
     if length.scale == "kL" and " " not in length.quantity:
         return speaker.name(length.quantity), real
@@ -120,7 +120,7 @@ def _datum(speaker: Speaker, step: Step, length: Scaled) -> tuple[Markup, float]
 
 
 def _crank_formula(speaker: Speaker, length: Scaled) -> Markup | None:
-    """How a velocity or acceleration of the crank's pin follows from the crank's motion."""
+    """Return the formula for a velocity or acceleration of the crank's pin from the crank's motion."""
     driver = speaker.subject.plan.mechanism.driver
     if not isinstance(driver, Crank) or length.scale == "kL":
         return None
@@ -137,7 +137,7 @@ def _crank_formula(speaker: Speaker, length: Scaled) -> Markup | None:
 
 
 def _component(speaker: Speaker, step: Given) -> Iterator[Markup]:
-    """A normal or Coriolis component, from velocities of the plan drawn before."""
+    """Yield a normal or Coriolis component, from velocities of the plan drawn before."""
     mm = abs(float(step.length.at(speaker.view)))
     if speaker.is_nothing(step.node, mm):
         return
@@ -162,7 +162,7 @@ def _component(speaker: Speaker, step: Given) -> Iterator[Markup]:
 
 
 def _speed(speaker: Speaker, ends: tuple[str, str]) -> tuple[Markup, float]:
-    """A velocity of the plan by its ends: its name and its amount."""
+    """Return a velocity of the plan by its ends: its name and its value."""
     return speaker.vector(*ends), speaker.distance(*ends) * speaker.scale_value("kv")
 
 
@@ -174,14 +174,14 @@ def _arm(speaker: Speaker, length: Normal) -> float:
 
 
 def _divided(speaker: Speaker, name: Markup, real: float, scale: str) -> Markup:
-    """A real value brought to paper: real / scale = millimetres."""
+    """Write a real value converted to paper: real / scale = millimetres."""
     by = speaker.scale_value(scale)
     numbers = Markup("{} / {} = {}").format(speaker.bare(real), speaker.bare(by), speaker.mm(real / by))
     return Markup("{} / {} = {}").format(name, speaker.scale(scale), numbers)
 
 
 def _read_off(speaker: Speaker, step: Step) -> Iterator[Markup]:
-    """The vectors that end in the step's node, and the rates that follow from them."""
+    """Yield the vectors that end in the step's node, and the rates that follow from them."""
     construction = speaker.subject.plan.construction
     laid_off = (step.start, step.node) if isinstance(step, Given) else None
     for vector in construction.vectors.values():
@@ -195,7 +195,7 @@ def _read_off(speaker: Speaker, step: Step) -> Iterator[Markup]:
 
 
 def _measured(speaker: Speaker, vector: Vector) -> Markup:
-    """A vector read off: drawn length times scale."""
+    """Write a measured vector: drawn length times scale."""
     mm = 0.0 if speaker.subject.is_zero(vector.name) else speaker.distance(vector.tail, vector.head)
     by = speaker.scale_value(vector.scale)
     return Markup("{} = {} · {} = {} · {} = {}").format(
@@ -205,7 +205,7 @@ def _measured(speaker: Speaker, vector: Vector) -> Markup:
 
 
 def _turning(speaker: Speaker, name: str, vector: Vector) -> Markup:
-    """An angular velocity or acceleration: relative vector over length, with its sense."""
+    """Write an angular velocity or acceleration: relative vector over length, with its sense."""
     plan = speaker.subject.plan
     rate = plan.construction.rates[name]
     arm = float(speaker.view.parameters[rate.length])

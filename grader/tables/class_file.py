@@ -1,4 +1,4 @@
-"""`planmark.toml` in a class's folder: what every command on that class is told once."""
+"""`planmark.toml` in a class's folder: options that are the same for every command on that class."""
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass

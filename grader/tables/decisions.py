@@ -1,4 +1,4 @@
-"""What people decided: a CSV file beside the submissions, which the program keeps and people may edit.
+"""People's decisions: a CSV file beside the submissions, which the program keeps and people may edit.
 
 Columns ``student_id,position,criterion,verdict,points,comment,by,at,basis``. Comma or semicolon separated; in
 a semicolon-separated file `points` has a decimal comma. `criterion` says what a row is about:

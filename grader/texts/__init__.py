@@ -1,1 +1,1 @@
-"""Sentences: what people read of reasons and problems, in their language, made from codes and parameters."""
+"""Sentences about reasons and problems in the reader's language, made from codes and parameters."""

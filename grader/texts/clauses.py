@@ -1,6 +1,6 @@
-"""The clauses that sentences hold: why something could not be read, placed or understood, and what to do.
+"""The clauses of sentences: why something could not be read, placed or understood, and what to do.
 
-By the code that the parameter ``why`` or ``advice`` of a reason has.
+Keyed by the value of a reason's parameter ``why`` or ``advice``.
 """
 
 from grader.language import N_
@@ -8,7 +8,7 @@ from grader.language import N_
 READING: dict[str, str] = {
     "no_stroke": N_("no stroke between %(start)s and %(end)s could be told apart"),
     "blank": N_("nothing is drawn between %(start)s and %(end)s"),
-    "upstream_unsure": N_("%(nodes)s, on which it hangs, was not read for certain"),
+    "upstream_unsure": N_("%(nodes)s, on which it depends, was not read for certain"),
     "scale_vector_unsure": N_("%(vector)s, which shows it, was not read for certain"),
     "no_velocity_plan": N_("no velocity plan was found on the sheets"),
     "no_acceleration_plan": N_("no acceleration plan was found on the sheets"),
@@ -19,7 +19,7 @@ READING: dict[str, str] = {
     "not_of_assignment": N_("it is no vector or node of this assignment"),
     "entry": "%(entries)s",
 }
-"""Why a vector or node was not read."""
+"""Reasons why a vector or node was not read."""
 
 PLACING: dict[str, str] = {
     "too_few_pixels": N_("%(long_side)s pixels along the long side are too few for an A3 drawing"),
@@ -60,7 +60,7 @@ PLACING: dict[str, str] = {
     ),
     "not_by_drawing": N_("nor does the drawing show the scale, by declared kL, kv and ka"),
 }
-"""Why a page could not be placed or is no drawing, and what to do."""
+"""Reasons why a page could not be placed or is no such drawing, and what to do."""
 
 SCALES: dict[str, str] = {
     "nothing_written": N_("nothing is written"),
@@ -88,7 +88,7 @@ SCALES: dict[str, str] = {
     "too_unsure": N_("too uncertain to be used"),
     "not_borne_out": N_("which neither the drawing nor the assignment's rule confirms"),
 }
-"""Why a declared scale could not be understood, or was not used."""
+"""Reasons why a declared scale could not be understood, or was not used."""
 
 OWNERS: dict[str, str] = {
     "looks_like": N_("the drawing looks like the variant of %(students)s"),
@@ -116,7 +116,7 @@ OWNERS: dict[str, str] = {
     "page_gone": N_("the page is not in the folder any more"),
     "nothing_judged": N_("nothing was judged; decide the verdicts of criteria first"),
 }
-"""Whose a page is, which number it has, and why something was not done or applied."""
+"""The evidence for a page's owner and number, and why something was not done or applied."""
 
 CLAUSES: dict[str, str] = {**READING, **PLACING, **SCALES, **OWNERS}
 

@@ -23,7 +23,7 @@ FAULTS: dict[str, tuple[str, ...]] = {
         N_("column '%(name)s' is not known; did you mean %(near)s?"),
         N_("column '%(name)s' is not known; remove it"),
     ),
-    "no_measurements": (N_("no column of measurements is known here; there are %(names)s, ..."),),
+    "no_measurements": (N_("no known column of measurements; known are %(names)s, ..."),),
     "fields_surplus": (
         N_(
             "has %(fields)s fields, the first line names %(columns)s columns; quote a field that holds"
@@ -39,7 +39,7 @@ FAULTS: dict[str, tuple[str, ...]] = {
     # Of a cell, whatever its table, or of a key.
     "cell_empty": (N_("is empty"),),
     "id_refused": (N_("'%(text)s' is refused: %(advice)s"),),
-    "no_whole_number": (N_("'%(text)s' is no whole number"),),
+    "no_whole_number": (N_("'%(text)s' is not a whole number"),),
     "no_number": (N_("'%(text)s' is no number"),),
     "no_decimal_point": (
         N_("'%(text)s' is no number; write a decimal point, or separate fields by semicolons"),
@@ -52,7 +52,7 @@ FAULTS: dict[str, tuple[str, ...]] = {
     "there_twice": (N_("'%(text)s' is there more than once"),),
     "not_known": (
         N_("is not known here; did you mean %(near)s?"),
-        N_("is not known here; there are %(names)s"),
+        N_("is not known here; known are %(names)s"),
         N_("is not known here"),
     ),
     "no_braces_inside": (N_("must be a table in braces"),),

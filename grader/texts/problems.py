@@ -1,7 +1,7 @@
 """The sentences of problems: of files, pages, sheets, owners, numbers, scales and pictures.
 
-Each code has its sentences, the most precise first: the first one is said whose parameters are all known.
-The last one needs none, and says the least: class pages count problems by it.
+Each code has its sentences, the most precise first: the first one whose parameters are all known is used. The
+last one needs none, and says the least: class pages count problems by it.
 """
 
 from grader.language import N_
@@ -15,7 +15,7 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
     "file_empty": (N_("The file is empty; hand it in again."),),
     "file_type_unsupported": (
         N_(
-            "The file is named %(suffix)s, but is no %(kind)s file: scan or export it as JPEG, PNG,"
+            "The file is named %(suffix)s, but is not a %(kind)s file: scan or export it as JPEG, PNG,"
             " TIFF or PDF."
         ),
         N_("The file is of a type that is not read: use JPEG, PNG, TIFF or PDF."),
@@ -69,7 +69,7 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
         N_("The document has %(pages)s pages, more than %(most)s: split it."),
         N_("The document has too many pages; split it."),
     ),
-    "page_blank": (N_("The page is blank and was passed over."),),
+    "page_blank": (N_("The page is blank and was skipped."),),
     "page_not_a_drawing": (
         N_("The page is no drawing: %(why)s. Scan it in greyscale, dark lines on white paper."),
         N_(
@@ -199,7 +199,7 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
     "does_not_assemble": (N_("The mechanism does not assemble with these data."),),
     "singular": (N_("The velocities are not determined in this position of the mechanism."),),
     "sheet_boxes": (
-        N_("Page %(form)s: %(lengths)s lengths are too many for boxes; none are printed."),
+        N_("Page %(form)s: there are too many lengths (%(lengths)s) for boxes; none is printed."),
         N_("The answer sheet's boxes are too small for this assignment."),
     ),
     "sheet_zone_small": (
@@ -229,18 +229,18 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
         N_("A measured value could not be used."),
     ),
     "measurement_columns": (
-        N_("The column %(column)s is not known and was passed over; did you mean %(near)s?"),
-        N_("The column %(column)s is not known and was passed over."),
-        N_("Columns of the measurements that are not known were passed over."),
+        N_("The unknown column %(column)s was ignored; did you mean %(near)s?"),
+        N_("The unknown column %(column)s was ignored."),
+        N_("Unknown columns of the measurements were ignored."),
     ),
     "measurement_not_used": (
         N_("Not drawn in this mechanism's plans, and not judged: %(columns)s."),
         N_("A measured value is not asked for in this assignment."),
     ),
     "roster_columns": (
-        N_("Columns of the roster without meaning here were passed over: %(columns)s, and %(more)s more."),
-        N_("Columns of the roster without meaning here were passed over: %(columns)s."),
-        N_("Columns of the roster without meaning here were passed over."),
+        N_("Columns of the roster that are not used were ignored: %(columns)s, and %(more)s more."),
+        N_("Columns of the roster that are not used were ignored: %(columns)s."),
+        N_("Columns of the roster that are not used were ignored."),
     ),
     "scale_refused": (
         N_("The declared %(scale)s, “%(text)s”, could not be understood: %(why)s."),

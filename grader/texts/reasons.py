@@ -9,13 +9,13 @@ from grader.texts.spoken import Coded, filled, spoken
 _NO_NAMES: Mapping[str, str] = {}
 
 UNDECIDED = "scale_undecided"
-"""Stands for `scale_assumed` and `follows` together, under review: neither alone says what is in doubt."""
+"""Replaces `scale_assumed` and `follows` together under review: neither alone says what is in doubt."""
 UNSURE = "read_unsurely"
-"""Stands for `unread` where something was read, though not surely, and for `doubtful` beside it."""
+"""Replaces `unread` if something was read, though not surely, and `doubtful` beside it."""
 UNCHECKED = "unchecked"
-"""Stands where nothing was judged and no reason is given."""
+"""Used if nothing was judged and no reason is given."""
 MISREAD = "misread"
-"""Stands for what is off as read, where it is proposed as right: most probably it was misread."""
+"""Used for an error that is proposed as right: most probably it was misread."""
 HINTS: dict[str, str] = {
     "right": N_("Right."),
     "too_long": N_("It is too long."),
@@ -31,13 +31,13 @@ HINTS: dict[str, str] = {
     "not_measured": N_("Nothing was handed in for it."),
     "optional": N_("It was not handed in, and is not required."),
     "unread": N_("It could not be read on the sheet."),
-    "entry_refused": N_("An entry that it rests on cannot be used: a person must look."),
+    "entry_refused": N_("It depends on an unusable entry; an instructor will check it."),
     "doubtful": N_("It was read with too little certainty."),
     "found_wrong_elsewhere": N_("A verdict like this one was found wrong in this class: a person must look."),
-    "near_limit": N_("It lies so near the limit of the tolerance that the scan cannot decide."),
-    "counted_for_you": N_("It is beyond the limit by no more than the scan can tell: counted for you."),
-    "not_certainly_within": N_("It is not certainly within the limit, as far as the scan can tell."),
-    "at_stake": N_("What is open here is worth very little: counted for you."),
+    "near_limit": N_("It is too close to the limit of the tolerance to decide from the scan."),
+    "counted_for_you": N_("It is over the limit by less than the scan's accuracy: accepted."),
+    "not_certainly_within": N_("At the scan's accuracy it is not certain to be within the limit."),
+    "at_stake": N_("The points still open are negligible: accepted."),
     "other_variant": N_("The drawing follows another student's data."),
     "not_explained": N_("The vectors of this plan do not belong together: a person must look."),
     "data_misread": N_("The drawing follows another crank angle than the one given."),
@@ -50,13 +50,12 @@ HINTS: dict[str, str] = {
     "letters_exchanged": N_("Two letters stand at each other's point: it is compared under the right ones."),
     "letters_unclear": N_("Two letters seem to stand at each other's point: a person must look."),
     "hand_may_miss": N_(
-        "Its lines meet at so small an angle that a careful hand may be off by as much: a person must look."
+        "Its lines meet at so small an angle that even careful drawing can miss by this much:"
+        " a person must look."
     ),
     "readings_disagree": N_("The drawing and the entered measurement differ."),
     "written_disagrees": N_("The drawing and the length written on the sheet differ: a person must look."),
-    "follows": N_(
-        "It follows rightly from your own earlier work; the earlier mistake is charged once, there."
-    ),
+    "follows": N_("It is consistent with your own earlier work; that mistake costs points only once."),
     "decided": N_("A person has decided this."),
     "scale_refused": N_("The declared scale could not be understood."),
     "scale_off": N_("The declared scale does not fit the drawing and the data."),
@@ -68,9 +67,9 @@ HINTS: dict[str, str] = {
     UNSURE: N_("It was read with too little certainty."),
     MISREAD: N_("It was probably misread; a person will look."),
     "scale_seems_off": N_("The declared scale seems not to be the one that the drawing was made with."),
-    UNCHECKED: N_("Nothing was drawn that it could be held against."),
+    UNCHECKED: N_("There is no drawing to compare it with."),
 }
-"""What is said at level `hint`, by code of the reason."""
+"""Sentences at level `hint`, by code of the reason."""
 
 FULL: dict[str, str] = {
     "too_long": N_("It is too long by %(off)s (tolerance ±%(tolerance)s)."),
@@ -88,20 +87,20 @@ FULL: dict[str, str] = {
         "The sign is wrong: %(measured)s instead of %(expected)s; counter-clockwise is positive."
     ),
     "unread": N_("It could not be read on the sheet (%(why)s)."),
-    "entry_refused": N_("An entry that it rests on cannot be used (%(entries)s): a person must look."),
+    "entry_refused": N_("It depends on an unusable entry (%(entries)s); an instructor will check it."),
     "doubtful": N_("It was read with too little certainty (%(confidence)s)."),
     UNSURE: N_("It was read with too little certainty (%(why)s)."),
     MISREAD: N_("It was probably misread; the dotted stroke may be the one meant."),
     "scale_seems_off": N_("%(declared)s is declared, %(expected)s was probably drawn with: %(factor)s."),
     "near_limit": N_(
-        "It lies so near the limit of the tolerance that the scan cannot decide (standard error %(se)s)."
+        "It is too close to the limit of the tolerance to decide from the scan (standard error %(se)s)."
     ),
     "counted_for_you": N_(
-        "It is %(beyond)s beyond the limit; the scan is good to %(good_to)s: counted for you."
+        "It is %(beyond)s over the limit, less than the scan's accuracy (%(good_to)s): accepted."
     ),
     "not_certainly_within": N_(
-        "It is %(beyond)s within the limit; the scan is good to %(good_to)s:"
-        " only what is certainly within counts."
+        "It is %(beyond)s within the limit, less than the scan's accuracy (%(good_to)s):"
+        " it counts only if it is certain."
     ),
     "other_variant": N_("The drawing follows another student's data (%(whose)s)."),
     "data_unclear": N_(
@@ -124,27 +123,25 @@ FULL: dict[str, str] = {
     "scale_off": N_("%(declared)s is declared, %(expected)s was drawn with: %(factor)s."),
     "scale_assumed": N_("The scale was not declared; %(used)s was assumed."),
 }
-"""What is said at level `full` where that differs."""
+"""Sentences at level `full` that differ from those at level `hint`."""
 
 FOLLOWS: dict[str, str] = {
-    "nodes": N_(
-        "It follows rightly from your own earlier points; the earlier mistake is charged once, there."
-    ),
+    "nodes": N_("It is consistent with your own earlier points; that mistake costs points only once."),
     "small_errors": N_(
-        "It follows rightly from your own earlier points: their small errors, each within its tolerance,"
+        "It is consistent with your own earlier points: their small errors, each within its tolerance,"
         " add up here."
     ),
-    "scale": N_("It is right at the scale that you used; the scale is charged once, there."),
-    "vector": N_("It follows rightly from your own %(of)s; that mistake is charged once, there."),
-    "value": N_("It follows rightly from your own %(of)s; that mistake is charged once, there."),
+    "scale": N_("It is right at the scale that you used; the wrong scale costs points only once."),
+    "vector": N_("It is consistent with your own %(of)s; that mistake costs points only once."),
+    "value": N_("It is consistent with your own %(of)s; that mistake costs points only once."),
 }
-"""Reason `follows`, by what it follows from."""
+"""Sentences for the reason `follows`, by what the result follows from."""
 
 
 def reason_sentence(
     reason: Coded, speaker: Tongue, level: Level, names: Mapping[str, str] = _NO_NAMES
 ) -> str:
-    """One reason; a code without a sentence is told by its name, so that nothing is lost."""
+    """Return the sentence of one reason; a code without a sentence is shown by its name."""
     hint = HINTS.get(reason.code, reason.code)
     texts = [FULL[reason.code], hint] if level == "full" and reason.code in FULL else [hint]
     if reason.code == "follows":

@@ -17,7 +17,7 @@ _NO_NAMES: Mapping[str, str] = {}
 
 
 class Coded(Protocol):
-    """A record with a code and parameters: a `Reason`, or what a document holds of one."""
+    """A record with a code and parameters: a `Reason`, or its form in a document."""
 
     @property
     def code(self) -> str:
@@ -25,7 +25,7 @@ class Coded(Protocol):
 
     @property
     def parameters(self) -> Mapping[str, float | str | Sequence[str]]:
-        """What its sentence names."""
+        """Values used in its sentence."""
 
 
 PLACES = {
@@ -54,13 +54,13 @@ AREAS = {
     "lower_middle": N_("at the bottom"),
     "lower_right": N_("at the lower right"),
 }
-"""Where a flaw lies on the sheet."""
+"""Position of a flaw on the sheet."""
 _NOUNS = {"corners": CORNERS, "areas": AREAS}
-"""Words of codes that lists hold, by the parameter's name."""
+"""Words for the codes in lists, by the parameter's name."""
 
 
 def place(at: str, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES) -> str:
-    """A node, vector, scale or figure as a sentence names it."""
+    """Return a node, vector, scale or figure as a sentence names it."""
     return speaker.gettext(PLACES[at]) if at in PLACES else names.get(at, at)
 
 
@@ -72,8 +72,8 @@ def spoken(
     speaker: Tongue,
     names: Mapping[str, str] = _NO_NAMES,
 ) -> dict[str, str]:
-    """Parameters in words: `off_mm` becomes `off`, with its unit."""
-    # `near_limit` says what it speaks of instead of a unit.
+    """Return parameters in words: `off_mm` becomes `off`, with its unit."""
+    # `near_limit` names its quantity instead of a unit.
     unit_of_limit = {"length": "mm", "scale": "mm", "direction": "°"}.get(str(parameters.get("what", "")), "")
     unit = str(parameters.get("unit", unit_of_limit))
     said: dict[str, str] = {}
@@ -105,7 +105,7 @@ def spoken(
 
 
 def filled(texts: Sequence[str], said: Mapping[str, str], speaker: Tongue) -> str:
-    """The first of the texts whose parameters are all known, in the language; empty where none is."""
+    """Fill in the first of the texts whose parameters are all known; empty if there is none."""
     for text in texts:
         try:
             return speaker.gettext(text) % said
@@ -141,11 +141,11 @@ def _placed(text: str, said: Mapping[str, str], speaker: Tongue) -> str:
 TOO_LARGE, TOO_SMALL = N_("%(times)s times too large"), N_("%(times)s times too small")
 SHARE_TOO_LARGE, SHARE_TOO_SMALL = N_("%(share)s too large"), N_("%(share)s too small")
 SEVERAL_TIMES = 1.5
-"""From this factor on a scale is said to be so many times too large, below it by so many per cent."""
+"""From this factor on, an error of a scale is stated as a multiple, below it as a percentage."""
 
 
 def _how_far_off(declared: float, right: float, speaker: Tongue) -> str:
-    """How far a declared scale is from the right one: "10 times too small", "5 % too large"."""
+    """Describe the error of a declared scale: "10 times too small", "5 % too large"."""
     factor = declared / right if right else 1.0
     ratio = max(factor, 1.0 / factor) if factor > 0.0 else 1.0
     if ratio >= SEVERAL_TIMES:
@@ -164,7 +164,7 @@ def _real(speaker: Tongue, value: float, unit: str) -> str:
 
 
 def _with_unit(unit: str) -> Callable[[Tongue, float], str]:
-    """What writes a number with a unit, whole numbers without decimals."""
+    """Return a function that writes a number with a unit, whole numbers without decimals."""
     return lambda speaker, value: speaker.quantity(value, 0 if isinstance(value, int) else 1, unit)
 
 
@@ -185,9 +185,9 @@ AT_PAGE, AT_LINE = N_("Page %(page)s: %(text)s"), N_("Line %(line)s: %(text)s")
 def sentence(
     reason: Coded, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES, *, brief: bool = False
 ) -> str:
-    """The sentence of a problem; empty where its code has none, or `brief` the one without numbers.
+    """Return the sentence of a problem (`brief`: the one without numbers); empty if its code has none.
 
-    What an error says in its own words (`detail`) is no sentence: `details` are told beside it.
+    An error's own words (`detail`) are no sentence: `details` shows them beside it.
     """
     texts = PROBLEMS.get(reason.code, ())
     said = spoken(reason.parameters, speaker, names)
@@ -212,12 +212,12 @@ def fault(reason: Coded, speaker: Tongue = ENGLISH) -> str:
 
 
 def message(reason: Coded, speaker: Tongue = ENGLISH) -> str:
-    """A problem in an error's own words, else its sentence; its code where it has neither."""
+    """Return an error's own words, else the problem's sentence; its code if it has neither."""
     return str(reason.parameters.get("detail", "")) or sentence(reason, speaker) or reason.code
 
 
 def of_error(error: PlanmarkError, file: str | None = None) -> Reason:
-    """An error as a problem: its parameters, and its own words as the `detail`."""
+    """Convert an error to a problem: its parameters, and its own words as the `detail`."""
     return Reason(error.code, {**error.parameters, "detail": error.message}, file)
 
 
@@ -255,7 +255,7 @@ def told_of(error: PlanmarkError, speaker: Tongue) -> str:
 
 
 def problem_documents(problems: Sequence[Reason]) -> Iterator[ProblemDocument]:
-    """Problems as documents hold them."""
+    """Convert problems to documents."""
     for one in problems:
         yield ProblemDocument(
             code=one.code, message=message(one), parameters=as_json(one.parameters), file=one.file
@@ -263,7 +263,7 @@ def problem_documents(problems: Sequence[Reason]) -> Iterator[ProblemDocument]:
 
 
 def unmatched_document(problem: Reason, page: int | None = None) -> UnmatchedDocument:
-    """A problem of a page or file that is nobody's, as documents hold it: the page in a field of its own."""
+    """Convert a problem of a page or file without an owner to a document: the page in a field of its own."""
     known = {key: value for key, value in problem.parameters.items() if page is None or key != "page"}
     return UnmatchedDocument(
         file=problem.file or "", page=page, code=problem.code, message=message(Reason(problem.code, known)),
@@ -272,7 +272,7 @@ def unmatched_document(problem: Reason, page: int | None = None) -> UnmatchedDoc
 
 
 def unread_document(gap: Unread) -> UnreadDocument:
-    """A vector or node that was not read, as documents hold it."""
+    """Convert a vector or node that was not read to a document."""
     reason = gap.reason
     return UnreadDocument(
         name=gap.name, reason=clause(reason, ENGLISH), code=reason.code, parameters=as_json(reason.parameters)
@@ -280,5 +280,5 @@ def unread_document(gap: Unread) -> UnreadDocument:
 
 
 def as_json(parameters: Mapping[str, Value]) -> dict[str, float | str | list[str]]:
-    """Parameters as documents hold them."""
+    """Convert parameters to JSON values."""
     return {key: list(value) if isinstance(value, tuple) else value for key, value in parameters.items()}

@@ -1,4 +1,4 @@
-"""Who from a platform is which student of a roster: whoever comes first, until the instructor decides.
+"""Claims of platform users to be students of a roster: the first one holds until the instructor decides.
 
 A student is found by the platform's id of the person, or by e-mail; the platform lets people change both.
 Whoever comes as a student whom somebody else is already, or as a second one, is refused and listed.

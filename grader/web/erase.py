@@ -1,4 +1,4 @@
-"""Everything of one student deleted from a publication: rows, files, results."""
+"""Delete everything about one student from a publication: rows, files, results."""
 
 import csv
 import io

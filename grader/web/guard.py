@@ -1,4 +1,4 @@
-"""Who may do what, and how often: visits, forms, bodies, headers.
+"""Access rights and rate limits: visits, forms, bodies, headers.
 
 A browser's visit is a random cookie, of which the data base has the digest. Whatever changes something needs
 a header with the visit's own token, which a page of another site can neither read nor send; a program's

@@ -1,4 +1,4 @@
-"""What instructors may do: publish, upload, grade, release, export, answer, delete."""
+"""Actions of instructors: publish, upload, grade, release, export, answer, delete."""
 
 import pathlib
 import secrets

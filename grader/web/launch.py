@@ -1,4 +1,4 @@
-"""A launch from a learning platform, checked: state, nonce, claims, then the signature (LTI Core 1.3).
+"""Check a launch from a learning platform: state, nonce, claims, then the signature (LTI Core 1.3).
 
 State, nonce, platform and browser are one record, good for one message. The platform's keys are fetched
 only for a message in which all is right that can be seen without them.

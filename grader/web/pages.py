@@ -1,4 +1,4 @@
-"""The pages: what a browser shows. Whatever they change goes through the routes of the API."""
+"""The pages for browsers. All changes go through the routes of the API."""
 
 from collections.abc import Mapping
 from datetime import UTC, datetime

@@ -1,4 +1,4 @@
-"""Where a publication's files are: the assignment's, what was handed in, results.
+"""Paths of a publication's files: the assignment's, submissions, results.
 
 A name that somebody sends never reaches a path as it is. A sheet keeps the name that people gave it, in their
 own script; where that is not plain, the file is stored under another and the name noted beside it. Files are

@@ -1,4 +1,4 @@
-"""A student's self-check of values and photos, as data: what is right or off, and the drawing as measured.
+"""A student's self-check of values and photos, as data: right and wrong values, and the drawing as measured.
 
 Nothing in it gives the answer away: the level says how much is told, and no expected vector is drawn.
 """

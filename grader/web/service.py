@@ -1,4 +1,4 @@
-"""What every route is given: who asks, the publication that is meant, the server's parts."""
+"""Parameters of every route: the user, the publication, the server's parts."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""How the web application runs: from the command line, secrets from the environment."""
+"""Settings of the web application: from the command line, secrets from the environment."""
 
 import os
 import secrets

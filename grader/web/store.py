@@ -1,4 +1,4 @@
-"""What the web application keeps in a data base: accounts, publications, jobs, links, requests, audit.
+"""The database of the web application: accounts, publications, jobs, links, requests, audit.
 
 What people hand in, and results, are files (`grader.web.places`). Times are seconds since 1970, UTC.
 """

@@ -1,4 +1,4 @@
-"""What students may do: check values and photos, see their feedback, hand in, ask for regrading."""
+"""Actions of students: check values and photos, see their feedback, hand in, ask for regrading."""
 
 import contextlib
 import hashlib

@@ -48,7 +48,7 @@ from reference.mechanism import (
 )
 
 IN_LINE_TOLERANCE = 1e-9
-"""Relative: lengths that sum up this nearly are meant to be in line."""
+"""Relative tolerance: lengths that sum up this closely are meant to be in line."""
 
 LARGEST = 1e9
 SHORTEST_M = 1e-9
@@ -57,13 +57,13 @@ underflow."""
 
 
 class Numbers:
-    """Formulas to arrays in SI, of shape (N,) or, where they do not depend on the variant, (1,)."""
+    """Evaluates formulas to arrays in SI, of shape (N,) or, if they do not depend on the variant, (1,)."""
 
     def __init__(self, values: Mapping[str, Value], count: int, unit_m: float) -> None:
         self.values, self.count, self.unit_m = values, count, unit_m
 
     def number(self, formula: Formula) -> FloatArray:
-        """A number as it is written; raises FormulaError for one beyond any mechanism."""
+        """Return a number as written; raises FormulaError for one beyond any mechanism."""
         numbers = formula(self.values)
         if np.abs(numbers).max(initial=0.0) > LARGEST:
             message = f"'{formula.text}' is larger than {LARGEST:g}: beyond any mechanism"
@@ -71,7 +71,7 @@ class Numbers:
         return numbers if numbers.ndim else numbers[None]
 
     def length(self, formula: Formula, what: str) -> FloatArray:
-        """A length above zero, m; raises FormulaError for any other, which calls it `what`."""
+        """Return a length above zero, m; raises FormulaError, which calls it `what`, for any other."""
         lengths = self.distance(formula)
         least = lengths.min(initial=LARGEST)
         if least <= 0.0:
@@ -82,16 +82,16 @@ class Numbers:
         return lengths
 
     def distance(self, formula: Formula) -> FloatArray:
-        """A length with a sign."""
+        """Return a length with a sign, m."""
         # Division by the unit's inverse: 30 cm is then exactly the double nearest to 0.3 m.
         return np.asarray(self.number(formula) / round(1.0 / self.unit_m))
 
     def angle(self, formula: Formula) -> FloatArray:
-        """Degrees to radians."""
+        """Return an angle given in degrees in radians."""
         return np.asarray(np.radians(self.number(formula)))
 
     def side(self, text: SideText) -> Side:
-        """+1 or -1; of a formula an array, whether or not it differs between the variants at hand."""
+        """Return +1 or -1; for a formula an array, whether or not it differs between these variants."""
         if isinstance(text.side, int):
             return text.side
         first, second = text.words
@@ -108,12 +108,12 @@ class Numbers:
         return signs
 
     def point(self, point: list[Formula]) -> ComplexArray:
-        """Coordinates, m, as x + iy."""
+        """Return coordinates, m, as x + iy."""
         x, y = (self.distance(formula) for formula in point)
         return np.asarray(x + 1j * y)
 
     def for_all(self, numbers: Array) -> Array:
-        """Of shape (N,); what all variants share stands in memory once, and is read only."""
+        """Return an array of shape (N,), read only; a number that all variants share is stored once."""
         if numbers.size != 1 or self.count == 1:
             return numbers
         shared = np.ndarray((self.count,), numbers.dtype, numbers, strides=(0,))
@@ -123,14 +123,14 @@ class Numbers:
 
 @dataclass(slots=True)
 class _LinkAxes:
-    """Where each link carries its joints, in the link's own axes, metres; and the slotted links."""
+    """Joints of each link in the link's own axes, metres; and the slotted links."""
 
     axes: dict[str, dict[str, ComplexArray]] = field(default_factory=dict)
     slots: dict[str, str] = field(default_factory=dict)
-    """By slotted link: its node."""
+    """Node of each slotted link."""
 
     def carry(self, link: str, origin: str, joint: str, length: FloatArray) -> None:
-        """A new link from its origin to a joint, along its own x axis."""
+        """Add a new link from its origin to a joint, along its own x axis."""
         self.axes[link] = {origin: np.zeros(np.shape(length), complex), joint: np.asarray(length + 0j)}
 
     def link_of(self, joints: tuple[str, str]) -> str:
@@ -139,7 +139,7 @@ class _LinkAxes:
 
 
 def build_mechanism(file: MechanismFile, values: Mapping[str, Value], count: int) -> Mechanism:
-    """The mechanism of `count` variants whose data are `values` (arrays of shape (count,)).
+    """Return the mechanism of `count` variants whose data are `values` (arrays of shape (count,)).
 
     Raises FormulaError for a number or length that no mechanism can have. The file must have passed
     `reference.authored.mechanism.check_mechanism`.
@@ -156,14 +156,14 @@ def build_mechanism(file: MechanismFile, values: Mapping[str, Value], count: int
 
 
 def build_driver(file: MechanismFile, values: Mapping[str, Value], count: int) -> Driver:
-    """The driven link alone, as `build_mechanism` has it."""
+    """Return the driving link alone, as `build_mechanism` makes it."""
     numbers = Numbers(values, count, LENGTH_UNITS_M[file.length_unit])
     driver: Driver = with_arrays(_driver(file, numbers), numbers.for_all)
     return driver
 
 
 def _located(index: int, table: AnyGroupTable, numbers: Numbers, bodies: _LinkAxes) -> Group:
-    """One group; an error in its numbers names its place in the file."""
+    """Return one group; an error in its numbers names its place in the file."""
     try:
         return _group(table, numbers, bodies)
     except FormulaError as error:
@@ -221,7 +221,7 @@ def _guide(guide: GuideTable, numbers: Numbers, bodies: _LinkAxes) -> Guide:
 
 
 def _group(table: AnyGroupTable, numbers: Numbers, bodies: _LinkAxes) -> Group:
-    """One group; `bodies` collects what each link carries."""
+    """Return one group; `bodies` collects the joints that each link carries."""
     node = table.node
     if isinstance(table, PlateTable | PointOnLineTable | PointTable):
         return _link_point(table, numbers, bodies)
@@ -262,7 +262,7 @@ def _slotted_link(table: SlottedLinkTable, numbers: Numbers, bodies: _LinkAxes) 
 def _link_point(
     table: PlateTable | PointOnLineTable | PointTable, numbers: Numbers, bodies: _LinkAxes
 ) -> Group:
-    """A further point of a link: rigid with its base, however it is given."""
+    """Return a further point of a link, rigid with its base, whichever way it is given."""
     node, link, (p, q) = table.node, table.link, table.base
     axes = bodies.axes[link]
     if isinstance(table, PointTable) and q == bodies.slots.get(link):
@@ -296,7 +296,7 @@ def _link_point(
 
 
 def _shape(base: FloatArray, first: FloatArray, second: FloatArray, side: Side) -> ComplexArray:
-    """A plate's third point over its base, (C - A) / (B - A); exactly real where it is in line."""
+    """Return a plate's third point over its base, (C - A) / (B - A); exactly real if it is in line."""
     with np.errstate(all="ignore"):
         along, across, _ = assur.rrr_place(base + 0j, first, second, side)
         shape = np.asarray(along + 1j * across)

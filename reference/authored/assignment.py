@@ -1,4 +1,4 @@
-"""An assignment: what varies, the scales, the sheets, the names; its variants and their mechanisms.
+"""An assignment: its variants, scales, sheets and names, and the mechanisms of its variants.
 
 Built from authored files, found by name in the library of built-in ones or by path. Everything is
 evaluated on arrays over variants.
@@ -52,7 +52,7 @@ class Range(Authored):
 
 
 class VariantTable(Authored):
-    """What a student's number n (and a position) sets: a table's data, then formulas of those above."""
+    """The values that follow from a student's number n (and a position): a table's data, then formulas."""
 
     n: Range | None = None
     position: Range | None = None
@@ -95,7 +95,7 @@ class PageTable(Authored):
 
 
 class GivenTable(Authored):
-    """One datum as the student reads it: label = value unit."""
+    """One item of the given data as the student reads it: label = value unit."""
 
     label: str
     value: FormulaText
@@ -106,13 +106,13 @@ TRADITIONS: dict[str, dict[str, str]] = {
     "o": {},
     "p": {"o": "p", "o'": "π", "kL": "μl", "kv": "μv", "ka": "μa"},
 }
-"""What students call poles and scales: o, o', kL, kv, ka; or p, π, μl, μv, μa."""
+"""Names that schools use for poles and scales: o, o', kL, kv, ka; or p, π, μl, μv, μa."""
 
 
 class AssignmentFile(Authored):
-    """An assignment: a mechanism, what varies, the scales, the sheets, the names students see.
+    """An assignment: a mechanism, its variants, the scales, the sheets, the names that students see.
 
-    `tradition` fills `names` with those of a school; names given one by one go before it.
+    `tradition` fills `names` with those of a school; names given one by one take precedence.
     """
 
     schema_version: Literal[1]
@@ -141,7 +141,7 @@ class AssignmentFile(Authored):
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """One student's task: the number n and the position, None where the assignment has none."""
+    """One student's task: the number n and the position, None if the assignment has none."""
 
     n: int | None = None
     position: int | None = None
@@ -169,13 +169,13 @@ class Scales:
 
 @dataclass(frozen=True, slots=True)
 class Assignment:
-    """An assignment and its mechanism, as authored, and where they came from."""
+    """An assignment and its mechanism, as authored, and the files they came from."""
 
     file: AssignmentFile
     mechanism_file: MechanismFile
     path: Path
     rows: VariantRows | None = None
-    """Of the table of variants, where there is one."""
+    """Rows of the table of variants, if there is one."""
     signs: Mapping[str, Mapping[Variant, float]] = field(default_factory=dict)
     """-1 for each group and variant that has passed a flat position on its way from the first position."""
 
@@ -191,7 +191,7 @@ class Assignment:
         return (self.path, *([self.path.parent / table.file] if table and table.file else []))
 
     def variants(self) -> list[Variant]:
-        """Every variant there is, numbers first, positions within."""
+        """Return every variant, by number, then by position."""
         spec = self.file.variant
         numbers = list(spec.n.values) if spec.n else [None]
         positions = list(spec.position.values) if spec.position else [None]
@@ -207,12 +207,12 @@ class Assignment:
         return [Variant(*key) for key in sorted(keys, key=lambda key: (key[0] or 0, key[1] or 0))]
 
     def numbers(self, name: str) -> list[int] | None:
-        """The numbers that there are of `n` or `position`, ascending; None where the assignment has none."""
+        """Values of `n` or `position`, ascending; None if the assignment has none."""
         known = {getattr(variant, name) for variant in self.variants()}
         return None if None in known else sorted(known)
 
     def variant(self, n: int | None, position: int | None = None) -> Variant:
-        """The variant asked for; raises CallError that says what is missing or out of range."""
+        """Return the requested variant; raises CallError that says what is missing or out of range."""
         variants = self.variants()
         for name, given in (("n", n), ("position", position)):
             known = sorted({getattr(variant, name) for variant in variants} - {None})
@@ -227,7 +227,7 @@ class Assignment:
         return variants[0]
 
     def values(self, variants: list[Variant]) -> dict[str, Value]:
-        """The variants' data by name, arrays of shape (N,)."""
+        """Return the variants' data by name, arrays of shape (N,)."""
         known: dict[str, Value] = {}
         for name in ("n", "position"):
             numbers = [getattr(variant, name) for variant in variants]
@@ -240,7 +240,7 @@ class Assignment:
         return known
 
     def given(self, variant: Variant) -> Iterator[tuple[GivenTable, float | str]]:
-        """What a student is told: each datum with its number, or the side that the table has in words."""
+        """Yield each given datum with its number, or with the side that the table states in words."""
         values = self.values([variant])
         for datum in self.file.given:
             number = float(np.ravel(datum.value(values))[0])
@@ -248,10 +248,10 @@ class Assignment:
             yield datum, column.words[number < 0.0] if column and column.words else number
 
     def mechanism(self, variants: list[Variant]) -> Mechanism:
-        """The mechanism of every variant, SI, arrays of shape (N,).
+        """Return the mechanism of every variant, SI, arrays of shape (N,).
 
-        The positions of one n are one motion: sides hold in the first of them that is not flat, and are
-        reversed by each flat position on the way.
+        The positions of one n are one motion: sides hold in the first position that is not flat, and each
+        flat position on the way reverses them.
         """
         mechanism = build_mechanism(self.mechanism_file, self.values(variants), len(variants))
         return with_signs(
@@ -268,7 +268,7 @@ class Assignment:
         kv: float | FloatArray | None = None,
         ka: float | FloatArray | None = None,
     ) -> Scales:
-        """The scales: those declared, the others by the assignment's rule.
+        """Return the scales: those declared, the others by the assignment's rule.
 
         A declared kL, or the drawn crank, replaces the proposed length of the crank.
         """
@@ -290,7 +290,7 @@ class Assignment:
 
 
 def _speeds(driver: Driver) -> dict[str, Value]:
-    """What the rule for the scales knows of the driven link."""
+    """Return the values of the driving link that the rule for the scales may use."""
     if isinstance(driver, Crank):
         return {"omega": np.abs(driver.omega), "crank_m": driver.length_m}
     return {"speed": np.abs(driver.speed)}
@@ -302,7 +302,7 @@ SUFFIXES = {"assignment": ".assignment.toml", "mechanism": ".mechanism.toml", "r
 
 
 def library() -> Path:
-    """The folder of built-in files: inside the installed package, or beside it in a checkout."""
+    """Return the folder of built-in files: inside the installed package, or beside it in a checkout."""
     installed = Path(str(files("reference"))) / "rubrics"
     return installed if installed.is_dir() else Path(__file__).resolve().parents[2] / "rubrics"
 
@@ -314,7 +314,7 @@ def built_in() -> list[str]:
 
 
 def locate(kind: str, name: str, beside: Path | None = None) -> Path:
-    """The file of an authored thing: a path ending in .toml, a neighbour, or a built-in name."""
+    """Return the file that a reference means: a path ending in .toml, a neighbour, or a built-in name."""
     if name.endswith(".toml") or os.sep in name:
         path = Path(name)
         return path if path.is_absolute() or beside is None else beside.parent / path
@@ -325,7 +325,7 @@ def locate(kind: str, name: str, beside: Path | None = None) -> Path:
 
 
 def load_assignment(name: str | Path) -> Assignment:
-    """A built-in assignment by its name, or one from the path of its file.
+    """Load a built-in assignment by its name, or one from the path of its file.
 
     Raises CallError for an unknown name (naming the known ones), AuthoredFileError with every
     fault of the files.
@@ -371,7 +371,7 @@ def _load(path: Path, _changed_ns: int) -> Assignment:
 
 
 def _load_mechanism(name: str, source: Path, beside: Path) -> MechanismFile:
-    """The mechanism that an assignment names; AuthoredFileError of the assignment where there is none."""
+    """Load the mechanism that an assignment names; AuthoredFileError of the assignment if there is none."""
     if not toml_file.is_file(source):
         suffix = SUFFIXES["mechanism"]
         known = [
@@ -391,7 +391,7 @@ def _built_in(suffix: str) -> Iterator[Path]:
 
 
 def _check_values(file: AssignmentFile) -> Iterator[Finding]:
-    """Names that formulas know already; ranges that are empty."""
+    """Report names that formulas already define, and empty ranges."""
     for name in file.variant.values:
         if name in CONSTANTS or name in FUNCTIONS or name in KEYS:
             message = f"{name} has a meaning in formulas already: choose another name"
@@ -403,7 +403,7 @@ def _check_values(file: AssignmentFile) -> Iterator[Finding]:
 
 
 def _check_table(assignment: Assignment) -> Iterator[Finding]:
-    """A table's columns against what stands beside it, and its units against the keys where they are used."""
+    """Check a table's columns against the keys beside it, and its units against the keys that use them."""
     spec, rows = assignment.file.variant, assignment.rows
     if rows is None:
         return
@@ -422,9 +422,9 @@ def _check_table(assignment: Assignment) -> Iterator[Finding]:
 
 
 def _check_formulas(assignment: Assignment, source: Path) -> Faults:
-    """Names that no formula above defines, and formulas that fail for some variant, each by itself.
+    """Report names that no formula above defines, and formulas that fail for some variant, one by one.
 
-    What follows from a value with a fault has no fault of its own.
+    A formula that depends on a faulty value is not reported.
 
     Arguments: `source` is the mechanism's file.
     """
@@ -470,7 +470,7 @@ def _check_formulas(assignment: Assignment, source: Path) -> Faults:
 
 
 def _check_scales(assignment: Assignment, variants: list[Variant]) -> Iterator[Finding]:
-    """The first scale that cannot be worked out, or is not above zero; the others follow from it."""
+    """Report the first scale that cannot be computed, or is not above zero; the others follow from it."""
     known: dict[str, FloatArray | float] = dict.fromkeys(SCALE_NAMES, 1.0)
     for name in SCALE_NAMES:
         del known[name]
@@ -485,7 +485,7 @@ def _check_scales(assignment: Assignment, variants: list[Variant]) -> Iterator[F
 
 
 def _failing(variants: list[Variant], which: BoolArray | None) -> str:
-    """The first variant where a formula fails, and how many more there are."""
+    """Return the first variant for which a formula fails, and how many more there are."""
     if which is None or which.shape != (len(variants),) or len(variants) == 1:
         return ""
     more = int(which.sum()) - 1

@@ -1,4 +1,4 @@
-"""Positions of one motion: behind a flat position (of a parallelogram, a kite) a group is on its other side.
+"""Positions of one motion: beyond a flat position (of a parallelogram, a kite) a group is on its other side.
 
 As `planmark cycle` follows a motion: where two branches meet, the motion goes on smoothly, by velocity.
 """
@@ -22,14 +22,14 @@ from reference.mechanism import (
 )
 
 FLAT = 1e-3
-"""The sine of a transmission angle below which a position does not tell one assembly from the other."""
+"""The sine of a transmission angle below which a position does not distinguish the two assemblies."""
 
 
 def signs_of(mechanism: Mechanism, numbers: Sequence[int | None]) -> dict[str, FloatArray]:
-    """By node, (N,): -1 where its group is reversed by flat positions since the first position of the same n.
+    """Return by node, (N,): -1 where flat positions since the first position of the same n reverse its group.
 
     Arguments: the mechanism of N variants with the sides of its file; n of each, equal ones together. The
-    first position that counts is one that is not flat itself. Groups that pass nothing are left out.
+    first position that counts is one that is not flat itself. Groups that pass no flat position are left out.
     """
     driven, sound = _driven(mechanism), _sound(mechanism)
     signs: dict[str, FloatArray] = {}
@@ -49,11 +49,11 @@ def signs_of(mechanism: Mechanism, numbers: Sequence[int | None]) -> dict[str, F
 
 
 def other_assemblies(mechanism: Mechanism, chain: Sequence[int]) -> dict[str, list[int]]:
-    """By node: the variants whose side means another assembly than in the variants before, as indices.
+    """Return by node the indices of variants whose side means another assembly than in the variants before.
 
     Arguments: the mechanism of N variants; some of them, neighbours in this order. Each is driven from its
-    own position to its neighbour's, a crank the shorter way round: where a flat position lies between, the
-    same assembly needs the other side. Variants that are flat themselves tell nothing and are passed over.
+    own position to its neighbour's, a crank the shorter way round: if a flat position lies between, the same
+    assembly needs the other side. Variants that are flat themselves are skipped.
     """
     driven, sound = _driven(mechanism), _sound(mechanism)
     rows = np.array([row for row in chain if sound[row]], dtype=np.intp)
@@ -79,7 +79,7 @@ def other_assemblies(mechanism: Mechanism, chain: Sequence[int]) -> dict[str, li
 
 
 def with_signs(mechanism: Mechanism, signs: Mapping[str, FloatArray]) -> Mechanism:
-    """The mechanism with some groups' sides times a sign, (N,) each."""
+    """Return the mechanism with some groups' sides times a sign, (N,) each."""
     groups = tuple(
         replace(group, side=group.side * signs[group.node]) if group.node in signs else group  # type: ignore[union-attr,arg-type]
         for group in mechanism.groups
@@ -99,7 +99,7 @@ def _sound(mechanism: Mechanism) -> BoolArray:
 
 
 def _is_one_motion(mechanism: Mechanism, rows: Sequence[int]) -> bool:
-    """Whether some variants differ in the position and the speed of their driven link alone."""
+    """Return whether some variants differ only in the position and the speed of their driving link."""
     same: list[bool] = []
 
     def compare(values: Array) -> Array:

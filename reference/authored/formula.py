@@ -27,7 +27,7 @@ Value = FloatArray | float
 
 CONSTANTS: Mapping[str, float] = {"pi": math.pi}
 ROUNDING = 1e-12
-"""A cosine this little above 1 is 1: at a dead point the law of cosines gives it with a rounding error."""
+"""A cosine that exceeds 1 by this little is 1: at a dead point the law of cosines has a rounding error."""
 
 
 def _within_one(ratio: Value) -> Value:
@@ -51,9 +51,9 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "radians": np.radians,
     "degrees": np.degrees,
 }
-"""Angles are in radians, but for what `radians` takes and `degrees` gives."""
+"""Angles are in radians, except for the argument of `radians` and the result of `degrees`."""
 ARGUMENTS: Mapping[str, tuple[int, int]] = {"atan2": (2, 2), "min": (2, 20), "max": (2, 20)}
-"""How many a function takes, at least and at most; one unless said. Twenty fill a formula."""
+"""Number of arguments of a function, least and most (default: one). Twenty fill a formula."""
 _OPERATORS: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: lambda x, y: x + y,
     ast.Sub: lambda x, y: x - y,
@@ -65,7 +65,7 @@ _OPERATORS: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
 
 
 class FormulaError(ValueError):
-    """The formula cannot be understood, or gives no number that can be used for the variants in `which`."""
+    """A formula that cannot be parsed, or has no usable value for the variants in `which`."""
 
     def __init__(self, message: str, which: NDArray[np.bool_] | None = None) -> None:
         super().__init__(message)
@@ -96,7 +96,7 @@ class Formula:
 
 @cache
 def _constant(text: str) -> FloatArray:
-    """A formula without names, worked out once."""
+    """Return the value of a formula without names, computed once."""
     return _finite(parse(text), {})
 
 
@@ -128,7 +128,7 @@ def parse(text: str | float) -> Formula:
 
 
 def _advice(text: str) -> str:
-    """What to do about a text that is often written in place of a formula; nothing for any other."""
+    """Return advice on a text that is often written in place of a formula; empty for any other."""
     if re.fullmatch(r"\d+([.,]\d+)?\s*:\s*\d+([.,]\d+)?", text):
         return ": a scale is a number of metres on a millimetre, 1:2.5 is 0.0025"
     if re.fullmatch(r"[+-]?\d+,\d+", text):

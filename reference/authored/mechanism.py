@@ -83,7 +83,7 @@ class GuideTable(Authored):
 
 
 class DrivenSliderTable(Authored):
-    """The driven slider, in place of a crank: where it is along its fixed guide, and how it moves.
+    """The driven slider, in place of a crank: its position along its fixed guide, and its rates.
 
     In `length_unit`, `length_unit`/s and `length_unit`/s^2, along the guide's direction.
     """
@@ -105,7 +105,7 @@ class DyadTable(Authored):
     links: Annotated[list[LinkName], Field(min_length=2, max_length=2)]
     lengths: TwoFormulas
     side: LeftRight
-    """Of the directed line pins[0] -> pins[1]."""
+    """Side of the directed line pins[0] -> pins[1]."""
 
 
 class SliderTable(Authored):
@@ -118,7 +118,7 @@ class SliderTable(Authored):
     length: FormulaText
     guide: GuideTable
     side: AheadBehind
-    """Where the slider is, seen from the pin along the guide's direction."""
+    """Position of the slider, seen from the pin along the guide's direction."""
 
 
 class SlottedLinkTable(Authored):
@@ -131,11 +131,11 @@ class SlottedLinkTable(Authored):
     pivot: Joint
     link: LinkName
     offset: FormulaText | None = None
-    """How far the pin lies to the left of the parallel to the guide through the pivot."""
+    """Distance of the pin to the left of the parallel to the guide through the pivot."""
     foot: Joint | None = None
-    """The guide's nearest point to the pivot, where there is an offset."""
+    """The guide's nearest point to the pivot, if there is an offset."""
     side: AheadBehind = SideText(AHEAD_BEHIND, 1)
-    """Where the pin is, seen from the pivot along the guide's direction."""
+    """Position of the pin, seen from the pivot along the guide's direction."""
 
     @model_validator(mode="after")
     def _has_foot_and_offset(self) -> Self:
@@ -172,7 +172,7 @@ class PlateTable(Authored):
     link: LinkName
     lengths: TwoFormulas
     side: LeftRight | None = None
-    """Of the directed line base[0] -> base[1]; needed unless the three are in line for every variant."""
+    """Side of the directed line base[0] -> base[1]; needed unless the three are in line for every variant."""
 
 
 class PointOnLineTable(Authored):
@@ -218,12 +218,12 @@ class MechanismFile(Authored):
     @model_validator(mode="after")
     def _has_one_driver(self) -> Self:
         if (self.crank is None) == (self.driven_slider is None):
-            raise ValueError("needs one driven link: either [crank] or [driven_slider]")
+            raise ValueError("needs one driving link: either [crank] or [driven_slider]")
         return self
 
     @property
     def driver(self) -> CrankTable | DrivenSliderTable:
-        """The driven link."""
+        """The driving link."""
         return cast("CrankTable | DrivenSliderTable", self.crank or self.driven_slider)
 
 
@@ -231,31 +231,31 @@ class MechanismFile(Authored):
 
 
 Keyed = Iterator[tuple[str, str]]
-"""A key of the group's table, and the joint that stands there."""
+"""Pairs of a key of the group's table and the joint that it names."""
 
 
 class _CarriedJoints:
-    """Which joints each link carries, as far as the file has been read."""
+    """Joints that each link carries, as far as the file has been read."""
 
     def __init__(self, file: MechanismFile) -> None:
         self.ground = set(file.ground)
         self.links: dict[str, set[str]] = {}
         self.slots: dict[str, set[str]] = {}
-        """By slotted link: its pivot and its node, the base of its points."""
+        """Pivot and node of each slotted link, the base of its points."""
         self.moments: dict[str, str] = {}
         """Points that lie under a slider at this instant only, and their links."""
 
     def body_of(self, joints: set[str]) -> str | None:
-        """The body that carries all these joints, in words; the ground is one."""
+        """Return the body that carries all these joints, in words; the ground is one."""
         link = next((link for link, held in self.links.items() if joints <= held), None)
         return "the ground" if joints <= self.ground else link and f"link {link}"
 
     def of(self, joints: list[str]) -> str | None:
-        """The moving link that carries all these joints."""
+        """Return the moving link that carries all these joints."""
         return next((link for link, held in self.links.items() if set(joints) <= held), None)
 
     def carriers_of(self, joints: list[str]) -> str:
-        """Which links carry each joint."""
+        """Describe which links carry each joint, for a message."""
         detail = []
         for joint in joints:
             links = [link for link, held in self.links.items() if joint in held]
@@ -266,7 +266,7 @@ class _CarriedJoints:
 
 
 def check_mechanism(file: MechanismFile) -> Iterator[Finding]:
-    """Joints not yet placed or placed twice, links named twice, bases and guides that are no one link's."""
+    """Report unplaced or repeated joints, repeated links, and bases and guides that no one link carries."""
     bodies = _CarriedJoints(file)
     placed = {*file.ground}
     later = [joint for group in file.group for _, joint in _added(group)]
@@ -299,7 +299,7 @@ def check_mechanism(file: MechanismFile) -> Iterator[Finding]:
 
 
 def _check_hinges(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> Iterator[Finding]:
-    """A group is hinged to points that stay on their links, and to two bodies that move differently."""
+    """Check that groups are hinged to points fixed on their links, and to two bodies in relative motion."""
     hinges = {joint for key, joint in _needed(group) if key.startswith(("pin", "pivot"))}
     for joint in sorted(hinges & bodies.moments.keys()):
         link = bodies.moments[joint]
@@ -328,7 +328,7 @@ def _check_names(joints: set[str]) -> Iterator[Finding]:
 
 
 def _ambiguous_names(joints: set[str]) -> Iterator[Finding]:
-    """Names that run together: v_BA is B about A, so no third joint may be called BA."""
+    """Report names that cannot be told apart: v_BA is B relative to A, so no third joint may be called BA."""
     read_as: dict[str, tuple[str, ...]] = {joint: (joint,) for joint in sorted(joints)}
     for first, second in permutations(sorted(joints), 2):
         other = read_as.setdefault(first + second, (first, second))
@@ -348,7 +348,7 @@ def _guides(group: AnyGroupTable) -> list[tuple[str, GuideTable]]:
 
 
 def _needed(group: AnyGroupTable) -> Keyed:
-    """The joints that must have their place before the group."""
+    """Yield the joints that must be placed before the group."""
     match group:
         case DyadTable(pins=pins):
             yield from ((f"pins[{index}]", pin) for index, pin in enumerate(pins))
@@ -363,7 +363,7 @@ def _needed(group: AnyGroupTable) -> Keyed:
 
 
 def _added(group: AnyGroupTable) -> Keyed:
-    """The joints that the group places."""
+    """Yield the joints that the group places."""
     yield "node", group.node
     if isinstance(group, SlottedLinkTable) and group.foot is not None:
         yield "foot", group.foot
@@ -371,7 +371,7 @@ def _added(group: AnyGroupTable) -> Keyed:
 
 
 def _check_links(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> Iterator[Finding]:
-    """New links have new names; bases and moving guides are carried by one link."""
+    """Check that new links have new names, and that one link carries each base and moving guide."""
     for key, guide in _guides(group):
         if guide.joints and (guide.joints[0] == guide.joints[1] or bodies.of(guide.joints) is None):
             detail = f"{guide.joints[0]} and {guide.joints[1]} must be two joints of one moving link"
@@ -421,7 +421,7 @@ def _check_base(
 
 
 def _add_link(link: str, joints: set[str], bodies: _CarriedJoints, where: str) -> Iterator[Finding]:
-    """A group's links are new bodies: under a name that is taken, two bodies would pass for one."""
+    """Add a group's links, and report used names: under one name, two bodies would pass for one."""
     if link in bodies.links:
         yield Finding(where, f"there is a link {link} already: each link needs a name of its own")
     bodies.links.setdefault(link, joints)

@@ -1,4 +1,4 @@
-"""Authored files: mechanisms and assignments in TOML, validated, all faults of a file at once."""
+"""Authored files: mechanisms and assignments in TOML, validated, with all faults of a file at once."""
 
 import re
 import tomllib
@@ -31,7 +31,7 @@ NOT_TOML = "not_toml"
 """The code of a file whose syntax is wrong."""
 MAX_NAME = 64
 _ENDLESS_KEY = re.compile(rb"(?:\.[ \t]*[\w\"'-]+[ \t]*){100}")
-"""The parser takes time with the square of a dotted key's parts: 20,000 of them take 20 s."""
+"""The parser's time grows with the square of a dotted key's parts: 20,000 of them take 20 s."""
 LARGEST_NUMBER = 1e300
 """Its neighbours overflow in the first product."""
 
@@ -73,7 +73,7 @@ SIDES = {word: sign for pair in (LEFT_RIGHT, AHEAD_BEHIND) for word, sign in zip
 """Words for a group's side."""
 
 NO_SIDES = {"above", "below", "up", "down", "over", "under", "front", "back", "open", "crossed"}
-"""Words that people write for a side, which say nothing of a line's two sides: never names of data."""
+"""Words that people write for a side but that name neither side of a line: never names of data."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +128,7 @@ class Text(Authored):
     ru: str | None = None
 
     def in_language(self, language: str) -> str:
-        """The text in a language, or in English where it is not given."""
+        """Return the text in a language, or in English if it is not given."""
         return getattr(self, language, None) or self.en
 
 
@@ -150,7 +150,7 @@ def load(model: type[Model], path: Path) -> Model:
 
 
 def _no_toml(error: Exception, text: str) -> Finding:
-    """Where a text is no TOML, the line itself, and what most likely to do."""
+    """Report invalid TOML with the faulty line and the most likely remedy."""
     found = re.search(r" \(at line (\d+), column \d+\)", str(error))
     if found is None:
         return Finding("$", f"is not TOML: {error}", NOT_TOML)
@@ -169,7 +169,7 @@ def _no_toml(error: Exception, text: str) -> Finding:
 
 
 def text_of(path: Path) -> str:
-    """The text of an authored file or of a table beside it; raises AuthoredFileError where it has none."""
+    """Return the text of an authored file or of a table beside it; raises AuthoredFileError without one."""
     try:
         return _content_of(path).decode("utf-8-sig")
     except FileNotFoundError as error:
@@ -181,7 +181,7 @@ def text_of(path: Path) -> str:
 
 
 def _content_of(path: Path) -> bytes:
-    """A file's bytes, no more than anything that is authored has; raises OSError, or AuthoredFileError."""
+    """Return a file's bytes, up to the largest authored size; raises OSError or AuthoredFileError."""
     if path.exists() and not path.is_file():
         raise AuthoredFileError(
             str(path), (Finding("$", "cannot be read: it is a folder or a device, not a file"),)
@@ -198,7 +198,7 @@ def _content_of(path: Path) -> bytes:
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is such a file; a name that the system refuses is none."""
+    """Return whether a file exists; False for a name that the system refuses."""
     try:
         return path.is_file()
     except OSError:
@@ -206,7 +206,7 @@ def is_file(path: Path) -> bool:
 
 
 def _check_tree(data: dict[str, Any]) -> Iterator[Finding]:
-    """Findings about numbers that are too large or not finite, and about tables nested too deep."""
+    """Report numbers that are too large or not finite, and tables nested too deep."""
     waiting: list[tuple[str, Any, int]] = [("$", data, 0)]
     while waiting:
         path, value, depth = waiting.pop()
@@ -217,7 +217,7 @@ def _check_tree(data: dict[str, Any]) -> Iterator[Finding]:
         elif isinstance(value, list):
             waiting += [(f"{path}[{index}]", inner, depth + 1) for index, inner in enumerate(value)]
         elif isinstance(value, int | float) and not abs(value) <= LARGEST_NUMBER:
-            # Not a number is no less than any.
+            # Comparisons with nan are false.
             yield Finding(path, "is no number that can be computed with")
 
 
@@ -230,7 +230,7 @@ def validate(model: type[Model], data: dict[str, Any], file: str) -> Model:
 
 
 def findings_of(error: ValidationError, model: type[BaseModel]) -> Iterator[Finding]:
-    """Pydantic's faults as paths and plain sentences: the first twenty, and how many more there are."""
+    """Convert Pydantic's errors to paths and plain sentences: the first twenty, and how many more."""
     faults = error.errors(include_url=False, include_context=False)
     for fault in faults[:MOST_FINDINGS]:
         *above, last = fault["loc"] or ("",)
@@ -270,7 +270,7 @@ _UNION_TAGS = {*_GROUP_TYPES, "str", "MechanismFile"}
 
 
 def _no_type(table: object) -> str:
-    """What is wrong with a group's type."""
+    """Describe what is wrong with a group's type."""
     given = table.get("type") if isinstance(table, dict) else None
     known = f"one of {', '.join(_GROUP_TYPES)}"
     if not isinstance(given, str):
@@ -281,7 +281,7 @@ def _no_type(table: object) -> str:
 
 
 def _a_list(name: str, given: object) -> str:
-    """How a list is written, of tables or of numbers."""
+    """Explain how a list of tables or of numbers is written."""
     return f" of tables: [[{name}]], not [{name}]" if isinstance(given, dict) else ", in square brackets"
 
 

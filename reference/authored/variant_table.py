@@ -39,16 +39,16 @@ MEASURES = {
     "speed": "a speed",
     "acceleration": "an acceleration",
 }
-"""What a key of a mechanism is, in the words of `UNITS`."""
+"""The kind of quantity that a key of a mechanism holds, in the words of `UNITS`."""
 LENGTHS = {"length", "lengths"}
-"""Keys of lengths that must be above zero; coordinates need not."""
+"""Keys of lengths that must be above zero; coordinates need not be."""
 MOST_VARIANTS = 10_000
-"""Of an assignment: more than any class has students, and all of them are computed before it is used."""
+"""Largest number of variants: more than any class has students, and all are computed before use."""
 LARGEST_KEY = 1e9
 """A roster's numbers have nine digits at most."""
 SPREADSHEETS = {".xlsx", ".xls", ".ods", ".numbers"}
 KEYS = ("n", "position")
-"""Columns that say which variant a row is of."""
+"""Columns that identify the variant of a row."""
 
 UNITS = {
     **{unit: ("a length", unit) for unit in LENGTH_UNITS_M},
@@ -59,9 +59,9 @@ UNITS = {
     "rad/s": ("an angular velocity", ""),
     "rad/s^2": ("an angular acceleration", ""),
 }
-"""What a unit in a heading measures, and the unit of length in it."""
+"""The kind of quantity of a unit in a heading, and its unit of length."""
 _LETTERS = str.maketrans({"м": "m", "с": "s", "²": "^2", "р": "r", "а": "a", "д": "d"})
-"""Cyrillic letters of units, which look like or stand for the Latin ones."""
+"""Cyrillic letters of units that look like or stand for the Latin ones."""
 _SPELT = {"об/мин": "rpm", "rot/min": "rpm", "min^-1": "rpm", "1/min": "rpm", "град": "deg", "1/s": "rad/s"}
 """Other spellings."""
 
@@ -71,7 +71,7 @@ _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 
 
 VariantKey = tuple[int | None, int | None]
-"""n and position, None where there is none."""
+"""n and position, None if there is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,9 +80,9 @@ class Column:
 
     Attributes
     ----------
-    unit : as the heading has it, empty where it has none
-    numbers : in degrees, and in the mechanism's unit of length, where the unit is one of these
-    words : the sides that stand in it, in place of +1 and -1
+    unit : as the heading has it; empty if it has none
+    numbers : in degrees or in the mechanism's unit of length, if the unit is one of these
+    words : the sides written in it, in place of +1 and -1
     """
 
     name: str
@@ -106,7 +106,7 @@ def _read_cell(value: object) -> object:
 class DataTable(Authored):
     """Data of the variants, row by row: `columns` and `rows` here, or the `file` of a CSV beside this one.
 
-    Columns by their names (`a = [40, 45]`), and rows as tables of their own, are read as well.
+    Also read: columns by their names (`a = [40, 45]`), and rows as tables of their own.
     """
 
     file: str | None = None
@@ -139,7 +139,7 @@ class DataTable(Authored):
 
 
 def or_its_file(schema: dict[str, Any]) -> None:
-    """In the schema of a table: a CSV's name, a list of rows, or lists by column may stand in its place."""
+    """Add to a table's schema that a CSV's name, a list of rows, or lists by column may replace it."""
     cell = {"type": ["number", "string"]}
     lists = {"type": "object", "additionalProperties": {"type": "array", "items": cell}, "minProperties": 1}
     rows = {"type": "array", "items": {"type": "object", "additionalProperties": cell}, "minItems": 1}
@@ -148,13 +148,13 @@ def or_its_file(schema: dict[str, Any]) -> None:
 
 @dataclass(frozen=True, slots=True)
 class VariantRows:
-    """A table that was read: which variant each row is of, and its columns.
+    """A table that was read: the variant of each row, and the columns.
 
     Attributes
     ----------
-    source : what messages call it
-    keys : of each row n and position, None where the table has no such column; ascending
-    places : of each row where it stands, in words
+    source : its name in messages
+    keys : n and position of each row, None if the table has no such column; ascending
+    places : the place of each row, in words
     columns : by name, in the order of the rows
     """
 
@@ -165,12 +165,12 @@ class VariantRows:
 
     @property
     def has(self) -> tuple[bool, bool]:
-        """Whether it has a column n, and a column position."""
+        """Two flags: the table has a column n, and a column position."""
         n, position = self.keys[0]
         return n is not None, position is not None
 
     def data(self, variants: Sequence[VariantKey]) -> dict[str, FloatArray]:
-        """The columns' numbers for some variants, shape (N,) each."""
+        """Return the columns' numbers for some variants, shape (N,) each."""
         row_of = {key: row for row, key in enumerate(self.keys)}
         n, position = self.has
         rows = [row_of[key[0] if n else None, key[1] if position else None] for key in variants]
@@ -178,9 +178,9 @@ class VariantRows:
 
 
 def delimiter_of(text: str) -> str:
-    """`,`, `;` or a tab, whichever the first line of a CSV text has most of; `;` where it has none.
+    """Return the delimiter (`,`, `;` or a tab) that the first line of a CSV text has most of; else `;`.
 
-    Of a table of one column, commas are decimal ones, or a name's own.
+    In a table of one column, commas are decimal commas or belong to a name.
     """
     first = next((line for line in text.splitlines() if line.strip()), "")
     return max(",;\t", key=first.count) if any(sign in first for sign in ",;\t") else ";"
@@ -214,7 +214,7 @@ Cell = float | int | str
 
 
 def read_rows(table: DataTable, beside: Path, length_unit_m: float) -> tuple[DataTable, VariantRows]:
-    """An assignment's table with its rows inside, and the data in them.
+    """Read an assignment's table; return it with its rows inside, and the data in them.
 
     Arguments: the assignment's file; the mechanism's unit of length. Raises AuthoredFileError with every
     fault, each with its row and column.
@@ -249,12 +249,12 @@ def read_rows(table: DataTable, beside: Path, length_unit_m: float) -> tuple[Dat
 
 @dataclass(slots=True)
 class _Reader:
-    """Reads the lines of a table and notes what is wrong with them.
+    """Reads the lines of a table and collects what is wrong with them.
 
     Attributes
     ----------
-    head, row : what the heading is called, and a row by its number
-    delimiter : of a CSV; beside semicolons or tabs 4,5 is a number
+    head, row : names of the heading, and of a row by its number
+    delimiter : of a CSV; with semicolons or tabs, 4,5 is a number
     """
 
     head: str
@@ -270,7 +270,7 @@ class _Reader:
     def read(
         self, lines: Sequence[tuple[int, Sequence[Cell]]]
     ) -> tuple[tuple[VariantKey, ...], dict[str, Column], tuple[str, ...]]:
-        """The variant of each row, the columns, and where each row stands, in the order of the variants."""
+        """Return the variant and place of each row, and the columns, in the order of the variants."""
         headings = self._headings(lines[0][1] if lines else ())
         rows = lines[1:]
         if self.findings:
@@ -304,7 +304,7 @@ class _Reader:
         return tuple(keys[row] for row in order), in_order, places
 
     def _headings(self, cells: Sequence[Cell]) -> list[Column]:
-        """The columns as their headings name them, without numbers."""
+        """Return the columns as their headings name them, without numbers."""
         headings: list[Column] = []
         texts = [str(cell).strip() for cell in cells]
         while texts and not texts[-1]:
@@ -330,7 +330,7 @@ class _Reader:
         return headings
 
     def _unit(self, where: str, text: str) -> str:
-        """A unit of a heading in one spelling; empty where there is none."""
+        """Return a heading's unit in one spelling; empty if there is none."""
         unit = _unit_of(text)
         if unit and unit not in UNITS:
             self.fault(where, f"'{text}' is no unit known here: there are {', '.join(UNITS)}, or none")
@@ -338,7 +338,7 @@ class _Reader:
         return unit
 
     def _column(self, heading: Column, cells: Sequence[tuple[int, Cell]]) -> Column:
-        """A column with its numbers, in degrees and in the mechanism's unit of length."""
+        """Return a column with its numbers, in degrees and in the mechanism's unit of length."""
         sides = [word for _, cell in cells if (word := str(cell).lower()) in SIDES]
         words = max((LEFT_RIGHT, AHEAD_BEHIND), key=lambda pair: sum(map(sides.count, pair))) if sides else ()
         numbers: list[float] = []
@@ -356,7 +356,7 @@ class _Reader:
         return replace(heading, numbers=tuple(numbers), words=words)
 
     def _in_file_units(self, number: float, unit: str) -> float:
-        """Degrees from radians; lengths in the mechanism's unit."""
+        """Convert radians to degrees, and lengths to the mechanism's unit."""
         if unit == "rad":
             return math.degrees(number)
         length = UNITS.get(unit, ("", ""))[1]
@@ -366,7 +366,7 @@ class _Reader:
         return number * round(1.0 / self.length_unit_m) / round(1.0 / LENGTH_UNITS_M[length])
 
     def _keys(self, columns: Mapping[str, Column], lines: Sequence[int]) -> list[VariantKey]:
-        """The variant of each row; two rows of one variant are a fault."""
+        """Return the variant of each row; two rows of one variant are a fault."""
         keys: list[VariantKey] = []
         first: dict[VariantKey, int] = {}
         named = [name for name in KEYS if name in columns]
@@ -390,13 +390,13 @@ class _Reader:
 
 
 def _unit_of(text: str) -> str:
-    """A unit in the spelling of `UNITS`, where it is one of them."""
+    """Return a unit in the spelling of `UNITS`, if it is one of them."""
     plain = text.lower().replace(" ", "")
     return _SPELT.get(plain, plain.translate(_LETTERS))
 
 
 def _side_in(cell: Cell, words: tuple[str, ...]) -> float:
-    """+1 or -1 from a word."""
+    """Convert a word to +1 or -1."""
     if str(cell).lower() not in words:
         raise ValueError(f"'{cell}' is neither {' nor '.join(words)}" if cell != "" else "is empty")
     return float(SIDES[str(cell).lower()])
@@ -421,7 +421,7 @@ def _number_in(cell: Cell, name: str, *, decimal_comma: bool) -> float:
 
 
 def formulas_in(thing: object, path: str, key: str = "") -> Iterator[tuple[str, str, Formula | SideText]]:
-    """Every formula and side of an authored table, however deep: its path, the key of the format, itself."""
+    """Yield every formula and side of an authored table, at any depth: its path, the format's key, itself."""
     inside: list[tuple[str, str, object]] = []
     if isinstance(thing, Formula | SideText):
         yield path, key, thing
@@ -436,7 +436,7 @@ def formulas_in(thing: object, path: str, key: str = "") -> Iterator[tuple[str, 
 
 
 def misused_columns(thing: object, rows: VariantRows, path: str) -> Iterator[Finding]:
-    """Columns that stand alone in a key of the mechanism and are of another kind; lengths not above zero."""
+    """Report columns used alone in a key of another kind, and lengths not above zero."""
     for where, key, leaf in formulas_in(thing, path):
         formula = leaf.side if isinstance(leaf, SideText) else leaf
         column = rows.columns.get(formula.text) if isinstance(formula, Formula) else None
@@ -453,7 +453,7 @@ def misused_columns(thing: object, rows: VariantRows, path: str) -> Iterator[Fin
 
 
 def _misuse(column: Column, key: str, words: tuple[str, ...]) -> str | None:
-    """What is wrong with a column in a key; None where nothing is."""
+    """Describe what is wrong with a column in a key; None if nothing is."""
     if words:
         if not {*column.words} <= {*words}:
             return f"holds {' and '.join(column.words)}; {' or '.join(words)} is needed here"

@@ -1,4 +1,4 @@
-"""The construction of a mechanism's plans, derived from the mechanism by one function.
+"""Derive the construction of a mechanism's plans from the mechanism.
 
 A `Draft` is a construction while it is written down. Each condition on a joint (it turns about a pin,
 it slides on a guide) gives a line of the velocity plan and one of the acceleration plan; two conditions
@@ -65,7 +65,7 @@ VELOCITY_POLE, ACCELERATION_POLE = "o", "o'"
 
 @dataclass(slots=True)
 class Draft:
-    """The construction while it is being written down."""
+    """A construction while it is being written down."""
 
     mechanism: Mechanism
     plate_by_similarity: bool
@@ -77,22 +77,22 @@ class Draft:
     images: dict[str, Similar] = field(default_factory=dict)
 
     def image(self, joint: str, *, primed: bool = False) -> str:
-        """The node of a joint in the velocity (or acceleration) plan."""
+        """Return the node of a joint in the velocity (or acceleration) plan."""
         if self.mechanism.is_ground(joint):
             return ACCELERATION_POLE if primed else VELOCITY_POLE
         return image_name(joint, primed=primed)
 
     def images_of(self, base: tuple[str, str], *, primed: bool) -> tuple[str, str]:
-        """The nodes of two joints."""
+        """Return the nodes of two joints in that plan."""
         return self.image(base[0], primed=primed), self.image(base[1], primed=primed)
 
     def add_images(self, velocity: Step, acceleration: Step) -> None:
-        """A step of each plan."""
+        """Add a step to each plan."""
         self.velocity.append(velocity)
         self.acceleration.append(acceleration)
 
     def relative(self, node: str, pin: str) -> str:
-        """The subscript of a vector of `node` about `pin`: B about A is BA, about the ground B."""
+        """Return the subscript of a vector of `node` relative to `pin`: BA relative to A, B to the ground."""
         return node if self.mechanism.is_ground(pin) else f"{node}{pin}"
 
     def vector(
@@ -104,13 +104,13 @@ class Draft:
         part: Part = "",
         turning: str | None = None,
     ) -> None:
-        """Note a vector, see `Vector`."""
+        """Add a vector, see `Vector`."""
         scale = "kv" if name.startswith("v") else "ka"
         self.vectors[name] = Vector(name, tail, head, scale, link, part, turning)
 
 
 def image_name(joint: str, *, primed: bool = False) -> str:
-    """The lower-case image of a moving joint, primed in the acceleration plan."""
+    """Return the lower-case image of a moving joint, primed in the acceleration plan."""
     return joint.lower() + ("'" if primed else "")
 
 
@@ -121,7 +121,7 @@ Condition = tuple[Line, Line]
 
 
 def images_at(draft: Draft, node: str, conditions: Sequence[Condition]) -> None:
-    """Both images of a node, where the two lines of each plan meet."""
+    """Add both images of a node, at the intersection of the two lines of each plan."""
     velocity_lines, acceleration_lines = zip(*conditions, strict=True)
     draft.add_images(
         TwoLines(draft.image(node), *velocity_lines),
@@ -131,7 +131,7 @@ def images_at(draft: Draft, node: str, conditions: Sequence[Condition]) -> None:
 
 
 def rotations(draft: Draft, node: str, links: Mapping[str, str]) -> list[Condition]:
-    """A node that turns about each pin: across the link, from the pin's image."""
+    """Add a node that turns about each pin: across the link, from the pin's image."""
     conditions = []
     for pin, link in links.items():
         length = Normal(draft.image(pin), draft.image(node), pair(pin, node))
@@ -141,7 +141,7 @@ def rotations(draft: Draft, node: str, links: Mapping[str, str]) -> list[Conditi
 
 
 def turning(draft: Draft, link: tuple[str, str], length: Normal) -> Condition:
-    """Across a link from a pin's image, and from the end of the normal component, which is laid off first."""
+    """Return the lines across a link: from a pin's image, and from the end of its normal component."""
     pin, node = link
     about, across = draft.relative(node, pin), Along(pin, node, 1)
     start, end = draft.image(pin, primed=True), f"n_{about}"
@@ -153,7 +153,7 @@ def turning(draft: Draft, link: tuple[str, str], length: Normal) -> Condition:
 
 
 def slides(draft: Draft, node: str, guides: Sequence[Guide]) -> list[Condition]:
-    """A node that slides on guides: along each, from the image of the point under it."""
+    """Add a node that slides on guides: along each, from the image of the point under it."""
     conditions = []
     for guide in guides:
         if isinstance(guide, FixedGuide):
@@ -172,7 +172,7 @@ def slides(draft: Draft, node: str, guides: Sequence[Guide]) -> list[Condition]:
 def sliding(
     draft: Draft, link: tuple[str, str], guide: Along, turn: tuple[str, str], turning_: tuple[str, str, str]
 ) -> Condition:
-    """The second joint slides about the first along a turning guide: Coriolis, then along the guide.
+    """Return the lines of a joint that slides along a turning guide: Coriolis, then along the guide.
 
     Arguments: `turn`, ends of a velocity that turns the guide's link; `turning_`, that link and the two
     joints of it that the velocity belongs to.
@@ -189,7 +189,7 @@ def sliding(
 
 
 def in_slot(draft: Draft, node: str, pin: str, slot: Fixed) -> Condition:
-    """A yoke's point about the block in its slot: along the slot, which does not turn."""
+    """Return the lines of a yoke's point relative to the block: along the slot, which does not turn."""
     image, image_primed = draft.image(pin), draft.image(pin, primed=True)
     draft.vector(f"v_{node}{pin}", image, draft.image(node), (pin, node))
     draft.vector(f"a_{node}{pin}_r", image_primed, draft.image(node, primed=True), (pin, node), "r")
@@ -200,14 +200,14 @@ def in_slot(draft: Draft, node: str, pin: str, slot: Fixed) -> Condition:
 
 
 def guide_line(node: str, guide: Guide) -> Line | FixedLine:
-    """A guide on the sketch."""
+    """Return a guide on the sketch."""
     if isinstance(guide, FixedGuide):
         return FixedLine(f"guide {node}")
     return Line(guide.base[0], Along(*guide.base))
 
 
 def similar_images(draft: Draft, node: str, base: tuple[str, str]) -> tuple[Similar, Similar]:
-    """The similarity steps of a link's third point, for both plans."""
+    """Return the similarity steps of a link's third point, for both plans."""
     velocity, acceleration = (
         Similar(draft.image(node, primed=primed), draft.images_of(base, primed=primed), (*base, node))
         for primed in (False, True)
@@ -216,26 +216,26 @@ def similar_images(draft: Draft, node: str, base: tuple[str, str]) -> tuple[Simi
 
 
 def note_similar_images(draft: Draft, node: str, base: tuple[str, str]) -> None:
-    """How both images of a plate's third point would come by similarity."""
+    """Record how both images of a plate's third point would be found by similarity."""
     draft.images.update({step.node: step for step in similar_images(draft, node, base)})
 
 
 def rigid_images(draft: Draft, node: str, base: tuple[str, str]) -> None:
-    """Both images of a link's point by similarity, without relative vectors."""
+    """Add both images of a link's point by similarity, without relative vectors."""
     note_similar_images(draft, node, base)
     draft.add_images(*similar_images(draft, node, base))
     absolute(draft, node)
 
 
 def absolute(draft: Draft, node: str) -> None:
-    """The velocity and the acceleration of a joint, from the poles."""
+    """Add the velocity and the acceleration of a joint, from the poles."""
     if f"v_{node}" not in draft.vectors:
         draft.vector(f"v_{node}", VELOCITY_POLE, draft.image(node))
     draft.vector(f"a_{node}", ACCELERATION_POLE, draft.image(node, primed=True))
 
 
 def rates_of(draft: Draft, link: str, about: str, joints: tuple[str, str]) -> None:
-    """Omega and epsilon of a link, from the first vector that turns it."""
+    """Add omega and epsilon of a link, from the first vector that turns it."""
     for name, vector in ((f"omega_{link}", f"v_{about}"), (f"epsilon_{link}", f"a_{about}_t")):
         draft.rates.setdefault(name, AngularRate(name, vector, joints, pair(*joints)))
 
@@ -243,14 +243,14 @@ def rates_of(draft: Draft, link: str, about: str, joints: tuple[str, str]) -> No
 # The whole construction ---------------------------------------------------------------------------
 
 CACHED = 256
-"""Constructions in the cache: all variants have the same one, and so has the same mechanism again."""
+"""Constructions in the cache: all variants of a mechanism share one."""
 _cache: dict[Hashable, Construction] = {}
 
 
 def construction_of(
     mechanism: Mechanism, *, accelerations: bool = True, plate_by_similarity: bool = False
 ) -> Construction:
-    """Write down how the mechanism and its plans are drawn, step by step.
+    """Return how the mechanism and its plans are drawn, step by step.
 
     Arguments
     ---------
@@ -267,7 +267,7 @@ def construction_of(
 
 
 def _form_of(mechanism: Mechanism) -> Hashable:
-    """Everything that the construction depends on: names, kinds, and which points are in line."""
+    """Return everything that the construction depends on: names, kinds, and which points are in line."""
     in_line = tuple(
         (group.is_ever_flat, group.line_ratio is None)
         for group in mechanism.groups
@@ -301,7 +301,7 @@ def _write_down(mechanism: Mechanism, accelerations: bool, plate_by_similarity: 
 
 
 def _centres(draft: Draft, rates: Mapping[str, AngularRate]) -> dict[str, Similar]:
-    """I: triangle I A B similar to o a b; J: triangle J A B similar to o' a' b' (Mehmke)."""
+    """Return centres: I with triangle I A B similar to o a b, J with J A B similar to o' a' b' (Mehmke)."""
     centres = {}
     for name, rate in rates.items():
         kind, _, link = name.partition("_")
@@ -316,7 +316,7 @@ def _centres(draft: Draft, rates: Mapping[str, AngularRate]) -> dict[str, Simila
 
 
 def _in_order(draft: Draft) -> list[str]:
-    """Names of vectors: velocities first, joint by joint, the absolute one before its parts."""
+    """Order the names of vectors: velocities first, joint by joint, the absolute one before its parts."""
     joints = draft.mechanism.joints
 
     def place(name: str) -> tuple[bool, int, str, str]:
@@ -412,7 +412,7 @@ def _draw_group(draft: Draft, group: Group) -> None:
 
 
 def _side(group: Dyad | Plate | Slider | SlottedLink) -> Side:
-    """The group's side; where it may differ between variants, the name of its parameter."""
+    """Return the group's side or, if it may differ between variants, the name of its parameter."""
     return group.side if isinstance(group.side, int) else VariantSide(f"side {group.node}")
 
 
@@ -426,7 +426,7 @@ def _draw_plate(draft: Draft, group: Plate) -> None:
 
 
 def _slot_axis(group: SlottedLink) -> Along:
-    """The direction of a slotted link's guide on the sketch."""
+    """Return the direction of a slotted link's guide on the sketch."""
     axis, side = Along(group.foot or group.pivot, group.pin), _side(group)
     return replace(axis, quarters=1 - side) if isinstance(side, int) else replace(axis, side=side)
 
@@ -450,7 +450,7 @@ def _draw_slotted_link(draft: Draft, group: SlottedLink) -> None:
 
 
 def _is_used(mechanism: Mechanism, joint: str) -> bool:
-    """Whether another group stands on a joint."""
+    """Return whether another group is attached to a joint."""
     several = [getattr(group, key, ()) for group in mechanism.groups for key in ("pins", "base")]
     single = [getattr(group, key, "") for group in mechanism.groups for key in ("pin", "pivot")]
     guides = [guide.base for group in mechanism.groups for guide in moving_guides(group)]

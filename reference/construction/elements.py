@@ -1,4 +1,4 @@
-"""The directions, lengths and lines that a step of a construction is made of.
+"""The directions, lengths and lines that a construction step consists of.
 
 Everything is in drawn millimetres, complex, y up, and an array over variants. `at` gives the value in a
 `View`: the nodes so far, the parameters, and the errors of drawing.
@@ -27,18 +27,18 @@ NO_ERROR: FloatArray = np.asarray(0.0)
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What a step is evaluated with: the nodes so far, the parameters, and the errors of drawing."""
+    """The context of a step's evaluation: the nodes so far, the parameters, and the errors of drawing."""
 
     nodes: Nodes
     parameters: Parameters
     errors: Errors = field(default_factory=dict)
 
     def error(self, node: str, slot: int, kind: str) -> FloatArray:
-        """One error of drawing, zero where there is none."""
+        """Return one error of drawing, zero if there is none."""
         return self.errors.get((node, slot, kind), NO_ERROR)
 
     def real_length(self, tail: str, head: str) -> FloatArray:
-        """The real length (m) between two joints, measured on the sketch."""
+        """Return the real length (m) between two joints, measured on the sketch."""
         return np.asarray(np.abs(self.nodes[head] - self.nodes[tail]) * self.parameters["kL"])
 
 
@@ -47,16 +47,16 @@ class FromNodes:
 
     __slots__ = ()
     reads: ClassVar[tuple[str, ...]] = ()
-    """The fields that hold names of nodes, or parts that are made from nodes themselves."""
+    """Fields that hold names of nodes, or parts that are made from nodes themselves."""
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """The nodes that it is made from."""
+        """Names of the nodes that the part is made from."""
         return _nodes_in(tuple([getattr(self, name) for name in self.reads]))
 
 
 def _nodes_in(value: object) -> tuple[str, ...]:
-    """The nodes that a field of a part names: one, several, those of another part, or none."""
+    """Return the nodes that a field of a part names: one, several, those of another part, or none."""
     if isinstance(value, str):
         return (value,)
     if isinstance(value, FromNodes):
@@ -69,7 +69,7 @@ def _nodes_in(value: object) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class VariantSide:
-    """A side that is among the parameters, because it differs between variants: +1 or -1."""
+    """A side stored among the parameters because it differs between variants: +1 or -1."""
 
     parameter: str
     sign: int = 1
@@ -79,11 +79,11 @@ class VariantSide:
 
 
 Side = int | VariantSide
-"""Of a group, the same for all variants or one of each."""
+"""Side of a group: the same for all variants, or one for each."""
 
 
 def side_at(side: Side, view: View) -> int | FloatArray:
-    """+1 to the left (ahead), -1 to the right (behind)."""
+    """Return +1 for the left (ahead), -1 for the right (behind)."""
     return side.sign * view.parameters[side.parameter] if isinstance(side, VariantSide) else side
 
 
@@ -104,7 +104,7 @@ class Along(FromNodes):
     side: Side = 1
 
     def at(self, view: View) -> ComplexArray:
-        """The unit vector."""
+        """Return the unit vector."""
         link = geometry.unit(view.nodes[self.head] - view.nodes[self.tail])
         return np.asarray(link * 1j**self.quarters * side_at(self.side, view))
 
@@ -121,7 +121,7 @@ class Fixed(FromNodes):
     quarters: int = 0
 
     def at(self, view: View) -> ComplexArray:
-        """The unit vector."""
+        """Return the unit vector."""
         turn = view.parameters.get("turn", NO_ERROR)
         return np.asarray(geometry.direction(view.parameters[self.angle] + turn) * 1j**self.quarters)
 
@@ -139,7 +139,7 @@ class Scaled(FromNodes):
     scale: str
 
     def at(self, view: View) -> FloatArray:
-        """Drawn millimetres."""
+        """Return the length in drawn millimetres."""
         return np.asarray(view.parameters[self.quantity] / view.parameters[self.scale])
 
 
@@ -147,8 +147,8 @@ class Scaled(FromNodes):
 class Normal(FromNodes):
     """A normal component v^2 / l, from a velocity as drawn and a real length, at the scale ka.
 
-    `measured` are the sketch's joints between which the length is taken where the mechanism's data do
-    not give it: the distance of a slotted link's point from its pivot.
+    `measured` are the sketch's joints between which the length is measured if the mechanism's data do not
+    give it: the distance of a slotted link's point from its pivot.
     """
 
     reads = ("tail", "head", "measured")
@@ -158,7 +158,7 @@ class Normal(FromNodes):
     measured: tuple[str, str] | None = None
 
     def at(self, view: View) -> FloatArray:
-        """Drawn millimetres."""
+        """Return the length in drawn millimetres."""
         known = view.parameters
         speed = np.abs(view.nodes[self.head] - view.nodes[self.tail]) * known["kv"]
         length = known[self.length] if self.measured is None else view.real_length(*self.measured)
@@ -175,10 +175,10 @@ class Coriolis(FromNodes):
     guide : the guide's direction, along which it slides
     turn : ends of the velocity that turns the guide's link about one of its joints
     link : those joints, in the same order, in the sketch
-    quarters : how the velocity plan is turned as a whole, by quarters counter-clockwise
+    quarters : quarter turns, counter-clockwise, of the velocity plan as a whole
 
-    The length is positive to the left of `guide`: 2 omega v of the components along guide and across
-    the link, with their signs.
+    The length is positive to the left of `guide`: 2 omega v of the components along guide and across the
+    link, with their signs.
     """
 
     reads = ("slide", "guide", "turn", "link")
@@ -189,7 +189,7 @@ class Coriolis(FromNodes):
     quarters: int = 0
 
     def at(self, view: View) -> FloatArray:
-        """Drawn millimetres."""
+        """Return the length in drawn millimetres."""
         known, nodes = view.parameters, view.nodes
         back = 1j**-self.quarters
         sliding, turning = ((nodes[head] - nodes[tail]) * back for tail, head in (self.slide, self.turn))
@@ -209,7 +209,7 @@ class Component(FromNodes):
     along: "Direction"
 
     def at(self, view: View) -> FloatArray:
-        """Drawn millimetres."""
+        """Return the length in drawn millimetres."""
         return geometry.dot(view.nodes[self.head] - view.nodes[self.tail], self.along.at(view))
 
 
@@ -225,12 +225,12 @@ class Line(FromNodes):
     along: Direction
 
     def at(self, view: View, node: str, slot: int) -> tuple[ComplexArray, ComplexArray]:
-        """A point of the line and its unit vector, with the errors of drawing it."""
+        """Return a point of the line and its unit vector, with the errors of drawing it."""
         return drawn(view, node, slot, view.nodes[self.through], self.along.at(view))
 
 
 def fixed_point(view: View, name: str) -> ComplexArray:
-    """A fixed point of the mechanism (pivot, or a guide's point) at the scale kL."""
+    """Return a fixed point of the mechanism (pivot, or a guide's point) at the scale kL."""
     known = view.parameters
     real = known[f"x {name}"] + 1j * known[f"y {name}"]
     return np.asarray(real / known["kL"] * geometry.direction(known.get("turn", NO_ERROR)))
@@ -244,11 +244,11 @@ class FixedLine(FromNodes):
 
     @property
     def along(self) -> Fixed:
-        """Its direction."""
+        """The guide's direction."""
         return Fixed(f"angle {self.guide}")
 
     def at(self, view: View, node: str, slot: int) -> tuple[ComplexArray, ComplexArray]:
-        """A point of the line and its unit vector, with the errors of drawing it."""
+        """Return a point of the line and its unit vector, with the errors of drawing it."""
         return drawn(view, node, slot, fixed_point(view, self.guide), self.along.at(view))
 
 
@@ -258,6 +258,6 @@ AnyLine = Line | FixedLine
 def drawn(
     view: View, node: str, slot: int, foot: ComplexArray, along: ComplexArray
 ) -> tuple[ComplexArray, ComplexArray]:
-    """A line with the errors of drawing it: its foot shifted sideways, its direction turned a little."""
+    """Return a line with the errors of drawing it: its foot shifted sideways, its direction turned."""
     tilted = along * geometry.direction(view.error(node, slot, "angle"))
     return np.asarray(foot + 1j * along * view.error(node, slot, "shift")), np.asarray(tilted)

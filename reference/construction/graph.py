@@ -53,14 +53,14 @@ from reference.mechanism import (
 
 
 def pair(pin: str, node: str) -> str:
-    """The name of the real length between two joints among the parameters."""
+    """Return the name of the real length between two joints among the parameters."""
     return f"{pin}{node}"
 
 
 def parameters_of(
     mechanism: Mechanism, k_length: FloatArray, k_velocity: FloatArray, k_acceleration: FloatArray
 ) -> dict[str, FloatArray]:
-    """The construction's parameters: real lengths, crank data, guides and the three scales.
+    """Return the construction's parameters: real lengths, crank data, guides and the three scales.
 
     Arguments: scales in real units per millimetre on paper (m/mm, (m/s)/mm, (m/s^2)/mm).
     """
@@ -164,7 +164,7 @@ class AngularRate:
 
 @dataclass(frozen=True)
 class Construction:
-    """Steps in an order in which they can be drawn, with the figure each belongs to.
+    """Steps in an order in which they can be drawn, with the figure that each belongs to.
 
     Attributes
     ----------
@@ -172,10 +172,10 @@ class Construction:
     poles : the pole's node by plan
     vectors : named vectors by name
     rates : angular velocities and accelerations by name
-    images : for each image of a plate's third point, the step that finds it by similarity, whichever
-        way the construction itself finds it
-    centres : on the sketch, by Mehmke's similarity from the finished plans: instantaneous centres
-        (``I3``) and acceleration poles (``J3``) of links that turn about no fixed pivot
+    images : for each image of a plate's third point, the step that finds it by similarity, even if the
+        construction itself finds it by other means
+    centres : on the sketch, by Mehmke's similarity from the finished plans: instantaneous centres (``I3``)
+        and acceleration poles (``J3``) of links that turn about no fixed pivot
     """
 
     figures: Mapping[str, tuple[Step, ...]]
@@ -197,35 +197,35 @@ class Construction:
 
     @cached_property
     def _upstream(self) -> dict[str, frozenset[str]]:
-        """By node: the node and everything that it is made from; steps come after those they need."""
+        """For each node, itself and all nodes that it is made from, each after those that it needs."""
         upstream: dict[str, frozenset[str]] = {}
         for step in self.steps:
             upstream[step.node] = frozenset((step.node,)).union(*[upstream[need] for need in step.needs])
         return upstream
 
     def step(self, node: str) -> Step:
-        """The step that makes a node. Raises KeyError for a node that there is not."""
+        """Return the step that makes a node. Raises KeyError for an unknown node."""
         return self._by_node[node][1]
 
     def figure_of(self, node: str) -> str:
-        """The figure that a node belongs to. Raises KeyError for a node that there is not."""
+        """Return the figure that a node belongs to. Raises KeyError for an unknown node."""
         return self._by_node[node][0]
 
     def needed_for(self, nodes: Collection[str]) -> frozenset[str]:
-        """The nodes from which any of some nodes are made directly."""
+        """Return the nodes from which some nodes are directly made."""
         return frozenset(need for step in self.steps if step.node in nodes for need in step.needs)
 
     def upstream(self, node: str) -> frozenset[str]:
-        """A node and everything that it is made from. Raises KeyError for a node that there is not."""
+        """Return a node and all nodes that it is made from. Raises KeyError for an unknown node."""
         return self._upstream[node]
 
     def vectors_of(self, figure: str) -> tuple[Vector, ...]:
-        """The vectors of one plan."""
+        """Return the vectors of one plan."""
         return tuple(v for v in self.vectors.values() if self._by_node[v.head][0] == figure)
 
     @property
     def links(self) -> Mapping[str, tuple[str, str]]:
-        """The pairs of joints that are drawn as links of the sketch, by their names run together."""
+        """Pairs of joints that the sketch draws as links, by their joined names."""
         pairs = [vector.link for vector in self.vectors.values() if vector.link and vector.part != "r"]
         place = {joint.node: joint.other for joint in self.steps if isinstance(joint, Coincide)}
         return {
@@ -235,7 +235,7 @@ class Construction:
         }
 
     def with_step(self, changed: Step) -> "Construction":
-        """The same construction with the step of one node replaced."""
+        """Return the construction with the step of one node replaced."""
         figures = {
             figure: tuple(changed if step.node == changed.node else step for step in steps)
             for figure, steps in self.figures.items()
@@ -244,7 +244,7 @@ class Construction:
 
 
 def ancestors(construction: Construction, wanted: Iterable[str]) -> frozenset[str]:
-    """The nodes wanted and everything that they are made from."""
+    """Return the requested nodes and all nodes that they are made from."""
     return frozenset().union(*(construction.upstream(node) for node in wanted))
 
 
@@ -261,11 +261,11 @@ def evaluate(
     Arguments
     ---------
     parameters : floats or arrays that broadcast, see `reference.construction.elements.Parameters`
-    given : nodes to take as they are instead of constructing them (millimetres, y up)
-    errors : of drawing, see `reference.construction.elements.Errors`; zero where absent
-    wanted : nodes asked for; all by default
+    given : nodes to use as they are instead of constructing them (millimetres, y up)
+    errors : of drawing, see `reference.construction.elements.Errors`; zero if absent
+    wanted : the requested nodes; all by default
 
-    Returns the nodes, complex millimetres; nan where a step has no solution.
+    Returns the nodes, complex millimetres; nan if a step has no solution.
     """
     given = given or {}
     steps = construction.steps
@@ -289,7 +289,7 @@ def evaluate(
 
 
 def bars(construction: Construction) -> tuple[tuple[str, str], ...]:
-    """Every bar that the steps of the sketch lay between two joints, from the earlier to the later one."""
+    """Return every bar that the sketch's steps draw between two joints, from the earlier joint."""
     return tuple(
         (start, step.node)
         for step in construction.figures["mechanism"]
@@ -320,6 +320,6 @@ def _starts(step: Step, construction: Construction) -> Iterator[str]:
 
 
 def coincident(construction: Construction) -> Mapping[str, str]:
-    """Joints that lie where another does at this instant, by name."""
+    """Return, by name, the joints that coincide with another joint at this instant."""
     steps = construction.figures["mechanism"]
     return {step.node: step.other for step in steps if isinstance(step, Coincide)}

@@ -1,4 +1,4 @@
-"""Mistakes as operators on the construction: one step or parameter changed, the rest follows from it.
+"""Mistakes as operators on the construction: one step or parameter is changed, the rest follows.
 
 A mistake is data; `commit` gives the drawing with that mistake in it. The reading uses mistakes as
 hypotheses, the diagnosis as explanations. Their codes are part of the published formats.
@@ -56,7 +56,7 @@ Code = Literal[
 ]
 CODES: tuple[Code, ...] = get_args(Code)
 RPM_FACTOR = 30.0 / math.pi
-"""omega = n instead of omega = pi n / 30."""
+"""Error factor of omega = n instead of omega = pi n / 30."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,13 +74,13 @@ class Mistake:
     Attributes
     ----------
     code : one of `CODES`
-    at : the node, vector, scale or figure that it is made at
-    slot : which of the step's two lines (0 or 1)
-    other : what is taken instead: two joints, a node, a vector (for its line), the two nodes swapped
+    at : the node, vector, scale or figure where it is made
+    slot : index of the step's line (0 or 1)
+    other : what is used instead: two joints, a node, a vector (for its line), the two nodes swapped
     factor : of a length, speed or scale
-    quarters : quarter turns of a figure or of the driven link's vector, counter-clockwise
+    quarters : quarter turns of a figure or of the driving link's vector, counter-clockwise
     n, position : the other student's variant
-    parameters : that variant's parameters, or those that differ; of data that were misread, those taken
+    parameters : that variant's parameters that differ; for misread data, the values used
     """
 
     code: str
@@ -95,7 +95,7 @@ class Mistake:
 
 
 def commit(mistake: Mistake, drawing: Drawing) -> Drawing:
-    """The drawing with the mistake made in it; later steps follow from it.
+    """Return the drawing with the mistake in it; later steps follow from it.
 
     Raises ValueError for a mistake that cannot be made at that step.
     """
@@ -122,7 +122,7 @@ def commit(mistake: Mistake, drawing: Drawing) -> Drawing:
 
 
 def changed_step(mistake: Mistake, construction: Construction) -> Step:
-    """The step of a node as a mistake makes it.
+    """Return the step of a node with a mistake in it.
 
     Raises ValueError for a mistake that cannot be made at that step.
     """
@@ -157,7 +157,7 @@ def changed_step(mistake: Mistake, construction: Construction) -> Step:
 
 
 def line_of(vector: Vector, construction: Construction) -> Line | None:
-    """The line on which a vector is drawn from its tail; None where its head is made in another way."""
+    """Return the line on which a vector is drawn from its tail; None if its head is found by other means."""
     match construction.step(vector.head):
         case TwoLines(first=first, second=second):
             lines = (one for one in (first, second) if isinstance(one, Line) and one.through == vector.tail)
@@ -168,7 +168,7 @@ def line_of(vector: Vector, construction: Construction) -> Line | None:
 
 
 def _with_line(step: TwoLines, slot: int, change: Callable[[Line], Line]) -> TwoLines:
-    """One of the two lines changed; raises ValueError for a fixed guide on the sketch."""
+    """Return the step with one of its two lines changed; raises ValueError for a fixed guide."""
     lines = [step.first, step.second]
     line = lines[slot]
     if not isinstance(line, Line):
@@ -178,7 +178,7 @@ def _with_line(step: TwoLines, slot: int, change: Callable[[Line], Line]) -> Two
 
 
 def _by_link(line: Line, tail: str, head: str) -> Line:
-    """The line by another link: across it, or along it where it ran along a guide."""
+    """Return the line by another link: across it, or along it if the right line runs along a guide."""
     turned = isinstance(line.along, Along) and line.along.quarters % 2 == 0
     return replace(line, along=Along(tail, head, 0 if turned else 1))
 
@@ -188,7 +188,7 @@ def _quarter(along: Direction, quarters: int) -> Direction:
 
 
 def _with_speed(parameters: Parameters, factor: float) -> Parameters:
-    """The parameters at another crank speed: v by the factor, a by its square."""
+    """Return the parameters at another crank speed: v changes by the factor, a by its square."""
     powers = {"v": 1, "a": 2}
     speeds = {
         name: np.asarray(value * factor ** powers[name[0]])
@@ -231,7 +231,7 @@ def _with_figure_turned(construction: Construction, figure: str, quarters: int) 
 
 
 def _coriolis_of_turned_plan(step: Step, figure: str, quarters: int) -> Step:
-    """A Coriolis component is computed from lengths and senses: a turned velocity plan gives the same."""
+    """Adapt a Coriolis component to a turned velocity plan: it depends on lengths and senses only."""
     if figure == "velocity_plan" and isinstance(step, Given) and isinstance(step.length, Coriolis):
         return replace(step, length=replace(step.length, quarters=step.length.quarters + quarters))
     return step
@@ -241,9 +241,9 @@ def _coriolis_of_turned_plan(step: Step, figure: str, quarters: int) -> Step:
 
 
 def single_mistakes(drawing: Drawing, figure: str) -> Iterator[Mistake]:
-    """Every mistake that could be made in one step of a figure, and in the figure as a whole.
+    """Yield every mistake that could be made in one step of a figure, and in the figure as a whole.
 
-    Mistakes of scale are offered at the factors that are met: powers of ten, halves and doubles.
+    Mistakes of scale are offered at common factors: powers of ten, halves and doubles.
     """
     for step in drawing.construction.figures[figure]:
         for mistake in mistakes_of_step(step, drawing.construction):
@@ -258,7 +258,7 @@ def single_mistakes(drawing: Drawing, figure: str) -> Iterator[Mistake]:
 
 
 def mistakes_of_step(step: Step, construction: Construction) -> Iterator[Mistake]:
-    """Every mistake that could be made in one step."""
+    """Yield every mistake that could be made in one step."""
     figure = construction.figure_of(step.node)
     match step:
         case Given():
@@ -272,7 +272,7 @@ def mistakes_of_step(step: Step, construction: Construction) -> Iterator[Mistake
 
 
 def _is_in_line(step: Step, drawing: Drawing) -> bool:
-    """Whether a point of a slotted link lies on its guide's line: its image's mirror image is itself."""
+    """Return whether a point of a slotted link lies on its guide's line: mirroring changes nothing."""
     if not isinstance(step, Similar):
         return False
     joint = drawing.construction.step(step.model[2])
@@ -312,7 +312,7 @@ def _mistakes_of_lines(step: TwoLines, construction: Construction, figure: str) 
 def _wrong_feet(
     step: TwoLines, slot: int, line: Line, construction: Construction, pole: str
 ) -> Iterator[Mistake]:
-    """The line drawn through the start of a normal component, or the pole, instead of its end."""
+    """Yield lines drawn through the start of a normal component, or the pole, instead of its end."""
     other = step.second if slot == 0 else step.first
     other_foot = other.through if isinstance(other, Line) else ""
     feet = [pole]
@@ -325,9 +325,9 @@ def _wrong_feet(
 
 
 def rarer_mistakes_of_step(step: Step, construction: Construction) -> Iterator[Mistake]:
-    """Further mistakes that could be made in one step of a plan, beside those of `mistakes_of_step`.
+    """Yield rarer mistakes in one step of a plan, in addition to `mistakes_of_step`.
 
-    The driven link's vector along the link instead of across it, or across instead of along; a line by the
+    The driving link's vector along the link instead of across it, or across instead of along; a line by the
     radius from a pivot that carries no link; a line through any earlier point, or any earlier line.
     """
     figure = construction.figure_of(step.node)
@@ -346,7 +346,7 @@ def rarer_mistakes_of_step(step: Step, construction: Construction) -> Iterator[M
 
 
 def _further_lines(step: TwoLines, slot: int, line: Line, construction: Construction) -> Iterator[Mistake]:
-    """A line by the radius to one of its joints from a pivot, through an earlier node, or an earlier line."""
+    """Yield other lines: by a pivot's radius to a joint, through an earlier node, or an earlier line."""
     given = [joint.node for joint in construction.figures["mechanism"] if not joint.needs]
     for pivot in given:
         for joint in line.along.needs:
@@ -360,7 +360,7 @@ def _further_lines(step: TwoLines, slot: int, line: Line, construction: Construc
         if node not in {line.through, foot}:
             yield Mistake("wrong_intersection", step.node, slot, other=(node,))
     for vector in construction.vectors.values():
-        # On a line through the other foot the two would meet there.
+        # With a line through the other foot, the two lines would meet at that foot.
         if vector.head in earlier and foot not in {vector.tail, vector.head}:
             drawn = line_of(vector, construction)
             if drawn is not None and drawn not in {line, other}:
@@ -368,7 +368,7 @@ def _further_lines(step: TwoLines, slot: int, line: Line, construction: Construc
 
 
 def affected(mistake: Mistake, construction: Construction) -> frozenset[str]:
-    """The nodes that a mistake moves: its own and those drawn from it."""
+    """Return the nodes that a mistake moves: its own and those drawn from it."""
     is_of_data = mistake.code in {"other_variant", "data_misread"} and mistake.at not in construction.poles
     if mistake.at in {"kL", "kv", "ka"} or mistake.code == "rpm_not_converted" or is_of_data:
         return frozenset(step.node for step in construction.steps)

@@ -26,18 +26,18 @@ from reference.kinematics import assur
 
 
 class Step(Protocol):
-    """Makes one node of one figure."""
+    """A step that makes one node of one figure."""
 
     @property
     def node(self) -> str:
-        """The node made."""
+        """The node that the step makes."""
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """The nodes it is made from."""
+        """Names of the nodes that it is made from."""
 
     def place(self, view: View) -> ComplexArray:
-        """The position of the node, complex millimetres."""
+        """Return the position of the node, complex millimetres."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class Pole(FromNodes):
     node: str
 
     def place(self, view: View) -> ComplexArray:
-        """Zero."""
+        """Return zero."""
         del view
         return np.asarray(0j)
 
@@ -59,15 +59,15 @@ class Pivot(FromNodes):
     node: str
 
     def place(self, view: View) -> ComplexArray:
-        """Real place at the scale kL, turned with the sketch."""
+        """Return the real position at the scale kL, turned with the sketch."""
         return fixed_point(view, self.node)
 
 
 @dataclass(frozen=True, slots=True)
 class Given(FromNodes):
-    """A known vector laid off from a node: a length along a direction (a negative one backwards).
+    """A known vector drawn from a node: a length along a direction (a negative one backwards).
 
-    `factor` multiplies the length: 1 for a right one, -1 for a wrong sense, 0 for one left out.
+    `factor` multiplies the length: 1 if right, -1 for a wrong sense, 0 if left out.
     """
 
     reads = ("start", "length", "along")
@@ -78,7 +78,7 @@ class Given(FromNodes):
     factor: float = 1.0
 
     def place(self, view: View) -> ComplexArray:
-        """The vector's end."""
+        """Return the vector's end."""
         foot, along = drawn(view, self.node, 0, view.nodes[self.start], self.along.at(view))
         length = self.factor * self.length.at(view) + view.error(self.node, 0, "length")
         return np.asarray(foot + along * length)
@@ -94,14 +94,14 @@ class OnGuide(FromNodes):
     length: Length
 
     def place(self, view: View) -> ComplexArray:
-        """The slider's place."""
+        """Return the slider's position."""
         foot, along = self.guide.at(view, self.node, 0)
         return np.asarray(foot + along * (self.length.at(view) + view.error(self.node, 0, "length")))
 
 
 @dataclass(frozen=True, slots=True)
 class TwoLines(FromNodes):
-    """Where two lines meet."""
+    """The intersection of two lines."""
 
     reads = ("first", "second")
     node: str
@@ -109,7 +109,7 @@ class TwoLines(FromNodes):
     second: AnyLine
 
     def place(self, view: View) -> ComplexArray:
-        """The meeting point."""
+        """Return the intersection."""
         p, u = self.first.at(view, self.node, 0)
         q, v = self.second.at(view, self.node, 1)
         return geometry.meet(p, u, q, v)
@@ -117,7 +117,7 @@ class TwoLines(FromNodes):
 
 @dataclass(frozen=True, slots=True)
 class TwoArcs(FromNodes):
-    """Where two compass arcs meet, on one side of the line between their centres."""
+    """The intersection of two compass arcs, on one side of the line between their centres."""
 
     reads = ("centres", "radii")
     node: str
@@ -126,7 +126,7 @@ class TwoArcs(FromNodes):
     side: Side
 
     def place(self, view: View) -> ComplexArray:
-        """The meeting point."""
+        """Return the intersection."""
         p, q = (view.nodes[centre] for centre in self.centres)
         r, s = (
             radius.at(view) + view.error(self.node, slot, "length") for slot, radius in enumerate(self.radii)
@@ -136,7 +136,7 @@ class TwoArcs(FromNodes):
 
 @dataclass(frozen=True, slots=True)
 class ArcAndLine(FromNodes):
-    """Where a compass arc meets a guide, ahead of (side +1) or behind its centre along the guide."""
+    """The intersection of a compass arc and a guide, ahead of (side +1) or behind the arc's centre."""
 
     reads = ("centre", "radius", "guide")
     node: str
@@ -146,7 +146,7 @@ class ArcAndLine(FromNodes):
     side: Side
 
     def place(self, view: View) -> ComplexArray:
-        """The meeting point."""
+        """Return the intersection."""
         foot, along = self.guide.at(view, self.node, 1)
         radius = self.radius.at(view) + view.error(self.node, 0, "length")
         return geometry.arc_and_line(view.nodes[self.centre], radius, foot, along, side_at(self.side, view))
@@ -154,20 +154,20 @@ class ArcAndLine(FromNodes):
 
 @dataclass(frozen=True, slots=True)
 class Coincide(FromNodes):
-    """A point that lies where another does at this instant: on the link under a slider."""
+    """A point that coincides with another at this instant: on the link under a slider."""
 
     reads = ("other",)
     node: str
     other: str
 
     def place(self, view: View) -> ComplexArray:
-        """The same place."""
+        """Return the position of the other point."""
         return view.nodes[self.other]
 
 
 @dataclass(frozen=True, slots=True)
 class Tangent(FromNodes):
-    """Where a line from a point touches a circle.
+    """The point where a line from a given point touches a circle.
 
     From the centre the touching point lies a quarter turn to the left (for a positive radius) of the
     line's direction; `side` is +1 where that runs from the touching point to `start`, -1 the other way.
@@ -181,7 +181,7 @@ class Tangent(FromNodes):
     side: Side
 
     def place(self, view: View) -> ComplexArray:
-        """The touching point."""
+        """Return the point of contact."""
         centre = view.nodes[self.centre]
         radius = self.radius.at(view) + view.error(self.node, 0, "length")
         _, along, _ = assur.rpr_place(view.nodes[self.start] - centre, radius, side_at(self.side, view))
@@ -200,7 +200,7 @@ class Local(FromNodes):
     y: Length
 
     def place(self, view: View) -> ComplexArray:
-        """Origin + (x + i y) along the axis."""
+        """Return origin + (x + i y) along the axis."""
         foot, along = drawn(view, self.node, 0, view.nodes[self.origin], self.axis.at(view))
         x = self.x.at(view) + view.error(self.node, 0, "length")
         return np.asarray(foot + along * (x + 1j * self.y.at(view)))
@@ -216,7 +216,7 @@ class Divide(FromNodes):
     ratio: str
 
     def place(self, view: View) -> ComplexArray:
-        """base[0] + ratio (base[1] - base[0])."""
+        """Return base[0] + ratio (base[1] - base[0])."""
         p, q = (view.nodes[end] for end in self.base)
         along = geometry.unit(q - p)
         slip = np.where(np.isfinite(along), along, 0.0) * view.error(self.node, 0, "length")
@@ -227,7 +227,7 @@ class Divide(FromNodes):
 class Similar(FromNodes):
     """The image of a link's third point: the triangle of the plan similar to that of the mechanism.
 
-    `mirrored` for the mistake of a triangle similar but traversed the other way round.
+    `mirrored` is for the mistake of a similar triangle traversed the other way round.
     """
 
     reads = ("base", "model")
@@ -237,7 +237,7 @@ class Similar(FromNodes):
     mirrored: bool = False
 
     def place(self, view: View) -> ComplexArray:
-        """The third corner."""
+        """Return the third corner."""
         p, q = (view.nodes[end] for end in self.base)
         corners = [view.nodes[corner] for corner in self.model]
         if self.mirrored:

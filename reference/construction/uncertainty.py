@@ -28,12 +28,13 @@ from reference.construction.steps import (
 from reference.geometry import ComplexArray
 
 Act = tuple[str, int, str]
-"""Node, which of its step's lines or lengths, and kind, as in `reference.construction.elements.Errors`."""
+"""Node, index of its step's line or length, and kind, as in `reference.construction.elements.Errors`."""
 SMALL = 1e-4
-"""Of a standard deviation: how large an error is tried. Small against any curvature, large against
-the digits of a length."""
+"""Size of the trial error in standard deviations: small against any curvature, large against the digits of a
+length.
+"""
 FOOT_SHARE = 0.5
-"""A line's foot lies on a point that is there: it is missed by this share of a length's error."""
+"""A line's foot lies on an existing point, so its error is this share of a length's error."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +53,7 @@ class Skill:
     mark_mm: float
 
     def deviation(self, kind: str) -> float:
-        """The standard deviation of one kind of act, millimetres or radians."""
+        """Return the standard deviation of one kind of act, millimetres or radians."""
         match kind:
             case "angle":
                 return float(np.radians(self.angle_deg))
@@ -65,7 +66,7 @@ class Skill:
 
 
 def acts_of(step: Step) -> tuple[tuple[int, str], ...]:
-    """The acts of drawing that a step consists of: which line or length, and kind."""
+    """Return the acts of drawing that a step consists of: index of the line or length, and kind."""
     mark = ((0, "x"), (0, "y"))
     match step:
         case Given() | Local() | OnGuide():
@@ -90,7 +91,7 @@ def acts(construction: Construction) -> tuple[Act, ...]:
 
 
 def step_errors(step: Step, skill: Skill) -> Errors:
-    """The errors of one step's acts, arrays (acts + 1, 1): none in the first row, then one in each row.
+    """Return the errors of one step's acts, (acts + 1, 1): none in the first row, then one in each row.
 
     Each is `SMALL` standard deviations.
     """
@@ -109,7 +110,7 @@ class OwnNode:
     Attributes
     ----------
     at : complex millimetres
-    shifts : (r,) how one standard deviation of each error of measuring moves it; None without any
+    shifts : (r,) its shift by one standard deviation of each error of measuring; None without any
     """
 
     at: complex
@@ -144,9 +145,9 @@ class TracedDrawing:
 
     Attributes
     ----------
-    made : each node as its step makes it from the nodes before it, own ones where they are known
-    nodes : the own node where it is known, else as made
-    drafting_count : how many of the errors are drafting errors; those of measuring come after them
+    made : each node as its step makes it from the nodes before it, the student's own ones if known
+    nodes : the student's own node if known, else as made
+    drafting_count : number of drafting errors; errors of measuring come after them
     """
 
     made: Mapping[str, TracedNode]
@@ -154,11 +155,11 @@ class TracedDrawing:
     drafting_count: int
 
     def vector(self, tail: str, head: str) -> complex:
-        """The vector to `head` as the step of `head` makes it, complex mm."""
+        """Return the vector to `head` as the step of `head` makes it, complex mm."""
         return self.made[head].at - self.nodes[tail].at
 
     def shifts(self, tail: str, head: str) -> ComplexArray:
-        """How one standard deviation of each error moves the vector's end, complex mm."""
+        """Return the shift of the vector's end by one standard deviation of each error, complex mm."""
         return np.asarray(self.made[head].shifts - self.nodes[tail].shifts)
 
 
@@ -217,13 +218,13 @@ def trace(
 
 
 def _traced(place: ComplexArray) -> TracedNode:
-    """A node's position without errors, and its shift by each of them."""
+    """Return a node's position without errors, and its shift by each of them."""
     shifts = (place[1:] - place[0]) / SMALL
     return TracedNode(complex(place[0]), np.where(np.isfinite(shifts), shifts, 0.0))
 
 
 def spread(shifts: ComplexArray, along: complex) -> EndSpread:
-    """The standard deviations of a vector's end along the vector and across it, from independent errors.
+    """Return the standard deviations of a vector's end along and across the vector, from independent errors.
 
     Arguments: `along` is the vector; for a zero vector both are the root of the sum over both axes.
     """

@@ -1,1 +1,1 @@
-"""The parts of the reference drawing: figures with their symbols and letters, their place, the tables."""
+"""The parts of the reference drawing: figures with their symbols and letters, the layout, the tables."""

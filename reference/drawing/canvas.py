@@ -11,9 +11,9 @@ from html import escape
 
 GREEK = {"omega": "ω", "epsilon": "ε"}
 INDEX_SIZE = 0.7
-"""Size of an index to that of its line."""
+"""Size of an index relative to that of its line."""
 RISES = {-1: -0.26, 0: 0.0, 1: 0.44}
-"""How far a piece is raised, in sizes of its line."""
+"""Rise of a piece, in sizes of its line."""
 ASCENT, DESCENT = 0.76, 0.24
 CACHE_SIZE = 4096
 _DESCENDING = frozenset("gjpqyQ,;()[]_/ȘșȚțДЦЩдцщруфμβφ")
@@ -32,7 +32,7 @@ _WIDTH_OF_OTHERS = 0.7
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A stretch of text on one height: 0 on the line, -1 an index below, +1 above."""
+    """A stretch of text at one height: 0 on the line, -1 an index below, +1 above."""
 
     text: str
     height: int = 0
@@ -42,7 +42,7 @@ class Piece:
         return size if self.height == 0 else INDEX_SIZE * size
 
     def rise(self, size: float) -> float:
-        """How far it is raised."""
+        """Rise of the piece above its line, for a size of the line."""
         return RISES[self.height] * size
 
 
@@ -50,7 +50,7 @@ Text = str | tuple[Piece, ...]
 
 
 def pieces_of(name: str) -> tuple[Piece, ...]:
-    """A name as it is set: ``a_BA_n`` as a with BA below and n above, ``O1A`` with its 1 below."""
+    """Typeset a name: ``a_BA_n`` as a with BA below and n above, ``O1A`` with its 1 below."""
     stem, *indices = name.split("_")
     if indices and stem:
         indexed = (Piece(index, height) for index, height in zip(indices, (-1, 1), strict=False))
@@ -60,13 +60,13 @@ def pieces_of(name: str) -> tuple[Piece, ...]:
 
 
 def scale_pieces(name: str) -> tuple[Piece, ...]:
-    """A scale's name: the letter k (or μ) with L, v or a below it."""
+    """Typeset a scale's name: the letter k (or μ) with L, v or a below it."""
     return (Piece(name[:1]), Piece(name[1:], -1)) if len(name) > 1 else (Piece(name),)
 
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """A piece in its place: from the text's start to the right, above the line."""
+    """A piece at its position: to the right of the text's start, above the line."""
 
     text: str
     right: float
@@ -75,7 +75,7 @@ class Placed:
 
 
 def set_pieces(text: Text, size: float) -> Iterator[Placed]:
-    """The pieces in their places; an index above stands over the index below that it follows."""
+    """Position the pieces; an index above stands over the index below that it follows."""
     right, below_from, below_to = 0.0, 0.0, 0.0
     for piece in (Piece(text),) if isinstance(text, str) else text:
         own = piece.size(size)
@@ -89,7 +89,7 @@ def set_pieces(text: Text, size: float) -> Iterator[Placed]:
 
 @lru_cache(maxsize=CACHE_SIZE)
 def width_of(text: Text, size: float) -> float:
-    """How wide a text is set."""
+    """Return the width of a text as set."""
     return max(
         (piece.right + _width(piece.text, piece.size) for piece in set_pieces(text, size)), default=0.0
     )
@@ -101,7 +101,7 @@ def _width(text: str, size: float) -> float:
 
 @lru_cache(maxsize=CACHE_SIZE)
 def rise_and_fall(text: Text, size: float) -> tuple[float, float]:
-    """How far a text reaches above and below its line."""
+    """Return how far a text extends above and below its line."""
     rise, fall = 0.0, 0.0
     for piece in set_pieces(text, size):
         rise = max(rise, piece.above + ASCENT * piece.size)
@@ -112,7 +112,7 @@ def rise_and_fall(text: Text, size: float) -> tuple[float, float]:
 
 
 def wrapped(text: str, size: float, wide: float) -> Sequence[str]:
-    """Lines that are no wider than `wide`, broken at spaces."""
+    """Break a text at spaces into lines no wider than `wide`."""
     lines: list[str] = []
     for word in text.split(" "):
         longer = f"{lines[-1]} {word}" if lines else word
@@ -133,7 +133,7 @@ INK = "#1b1f24"
 CONSTRUCTION = "#7d8791"
 PAPER = "#ffffff"
 SLANT = 0.21
-"""How far slanted letters lean to the right, of their height (12 degrees)."""
+"""Slant of letters to the right, as a share of their height (12 degrees)."""
 FONTS = "'DejaVu Sans Condensed', 'DejaVu Sans', Arial, sans-serif"
 Point = tuple[float, float]
 Bounds = tuple[float, float, float, float]
@@ -184,7 +184,7 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """A text whose line starts, ends or has its middle `at` a point; `size` is the height of its line."""
+    """A text whose line starts at, ends at, or is centred on a point; `size` is the height of its line."""
 
     at: Point
     text: Text
@@ -195,7 +195,7 @@ class Label:
 
     @property
     def left(self) -> float:
-        """Where its line starts."""
+        """The x coordinate where the line starts."""
         share = {"start": 0.0, "middle": 0.5, "end": 1.0}[self.anchor]
         return self.at[0] - share * width_of(self.text, self.size)
 
@@ -211,7 +211,7 @@ Shape = Stroke | Ring | Area | Curve | Label
 
 
 def shifted(shape: Shape, by: Point) -> Shape:
-    """The shape elsewhere on the sheet."""
+    """Return the shape shifted on the sheet."""
 
     def shift(point: Point) -> Point:
         return (point[0] + by[0], point[1] + by[1])
@@ -228,7 +228,7 @@ def shifted(shape: Shape, by: Point) -> Shape:
 
 
 def bounds(shapes: Iterable[Shape]) -> Bounds:
-    """The box that shapes fill; raises ValueError for none."""
+    """Return the box that shapes fill; raises ValueError for none."""
     boxes = [_bounds_of(shape) for shape in shapes]
     lows, highs = [box[:2] for box in boxes], [box[2:] for box in boxes]
     left, top = (min(low[axis] for low in lows) for axis in (0, 1))
@@ -254,7 +254,7 @@ def _bounds_of(shape: Shape) -> Bounds:
 
 
 def svg(sheets: Sequence[Sequence[Shape]], page_mm: tuple[float, float] = A3_MM) -> str:
-    """The sheets, one under another, as one SVG; one user unit is one millimetre."""
+    """Return the sheets, one under another, as one SVG; one user unit is one millimetre."""
     width, height = page_mm
     total = height * len(sheets)
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', _svg_tag((0.0, 0.0, width, total))]
@@ -267,7 +267,7 @@ def svg(sheets: Sequence[Sequence[Shape]], page_mm: tuple[float, float] = A3_MM)
 
 
 def picture_svg(shapes: Sequence[Shape], box: Bounds) -> str:
-    """Shapes as an SVG element of a page, true to size, cut at a box."""
+    """Return shapes as an SVG element of a page, true to size, clipped to a box."""
     return "\n".join([_svg_tag(box), *elements(shapes), "</svg>"])
 
 
@@ -278,7 +278,7 @@ def _svg_tag(box: Bounds) -> str:
 
 
 def elements(shapes: Iterable[Shape]) -> Iterator[str]:
-    """Each shape as an element of an SVG."""
+    """Yield each shape as an element of an SVG."""
     return (_element(shape) for shape in shapes)
 
 
@@ -315,7 +315,7 @@ def _corners(points: Sequence[Point]) -> str:
 
 
 def _text(label: Label) -> str:
-    """A text, its indices as spans; each piece at its own place, so that every viewer stacks them alike."""
+    """Return a text with its indices as spans, each positioned, so that every viewer stacks them alike."""
     style = ' font-style="italic"' if label.italic else ""
     placed = list(set_pieces(label.text, label.size))
     x, y = label.left, label.at[1]

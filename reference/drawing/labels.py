@@ -44,14 +44,14 @@ SAME_POINT_MM = 1e-6
 TINY_MM = 1e-9
 LEADER_DASH = (0.5, 0.8)
 TOUCHING_COST, CROSSING_COST = 60.0, 12.0
-"""Of a millimetre of stroke under a letter (and as much for each stroke); of letters on one another."""
+"""Cost of a millimetre of stroke under a letter (and as much for each stroke); of overlapping letters."""
 OTHERS_POINT_COST = 1.5
-"""Of each millimetre that a letter is nearer to another point than to its own."""
+"""Cost of each millimetre by which a letter is nearer to another point than to its own."""
 
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """A letter to be placed: at which point (millimetres, y down), clear by `radius` of its middle."""
+    """A letter to be placed: its point (millimetres, y down), and the `radius` to keep clear around it."""
 
     node: str
     at: Point
@@ -60,13 +60,13 @@ class Wanted:
     colour: str
     radius: float = 1.0
     outward: complex = 0j
-    """Where it would best stand, a direction with y up; none where it does not matter."""
+    """Preferred direction from the point, y up; zero if it does not matter."""
     italic: bool = True
 
 
 @dataclass(frozen=True, slots=True)
 class PlacedLabel:
-    """A letter in its place, with the thin line to its point where it stands apart."""
+    """A placed letter, with a thin line to its point if it stands far from it."""
 
     wanted: Wanted
     label: Label
@@ -74,12 +74,12 @@ class PlacedLabel:
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
-        """What is drawn."""
+        """The shapes to draw."""
         return (self.label,) if self.leader is None else (self.label, self.leader)
 
 
 def place_labels(wanted: Sequence[Wanted], obstacles: Iterable[Shape], rounds: int = 3) -> list[PlacedLabel]:
-    """The position of each letter; those with the least room are placed first, then all again in turn."""
+    """Choose the position of each letter: those with the least room first, then all again in turn."""
     segments = segments_of(obstacles)
     points = np.array([one.at for one in wanted]).reshape(-1, 2)
     tries = [_candidates_at(one, GAPS_MM, segments, points) for one in wanted]
@@ -102,7 +102,7 @@ def place_labels(wanted: Sequence[Wanted], obstacles: Iterable[Shape], rounds: i
 
 @dataclass(frozen=True, slots=True)
 class _Candidates:
-    """The places tried for a letter: boxes (p, 4), and what each costs by itself (p,)."""
+    """Candidate positions for a letter: boxes (p, 4), and the cost of each by itself (p,)."""
 
     wanted: Wanted
     boxes: FloatArray
@@ -110,12 +110,12 @@ class _Candidates:
     cost: FloatArray
 
     def with_more(self, far: "_Candidates") -> "_Candidates":
-        """These places and others farther off."""
+        """Return these positions and others farther off."""
         pairs = ((self.boxes, far.boxes), (self.leaders, far.leaders), (self.cost, far.cost))
         return _Candidates(self.wanted, *(np.concatenate(pair) for pair in pairs))
 
     def best(self, others: Sequence[PlacedLabel]) -> tuple[PlacedLabel, float]:
-        """The cheapest place beside the letters that stand already, and its cost."""
+        """Return the cheapest position beside the letters placed so far, and its cost."""
         cost = self.cost.copy()
         if others:
             taken = np.array([other.label.bounds for other in others])
@@ -141,7 +141,7 @@ class _Candidates:
 def _candidates_at(
     wanted: Wanted, gaps: Sequence[float], segments: FloatArray, points: FloatArray
 ) -> _Candidates:
-    """Places all round a point, at each of some distances from its mark."""
+    """Return positions all round a point, at each of some distances from its mark."""
     boxes, gap, turn = _boxes_around(wanted, gaps)
     own, others = _distances(boxes, wanted, points)
     doubtful = (gap >= LEADER_FROM_MM) | ((others < own + DOUBT_MM) & (gap >= LEAST_LEADER_MM))
@@ -153,14 +153,14 @@ def _candidates_at(
 
 
 def _boxes_around(wanted: Wanted, gaps: Sequence[float]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Boxes (p, 4), the distance of each from the point's mark (p,), the direction of each (p,)."""
+    """Return boxes (p, 4), the distance of each from the point's mark (p,), the direction of each (p,)."""
     rise, fall = rise_and_fall(wanted.text, wanted.size)
     wide = width_of(wanted.text, wanted.size) + (SLANT * rise if wanted.italic else 0.0)
     half = np.array([wide, rise + fall]) / 2.0
     turns = np.arange(DIRECTIONS) * math.tau / DIRECTIONS
     gap, turn = (grid.ravel() for grid in np.meshgrid(gaps, turns, indexing="ij"))
     along = np.stack([np.cos(turn), -np.sin(turn)], axis=1)
-    # So far that the box, not its middle, is the gap away from the mark.
+    # The gap is measured from the mark to the box, not to its middle.
     steep = np.maximum(np.abs(along), TINY_MM)
     reach = np.minimum(half[0] / steep[:, 0], half[1] / steep[:, 1]) + wanted.radius + gap
     middles = np.asarray(wanted.at) + along * reach[:, None]
@@ -168,7 +168,7 @@ def _boxes_around(wanted: Wanted, gaps: Sequence[float]) -> tuple[FloatArray, Fl
 
 
 def _distances(boxes: FloatArray, wanted: Wanted, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """How far each of (p, 4) boxes is from its own point and from the nearest other point, (p,) each."""
+    """Return the distances of (p, 4) boxes from their own point and from the nearest other one, (p,)."""
     apart = points[:, None] - np.clip(points[:, None], boxes[:, :2], boxes[:, 2:])
     away = np.hypot(apart[..., 0], apart[..., 1])
     mine = np.hypot(*(points - np.asarray(wanted.at)).T) < SAME_POINT_MM
@@ -177,7 +177,7 @@ def _distances(boxes: FloatArray, wanted: Wanted, points: FloatArray) -> tuple[F
 
 
 def _leaders(wanted: Wanted, boxes: FloatArray, doubtful: NDArray[np.bool_]) -> FloatArray:
-    """The thin line from a point's mark to each box, as segments; nan where none is needed."""
+    """Return the thin line from a point's mark to each box, as segments; nan if none is needed."""
     at = np.asarray(wanted.at)
     near = np.clip(at, boxes[:, :2], boxes[:, 2:])
     span = near - at
@@ -188,7 +188,7 @@ def _leaders(wanted: Wanted, boxes: FloatArray, doubtful: NDArray[np.bool_]) -> 
 
 
 def segments_of(shapes: Iterable[Shape]) -> FloatArray:
-    """Every edge of shapes as (m, 5): both ends and half the stroke's width; letters have none."""
+    """Return every edge of shapes as (m, 5): both ends and half the stroke's width; letters have none."""
     rows = [(*start, *end, half) for shape in shapes for start, end, half in _edges(shape)]
     return np.array(rows, dtype=np.float64).reshape(-1, 5)
 
@@ -212,7 +212,7 @@ def _edges(shape: Shape) -> Iterator[tuple[Point, Point, float]]:
 
 
 def lengths_inside(boxes: FloatArray, segments: FloatArray, clear: float = CLEAR_MM) -> FloatArray:
-    """Length of each of (m, 5) segments in each of (p, 4) boxes grown by a clearance, (p, m).
+    """Return the length of each of (m, 5) segments in each of (p, 4) boxes grown by a clearance, (p, m).
 
     Liang and Barsky's clipping; a segment with nan is in no box.
     """
@@ -232,7 +232,7 @@ def lengths_inside(boxes: FloatArray, segments: FloatArray, clear: float = CLEAR
 
 
 def _overlaps(boxes: FloatArray, taken: FloatArray, clear: float) -> FloatArray:
-    """How deep each of (p, 4) boxes lies on each of (t, 4) others, millimetres and one more, (p, t)."""
+    """Return the overlap of (p, 4) boxes with (t, 4) others, mm plus one, (p, t); zero if apart."""
     low = np.maximum(boxes[:, None, :2], taken[:, :2])
     high = np.minimum(boxes[:, None, 2:], taken[:, 2:])
     depth = np.min(high - low, axis=2) + clear
@@ -244,7 +244,7 @@ def _overlaps(boxes: FloatArray, taken: FloatArray, clear: float) -> FloatArray:
 
 @dataclass(frozen=True, slots=True)
 class Style:
-    """How a figure's letters are written, and how far its points' marks reach."""
+    """Style of a figure's letters, and the radius of its points' marks."""
 
     size: float
     small: float
@@ -252,7 +252,7 @@ class Style:
     radius: float
 
     def of(self, nodes: Sequence[str]) -> float:
-        """The size: ends of components are written smaller."""
+        """Return the size: ends of components are written smaller."""
         return self.small if all("_" in node for node in nodes) else self.size
 
 
@@ -263,7 +263,7 @@ def letters(
     style: Style,
     others: Sequence[Wanted] = (),
 ) -> Iterator[Part]:
-    """The letters of nodes, and other texts to be placed with them, clear of what is drawn."""
+    """Place the letters of nodes, and other texts with them, clear of what is drawn."""
     middle = sum(nodes.values()) / len(nodes)
     points = list(_together(nodes))
     wanted = [
@@ -284,7 +284,7 @@ def letters(
 
 
 def _together(nodes: dict[str, complex]) -> Iterator[tuple[tuple[str, ...], complex]]:
-    """Nodes gathered where they fall on one point of the paper."""
+    """Group nodes that coincide on paper."""
     left = dict(nodes)
     while left:
         at = next(iter(left.values()))
@@ -295,7 +295,7 @@ def _together(nodes: dict[str, complex]) -> Iterator[tuple[tuple[str, ...], comp
 
 
 def _joined(subject: Subject, nodes: Sequence[str]) -> tuple[Piece, ...]:
-    """The letters of nodes that fall on one point."""
+    """Join the letters of nodes that coincide."""
     pieces: list[Piece] = []
     for node in nodes:
         pieces += [*([Piece(", ")] if pieces else []), *subject.letter(node)]

@@ -43,7 +43,7 @@ ENGLISH = Wording()
 
 @dataclass(frozen=True, slots=True)
 class DrawnSheet:
-    """One A3 sheet of the reference drawing; `fits` is False where a figure is too large for it."""
+    """One A3 sheet of the reference drawing; `fits` is False if a figure is too large for it."""
 
     shapes: tuple[Shape, ...]
     fits: bool
@@ -57,13 +57,13 @@ def reference_drawing(
     *,
     altitude: bool = False,
 ) -> list[DrawnSheet]:
-    """The drawing of one variant of a plan on A3, true to scale.
+    """Return the drawing of one variant of a plan on A3, true to scale.
 
-    All on one sheet where it fits, else on the sheets that the assignment asks for, else on as many as
-    are needed. The drawing says in red where a figure is too large at its scales even so.
+    All on one sheet if it fits, else on the sheets that the assignment asks for, else on as many as are
+    needed. If a figure is still too large at its scales, the drawing says so in red.
 
-    Arguments: `altitude` draws the right triangles of the normal components on the sketch; raises
-    CallError where the scales do not allow that.
+    Arguments: `altitude` draws the right triangles of the normal components on the sketch; raises CallError
+    if the scales do not allow that.
     """
     subject = Subject(assignment, plan, index, wording, altitude)
     figures = figures_of(subject)
@@ -81,7 +81,7 @@ def reference_drawing(
 
 
 def _on_several_sheets(subject: Subject, figures: Sequence[DrawnFigure]) -> list[DrawnSheet]:
-    """Sheets with as many figures each, in their order, as fit."""
+    """Return sheets with as many figures each, in their order, as fit."""
     sheets: list[tuple[DrawnSheet, list[DrawnFigure]]] = []
     for figure in figures:
         together = _sheet(subject, [*sheets[-1][1], figure]) if sheets else None
@@ -93,7 +93,7 @@ def _on_several_sheets(subject: Subject, figures: Sequence[DrawnFigure]) -> list
 
 
 def figures_of(subject: Subject) -> dict[str, DrawnFigure]:
-    """Each figure of a plan by its name."""
+    """Return each figure of a plan by its name."""
     return {
         name: sketch(subject) if name == "mechanism" else polygon(subject, name)
         for name in subject.plan.nodes_mm
@@ -121,15 +121,15 @@ LEAST_GAP_MM = 6.0
 CELL_MM = 2.0
 HALF_A_CELL = 0.5
 CORNERS = (None, (0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0))
-"""Where the largest figure of a crowded sheet is tried: amid, and in each corner (right, down)."""
+"""Positions tried for the largest figure of a crowded sheet: the middle, and each corner (right, down)."""
 Mask = NDArray[np.bool_]
 
 
 def lay_out(figures: Sequence[DrawnFigure], room: Bounds, column: Bounds) -> tuple[list[Point], bool]:
-    """The shift of each figure from its own origin, and whether all have room.
+    """Return the shift of each figure from its own origin, and whether all have room.
 
-    Arguments: `room` is the sheet inside its frame, `column` the part of it that the table takes, at
-    its right.
+    Arguments: `room` is the sheet inside its frame, `column` the part of it that the table occupies, at its
+    right.
     """
     beside = (room[0], room[1], column[0], room[3])
     found = _in_rows(figures, beside) or _packed_by_size(figures, room, column)
@@ -141,14 +141,14 @@ def _sizes(figures: Sequence[DrawnFigure]) -> list[tuple[float, float]]:
 
 
 def _in_rows(figures: Sequence[DrawnFigure], room: Bounds) -> list[Point] | None:
-    """The shifts in rows with equal spaces, in the layout with the widest spaces; None without room."""
+    """Return shifts in rows with equal spaces, in the layout with the widest spaces; None without room."""
     layouts = [_rows(figures, breaks, room) for breaks in product((False, True), repeat=len(figures) - 1)]
     gap, moves = max(layouts, key=lambda layout: layout[0])
     return moves if gap >= LEAST_GAP_MM else None
 
 
 def _rows(figures: Sequence[DrawnFigure], breaks: Sequence[bool], room: Bounds) -> tuple[float, list[Point]]:
-    """The least space and the places where a new row starts after each figure marked so."""
+    """Return the least space, and flags for the figures after which a new row starts."""
     left, top, right, bottom = room
     sizes, rows = _sizes(figures), [[0]]
     for k, new in enumerate(breaks, start=1):
@@ -170,9 +170,9 @@ def _rows(figures: Sequence[DrawnFigure], breaks: Sequence[bool], room: Bounds) 
 
 
 def _packed_by_size(figures: Sequence[DrawnFigure], room: Bounds, reserved: Bounds) -> list[Point] | None:
-    """The shifts with the largest figure in the middle or in a corner, each other farthest from those there.
+    """Return shifts with the largest figure in the middle or a corner, the others as far away as possible.
 
-    Of these layouts the one whose figures are farthest apart; None where none has room for all.
+    Of these layouts the one whose figures are farthest apart; None if none has room for all.
     """
     sizes = _sizes(figures)
     if any(width > room[2] - room[0] or height > room[3] - room[1] for width, height in sizes):
@@ -185,7 +185,7 @@ def _packed_by_size(figures: Sequence[DrawnFigure], room: Bounds, reserved: Boun
 def _packed(
     figures: Sequence[DrawnFigure], room: Bounds, reserved: Bounds, corner: tuple[float, float] | None
 ) -> tuple[float, list[Point]]:
-    """How far the figures keep apart, zero where one has no place, and their moves."""
+    """Return the least distance between figures, zero if one has no room, and their shifts."""
     taken = np.zeros((int((room[3] - room[1]) / CELL_MM), int((room[2] - room[0]) / CELL_MM)), dtype=bool)
     x0, y0, x1, y1 = (int((side - room[k % 2]) / CELL_MM) for k, side in enumerate(reserved))
     taken[y0 : y1 + 1, x0 : x1 + 1] = True
@@ -203,7 +203,7 @@ def _packed(
 
 
 def _mask(figure: DrawnFigure) -> tuple[Mask, Point]:
-    """The cells that a figure's ink needs, with the least gap around; the corner of the first cell."""
+    """Return the cells that a figure's ink and the least gap need, and the corner of the first cell."""
     x0, y0, x1, y1 = figure.bounds
     corner = (x0 - LEAST_GAP_MM, y0 - LEAST_GAP_MM)
     shape = (int((y1 - y0 + 2 * LEAST_GAP_MM) / CELL_MM) + 1, int((x1 - x0 + 2 * LEAST_GAP_MM) / CELL_MM) + 1)
@@ -216,7 +216,7 @@ def _mask(figure: DrawnFigure) -> tuple[Mask, Point]:
 
 
 def _ink(shapes: Sequence[Shape]) -> Sequence[Point]:
-    """Points along every stroke and in every letter, no farther apart than a cell."""
+    """Return points along every stroke and in every letter, no farther apart than a cell."""
     points: list[Point] = []
     for x0, y0, x1, y1, _half in segments_of(shapes):
         count = int(np.hypot(x1 - x0, y1 - y0) / CELL_MM) + 2
@@ -230,9 +230,9 @@ def _ink(shapes: Sequence[Shape]) -> Sequence[Point]:
 
 
 def _roomiest(taken: Mask, mask: Mask, corner: tuple[float, float] | None) -> tuple[tuple[int, int], float]:
-    """A free place for a mask, and how far it is from all that is taken: zero for none.
+    """Return a free position for a mask, and its distance from all that is taken: zero for none.
 
-    The place farthest from everything, or the free one nearest to a corner (shares of the room).
+    The position farthest from everything, or the free one nearest to a corner (shares of the room).
     """
     from scipy import ndimage, signal  # noqa: PLC0415 - needed for crowded sheets alone
 
@@ -240,7 +240,7 @@ def _roomiest(taken: Mask, mask: Mask, corner: tuple[float, float] | None) -> tu
     if rows <= 0 or columns <= 0:
         return (0, 0), 0.0
     overlap = signal.fftconvolve(taken.astype(float), mask[::-1, ::-1].astype(float), mode="valid")
-    # A rim of places that are not to be had keeps the figure off the edges as well.
+    # A rim of occupied cells keeps the figure off the edges as well.
     depth = ndimage.distance_transform_edt(np.pad(overlap < HALF_A_CELL, 1))[1:-1, 1:-1]
     if corner is not None:
         down, across = np.indices(depth.shape)
@@ -252,7 +252,7 @@ def _roomiest(taken: Mask, mask: Mask, corner: tuple[float, float] | None) -> tu
 
 
 def _stacked(figures: Sequence[DrawnFigure], room: Bounds) -> list[Point]:
-    """The shifts that put all figures into the top left corner, so that what does not fit is visible."""
+    """Return shifts of all figures into the top left corner, so that what does not fit is visible."""
     return [(room[0] - box[0], room[1] - box[1]) for box in (figure.bounds for figure in figures)]
 
 
@@ -266,7 +266,7 @@ MODEL_MM, LARGE_MM = 1.0, 90.0
 
 
 def stage(figure: DrawnFigure, earlier: Collection[str], node: str) -> tuple[Shape, ...]:
-    """The figure once a node's step is done, after the steps of the earlier nodes."""
+    """Return the figure once a node's step is done, after the steps of the earlier nodes."""
     known = {*earlier, node}
     shown = [part for part in figure.parts if part.node in known and part.until not in known]
     plates = [part.shape for part in shown if _is_light(part.shape)]
@@ -276,12 +276,12 @@ def stage(figure: DrawnFigure, earlier: Collection[str], node: str) -> tuple[Sha
 
 
 def grey(figure: DrawnFigure) -> tuple[Shape, ...]:
-    """The finished figure without its caption, all of it grey."""
+    """Return the finished figure without its caption, all of it grey."""
     return tuple(inked(part.shape, BEFORE) for part in figure.parts if part.node and not part.until)
 
 
 def inked(shape: Shape, colour: str) -> Shape:
-    """The shape in another ink; paper stays white, a light fill stays what it is."""
+    """Return the shape in another ink; paper stays white, a light fill stays unchanged."""
     match shape:
         case Ring():
             return replace(shape, colour=colour, fill=PAPER if shape.fill == PAPER else colour)
@@ -303,7 +303,7 @@ def _wider(shape: Shape) -> Shape:
 
 
 def compasses(step: Step, nodes: dict[str, complex]) -> Iterator[Shape]:
-    """The arcs that a point of the sketch is found by."""
+    """Yield the arcs that determine a point of the sketch."""
     centres: tuple[str, ...] = ()
     if isinstance(step, TwoArcs):
         centres = step.centres
@@ -316,7 +316,7 @@ def compasses(step: Step, nodes: dict[str, complex]) -> Iterator[Shape]:
 
 
 def models(subject: Subject, step: Step) -> Iterator[Shape]:
-    """What the step takes its directions or its triangle from, on the mechanism sketch."""
+    """Yield the links or triangle on the mechanism sketch from which the step takes its directions."""
     nodes = subject.nodes("mechanism")
     for joints in _model_joints(step):
         corners = [point(nodes[joint]) for joint in joints]
@@ -338,7 +338,7 @@ def _model_joints(step: Step) -> Iterator[tuple[str, ...]]:
 
 
 def centre(subject: Subject, name: str) -> Iterator[Shape]:
-    """An instantaneous centre or acceleration pole, with its triangle on the link that it belongs to."""
+    """Yield an instantaneous centre or acceleration pole, with its triangle on the link it belongs to."""
     nodes, at = subject.nodes("mechanism"), subject.centres[name]
     p, q = (nodes[joint] for joint in subject.plan.construction.centres[name].base)
     yield Stroke(point(p), point(q), MODEL_MM, NOW)

@@ -22,12 +22,12 @@ CAPTION_GAP_MM, CAPTION_MM = 6.0, 3.5
 
 
 def sketch(subject: Subject) -> DrawnFigure:
-    """The mechanism of one variant, with its title and scale."""
+    """Return the mechanism of one variant, with its title and scale."""
     return captioned(subject, "mechanism", scheme(subject).parts, INK)
 
 
 def scheme(subject: Subject) -> DrawnFigure:
-    """The mechanism of one variant: links, joints and guides with their names, and the driving arrow."""
+    """Return the mechanism of one variant: links, joints, guides, their names, the driving arrow."""
     nodes = subject.nodes("mechanism")
     thin = altitudes(subject, nodes)
     layers = (_plates(subject, nodes), thin.lines, *_layers(subject, nodes), thin.vectors)
@@ -39,14 +39,14 @@ def scheme(subject: Subject) -> DrawnFigure:
 
 
 def captioned(subject: Subject, name: str, parts: tuple[Part, ...], colour: str) -> DrawnFigure:
-    """A figure with its title and scale above it."""
+    """Return a figure with its title and scale above it."""
     left, top, _right, _bottom = DrawnFigure(name, parts).bounds
     caption = Label((left, top - CAPTION_GAP_MM), subject.caption(name), CAPTION_MM, colour=colour)
     return DrawnFigure(name, (*parts, Part("", caption)))
 
 
 def _layers(subject: Subject, nodes: dict[str, complex]) -> Iterator[Iterator[Part]]:
-    """Over plates and thin lines: what lies undermost first."""
+    """Yield the layers over plates and thin lines, the lowest first."""
     driver = subject.plan.mechanism.driver.pin
     yield _guides(subject, nodes)
     yield (
@@ -71,15 +71,15 @@ def _plates(subject: Subject, nodes: dict[str, complex]) -> Iterator[Part]:
 GUIDE_REACH_MM, NEAR_GUIDE_MM = 13.0, 7.0
 AXIS_REACH_MM = 18.0
 SHORTEST_GUIDE_MM, ROD_CLEAR_MM = 7.0, 1.0
-"""A guide ends where the rod comes nearer to it than this; a shorter one lies on the block's other side."""
+"""A guide stops this far from the rod; if that leaves it shorter, it lies on the block's other side."""
 SUPPORTS = (-1j, 1j, -1.0 + 0j, 1.0 + 0j)
-"""Where the ground of a pivot may lie, the best first."""
+"""Possible directions of a pivot's ground, the best first."""
 SUPPORT_CLEAR_COSINE = 0.62
-"""Of the angle between a link and the ground of its pivot, at most."""
+"""Largest cosine of the angle between a link and the ground of its pivot."""
 
 
 def _guides(subject: Subject, nodes: dict[str, complex]) -> Iterator[Part]:
-    """Ground below a block, or away from a rod that comes from there; the line along which it moves."""
+    """Draw ground below a block, or away from a rod that comes from there; and the line of its motion."""
     for block in blocks(subject, nodes):
         if not block.grounded:
             continue
@@ -100,14 +100,14 @@ def _guides(subject: Subject, nodes: dict[str, complex]) -> Iterator[Part]:
 
 
 def _before_rod(rod: complex, side: int) -> float:
-    """How far the ground on one side may reach before the rod (in the guide's axes) crosses it."""
+    """Return how far the ground on one side may extend before the rod (in the guide's axes) crosses it."""
     if rod.imag * side <= 0.0:
         return float("inf")
     return (symbols.BLOCK_MM[1] - ROD_CLEAR_MM) * abs(rod.real / rod.imag)
 
 
 def _guide_length(at: complex, along: complex, nodes: dict[str, complex]) -> float:
-    """How far a guide goes: short of a joint that lies near its line."""
+    """Return the length of a guide, which stops short of a joint near its line."""
     reach = GUIDE_REACH_MM
     for place in nodes.values():
         away = np.conj(along) * (place - at)
@@ -125,7 +125,7 @@ def _grounds(subject: Subject, nodes: dict[str, complex]) -> Iterator[Part]:
 
 
 def support_direction(at: complex, links: Sequence[tuple[complex, complex]]) -> complex:
-    """Where the ground of a pivot lies: below, unless a link goes there."""
+    """Return the direction of a pivot's ground: below, unless a link goes there."""
     towards = [end - at for ends in links for end in ends if abs(end - at) > 0.0]
     if not towards:
         return SUPPORTS[0]
@@ -140,11 +140,11 @@ def support_direction(at: complex, links: Sequence[tuple[complex, complex]]) -> 
 # Joints and links ----------------------------------------------------------------------------------
 
 NUMBER_SHARES = (0.5, 0.36, 0.64, 0.25, 0.75)
-"""Where along its longest stretch a link's number may stand, the best first."""
+"""Positions of a link's number along its longest stretch, the best first."""
 
 
 def _joints(subject: Subject, nodes: dict[str, complex]) -> Iterator[Part]:
-    """Rings where links are hinged, a dot at a point of one link alone."""
+    """Draw rings where links are hinged, a dot at a point of one link alone."""
     mechanism = subject.plan.mechanism
     hinged = {joint for bar in bars(subject, nodes) for joint in bar.joints}
     hinged.update(block.node for block in blocks(subject, nodes))
@@ -161,7 +161,7 @@ def _joints(subject: Subject, nodes: dict[str, complex]) -> Iterator[Part]:
 
 
 def _free_points(mechanism: Mechanism) -> set[str]:
-    """Points of a link at which nothing is hinged."""
+    """Return points of a link at which nothing is hinged."""
     kinds = PointOnLine | Plate | SlotPoint
     points = {group.node for group in mechanism.groups if isinstance(group, kinds)}
     points.update(group.foot for group in mechanism.groups if isinstance(group, SlottedLink) and group.foot)
@@ -171,7 +171,7 @@ def _free_points(mechanism: Mechanism) -> set[str]:
 def _welds(
     group: PointOnLine | Plate, share: float, subject: Subject, nodes: dict[str, complex]
 ) -> Iterator[Part]:
-    """A rigid link through three joints: a bow over the one in the middle, away from what hangs there."""
+    """Mark a rigid link through three joints with a bow over the middle one, away from other links there."""
     shares = {group.base[0]: 0.0, group.base[1]: 1.0, group.node: share}
     start, middle, end = sorted(shares, key=lambda joint: shares[joint])
     if middle in _free_points(subject.plan.mechanism) or nodes[start] == nodes[end]:
@@ -184,7 +184,7 @@ def _welds(
 
 
 def _link_numbers(subject: Subject, nodes: dict[str, complex]) -> Iterator[Wanted]:
-    """A number at the longest stretch of each link, in a plate's middle, at a driven slider."""
+    """Place a number at the longest stretch of each link, in a plate's middle, at a driven slider."""
     driver = subject.plan.mechanism.driver
     if isinstance(driver, DrivenSlider):
         yield Wanted(
@@ -207,25 +207,25 @@ def _middle(parts: Sequence[Bar]) -> complex:
 
 
 def _beside(parts: Sequence[Bar], nodes: dict[str, complex]) -> complex:
-    """The place on a link's longest stretch that is farthest from all joints, its middle if that will do."""
+    """Return the position on a link's longest stretch farthest from all joints: its middle if clear."""
     start, end = max((bar.ends for bar in parts), key=lambda ends: abs(ends[1] - ends[0]))
     places = (start + share * (end - start) for share in NUMBER_SHARES)
     return max(places, key=lambda at: min(10.0, *(abs(at - place) for place in nodes.values())))
 
 
-# The arrow at the driven link ----------------------------------------------------------------------
+# The arrow at the driving link ----------------------------------------------------------------------
 
 RADIUS_MM, SWEEP, THRUST_MM = 9.0, 0.9, 10.0
 DRIVE_LETTER_MM = 3.4
 CLEAR_MM = 0.8
 STARTS = (0.25, -0.25 - SWEEP, 1.5, -1.5 - SWEEP, 2.5)
-"""Where a turning arrow may start, from the crank on in its sense, the best first."""
+"""Starting angles of a turning arrow, from the crank on in its sense, the best first."""
 Turn = tuple[float, float, float]
 """Radius, start and sweep."""
 
 
 def drive_arrow(subject: Subject, nodes: dict[str, complex]) -> Iterator[Shape]:
-    """The arrow, unless the driven link stands still."""
+    """Yield the arrow, unless the driving link stands still."""
     driver = subject.plan.mechanism.driver
     if _stands_still(subject):
         return
@@ -236,7 +236,7 @@ def drive_arrow(subject: Subject, nodes: dict[str, complex]) -> Iterator[Shape]:
 
 
 def drive_letter(subject: Subject, nodes: dict[str, complex]) -> Iterator[Wanted]:
-    """The angular velocity or the velocity that the arrow stands for."""
+    """Yield the angular velocity or the velocity that the arrow stands for."""
     driver = subject.plan.mechanism.driver
     if _stands_still(subject):
         return
@@ -251,7 +251,7 @@ def drive_letter(subject: Subject, nodes: dict[str, complex]) -> Iterator[Wanted
 
 
 def _rate(subject: Subject) -> float:
-    """The crank's angular velocity, or the driven slider's speed."""
+    """Return the crank's angular velocity, or the driven slider's speed."""
     driver = subject.plan.mechanism.driver
     return subject.number(np.asarray(driver.speed if isinstance(driver, DrivenSlider) else driver.omega))
 
@@ -261,7 +261,7 @@ def _stands_still(subject: Subject) -> bool:
 
 
 def _thrust(subject: Subject, driver: DrivenSlider, nodes: dict[str, complex]) -> tuple[complex, complex]:
-    """Beside the block, in the sense of its velocity, where it meets the fewest links."""
+    """Return an arrow beside the block, in the sense of its velocity, where it meets the fewest links."""
     block = next(block for block in blocks(subject, nodes) if block.node == driver.pin)
     along = block.along * float(np.sign(_rate(subject)))
     above = 1j * block.along * (1 if block.along.real >= 0.0 else -1)
@@ -277,7 +277,7 @@ def _thrust(subject: Subject, driver: DrivenSlider, nodes: dict[str, complex]) -
 
 
 def _turn(subject: Subject, crank: Crank, nodes: dict[str, complex]) -> Turn:
-    """About the crank's pivot, in the sense in which it turns, where it meets the fewest links."""
+    """Return an arrow about the crank's pivot, in its sense, where it meets the fewest links."""
     centre = nodes[crank.pivot]
     arm = nodes[crank.pin] - centre
     sign, largest = float(np.sign(_rate(subject))), min(RADIUS_MM, 0.45 * abs(arm))
@@ -296,12 +296,12 @@ def _turn(subject: Subject, crank: Crank, nodes: dict[str, complex]) -> Turn:
 
 
 def _links(subject: Subject, nodes: dict[str, complex]) -> FloatArray:
-    """The links as segments, millimetres, y down."""
+    """Return the links as segments, millimetres, y down."""
     return segments_of(Stroke(point(bar.ends[0]), point(bar.ends[1])) for bar in bars(subject, nodes))
 
 
 def _meets(curve: Curve, links: FloatArray) -> int:
-    """How many links a curve meets, or nearly so."""
+    """Count the links that a curve meets, or nearly so."""
     corners = np.array(curve.points)
     share = np.linspace(0.0, len(corners) - 1.0, 24)
     places = np.stack(
@@ -315,13 +315,13 @@ def _meets(curve: Curve, links: FloatArray) -> int:
 
 NODE_LETTER_MM, SMALL_NODE_LETTER_MM = 4.2, 3.4
 OVERRUN_MM = 5.0
-"""A construction line goes on past its foot and past the node that it finds."""
+"""Length by which a construction line extends past its foot and past the node that it finds."""
 ABSOLUTE_MM, RELATIVE_MM = 0.5, 0.3
 """Widths of vectors from the pole, and of all others."""
 
 
 def polygon(subject: Subject, figure: str) -> DrawnFigure:
-    """One plan of one variant."""
+    """Return one plan of one variant."""
     colour, nodes = PLAN_COLOURS[figure], subject.nodes(figure)
     drawn = [*_lines(subject, figure, nodes), *_vectors(subject, figure, nodes)]
     pole = subject.plan.construction.poles[figure]
@@ -339,7 +339,7 @@ def _lines(subject: Subject, figure: str, nodes: dict[str, complex]) -> Iterator
 
 
 def construction_lines(step: Step, view: View, nodes: dict[str, complex]) -> Iterator[Shape]:
-    """The lines that a node is found by, thin, going on a little at both ends."""
+    """Yield the thin lines that determine a node, extended a little at both ends."""
     lines = (step.first, step.second) if isinstance(step, TwoLines) else ()
     drawn = [(line.through, complex(line.along.at(view))) for line in lines if isinstance(line, Line)]
     for through, along in drawn:
@@ -350,7 +350,7 @@ def construction_lines(step: Step, view: View, nodes: dict[str, complex]) -> Ite
 
 
 def _vectors(subject: Subject, figure: str, nodes: dict[str, complex]) -> Iterator[Part]:
-    """Each vector that is longer than nothing; of several along one line the longest undermost."""
+    """Draw each vector of non-zero length; of several along one line, the longest lowest."""
     pole, colour = subject.plan.construction.poles[figure], PLAN_COLOURS[figure]
     for vector in subject.plan.construction.vectors_of(figure):
         if subject.is_zero(vector.name):

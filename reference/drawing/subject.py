@@ -1,4 +1,4 @@
-"""What is drawn: one variant of an assignment's plan, its names and numbers, and the words around them."""
+"""The subject of a drawing: one variant of an assignment's plan, its names and numbers, and the wording."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,7 +15,7 @@ from reference.quantities import SCALE_OF, unit_of
 PLAN_COLOURS = {"velocity_plan": "#1456a0", "acceleration_plan": "#a03014"}
 FARTHEST_MM = 1e4
 TOUCHING_MM = 0.05
-"""Nodes nearer than this are one point on paper."""
+"""Nodes closer than this are one point on paper."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,25 +39,25 @@ class Wording:
     sides: Mapping[str, str] = field(default_factory=dict)
 
     def unit(self, unit: str) -> str:
-        """A unit in the language's letters, `m/s^2` with a superscript."""
+        """Return a unit in the language's letters, `m/s^2` with a superscript."""
         written = unit.replace("^2", "²")
         return self.units.get(written, written)
 
     def number(self, text: str) -> str:
-        """A number, written with a point, as the language writes it."""
+        """Return a number, given with a point, as the language writes it."""
         return text.replace(".", self.decimal_mark).replace("-", "−")
 
     def variant_text(self, variant: Variant) -> str:
-        """The student's number and position."""
+        """Return the student's number and position."""
         values = (("n", variant.n), ("position", variant.position))
         return ", ".join(f"{self.variant[name]} = {value}" for name, value in values if value is not None)
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A shape of a figure, and the node whose step draws it (none for what is there from the start).
+    """A shape of a figure, and the node whose step draws it (none if it is there from the start).
 
-    `until` is the node whose step puts another shape in its place: a letter to which one is added.
+    `until` is the node whose step replaces the shape: a letter to which one is added.
     """
 
     node: str
@@ -74,7 +74,7 @@ class DrawnFigure:
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
-        """All of it, as it is in the end."""
+        """All shapes of the finished figure."""
         return tuple(part.shape for part in self.parts if not part.until)
 
     @property
@@ -101,11 +101,11 @@ class Subject:
         return f"{title}, {variant_text}" if variant_text else title
 
     def number(self, values: FloatArray) -> float:
-        """The variant's number, of an array over variants or of a number common to all."""
+        """Return the variant's number, from an array over variants or a number common to all."""
         return float(values[self.index] if np.ndim(values) else values)
 
     def nodes(self, figure: str) -> dict[str, complex]:
-        """A figure's nodes, complex millimetres about its origin, y up."""
+        """Return a figure's nodes, complex millimetres about its origin, y up."""
         count = len(self.plan.variants)
         return {
             node: complex(np.broadcast_to(at, (count,))[self.index])
@@ -114,7 +114,7 @@ class Subject:
 
     @property
     def view(self) -> View:
-        """All nodes and parameters of this variant, as steps see them."""
+        """All nodes and parameters of this variant, as steps use them."""
         nodes = {
             node: np.asarray(at) for figure in self.plan.nodes_mm for node, at in self.nodes(figure).items()
         }
@@ -127,7 +127,7 @@ class Subject:
 
     @property
     def centres(self) -> dict[str, complex]:
-        """Instantaneous centres and acceleration poles on the sketch, those on any paper at all."""
+        """Instantaneous centres and acceleration poles on the sketch, if they lie on the paper."""
         view = self.view
         with np.errstate(all="ignore"):
             found = {
@@ -137,25 +137,25 @@ class Subject:
         return {name: at for name, at in found.items() if abs(at) < FARTHEST_MM}
 
     def is_zero(self, vector: str) -> bool:
-        """Whether a vector is too short, against its plan, to have a direction."""
+        """Return whether a vector is too short, compared with its plan, to have a direction."""
         figure = self.plan.construction.figure_of(self.plan.construction.vectors[vector].head)
         size = self.number(self.plan.size_mm(figure))
         return self.number(np.abs(self.plan.drawn_mm(vector))) <= max(ZERO_SHARE * size, 1e-9)
 
     def shown(self, name: str) -> str:
-        """A name as the assignment's students know it."""
+        """Return a name as the assignment's students know it."""
         return self.assignment.file.names.get(name, name)
 
     def letter(self, name: str) -> tuple[Piece, ...]:
-        """A node's or a vector's name, set."""
+        """Return a node's or a vector's name, typeset."""
         return pieces_of(self.shown(name))
 
     def scale_with_value(self, scale: str) -> tuple[Piece, ...]:
-        """A scale with its value: kL = 0.005 m/mm."""
+        """Return a scale with its value: kL = 0.005 m/mm."""
         value = self.wording.number(f"{self.number(getattr(self.plan.scales, scale)):.5g}")
         unit = self.wording.unit(unit_of(scale))
         return (*scale_pieces(self.shown(scale)), Piece(f" = {value} {unit}"))
 
     def caption(self, figure: str) -> Text:
-        """What stands above a figure."""
+        """Return the caption above a figure: its title and scale."""
         return (Piece(f"{self.wording.titles[figure]},  "), *self.scale_with_value(SCALE_OF[figure]))

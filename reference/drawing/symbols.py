@@ -32,17 +32,17 @@ LINK_MM, MEDIUM_MM, THIN_MM, HAIR_MM = 0.6, 0.35, 0.18, 0.13
 JOINT_RADIUS_MM = 1.3
 POINT_RADIUS_MM = 0.7
 ARROW_MM = (3.4, 0.62)
-"""Length and half the width of an arrowhead; a short vector's is at most `ARROW_SHARE` of it long."""
+"""Length and half width of an arrowhead; on a short vector at most `ARROW_SHARE` of its length."""
 ARROW_SHARE = 0.45
 BLOCK_MM = (4.0, 2.5)
 """Half the length and half the width of a sliding block."""
 PIVOT_MM = (2.6, 4.8, 3.8)
-"""Of a ground pivot: half its foot's width, its height, half the width of the ground."""
+"""Sizes of a ground pivot: half its foot's width, its height, half the width of the ground."""
 HATCH_MM = 1.5
 
 
 def point(z: complex) -> Point:
-    """On paper, y down."""
+    """Convert a point to paper coordinates, y down."""
     return (float(z.real), float(-z.imag))
 
 
@@ -54,7 +54,7 @@ def arrow(
     head_mm: tuple[float, float] = ARROW_MM,
     dash: tuple[float, ...] = (),
 ) -> Iterator[Shape]:
-    """A vector: a line and a filled head (length and half width), shorter where the vector is short."""
+    """Yield a vector: a line and a filled head (length and half width), smaller for a short vector."""
     along = (end - start) / abs(end - start)
     length = min(head_mm[0], ARROW_SHARE * abs(end - start))
     half = head_mm[1] * length / head_mm[0]
@@ -64,7 +64,7 @@ def arrow(
 
 
 def hatched(start: complex, end: complex) -> Iterator[Shape]:
-    """A ground line with hatching to its right-hand side."""
+    """Yield a ground line with hatching to its right-hand side."""
     yield Stroke(point(start), point(end), MEDIUM_MM)
     along = (end - start) / abs(end - start)
     count = max(1, int(abs(end - start) / HATCH_MM))
@@ -74,7 +74,7 @@ def hatched(start: complex, end: complex) -> Iterator[Shape]:
 
 
 def pivot(at: complex, away: complex) -> Iterator[Shape]:
-    """A joint's support on the ground, which lies in the direction `away` (a unit vector)."""
+    """Yield a joint's support on the ground, which lies in the direction `away` (a unit vector)."""
     half, height, ground = PIVOT_MM
     across = 1j * away
     foot = at + away * height
@@ -83,26 +83,26 @@ def pivot(at: complex, away: complex) -> Iterator[Shape]:
 
 
 def joint(at: complex) -> Ring:
-    """A hinge."""
+    """Return a hinge."""
     return Ring(point(at), JOINT_RADIUS_MM)
 
 
 def marked_point(at: complex, colour: str = INK) -> Ring:
-    """A point of a link where nothing else is hinged; the pole of a plan."""
+    """Return a point of a link where nothing else is hinged, or the pole of a plan."""
     return Ring(point(at), POINT_RADIUS_MM, MEDIUM_MM, colour, colour)
 
 
 def block(at: complex, along: complex) -> Area:
-    """A sliding block on a guide along a unit vector."""
+    """Return a sliding block on a guide along a unit vector."""
     length, width = BLOCK_MM
     corners = (length + 1j * width, -length + 1j * width, -length - 1j * width, length - 1j * width)
     return Area(tuple(point(at + along * corner) for corner in corners), PAPER, MEDIUM_MM * 1.3)
 
 
 def guide(at: complex, along: complex, side: int, reach: tuple[float, float]) -> Iterator[Shape]:
-    """A fixed guide under a block, its ground to the left (side +1) or right (-1) of `along`.
+    """Yield a fixed guide under a block, its ground to the left (side +1) or right (-1) of `along`.
 
-    Arguments: `reach` is how far it goes on behind and ahead of the block's middle.
+    Arguments: `reach` is its extent behind and ahead of the block's middle.
     """
     offset = 1j * along * side * BLOCK_MM[1]
     behind, ahead = at + offset - along * reach[0], at + offset + along * reach[1]
@@ -110,18 +110,18 @@ def guide(at: complex, along: complex, side: int, reach: tuple[float, float]) ->
 
 
 def axis(start: complex, end: complex) -> Stroke:
-    """The line along which a point moves, thin, dashed and dotted."""
+    """Return the line along which a point moves, thin, dashed and dotted."""
     return Stroke(point(start), point(end), HAIR_MM, INK, (4.0, 1.0, 0.4, 1.0))
 
 
 def weld(at: complex, along: complex, side: int) -> Curve:
-    """A rigid link that goes on past a hinge at its middle: half a turn about the joint."""
+    """Mark a rigid link that continues past a hinge at its middle: half a turn about the joint."""
     start = math.atan2(along.imag, along.real)
     return arc(at, 2.3, start, side * math.pi, LINK_MM * 0.8)
 
 
 def arc(centre: complex, radius: float, start: float, sweep: float, width: float, colour: str = INK) -> Curve:
-    """An arc of a circle from an angle over another, radians counter-clockwise."""
+    """Return an arc of a circle from an angle over another, radians counter-clockwise."""
     count = max(8, math.ceil(abs(sweep) / 0.1))
     turns = (start + sweep * step / count for step in range(count + 1))
     points = tuple(point(centre + radius * complex(math.cos(turn), math.sin(turn))) for turn in turns)
@@ -129,7 +129,7 @@ def arc(centre: complex, radius: float, start: float, sweep: float, width: float
 
 
 def turning(centre: complex, radius: float, start: float, sweep: float, colour: str = INK) -> Iterator[Shape]:
-    """A curved arrow about a centre: the sense in which a link turns."""
+    """Yield a curved arrow about a centre: the sense in which a link turns."""
     head = min(2.6, 0.85 * radius)
     shaft = sweep - math.copysign(head / radius, sweep)
     yield arc(centre, radius, start, shaft, THIN_MM * 1.4, colour)
@@ -142,7 +142,7 @@ def turning(centre: complex, radius: float, start: float, sweep: float, colour: 
 
 
 def sense(at: complex, sign: float) -> Iterator[Shape]:
-    """A small turning arrow, counter-clockwise for a sign above zero, clockwise below."""
+    """Yield a small turning arrow, counter-clockwise for a sign above zero, clockwise below."""
     start = math.radians(-50.0 if sign > 0 else 230.0)
     yield from turning(at, 1.5, start, math.copysign(math.radians(290.0), sign))
 
@@ -150,12 +150,12 @@ def sense(at: complex, sign: float) -> Iterator[Shape]:
 # Links and blocks of a sketch ----------------------------------------------------------------------
 
 BEYOND_MM = 13.0
-"""How far a rod goes on past the block that slides on it."""
+"""Length of a rod beyond the block that slides on it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Bar:
-    """A straight stretch of a link, drawn at its node's step: the joints at its ends, and where it ends."""
+    """A straight stretch of a link, drawn at its node's step: the joints at its ends, and its end points."""
 
     node: str
     link: str
@@ -165,7 +165,7 @@ class Bar:
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A sliding block at a joint, along a unit vector; on fixed ground where `rod` says whence it comes."""
+    """A sliding block at a joint, along a unit vector; if on fixed ground, `rod` is its rod's direction."""
 
     node: str
     at: complex
@@ -175,12 +175,12 @@ class Block:
 
 
 def unit(z: complex) -> complex:
-    """The unit vector along z; along +x where it has no length."""
+    """Return the unit vector along z; along +x if z is zero."""
     return z / abs(z) if abs(z) > 0.0 else 1.0 + 0j
 
 
 def bars(subject: Subject, nodes: dict[str, complex]) -> list[Bar]:
-    """The links as straight stretches."""
+    """Return the links as straight stretches."""
     driver = subject.plan.mechanism.driver
     found = []
     if isinstance(driver, Crank):
@@ -223,7 +223,7 @@ def _bars_of(subject: Subject, group: Group, nodes: dict[str, complex]) -> Itera
 
 
 def _carriers(group: Group, nodes: dict[str, complex]) -> Iterator[Bar]:
-    """A moving guide that its link's joints do not reach: the link goes on past the block."""
+    """Extend the link of a moving guide that its joints do not reach past the block."""
     for guide in moving_guides(group):
         g, h = (nodes[joint] for joint in guide.base)
         at = nodes[guide.coincident]
@@ -233,23 +233,23 @@ def _carriers(group: Group, nodes: dict[str, complex]) -> Iterator[Bar]:
 
 
 def slotted_link(subject: Subject, node: str) -> SlottedLink:
-    """The slotted link of a node."""
+    """Return the slotted link of a node."""
     groups = subject.plan.mechanism.groups
     return next(group for group in groups if isinstance(group, SlottedLink) and group.node == node)
 
 
 def slot_direction(group: SlottedLink, nodes: dict[str, complex]) -> complex:
-    """From a slotted link's pivot (or its guide's foot) towards the block."""
+    """Return the direction from a slotted link's pivot (or its guide's foot) towards the block."""
     return unit(nodes[group.pin] - nodes[group.foot or group.pivot])
 
 
 def slot_of_yoke(subject: Subject, group: Yoke) -> complex:
-    """The direction of a yoke's slot."""
+    """Return the direction of a yoke's slot."""
     return complex(np.exp(1j * subject.number(np.asarray(group.slot_rad))))
 
 
 def blocks(subject: Subject, nodes: dict[str, complex]) -> Iterator[Block]:
-    """The sliding blocks of the driven link and of every group."""
+    """Yield the sliding blocks of the driving link and of every group."""
     driver = subject.plan.mechanism.driver
     if isinstance(driver, DrivenSlider):
         along = _along(subject, FixedGuide(driver.guide_m, driver.guide_rad), nodes)
@@ -281,7 +281,7 @@ def _along(subject: Subject, guide: Guide, nodes: dict[str, complex]) -> complex
 
 
 def hinged_on(group: Group) -> tuple[str, ...]:
-    """The joints at which a group's own links are hinged."""
+    """Return the joints at which a group's own links are hinged."""
     match group:
         case Dyad(pins=pins):
             return pins

@@ -27,7 +27,7 @@ TITLE_MM, DATA_MM = 3.8, 3.2
 LINE_HEIGHT = 1.45
 ROW_MM, LEAST_ROW_MM = 4.6, 3.0
 LETTER_SHARE = 0.68
-"""Of a row's height."""
+"""Letter size as a share of a row's height."""
 COLUMNS_MM = (0.0, 15.0, 33.0, 48.0, 75.0, 96.0)
 WORDS, CELL_EDGE_MM = (0, 1), 1.3
 RULE_COLOUR = "#9aa3ad"
@@ -35,7 +35,7 @@ RULE_COLOUR = "#9aa3ad"
 
 @dataclass(frozen=True, slots=True)
 class TableRow:
-    """A row of the table: name, where it stands on paper, drawn length, value, direction or sense."""
+    """A row of the table: name, position on paper, drawn length, value, direction or sense."""
 
     name: Text
     segment: Text
@@ -43,12 +43,12 @@ class TableRow:
     value: str
     direction: str
     turns: float = 0.0
-    """Above zero counter-clockwise, below clockwise; zero for what is no rate, or does not turn."""
+    """Above zero counter-clockwise, below clockwise; zero for anything that does not turn."""
 
 
 @dataclass(frozen=True, slots=True)
 class TableColumn:
-    """What stands beside the figures, how far down it reaches, and whether it has room."""
+    """The column beside the figures, its lower end, and whether it has room."""
 
     shapes: tuple[Shape, ...]
     box: Bounds
@@ -58,7 +58,7 @@ class TableColumn:
 def column(
     subject: Subject, figures: Sequence[str], corner: tuple[float, float], bottom: float
 ) -> TableColumn:
-    """Title, data and table of a sheet's figures, from the column's top right corner down."""
+    """Draw title, data and table of a sheet's figures, from the column's top right corner down."""
     left, top = corner[0] - COLUMN_MM, corner[1]
     head, y = _heading(subject, (left + EDGE_MM, top + EDGE_MM))
     rows = list(table_rows(subject, figures))
@@ -72,7 +72,7 @@ def column(
 
 
 def _heading(subject: Subject, at: tuple[float, float]) -> tuple[list[Shape], float]:
-    """Title, variant and given data; where they end."""
+    """Draw title, variant and given data; return their lower end."""
     x, y = at
     shapes: list[Shape] = []
     lines: list[tuple[Text, float]] = []
@@ -90,7 +90,7 @@ def _heading(subject: Subject, at: tuple[float, float]) -> tuple[list[Shape], fl
 
 
 def given_data(subject: Subject) -> Iterator[tuple[Piece, ...]]:
-    """The variant's data, each as label = value unit."""
+    """Yield the variant's data, each as label = value unit."""
     wording = subject.wording
     for datum, given in subject.assignment.given(subject.plan.variants[subject.index]):
         value = wording.sides.get(given, given) if isinstance(given, str) else wording.number(f"{given:.6g}")
@@ -100,7 +100,7 @@ def given_data(subject: Subject) -> Iterator[tuple[Piece, ...]]:
 
 
 def _flowed(data: Iterator[tuple[Piece, ...]], wide: float) -> list[tuple[Piece, ...]]:
-    """Data side by side in as many lines as they need."""
+    """Set data side by side in as many lines as they need."""
     lines: list[tuple[Piece, ...]] = []
     for datum in data:
         longer = (*lines[-1], Piece(",  "), *datum) if lines else datum
@@ -112,7 +112,7 @@ def _flowed(data: Iterator[tuple[Piece, ...]], wide: float) -> list[tuple[Piece,
 
 
 def table_rows(subject: Subject, figures: Sequence[str]) -> Iterator[TableRow]:
-    """Headings, the vectors of these figures, the rates that follow from them."""
+    """Yield headings, the vectors of these figures, and the rates that follow from them."""
     wording, plan = subject.wording, subject.plan
     yield TableRow(*wording.columns)
     shown = [vector for figure in figures for vector in plan.construction.vectors_of(figure)]
@@ -138,12 +138,12 @@ def table_rows(subject: Subject, figures: Sequence[str]) -> Iterator[TableRow]:
 
 
 def four_digits(value: float) -> str:
-    """A value of the table: four significant digits, the zeros among them kept."""
+    """Return a value of the table with four significant digits, trailing zeros kept."""
     return f"{value:#.4g}".rstrip(".") if value else "0"
 
 
 def _cell(column_at: int, text: Text, at: tuple[float, float], size: float) -> Label:
-    """A text in its column: words to the left, numbers to the right; smaller where it is too long."""
+    """Set a text in its column: words left, numbers right-aligned; smaller if it is too long."""
     start, end = COLUMNS_MM[column_at] + CELL_EDGE_MM, COLUMNS_MM[column_at + 1] - CELL_EDGE_MM
     fitting = size * min(1.0, (end - start) / width_of(text, size))
     if column_at in WORDS:

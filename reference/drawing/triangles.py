@@ -25,7 +25,7 @@ from reference.plan import Plan
 
 FIGURE = "altitude"
 RATIO_TOLERANCE = 1e-6
-"""Of kL ka / kv^2 from 1: far below what a ruler shows."""
+"""Tolerance of kL ka / kv^2 about 1: far below what a ruler shows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class Triangle:
 
     Attributes
     ----------
-    velocity : ends, in the velocity plan, of the joint's velocity about the pin
+    velocity : ends, in the velocity plan, of the joint's velocity relative to the pin
     end, beyond, turned : nodes b'', b''' and b^IV
     """
 
@@ -48,7 +48,7 @@ class Triangle:
 
     @property
     def steps(self) -> tuple[Step, ...]:
-        """From the velocity, put at the joint, to the normal component."""
+        """The steps from the velocity, drawn at the joint, to the normal component."""
         across, outward = Along(self.pin, self.joint, 1), Along(self.pin, self.joint)
         inward = Along(self.joint, self.pin)
         return (
@@ -59,7 +59,7 @@ class Triangle:
 
 
 def triangles(construction: Construction) -> tuple[Triangle, ...]:
-    """One for each normal component that the acceleration plan takes from a velocity."""
+    """Return a triangle for each normal component that the acceleration plan takes from a velocity."""
     found = []
     for step in construction.figures.get("acceleration_plan", ()):
         if isinstance(step, Given) and isinstance(step.length, Normal):
@@ -72,15 +72,15 @@ def triangles(construction: Construction) -> tuple[Triangle, ...]:
 
 
 def with_triangles(construction: Construction) -> Construction:
-    """The same construction with one figure more: the triangles on the mechanism sketch."""
+    """Return the construction with one figure more: the triangles on the mechanism sketch."""
     steps = tuple(step for triangle in triangles(construction) for step in triangle.steps)
     return replace(construction, figures={**construction.figures, FIGURE: steps})
 
 
 def altitude_nodes(plan: Plan) -> Mapping[str, ComplexArray]:
-    """The triangles' nodes on the sketch, complex millimetres.
+    """Return the triangles' nodes on the sketch, complex millimetres.
 
-    Raises CallError where the scales do not allow the method: kL ka is not kv^2.
+    Raises CallError if the scales do not allow the method: kL ka is not kv^2.
     """
     check_scales(plan)
     nodes = evaluate(with_triangles(plan.construction), plan.drawing.parameters)
@@ -91,7 +91,7 @@ def altitude_nodes(plan: Plan) -> Mapping[str, ComplexArray]:
 
 
 def check_scales(plan: Plan) -> None:
-    """Refuse scales at which B b^IV is not the normal component; says the ratio and what to do."""
+    """Raise CallError for scales at which B b^IV is not the normal component, with the ratio and a remedy."""
     scales = plan.scales
     ratios = np.atleast_1d(scales.kL * scales.ka / scales.kv**2)
     worst = float(ratios[np.argmax(np.abs(ratios - 1.0))])
@@ -113,7 +113,7 @@ RIGHT_ANGLE_MM = 1.8
 
 @dataclass(frozen=True, slots=True)
 class Altitudes:
-    """Thin lines for under the links, vectors for over them, letters to be placed."""
+    """Thin lines under the links, vectors over them, and letters to be placed."""
 
     lines: tuple[Part, ...] = ()
     vectors: tuple[Part, ...] = ()
@@ -121,9 +121,9 @@ class Altitudes:
 
 
 def altitudes(subject: Subject, nodes: dict[str, complex]) -> Altitudes:
-    """The triangles that are not of zero size, where the subject asks for them.
+    """Return the triangles that are not of zero size, if the subject asks for them.
 
-    Raises CallError where the scales do not allow the method.
+    Raises CallError if the scales do not allow the method.
     """
     if not subject.altitude:
         return Altitudes()
@@ -159,7 +159,7 @@ def _lines(triangle: Triangle, nodes: dict[str, complex]) -> Iterator[Part]:
 
 
 def _vectors(triangle: Triangle, nodes: dict[str, complex]) -> Iterator[Part]:
-    """The velocity put at the joint, and the normal component found."""
+    """Yield the velocity drawn at the joint, and the normal component found."""
     for tip, figure in ((triangle.end, "velocity_plan"), (triangle.turned, "acceleration_plan")):
         colour = PLAN_COLOURS[figure]
         for shape in symbols.arrow(nodes[triangle.joint], nodes[tip], MEDIUM_MM, colour):
@@ -172,7 +172,7 @@ def _right_angle(at: complex, p: complex, q: complex) -> Curve:
 
 
 def _letters(triangle: Triangle, nodes: dict[str, complex], *, several: bool) -> Iterator[Wanted]:
-    """Letters at the triangle's nodes, with the component's index where the joint has several."""
+    """Yield letters at the triangle's nodes, with the component's index if the joint has several."""
     about = (Piece(triangle.vector.name.split("_")[1], -1),) if several else ()
     letter = pieces_of(triangle.joint.lower())
     for node, mark, figure in (

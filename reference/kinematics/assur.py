@@ -1,4 +1,4 @@
-"""The closed forms of the driven links and of the Assur groups: places, velocities, accelerations.
+"""The closed forms of the driving links and of the Assur groups: positions, velocities, accelerations.
 
 Written once, on numbers of any kind (`reference.numbers`): arrays over variants, Python's own for a
 single variant, or many digits near a singularity. No inverse trigonometry, no absolute
@@ -28,7 +28,7 @@ from reference.numbers import (
 
 
 def arm(length: Number, angle: Number) -> tuple[Complex, Complex]:
-    """Length e^(i angle) as the nearest axis' arm and the small rest, each part accurate by itself.
+    """Length e^(i angle) as the arm along the nearest axis and the small rest, each accurate by itself.
 
     The rest of a turn by psi from the axis is length (-2 sin^2(psi/2) + i sin psi): without the
     cancellation of cos psi - 1.
@@ -112,7 +112,7 @@ def plate_growth(shape: Complex) -> Number:
 def rrp_place(
     height: Number, height_rest: Number, length: Number, side: Number
 ) -> tuple[Number, Number, Number]:
-    """How far along the guide the slider lies from the pin's foot; the pin's height; the sine.
+    """Return the slider's distance along the guide from the pin's foot; the pin's height; the sine.
 
     Arguments: the pin's height over the guide (to its left) and what rounding took from it. The
     half chord is sqrt((l - h)(l + h)); nan where the rod does not reach the guide.
@@ -145,7 +145,7 @@ def rrp_acceleration(
 
 
 def rpr_place(d: Complex, offset: Number, side: Number) -> tuple[Number, Complex, Number]:
-    """How far the pin lies from the pivot along the guide, the guide's direction, and the sine.
+    """Return the pin's distance from the pivot along the guide, the guide's direction, and the sine.
 
     Arguments: `d` from the pivot to the pin. d = u (s + i offset), nan where |d| < |offset|.
     """
@@ -173,7 +173,7 @@ def rpr_acceleration(
 
 
 def cross_place(between: Complex, first: Complex, second: Complex) -> tuple[Number, Number]:
-    """How far along the first line it meets the second, and the sine of their angle (signed).
+    """Return the distance along the first line to the second, and the sine of their angle (signed).
 
     Arguments: from the first line's point to the second's; the lines' unit vectors.
     """

@@ -1,7 +1,7 @@
-"""Continuation of a mechanism from one position: how far its driven link goes, and where branches cross.
+"""Continuation of a mechanism from one position: how far its driving link goes, and where branches cross.
 
 Each Assur group closes while its closures, smooth functions of the driven coordinate, are positive.
-Where one changes its sign the driven link is stopped. Where one only touches zero (a parallelogram
+Where one changes its sign the driving link is stopped. Where one only touches zero (a parallelogram
 stretched along its ground, a kite folded, an isosceles slider-crank at its guide's end) both branches
 meet, and the motion goes on smoothly on the other branch: the group's side is reversed.
 Sides thus follow from the closures' zeros and minima, not from one sample to the next: no step is too
@@ -31,20 +31,20 @@ from reference.mechanism import (
 from reference.numbers import Complex, Number
 
 SCANNED = 3001
-"""Samples in which closures are scanned; of two events nearer than a sample one may be overlooked."""
+"""Samples at which closures are evaluated; of two events closer than a sample, one may be missed."""
 ROUNDINGS = 32.0 * float(np.finfo(np.float64).eps)
 """A closure this small against the coordinates it comes from is zero."""
 LARGEST_AMPLIFICATION = 1e6
-"""Of rounding errors, as they are counted in a closure's slack at most."""
+"""Largest amplification of rounding errors counted in a closure's slack."""
 GLANCES = 73
-"""Samples of a quick look, 5 degrees apart on a turn."""
+"""Samples of the quick check, 5 degrees apart on a full turn."""
 NEARLY = 0.05
 """A closure that falls below this share of its largest sample may touch zero between two samples: over the
 2.5 degrees to the nearest one a closure with a touch of zero grows by a tenth of that."""
 NEAR = 1e-4
 """Flat positions of two groups so near to each other are one: the second is located only roughly."""
 PARTS = 64
-"""An interval is divided into so many parts at a time: one evaluation on an array each."""
+"""Number of parts into which an interval is divided at a time: one evaluation on an array each."""
 FINEST = 2.0 * float(np.finfo(np.float64).eps)
 """Relative width of an interval that is not divided further: neighbouring numbers."""
 TURN = 2.0 * np.pi
@@ -53,7 +53,7 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Where something happens to a group: the driven coordinate (rad or m), its node, and why."""
+    """An event of a group: the driven coordinate (rad or m), the group's node, and the reason."""
 
     at: float
     node: str
@@ -71,7 +71,7 @@ class Closure:
 
 @dataclass(frozen=True, slots=True)
 class Continuation:
-    """A mechanism of one variant, followed both ways from its own position.
+    """A mechanism of one variant, followed in both directions from its own position.
 
     Attributes
     ----------
@@ -89,12 +89,12 @@ class Continuation:
     changes: Mapping[str, tuple[float, ...]]
 
     def at(self, driven: FloatArray) -> Mechanism:
-        """The mechanism at some driven coordinates, shape (N,), each group on the side it is on there."""
+        """Return the mechanism at some driven coordinates, shape (N,), each group on its side there."""
         return _driven_at(self.mechanism, driven, self.start, self.changes)
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """The flat positions that are passed, in order."""
+        """Flat positions that are passed, in order."""
         events = [
             Event(at, group.node, _why(group))
             for group in self.mechanism.groups
@@ -128,10 +128,10 @@ def follow(mechanism: Mechanism, start: float, low: float, high: float) -> Conti
 
 
 def signs_between(mechanism: Mechanism, start: float, ends: FloatArray) -> dict[str, FloatArray]:
-    """By node, -1 where a group has passed an odd number of flat positions on its way to an end, else +1.
+    """Return by node -1 where a group passes an odd number of flat positions on its way to an end, else +1.
 
     Arguments: a mechanism of one variant, which assembles at `start`; driven coordinates, shape (N,). Only
-    groups that pass flat positions are told; ends that the driven link cannot reach have +1.
+    groups that pass flat positions are included; ends that the driving link cannot reach have +1.
     """
     following = follow(mechanism, start, min(start, *ends), max(start, *ends))
     reached = (ends >= following.low) & (ends <= following.high)
@@ -143,7 +143,7 @@ def signs_between(mechanism: Mechanism, start: float, ends: FloatArray) -> dict[
 
 
 def may_pass(mechanism: Mechanism, low: FloatArray, high: FloatArray) -> BoolArray:
-    """Whether some group comes near a flat position between two driven coordinates, shape (N,) each.
+    """Return whether some group comes near a flat position between two driven coordinates, shape (N,) each.
 
     A quick look at many variants at once: where it says no, `follow` finds no flat position.
     """
@@ -179,20 +179,20 @@ def _driven_at(
 
 
 def _on_its_side(group: Group, driven: FloatArray, start: float, changes: tuple[float, ...]) -> Group:
-    """The group on the side it is on after so many flat positions, counted from the start."""
+    """Return the group on the side that it has after so many flat positions, counted from the start."""
     if not changes or not isinstance(group, Dyad | Slider | SlottedLink):
         return group
     return replace(group, side=np.asarray(group.side * _sign(changes, driven, start)))
 
 
 def _sign(changes: tuple[float, ...], driven: FloatArray, start: float) -> FloatArray:
-    """-1 where the number of flat positions between the start and a driven coordinate is odd."""
+    """-1 if the number of flat positions between the start and a driven coordinate is odd, else +1."""
     passed = np.searchsorted(changes, driven) - np.searchsorted(changes, start)
     return np.where(passed % 2 == 0, 1.0, -1.0)
 
 
 def _unit_speed(mechanism: Mechanism) -> Solution:
-    """Positions, and their derivatives by the driven coordinate."""
+    """Return positions and their derivatives by the driven coordinate."""
     one = np.ones(1)
     if isinstance(mechanism.driver, Crank):
         driver: Crank | DrivenSlider = replace(mechanism.driver, omega=one)
@@ -206,7 +206,7 @@ def _unit_speed(mechanism: Mechanism) -> Solution:
 
 
 def closures_of(solution: Solution, group: Group) -> list[Closure]:
-    """A group's closures, from the joints before it at unit speed of the driven link."""
+    """Return a group's closures from the joints before it at unit speed of the driving link."""
     joints = solution.joints
     with np.errstate(all="ignore"):
         match group:
@@ -239,14 +239,14 @@ def _distance(p: Joint, q: Joint, limit: FloatArray, sign: int = 1) -> Closure:
 
 
 def _crossing(first: Rail, second: Rail) -> Closure:
-    """The sine between two guides: where it is zero the node is at infinity, on either side of it."""
+    """The sine of the angle between two guides: where it is zero, the node is at infinity."""
     sine = cross(first.along, second.along)
     slope = dot(first.along, second.along) * (second.omega - first.omega)
     return _closure(sine, slope, ROUNDINGS)
 
 
 def _rounding(p: Joint, q: Joint) -> Number:
-    """What rounding may have added to the distance of two joints."""
+    """The largest rounding error in the squared distance of two joints."""
     grown = np.fmin(np.maximum(p.amplification, q.amplification), LARGEST_AMPLIFICATION)
     return ROUNDINGS * grown * (np.abs(p.position) + np.abs(q.position))
 
@@ -270,7 +270,7 @@ class _Walk:
 
 
 def _walk(closures: Closures, index: int, span: tuple[float, float], *, may_pass: bool) -> _Walk:
-    """The events from the start to a limit (`span`), or to where the closure ends the motion.
+    """Return the events from the start to a limit (`span`), or to where the closure ends the motion.
 
     Samples are denser at both ends, where the mechanism moves fastest near a stop.
     """
@@ -307,7 +307,7 @@ def _walk(closures: Closures, index: int, span: tuple[float, float], *, may_pass
 
 
 def change(holds: Callable[[FloatArray], BoolArray], inside: float, outside: float) -> tuple[float, float]:
-    """Neighbouring numbers between which what holds inside ceases to hold."""
+    """Return the neighbouring numbers between which a condition that holds inside ceases to hold."""
     low, high = inside, outside
     while abs(high - low) > FINEST * max(abs(inside), abs(outside)):
         points = low + (high - low) * np.linspace(0.0, 1.0, PARTS + 1)
@@ -319,13 +319,13 @@ def change(holds: Callable[[FloatArray], BoolArray], inside: float, outside: flo
 
 
 def _is_passed(curve: Callable[[FloatArray], Closure], at: float, span: float) -> bool:
-    """Whether branches cross there: the closure leaves zero as a square, not as a fourth power."""
+    """Return whether branches cross at a zero: the closure leaves zero as a square, not as a fourth power."""
     step = min(1e-3, 1e-4 * span)
     near, far = curve(np.array([at + step, at + 2.0 * step])).value
     return bool(abs(far) < 8.0 * abs(near))
 
 
 def _snapped(at: float, changes: Mapping[str, tuple[float, ...]]) -> float:
-    """The flat position of an earlier group, where that is so near that both are one."""
+    """Return the flat position of an earlier group if it is so near that both are one."""
     earlier = (known for passed in changes.values() for known in passed)
     return next((known for known in earlier if abs(known - at) < NEAR), at)

@@ -1,6 +1,6 @@
-"""The motion over a cycle of the driven link, or over the range in which it can move.
+"""The motion over a cycle of the driving link, or over the range in which it can move.
 
-The driven link takes the variant's own speed and acceleration in every position; sides are followed
+The driving link takes the variant's own speed and acceleration in every position; sides are followed
 through flat positions by `reference.kinematics.continuation`.
 """
 
@@ -28,16 +28,16 @@ from reference.mechanism import (
 )
 
 FEWEST, MOST = 3, 100_001
-"""Samples of a cycle: a start, a middle and an end; more than any table or diagram needs."""
+"""Fewest samples of a cycle (start, middle, end), and more than any table or diagram needs."""
 SEARCHED = 1441
-"""Positions of a turn, a quarter of a degree apart, in which other ranges are looked for."""
+"""Positions of a turn, a quarter of a degree apart, at which other ranges are searched."""
 AT_IT = 1e-9
-"""A sample this near to a singular position, as a share of the range, is singular."""
+"""A sample this close to a singular position, as a share of the range, is singular."""
 
 
 @dataclass(frozen=True, slots=True)
 class Cycle:
-    """A mechanism's motion over the cycle of its driven link, arrays of shape (N,).
+    """A mechanism's motion over the cycle of its driving link, arrays of shape (N,).
 
     Attributes
     ----------
@@ -63,12 +63,12 @@ class Cycle:
 
     @property
     def is_turned(self) -> bool:
-        """Whether a crank drives, so that driven coordinates are angles."""
+        """True if a crank drives, so that driven coordinates are angles."""
         return isinstance(self.mechanism.driver, Crank)
 
     @property
     def passed(self) -> tuple[Event, ...]:
-        """The flat positions on the cycle; of a full one, not again at its end."""
+        """Flat positions on the cycle; one at the start of a full cycle is not repeated at its end."""
         low, high = float(self.driven[0]), float(self.driven[-1])
         slack = AT_IT * (high - low)
         last = high - slack if self.turns else high + slack
@@ -76,14 +76,13 @@ class Cycle:
 
 
 def cycle(mechanism: Mechanism, samples: int = 361) -> Cycle:
-    """The motion of one variant over 0..360 degrees of its crank, or over the range it can reach.
+    """Return the motion of one variant over 0..360 degrees of its crank, or over the range it can reach.
 
-    A crank that returns to another assembly after a turn is followed over two turns; a driven slider
-    over the range in which the mechanism assembles. A group stays on its authored side but for flat
-    positions, which are passed smoothly (by velocity). Singular samples have no rates.
+    A crank that returns to another assembly after one turn is followed over two turns; a driven slider over
+    the range in which the mechanism assembles. A group stays on its authored side except at flat positions,
+    which it passes smoothly (by velocity). Singular samples have no rates.
 
-    Raises CallError for too few or too many samples, MechanismError where the variant itself has no
-    motion.
+    Raises CallError for too few or too many samples, MechanismError if the variant itself has no motion.
     """
     if not FEWEST <= samples <= MOST:
         raise CallError("samples", f"{samples} samples: a whole number from {FEWEST} to {MOST} is needed")
@@ -99,7 +98,7 @@ def cycle(mechanism: Mechanism, samples: int = 361) -> Cycle:
 
 
 def _followed(mechanism: Mechanism) -> tuple[Continuation, int]:
-    """The mechanism followed over its whole cycle, and in how many turns that closes."""
+    """Follow the mechanism over its whole cycle; return it and the number of turns of the cycle."""
     driver = mechanism.driver
     if not isinstance(driver, Crank):
         start, reach = float(driver.displacement_m[0]), _largest_travel(mechanism, driver)
@@ -118,7 +117,7 @@ def _followed(mechanism: Mechanism) -> tuple[Continuation, int]:
 
 
 def _shifted(following: Continuation, by: float) -> Continuation:
-    """The same in angles that are so many turns further, its range about the first turn."""
+    """Shift the driven coordinates by an angle, so that the range lies about the first turn."""
     if by == 0.0:
         return following
     low, high = (stop and replace(stop, at=stop.at + by) for stop in following.stops)
@@ -133,7 +132,7 @@ def _shifted(following: Continuation, by: float) -> Continuation:
 
 
 def _largest_travel(mechanism: Mechanism, driver: DrivenSlider) -> float:
-    """How far a driven slider may go at most, metres: all lengths in line, all distances on the ground."""
+    """Upper bound of a driven slider's travel, m: all lengths in line, plus all distances on the ground."""
     take = one_variant(0)
     places = [complex(take(place)) for place in mechanism.ground_m.values()]
     guides = [guide for group in mechanism.groups for guide in guides_of(group)]
@@ -153,7 +152,7 @@ def _lengths(group: Group) -> float:
 
 
 def _singular(following: Continuation, driven: FloatArray) -> dict[int, str]:
-    """Samples in a flat position or at a stop, by index, and why they have no rates."""
+    """Return samples in a flat position or at a stop, by index, with the reason why they have no rates."""
     within = AT_IT * float(driven[-1] - driven[0])
     stops = tuple(stop for stop in following.stops if stop is not None)
     undetermined: dict[int, str] = {}
@@ -166,7 +165,7 @@ def _singular(following: Continuation, driven: FloatArray) -> dict[int, str]:
 def _motion(
     following: Continuation, at_samples: Mechanism, driven: FloatArray, undetermined: dict[int, str]
 ) -> Motion:
-    """At all samples; of the singular ones the positions only."""
+    """Return the motion at all samples; at singular ones, positions only."""
     singular = np.zeros(driven.size, dtype=np.bool_)
     singular[list(undetermined)] = True
     motion = move_where_possible(following.at(np.where(singular, following.start, driven)))
@@ -184,7 +183,7 @@ def _motion(
 
 
 def _elsewhere(following: Continuation) -> tuple[tuple[float, float], ...]:
-    """Other ranges in which the mechanism assembles as authored, to full accuracy."""
+    """Return other ranges in which the mechanism assembles as authored, to full accuracy."""
     authored = replace(following, changes={})
     driver = following.mechanism.driver
     if isinstance(driver, Crank):
@@ -210,7 +209,7 @@ def _elsewhere(following: Continuation) -> tuple[tuple[float, float], ...]:
 
 
 def _runs(grid: FloatArray, assembles: Callable[[FloatArray], BoolArray]) -> Iterator[tuple[float, float]]:
-    """Where on a grid it assembles, the ends of each run as exact as numbers are."""
+    """Yield the ranges of a grid in which the mechanism assembles, their ends to machine precision."""
     held = assembles(grid)
     edges = np.flatnonzero(np.diff(held.astype(np.int8), prepend=0, append=0))
     for first, after in edges.reshape(-1, 2):

@@ -47,11 +47,11 @@ from reference.numbers import cross, larger
 
 EPSILON = float(np.finfo(np.float64).eps)
 SAFETY = 32.0
-"""Rounding errors of the formulas in units of those of the data; compared with 50 digits in tests."""
+"""Rounding errors of the formulas in units of those of the data; tests compare them with 50 digits."""
 FEW = 3
-"""Up to so many variants are faster one by one, on Python's numbers."""
+"""Up to this many variants, Python's numbers are faster than arrays."""
 CLASSES = 200
-"""From so many variants on, calculating shared quantities once saves time."""
+"""From this many variants on, computing shared quantities once saves time."""
 BoolArray = NDArray[np.bool_]
 
 
@@ -93,10 +93,10 @@ def move(mechanism: Mechanism, *, accelerations: bool = True) -> Motion:
 
 
 def move_where_possible(mechanism: Mechanism, *, accelerations: bool = True) -> Motion:
-    """The motion of every variant; nan, with an infinite predicted error, for variants without one."""
+    """Return the motion of every variant; nan, with an infinite predicted error, for those without one."""
     count, origin = _count(mechanism.driver), _origin(mechanism)
     if origin.any():
-        # Far from the coordinates' origin, differences of places lose digits: solved about the driven link.
+        # Far from the origin, differences of positions lose digits: solve about the driving link.
         motion = _in_doubles(translated(mechanism, -origin), count, accelerations)
         motion.position.update({name: place + origin for name, place in motion.position.items()})
     else:
@@ -154,7 +154,7 @@ def _on_arrays(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
 
 
 def _in_python_numbers(mechanism: Mechanism, count: int, accelerations: bool) -> Motion:
-    """The motion of a few variants on Python's numbers; where these divide by zero, on arrays."""
+    """Solve a few variants on Python's numbers; if these divide by zero, on arrays."""
     try:
         solutions = [
             solve(mechanism, one_variant(index, among=count), accelerations=accelerations)
@@ -166,7 +166,7 @@ def _in_python_numbers(mechanism: Mechanism, count: int, accelerations: bool) ->
     first = solutions[0]
     grown = [_amplification(solution) for solution in solutions]
     predicted = [np.inf if math.isnan(times) else SAFETY * EPSILON * times for times in grown]
-    # One array for all that is complex and one for all that is real: faster than one for each joint.
+    # One complex and one real array are faster than one array for each joint.
     states = iter(np.array([_states(solution) for solution in solutions]).T)
     rates = iter(np.array([_rates(solution, accelerations) for solution in solutions]).T)
     return Motion(
@@ -206,21 +206,22 @@ def _predicted_error(amplification: FloatArray) -> FloatArray:
 # Again with more digits, near a singular position --------------------------------------------------
 
 EXTENDED = float(np.finfo(np.longdouble).eps)
-"""As `EPSILON` where the processor or compiler has no wider floats."""
+"""Relative precision of extended floats; equal to `EPSILON` if the processor or compiler has none wider."""
 LOSSY = 1e-9
 """A predicted relative error from which a variant is solved again: 4e-7 mm in a plan of 400 mm, which nobody
 can draw. Ordinary mechanisms stay far below, and solving again takes ten times as long."""
 EXTENDED_ENOUGH = LOSSY * EPSILON / EXTENDED
 """A predicted relative error up to which extended floats bring it below `LOSSY`; beyond, eighty digits."""
 LEAST_SINE = 8e-16
-"""Of a transmission angle; below it (as between guides at 0 and 180 degrees) there is no solution: the data's
-last digit decides how the mechanism moves."""
+"""Least sine of a transmission angle; below it (guides at 0 and 180 degrees) there is no solution: the data's
+last digit decides how the mechanism moves.
+"""
 DIGITS = 80
 """Decimal digits of the last resort."""
 
 
 def _refine(motion: Motion, mechanism: Mechanism, accelerations: bool) -> None:
-    """Solve the variants that have lost digits again, in place; nan where a variant has no motion."""
+    """Solve the variants that have lost digits again, in place; nan for a variant without motion."""
     predicted = motion.predicted_error
     sine = reduce(np.minimum, motion.transmission.values(), np.ones(predicted.shape))
     motion.recomputed[:], solutions = refined(mechanism, predicted, sine, accelerations=accelerations)
@@ -235,7 +236,7 @@ def _refine(motion: Motion, mechanism: Mechanism, accelerations: bool) -> None:
 def refined(
     mechanism: Mechanism, predicted: FloatArray, sine: FloatArray, *, accelerations: bool
 ) -> tuple[NDArray[np.bool_], list[tuple[Solution, NDArray[np.intp]]]]:
-    """Which variants have lost digits, and their new solutions, each with the rows that it is of.
+    """Return which variants have lost digits, and their new solutions with the rows that each is for.
 
     Arguments
     ---------
@@ -261,7 +262,7 @@ def refined(
 
 
 def _in_digits(mechanism: Mechanism, index: int, accelerations: bool) -> Solution | None:
-    """One variant in eighty digits; None where it divides by zero even so, or does not close."""
+    """Solve one variant in eighty digits; None if it still divides by zero, or does not close."""
     from mpmath import mp  # noqa: PLC0415 - seldom needed, and slow to import
 
     with mp.workdps(DIGITS):
@@ -307,14 +308,14 @@ WHAT_IS_IN_LINE = {
 
 
 def reason(mechanism: Mechanism, broken: NDArray[np.bool_]) -> MechanismError:
-    """The error for the first of the broken variants, which says how many there are."""
+    """Return the error for the first of the broken variants, with the number of all."""
     first = int(np.argmax(broken))
     where = f" ({int(broken.sum())} of {broken.size} variant(s), the first at index {first})"
     return reason_at(mechanism, first, "" if broken.size == 1 else where)
 
 
 def reason_at(mechanism: Mechanism, index: int, where: str = "") -> MechanismError:
-    """The error for the variant at an index, from the first group that fails there."""
+    """Return the error for the variant at an index, from the first group that fails there."""
     take = one_variant(index, _quiet)
     groups = mechanism.groups
     driven = "crank angle" if isinstance(mechanism.driver, Crank) else "displacement of the driven slider"
@@ -328,7 +329,7 @@ def reason_at(mechanism: Mechanism, index: int, where: str = "") -> MechanismErr
             node = after.joints[group.node]
             if not np.isfinite(node.position) or np.isnan(after.transmission.get(group.node, 1.0)):
                 gap, reach = _gap(group, before), max(abs(one.position) for one in before.joints.values())
-                # A gap of rounding alone: the group is flat, and its data say so as well as they can.
+                # The gap is only rounding: the group is flat, as exactly as its data can be.
                 if gap > ROUNDING * reach:
                     return _does_not_close(group, gap, where, driven)
                 return _singular(group, where, driven)
@@ -340,7 +341,7 @@ def reason_at(mechanism: Mechanism, index: int, where: str = "") -> MechanismErr
 
 
 def _quiet(number: complex) -> np.generic:
-    """A number as a NumPy scalar, which divides by zero without an error."""
+    """Return a number as a NumPy scalar, which divides by zero without an error."""
     scalar: np.generic = np.asarray(number)[()]  # type: ignore[assignment]
     return scalar
 
@@ -363,7 +364,7 @@ def _singular(group: Group, where: str, driven: str) -> MechanismError:
 
 
 def _gap(group: Group, before: Solution) -> float:
-    """The gap by which a group fails to close, metres, with the pins at their positions in `before`."""
+    """Return the gap by which a group fails to close, m, with the pins at their positions in `before`."""
     at = {name: joint.position for name, joint in before.joints.items()}
     take = before.take
     match group:

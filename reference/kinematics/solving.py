@@ -31,19 +31,19 @@ from reference.mechanism import (
 from reference.numbers import Complex, Number, cross, dot, larger, root, where
 
 Take = Callable[[Any], Any]
-"""The number to calculate with, of one that the mechanism holds: the array, or one variant's."""
+"""Selects the number to compute with from one that the mechanism holds: the array, or one variant's."""
 
 
 def as_it_is(value: Any) -> Any:  # noqa: ANN401 - arrays of either kind
-    """All variants at once."""
+    """Return the value unchanged: all variants at once."""
     return value
 
 
 @dataclass(slots=True)
 class Joint:
-    """Position (and what rounding took from it, where known), velocity, acceleration, SI.
+    """Position (and its rounding error, if known), velocity, acceleration of a joint, SI.
 
-    `amplification` is by how much a rounding error of the data may have grown up to here.
+    `amplification` is the factor by which a rounding error of the data may have grown up to this joint.
     """
 
     position: Complex
@@ -55,7 +55,7 @@ class Joint:
 
 @dataclass(slots=True)
 class Solution:
-    """Joints and links of a mechanism in motion; each group's |sin| of its transmission angle."""
+    """Joints and links of a mechanism in motion, and the |sin| of each group's transmission angle."""
 
     joints: dict[str, Joint] = field(default_factory=dict)
     omega: dict[str, Number] = field(default_factory=dict)
@@ -66,17 +66,17 @@ class Solution:
     take: Take = as_it_is
     accelerations: bool = True
     anew: bool = False
-    """Whether shapes of links are calculated from their data, not taken as they were rounded."""
+    """True if shapes of links are computed from their data, not taken as rounded."""
 
     def add(self, name: str, node: Joint, sine: Number, amplification: Number) -> None:
-        """A group's node; rounding errors of what it hangs on grow by 1 / sine^2 and by `amplification`."""
+        """Add a group's node; rounding errors grow by 1 / sine^2 and by `amplification`."""
         node.amplification = amplification / (sine * sine)
         self.joints[name], self.transmission[name] = node, abs(sine)
 
 
 @dataclass(slots=True)
 class Rail:
-    """A guide in motion: a point of it, its direction, and the rates of the link that carries it.
+    """A guide in motion: one of its points, its direction, and the rates of the link that carries it.
 
     Most guides are fixed: what does not turn moves as its point does, and nothing is calculated.
     """
@@ -89,13 +89,13 @@ class Rail:
     turns: bool = False
 
     def velocity(self, place: Complex) -> Complex:
-        """Of the link's point at a place."""
+        """Return the velocity of the link's point at a position."""
         if not self.turns:
             return self.joint.velocity
         return self.joint.velocity + 1j * self.omega * (place - self.joint.position)
 
     def acceleration(self, place: Complex) -> Complex:
-        """Of the link's point at a place."""
+        """Return the acceleration of the link's point at a position."""
         if not self.turns:
             return self.joint.acceleration
         swing = assur.turned(place - self.joint.position, self.omega, self.epsilon)
@@ -107,8 +107,8 @@ def solve(
 ) -> Solution:
     """Solve a mechanism in the numbers that `take` gives; epsilon stays empty without accelerations.
 
-    `anew` calculates the shapes of links in those numbers, from their lengths or coordinates: the
-    mechanism holds them rounded to doubles.
+    `anew` computes the shapes of links in those numbers, from their lengths or coordinates: the mechanism
+    holds them rounded to doubles.
     """
     solution = Solution(take=take, accelerations=accelerations, anew=anew)
     for name, place in mechanism.ground_m.items():
@@ -166,7 +166,7 @@ def _add(solution: Solution, group: Group) -> None:
 
 
 def _between(p: Joint, q: Joint) -> Complex:
-    """The vector from p to q, with the rounding rests of both."""
+    """Return the vector from p to q, with the rounding errors of both."""
     d = q.position - p.position
     if q.rest is not None:
         d = d + q.rest
@@ -277,7 +277,7 @@ def _add_point(solution: Solution, group: Plate | PointOnLine) -> None:
 
 
 def _shape_anew(take: Take, group: Plate | PointOnLine, shape: Complex, d: Complex) -> Complex:
-    """The shape of a link's point over its base `d`, from the data in the numbers of `d`."""
+    """Return the shape of a link's point over its base `d`, from the data in the numbers of `d`."""
     if group.local_m is not None:
         return take(group.local_m) / abs(d)
     if isinstance(group, PointOnLine):
@@ -289,7 +289,7 @@ def _shape_anew(take: Take, group: Plate | PointOnLine, shape: Complex, d: Compl
 
 
 def rail_of(solution: Solution, guide: Guide) -> Rail:
-    """A guide as it moves; raises KeyError where its link is not placed yet."""
+    """Return a guide in motion; raises KeyError if its link is not placed yet."""
     if isinstance(guide, FixedGuide):
         through, angle = solution.take(guide.through_m), solution.take(guide.angle_rad)
         return Rail(Joint(through), assur.heading(angle))
@@ -301,7 +301,7 @@ def rail_of(solution: Solution, guide: Guide) -> Rail:
 
 
 def _add_coincident(solution: Solution, guide: Guide, rail: Rail, node: str) -> None:
-    """The point of a moving guide's link that lies under a slider."""
+    """Add the point of a moving guide's link that lies under a slider."""
     if isinstance(guide, FixedGuide):
         return
     over = solution.joints[node]
@@ -335,15 +335,15 @@ def _add_crossing(solution: Solution, node: str, rails: tuple[Rail, Rail]) -> No
 
 
 def each_number_once(values: Any) -> Any:  # noqa: ANN401 - an array, or a side that all variants share
-    """All variants at once; a number that they share (an array of stride 0) only once."""
+    """Return all variants at once; a number that they share (an array of stride 0) only once."""
     return values[:1] if type(values) is not int and values.strides == (0,) else values
 
 
 def one_variant(index: int, number: Callable[[Any], Any] | None = None, *, among: int | None = None) -> Take:
-    """A function that takes one variant's number from an array over variants (one entry holds for all).
+    """Return a function that takes one variant's number from an array over variants or of one entry.
 
-    Arguments: `number` converts a float or complex to another kind of number; `among`, where given, is the
-    number of variants, and an array of another size raises ValueError.
+    Arguments: `number` converts a float or complex to another kind of number; `among`, if given, is the
+    number of variants: an array of another size raises ValueError.
     """
 
     def take(values: Any) -> Any:  # noqa: ANN401 - an array, or a side that all variants share
@@ -361,7 +361,7 @@ def one_variant(index: int, number: Callable[[Any], Any] | None = None, *, among
 
 
 def some_variants(rows: NDArray[np.intp]) -> Take:
-    """A function that takes some variants from arrays over variants, in the widest floats there are."""
+    """Return a function that takes some variants from arrays over variants, in the widest floats."""
 
     def take(values: Any) -> Any:  # noqa: ANN401 - an array, or a side that all variants share
         if type(values) is int:

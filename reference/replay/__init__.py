@@ -1,1 +1,1 @@
-"""What was done: a construction held against a drawing, step by step."""
+"""Find what the student did: a construction compared with a drawing, step by step."""

@@ -1,7 +1,7 @@
-"""What one step of a drawing may have been: the right step, a known mistake, a slip, something else.
+"""Explanations of one step of a drawing: the right step, a known mistake, a slip, something else.
 
-Each explanation has a cost, -2 log of its probability up to a constant: the squared residual of the
-drawn node, with its covariance, and for each mistake how rare it is.
+Each explanation has a cost, -2 log of its probability up to a constant: the squared residual of the drawn
+node, with its covariance, and for each mistake its rarity.
 """
 
 import math
@@ -39,33 +39,33 @@ RARITY: Mapping[str, float] = {
 """Cost of each mistake: one step in about a hundred goes wrong, in one of about ten ways; a slip in a
 computation may give any length."""
 NOT_THERE = 5.0
-"""What a component left out costs less where it is not there: a component drawn is seldom left blank."""
+"""Reduced cost of a component left out if it is not there: a component drawn is seldom left blank."""
 KNOWN_SLIP = 11.0
-"""Of a slip by one of `SLIPS`: less rare than any other."""
+"""Cost of a slip by one of `SLIPS`: less rare than any other."""
 SLIPS = (0.1, 0.5, 2.0, 10.0)
 """A decimal point, a half or a double: the commonest slips in computing a length."""
 RARER = 3.0
-"""What a mistake costs more that is seldom made."""
+"""Extra cost of a mistake that is seldom made."""
 ANOTHER_WAY = 2.0
-"""Of an image found by similar triangles rather than by lines: one in three."""
+"""Cost of an image found by similar triangles rather than by lines: one in three."""
 AN_OTHER_LINE = 3.0
-"""And what it costs more to take a whole line that belongs to another vector: there are many."""
+"""Extra cost of a whole line that belongs to another vector: there are many."""
 SOMETHING_ELSE = 9.0
 """Cost of a step that went wrong in an unknown way, without the cost of its position."""
 AREA_MM = 100.0
-"""An unknown coordinate or length may be anything within so many millimetres, or within its own size."""
+"""An unknown coordinate or length may have any value within this range, or within its own size."""
 SUSPECT = 9.0
-"""From this squared misfit on (three standard errors) mistakes are tried."""
+"""Mistakes are tried from this squared misfit on (three standard errors)."""
 COST_WINDOW = 24.0
-"""Explanations that cost more than the cheapest one of the same care by more than this are dropped."""
+"""Explanations that cost this much more than the cheapest one of the same care are dropped."""
 MOST_BRANCHES = 40
-"""Explanations of one care that are continued."""
+"""Explanations that are continued for each care."""
 STIFFNESS = 1e-3
-"""Weight of where the step puts a node, relative to what was observed of it."""
+"""Weight of the position that the step gives, relative to the observation."""
 TINY = 1e-6
 """Millimetres; a shorter vector has no direction."""
 SETTLING = 2
-"""Steps in which a node is moved to the observed lengths."""
+"""Steps in which a node is moved to fit the observed lengths."""
 
 BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 Covariance = tuple[float, float, float]
@@ -80,7 +80,7 @@ class Observation:
     ----------
     node : the node, or the vector's head
     tail : the vector's tail; None for a position about the figure's origin
-    value : complex millimetres, or a length where the direction is not known
+    value : complex millimetres, or a length if the direction is not known
     spread : its covariance; with a direction that of the reading alone, without drafting errors
     """
 
@@ -98,12 +98,12 @@ class Observations:
     Attributes
     ----------
     entries : its nodes and vectors
-    sketches : by plan, the mechanism's joints as drawn beside it, where that is another sketch
-    cost : of taking it so: of measurements that contradict each other, or are left out
+    sketches : by plan, the mechanism's joints as drawn beside it, if that is another sketch
+    cost : cost of this version of the drawing: of measurements that contradict each other, or are left out
     directions_rad : by pair of joints, the standard error of the direction between them on a sketch that was
         not handed in
-    blank : nodes in which a component ends that is not there, beside others that are
-    apart : by plan, how much less than `cost` its measurements cost where they need not close any polygon
+    blank : ends of components that are missing although others are drawn
+    apart : by plan, how much less than `cost` its measurements cost if they need not close any polygon
     """
 
     entries: tuple[Observation, ...]
@@ -115,7 +115,7 @@ class Observations:
 
 
 def by_node(construction: Construction, entries: Iterable[Observation]) -> dict[str, tuple[Observation, ...]]:
-    """The observations by the node that is made later; vectors that end at the earlier node are reversed."""
+    """Return the observations by the node made later; vectors that end at the earlier node are reversed."""
     order = {step.node: index for index, step in enumerate(construction.steps)}
     found: dict[str, tuple[Observation, ...]] = {}
     for one in entries:
@@ -129,7 +129,7 @@ def by_node(construction: Construction, entries: Iterable[Observation]) -> dict[
 def needed_nodes(
     construction: Construction, entries: Mapping[str, tuple[Observation, ...]]
 ) -> frozenset[str]:
-    """The observed nodes and all from which these may be made, with the right steps or with wrong ones."""
+    """Return the observed nodes and all from which these may be made, with right or wrong steps."""
     wanted = set(entries) | {one.tail for ones in entries.values() for one in ones if one.tail is not None}
     # A wrong line may be taken by any link, and through a pole.
     wanted.update(step.node for step in construction.figures["mechanism"])
@@ -146,7 +146,7 @@ class NodeObservations:
 
     Attributes
     ----------
-    turned : (branches,) factor by which its plan is turned as a whole, None where in no branch
+    turned : (branches,) factor by which its plan is turned as a whole, None if it is turned in no branch
     care : (branches,) drafting errors as multiples of the usual ones
     """
 
@@ -158,14 +158,14 @@ class NodeObservations:
         return bool(self.entries)
 
     def value(self, one: Observation) -> ComplexArray | complex:
-        """The observed value in a plan that is not turned."""
+        """Return the observed value in a plan that is not turned."""
         if self.turned is None or not one.has_direction:
             return one.value
         return np.asarray(one.value / self.turned)
 
     @property
     def fixes_place(self) -> bool:
-        """Whether the observations leave only one position for the node."""
+        """True if the observations leave only one position for the node."""
         return any(one.has_direction for one in self.entries)
 
     @property
@@ -175,18 +175,18 @@ class NodeObservations:
 
     @property
     def anywhere(self) -> float:
-        """The cost of any position, made in an unknown way."""
+        """The cost of an arbitrary position, found in an unknown way."""
         return SOMETHING_ELSE + cost_of_any(self.entries)
 
     def misfit_and_cost(
         self, place: ComplexArray, shifts: ComplexArray | None, nodes: Mapping[str, ComplexArray]
     ) -> tuple[FloatArray, FloatArray]:
-        """The squared misfit of positions in standard deviations (inf where there is none), and its cost.
+        """Return the squared misfit of positions in standard deviations (inf if there is none), and its cost.
 
         The cost is -2 log of the density of the observations per mm: wide errors make each position rarer.
 
-        Arguments: `place` (alternatives, branches); `shifts` (alternatives, acts, branches) is how far each
-        usual drafting error moves it.
+        Arguments: `place` (alternatives, branches); `shifts` (alternatives, acts, branches), its shift by
+        each usual drafting error.
         """
         misfit, width = np.zeros(place.shape), np.zeros(place.shape)
         for one in self.entries:
@@ -203,7 +203,7 @@ class NodeObservations:
         return np.where(is_there, misfit, np.inf), np.where(is_there, whole, np.inf)
 
     def settled(self, place: ComplexArray, nodes: Mapping[str, ComplexArray]) -> ComplexArray:
-        """Positions moved to the observations, by as little as possible where lengths alone are known."""
+        """Return positions moved to the observations, by as little as possible if only lengths are known."""
         first = self.entries[0]
         if first.has_direction:
             tail = 0.0 if first.tail is None else nodes[first.tail]
@@ -214,7 +214,7 @@ class NodeObservations:
         return place
 
     def _shift(self, place: ComplexArray, nodes: Mapping[str, ComplexArray]) -> ComplexArray:
-        """A Gauss-Newton step towards the observed lengths."""
+        """Return a Gauss-Newton step towards the observed lengths."""
         tails = [one.tail for one in self.entries]
         vectors = np.array([place if tail is None else place - nodes[tail] for tail in tails])
         lengths = np.abs(vectors)
@@ -233,7 +233,7 @@ def _freedom(entries: Sequence[Observation]) -> int:
 
 
 def cost_of_any(entries: Sequence[Observation]) -> float:
-    """The cost of a node's observations where it may be anywhere; two of them place it."""
+    """Return the cost of a node's observations if it may be anywhere; two of them determine its position."""
     size_mm = max(AREA_MM, *(abs(one.value) for one in entries))
     return 2.0 * math.log(size_mm) * min(_freedom(entries), 2)
 
@@ -241,7 +241,7 @@ def cost_of_any(entries: Sequence[Observation]) -> float:
 def _squared_residual(
     residual: ComplexArray, spread: Covariance, shifts: ComplexArray | None
 ) -> tuple[FloatArray, FloatArray]:
-    """Deviations squared, in standard deviations, and the determinants of their covariances."""
+    """Return squared deviations, in standard deviations, and the determinants of their covariances."""
     x, y = residual.real, residual.imag
     xx, xy, yy = (np.asarray(one) for one in spread)
     if shifts is not None:
@@ -256,7 +256,7 @@ def _squared_residual(
 def _squared_length_residual(
     drawn_mm: float, vector: ComplexArray, spread: Covariance
 ) -> tuple[FloatArray, FloatArray]:
-    """Deviations of lengths squared, in standard deviations, and their variances."""
+    """Return squared deviations of lengths, in standard deviations, and their variances."""
     length, x, y = np.abs(vector), vector.real, vector.imag
     xx, xy, yy = spread
     along = (xx * x * x + 2.0 * xy * x * y + yy * y * y) / np.maximum(length, TINY) ** 2
@@ -267,7 +267,7 @@ def _squared_length_residual(
 # Mistakes of a step, and their costs ---------------------------------------------------------------
 
 LEAST_FACTOR, MOST_FACTOR = 0.02, 30.0
-"""A computed length that is wrong by a larger or smaller factor is no slip in its computation."""
+"""A computed length that is wrong by a factor outside this range is not a slip in its computation."""
 SLIP = "arithmetic"
 
 WrongSteps = tuple[tuple[Mistake, Step], ...]
@@ -284,21 +284,21 @@ class Repertoire:
         self._errors: dict[tuple[str, type[Step], int], Errors] = {}
 
     def wrong(self, step: Step) -> WrongSteps:
-        """The mistakes that can be made in a step, with the step as each makes it."""
+        """Return the mistakes that can be made in a step, each with the step it leads to."""
         if step.node not in self._wrong:
             mistakes = mistakes_of_step(step, self.construction)
             self._wrong[step.node] = tuple((one, changed_step(one, self.construction)) for one in mistakes)
         return self._wrong[step.node]
 
     def rarer(self, step: Step) -> WrongSteps:
-        """The same of mistakes that are seldom made."""
+        """Return the seldom made mistakes in a step, each with the step it leads to."""
         if step.node not in self._rarer:
             mistakes = (*rarer_mistakes_of_step(step, self.construction), *_known_slips(step))
             self._rarer[step.node] = tuple((one, changed_step(one, self.construction)) for one in mistakes)
         return self._rarer[step.node]
 
     def errors(self, step: Step, further: int) -> Errors:
-        """The errors of a step's acts, with so many rows left free for further errors at the end."""
+        """Return the errors of a step's acts, with `rows` free rows for further errors at the end."""
         key = (step.node, type(step), further)
         if key not in self._errors:
             free = np.zeros((further, 1))
@@ -308,13 +308,13 @@ class Repertoire:
 
 
 def _known_slips(step: Step) -> Iterator[Mistake]:
-    """The commonest slips in a length that is computed."""
+    """Yield the commonest slips in a computed length."""
     if isinstance(step, Given) and isinstance(step.length, Normal | Coriolis):
         yield from (Mistake(SLIP, step.node, factor=factor) for factor in SLIPS)
 
 
 def _rarity(mistake: Mistake) -> float:
-    """The cost of a mistake."""
+    """Return the cost of a mistake."""
     if mistake.code == SLIP and mistake.factor in SLIPS:
         return KNOWN_SLIP
     is_line = mistake.code == "wrong_intersection" and mistake.other[0][:2] in {"v_", "a_"}
@@ -327,7 +327,7 @@ _repertoires: deque[Repertoire] = deque(maxlen=CACHE_SIZE)
 
 
 def repertoire_of(construction: Construction, skill: Skill) -> Repertoire:
-    """The repertoire of a construction, from the cache where it is there."""
+    """Return the repertoire of a construction, from the cache if it is there."""
     for repertoire in _repertoires:
         if repertoire.construction is construction and repertoire.skill == skill:
             return repertoire
@@ -347,7 +347,7 @@ class StepAlternatives:
     misfit : squared, of the observations; zero for an unknown way, which fits anything
     mistakes : by alternative; None for the right one and for an unknown way
     factors : of a slip, by branch
-    others : how many alternatives at the end are unknown ways
+    others : number of alternatives at the end that are unknown ways
     """
 
     place: ComplexArray
@@ -358,7 +358,7 @@ class StepAlternatives:
     others: int = 0
 
     def made(self, choice: int, branch: int) -> tuple[Mistake, ...]:
-        """The mistake of an alternative in a branch, as a tuple of one or none."""
+        """Return the mistake of an alternative in a branch, as a tuple of one or none."""
         mistake = self.mistakes[choice]
         if mistake is None:
             return ()
@@ -367,7 +367,7 @@ class StepAlternatives:
         return (mistake,)
 
     def is_something_else(self, choice: int) -> bool:
-        """Whether an alternative is an unknown way."""
+        """Return whether an alternative is an unknown way."""
         return choice >= len(self.mistakes) - self.others
 
     def __add__(self, more: "StepAlternatives") -> "StepAlternatives":
@@ -383,7 +383,7 @@ class StepAlternatives:
 
 @dataclass(frozen=True, slots=True)
 class StepContext:
-    """What a step is compared with: the nodes so far in each branch, and the observations of the new one.
+    """The data for comparing a step: the nodes so far in each branch, and the observations of the new one.
 
     `measured` are the nodes of its figure that were measured roughly, see `measured_nodes`; `blank` those of
     `Observations`.
@@ -399,15 +399,15 @@ class StepContext:
 
     @property
     def count(self) -> int:
-        """How many branches there are."""
+        """The number of branches."""
         return len(self.observed.care)
 
     def right(self, step: Step) -> StepAlternatives:
-        """The step as it should be made."""
+        """Return the alternative of the right step."""
         return self._alternatives(step, [(None, step)])
 
     def by_similarity(self, step: Step, is_tried: BoolArray) -> StepAlternatives:
-        """The image of a link's point by similar triangles, where it is made by lines; in some branches."""
+        """Return, for some branches, the image of a link's point by similar triangles if lines make it."""
         image = self.repertoire.construction.images.get(step.node)
         if image is None or not isinstance(step, TwoLines):
             return self._alternatives(step, [])
@@ -415,16 +415,16 @@ class StepContext:
         return replace(found, cost=np.where(is_tried, found.cost + ANOTHER_WAY, np.inf))
 
     def wrong(self, step: Step) -> StepAlternatives:
-        """The step with each usual mistake in it."""
+        """Return the step with each usual mistake in it."""
         return self._alternatives(step, self.repertoire.wrong(step))
 
     def rarer(self, step: Step) -> StepAlternatives:
-        """The step with each mistake in it that is seldom made."""
+        """Return the step with each seldom made mistake in it."""
         found = self._alternatives(step, self.repertoire.rarer(step))
         return replace(found, cost=found.cost + RARER)
 
     def slips(self, step: Given) -> StepAlternatives | None:
-        """The right direction with a wrongly computed length, as drawn; None where none is computed."""
+        """Return the right direction with a wrongly computed length, as drawn; None if none is computed."""
         entries, view = self.observed.entries, View(self.nodes, self.known)
         one = next((one for one in entries if one.tail == step.start or one.has_direction), None)
         if one is None or not isinstance(step.length, Normal | Coriolis):
@@ -442,7 +442,7 @@ class StepContext:
         return replace(self._alternatives(step, [(Mistake(SLIP, step.node), changed)]), factors=factors)
 
     def something_else(self, right: StepAlternatives) -> StepAlternatives:
-        """The node where it was drawn, made in an unknown way; from lengths alone both possible positions."""
+        """Return the node where it was drawn, made in an unknown way; from lengths alone, in both."""
         observed, nodes = self.observed, self.nodes
         start = np.where(np.isfinite(right.place[0]), right.place[0], 0.0)
         starts = [start]
@@ -470,12 +470,12 @@ class StepContext:
         return StepAlternatives(place, cost + rarity[:, None], misfit, mistakes)
 
     def _rarity(self, mistake: Mistake) -> float:
-        """The cost of a mistake; of a component left out less where it is not there."""
+        """Return the cost of a mistake; less for a component left out if it is not there."""
         is_blank = mistake.code == "normal_missing" and mistake.at in self.blank
         return _rarity(mistake) - (NOT_THERE if is_blank else 0.0)
 
     def _placed(self, step: Step, steps: Sequence[Step]) -> tuple[ComplexArray, ComplexArray | None]:
-        """Where each step puts the node, and how each usual error moves it (steps, errors, branches)."""
+        """Return positions that steps give, and shifts by usual errors (steps, errors, branches)."""
         if not self.observed.fixes_place:
             view = View(self.nodes, self.known)
             return np.array([_shaped(one, (self.count,)) for one in _places(steps, view)]), None
@@ -494,7 +494,7 @@ class StepContext:
         return place[:, 0], (place[:, 1:] - place[:, :1]) / SMALL
 
     def _with_sketch(self, step: Step, errors: Errors) -> Errors:
-        """The errors with those of the sketch's directions, where these are known no better."""
+        """Return the errors with those of the sketch's directions, if these are known less well."""
         usual = self.repertoire.skill.deviation("angle")
         if not self.directions_rad or not usual:
             return errors
@@ -507,7 +507,7 @@ class StepContext:
         return found
 
     def _measured(self, step: Step, steps: Sequence[Step]) -> dict[str, int]:
-        """The measured nodes from which the steps start, by the group whose rows their errors have.
+        """Return the measured nodes from which the steps start, by the group whose rows their errors have.
 
         The right step's first two nodes have rows of their own, all others share theirs: no step uses two.
         """
@@ -518,14 +518,14 @@ class StepContext:
         return groups
 
     def _moved(self, name: str, row: int, count: int) -> ComplexArray:
-        """A node, moved by its error along both axes of the covariance in two rows."""
+        """Return a node, moved by its error along both axes of the covariance in two rows."""
         shifts = np.zeros((count, 1), np.complex128)
         shifts[row : row + 2, 0] = SMALL * self.measured[name]
         return np.asarray(self.nodes[name] + shifts)
 
 
 def _directions(step: Step) -> tuple[Direction | None, ...]:
-    """The directions of a step's lines, in the order of their slots."""
+    """Return the directions of a step's lines, in the order of their slots."""
     match step:
         case TwoLines(first=first, second=second):
             return tuple(one.along if isinstance(one, Line) else None for one in (first, second))
@@ -535,11 +535,11 @@ def _directions(step: Step) -> tuple[Direction | None, ...]:
 
 
 LEAST_MEASURED_MM = 0.25
-"""Nodes that are known better than this are taken as exact where a step starts from them."""
+"""Nodes known better than this are taken as exact when a step starts from them."""
 
 
 def measured_nodes(entries: Mapping[str, tuple[Observation, ...]]) -> dict[str, ComplexArray]:
-    """The nodes whose positions were measured roughly, and how two independent errors move each."""
+    """Return the nodes whose positions were measured roughly, and how two independent errors move each."""
     found = {}
     for node, observed in entries.items():
         first = observed[0]
@@ -556,7 +556,7 @@ def _shaped(place: ComplexArray, shape: tuple[int, ...]) -> ComplexArray:
 
 
 def _places(steps: Sequence[Step], view: View) -> Iterator[ComplexArray]:
-    """Where each of the alternative steps puts the node; a line that several share is drawn once."""
+    """Yield the node's position by each of the alternative steps; a line that several share is drawn once."""
     drawn: dict[tuple[int, int], tuple[ComplexArray, ComplexArray]] = {}
     for step in steps:
         if not isinstance(step, TwoLines):

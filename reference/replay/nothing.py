@@ -1,4 +1,4 @@
-"""None of these: what was drawn has nothing to do with the construction.
+"""The explanation that what was drawn has nothing to do with the construction.
 
 The explanations of `reference.replay.replay` are compared with each other, and the best of many is
 always some explanation. This one has no mistakes and no steps: every node and length of a plan may be
@@ -18,11 +18,11 @@ from reference.replay.replay import Replay
 NOTHING_FITS, ONE_PLAN = 11.0, 15.0
 """Cost of a submission that follows no construction, one in about 250; of one plan alone, rarer."""
 LEAST_NODES = 2
-"""A plan with fewer observed nodes is not explained apart from the others."""
+"""A plan with fewer observed nodes is not left unexplained on its own."""
 
 
 def cost_of_anything(construction: Construction, observations: Observations) -> dict[str, float]:
-    """By figure with observed nodes, the cost of its observations where each node may be anywhere."""
+    """Return by figure the cost of its observations if each node may be anywhere."""
     found: dict[str, float] = {}
     for node, entries in by_node(construction, observations.entries).items():
         figure = construction.figure_of(node)
@@ -33,9 +33,9 @@ def cost_of_anything(construction: Construction, observations: Observations) -> 
 def with_nothing(
     explanations: Sequence[Replay], construction: Construction, observations: Observations
 ) -> list[Replay]:
-    """The explanations and, beside them, those in which one or all plans are not explained, by cost.
+    """Return the explanations, with those in which one or all plans are not explained, ordered by cost.
 
-    What is left of an explanation without such a plan is taken once, from the cheapest one.
+    The rest of an explanation without such a plan is kept once, from the cheapest one.
     """
     anything = cost_of_anything(construction, observations)
     nodes: dict[str, list[str]] = {figure: [] for figure in anything}
@@ -66,7 +66,7 @@ def with_nothing(
 
 
 def _subsets(plans: Sequence[str], figures: set[str]) -> Iterator[set[str]]:
-    """Each plan alone, all plans, and all figures."""
+    """Yield each plan alone, all plans, and all figures."""
     some = chain.from_iterable(combinations(plans, size) for size in range(1, len(plans) + 1))
     found = [set(one) for one in some]
     yield from found
@@ -82,7 +82,7 @@ def _without(
     others: Collection[str],
     nodes: Mapping[str, Sequence[str]],
 ) -> Replay:
-    """An explanation in which these figures are not explained, which costs less by the gain."""
+    """Return an explanation with these figures unexplained, which costs less by the gain."""
     cost, kept = explanation.cost - gain, []
     for one in explanation.made:
         at, shown = _figures_of(one, construction)
@@ -101,7 +101,7 @@ def _without(
 
 
 def _figures_of(mistake: Mistake, construction: Construction) -> tuple[str, frozenset[str]]:
-    """The figure that a mistake was made in, empty for the whole drawing; and the figures that show it."""
+    """Return the figure of a mistake, empty for the whole drawing, and the figures that show it."""
     if mistake.at in {step.node for step in construction.steps}:
         at = construction.figure_of(mistake.at)
         if at in construction.poles:

@@ -1,11 +1,10 @@
-"""A finished drawing replayed step by step, to find how each step was made.
+"""Replay a finished drawing step by step, to find how each step was made.
 
-Every branch of the replay is one explanation of the drawing: how each step was made, and where its node
-lies. Where the right step does not explain what was drawn, each mistake that
-`reference.construction.mistakes` has for that step opens a branch, and an unknown way one more. Later
-steps start from what was drawn, as the student did, so that one mistake does not hide the next.
-Branches are arrays and are evaluated together, for drafting errors of several sizes. The alternatives
-for one step and their costs are in `reference.replay.explanations`.
+Every branch of the replay is one explanation of the drawing: how each step was made, and where its node lies.
+If the right step does not explain the drawing, each mistake that `reference.construction.mistakes` has for
+that step opens a branch, and an unknown way one more. Later steps start from what was drawn, as the student
+did, so that one mistake does not hide the next. Branches are arrays and are evaluated together, for drafting
+errors of several sizes. The alternatives for one step and their costs are in `reference.replay.explanations`.
 """
 
 from collections import ChainMap
@@ -64,9 +63,9 @@ class Replay:
     care : drafting errors as a multiple of the usual ones
     made : the mistakes, in the order of construction
     unexplained : nodes whose steps were made in an unknown way
-    spent : by figure, its part of the cost; what the whole drawing costs is in the first one's
+    spent : by figure, its part of the cost; the first one includes the cost of the whole drawing
     not_explained : the figures in which nothing belongs together, see `reference.replay.nothing`
-    branches, index : all branches of the replay, and which of them this is
+    branches, index : all branches of the replay, and the index of this one
     """
 
     cost: float
@@ -80,12 +79,12 @@ class Replay:
 
     @property
     def is_innocent(self) -> bool:
-        """Whether it has no mistake and no unexplained step."""
+        """True if it has no mistake and no unexplained step."""
         return not self.made and not self.unexplained
 
     @property
     def right(self) -> Mapping[str, float]:
-        """By observed node, the root mean square misfit of the right step in standard deviations."""
+        """By observed node the root mean square misfit of the right step in standard deviations."""
         return {node: float(misfit[self.index]) for node, misfit in self.branches.right.items()}
 
 
@@ -98,14 +97,14 @@ def replay(
     cares: Sequence[float] = (1.0,),
     blind: bool = False,
 ) -> list[Replay]:
-    """The explanations of a drawing, the likeliest first.
+    """Return the explanations of a drawing, the likeliest first.
 
     Arguments
     ---------
     drawing : the right one at its scales, parameters scalar
     skill : usual drafting errors
-    cares : the sizes of drafting errors that are tried, as multiples of the usual ones
-    blind : try mistakes also at steps whose node's position was not observed, one to an explanation
+    cares : the sizes of drafting errors to try, as multiples of the usual ones
+    blind : try mistakes also at steps whose node was not observed, one in each explanation
     """
     construction, by_name = drawing.construction, by_node(drawing.construction, observations.entries)
     branches = _open(drawing, roots, cares, observations.cost)
@@ -120,7 +119,7 @@ def replay(
             for step in steps:
                 if step.node in needed:
                     if isinstance(step, Given) and step.node not in by_name and step.start in measured:
-                        # A vector laid off has the error of its start.
+                        # A drawn vector inherits the error of its start.
                         measured[step.node] = measured[step.start]
                     here, nodes = by_name.get(step.node, ()), ChainMap(sketch, branches.nodes)
                     observed = branches.observed(here, figure)
@@ -143,7 +142,7 @@ def replay(
 def _alternatives(
     step: Step, context: StepContext, has_guessed: BoolArray, *, blind: bool
 ) -> StepAlternatives:
-    """The right step, and the wrong ones where it does not explain the observations.
+    """Return the right step, and the wrong ones if it does not explain the observations.
 
     Arguments: `has_guessed` marks the branches that already have a mistake without an observation.
     """
@@ -189,7 +188,7 @@ class _Branches:
     """By figure, the cost up to its end."""
 
     def observed(self, entries: tuple[Observation, ...], figure: str) -> NodeObservations:
-        """The observations of a node of a figure, with the turn and the care of each branch."""
+        """Return the observations of a node, with the turn and the care of each branch."""
         return NodeObservations(entries, self.turned.get(figure), self.care)
 
     def go_on(
@@ -217,7 +216,7 @@ class _Branches:
         self.nodes[step.node] = place
 
     def _likeliest(self, costs: FloatArray) -> tuple[IntArray, IntArray]:
-        """The alternatives and branches that go on, the likeliest first within each care."""
+        """Return the alternatives and branches to continue, the likeliest first within each care."""
         chosen = []
         for care in sorted(set(self.care.tolist())):
             columns = np.flatnonzero(self.care == care)
@@ -231,7 +230,7 @@ class _Branches:
         return which, index
 
     def _take(self, index: IntArray) -> None:
-        """Keep these branches, in this order; one may be taken several times."""
+        """Keep these branches, in this order; a branch may be kept several times."""
         arrays: dict[str, np.ndarray[tuple[int, ...], np.dtype[np.generic]]]
         for arrays in (self.nodes, self.known, self.turned, self.right, self.spent):  # type: ignore[assignment]
             arrays.update({name: array[index] for name, array in arrays.items() if np.ndim(array)})
@@ -240,7 +239,7 @@ class _Branches:
         self.unexplained = [self.unexplained[i] for i in index]
 
     def explanations(self) -> list[Replay]:
-        """The branches as explanations, the likeliest first."""
+        """Return the branches as explanations, the likeliest first."""
         before = [np.zeros(len(self.cost)), *self.spent.values()]
         spent = {
             figure: up_to - start for (figure, up_to), start in zip(self.spent.items(), before, strict=False)
@@ -256,7 +255,7 @@ class _Branches:
 
 
 def _open(drawing: Drawing, roots: Sequence[Root], cares: Sequence[float], cost: float) -> _Branches:
-    """A branch for each root and care; `cost` is that of what is observed."""
+    """Open a branch for each root and care; `cost` is that of the observations."""
     starts = [(root, care) for care in cares for root in roots]
     known = {name: np.asarray(value) for name, value in drawing.parameters.items()}
     for name in {name for root in roots for name in root.parameters}:

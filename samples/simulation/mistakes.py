@@ -112,7 +112,7 @@ def fits_paper(drawing: Intent, right: Intent) -> bool:
 
 
 def _laid_off_backwards(occasion: Occasion) -> Iterator[StudentMistake]:
-    """The driven link's vector in the wrong sense: the sign of a clockwise crank."""
+    """The driving link's vector in the wrong sense: the sign of a clockwise crank."""
     for step in occasion.steps(*PLANS):
         if isinstance(step, Given) and isinstance(step.length, Scaled):
             yield StudentMistake("sense_reversed", step.node)
@@ -167,7 +167,7 @@ def _lines(occasion: Occasion) -> Iterator[tuple[TwoLines, int, Line]]:
 
 
 def _along_for_across(occasion: Occasion) -> Iterator[StudentMistake]:
-    """A line drawn along the link instead of across it; the driven link's vector too."""
+    """A line drawn along the link instead of across it; the driving link's vector too."""
     for step, slot, _ in _lines(occasion):
         yield StudentMistake("parallel_for_perpendicular", step.node, slot)
     for drawn in occasion.steps(*PLANS):
@@ -319,7 +319,7 @@ def with_mistake(intent: Intent, mistake: StudentMistake) -> Intent:
 
 
 def _at_another_speed(construction: Construction, known: Parameters, factor: float) -> dict[str, np.ndarray]:
-    """The driven link's computed values, and the scales that are proportional to them: the plans stay."""
+    """The driving link's computed values, and the scales that are proportional to them: the plans stay."""
     powers = {"kv": 1, "ka": 2}
     for steps in construction.figures.values():
         for step in steps:

@@ -19,16 +19,16 @@ SLACK = 1e-5
 ROUNDING = 0.06
 """Of a number with one decimal, told and shown."""
 OPPOSITE_DEG = 150.0
-DOUBTS = re.compile(r"cannot decide|too little certainty|a person must look")
+DOUBTS = re.compile(r"too close to|too little certainty|a person must look|an instructor will")
 NOT_READ = re.compile(r"could not be read|Nothing was handed in|is not required")
 COUNTED = {"counted_for_you", "at_stake"}
 """Reasons that say why more than the tolerance is right."""
-AGAINST_THE_DATA = "held against the data"
+AGAINST_THE_DATA = "compared with the data"
 """After it numbers are told that are not the row's: what was expected there follows from own values."""
 OFF = re.compile(
     r"too (long|short) by|turned [\d.]+°|opposite way|is too (large|small)|times too (large|small)"
 )
-IN_FAVOUR = re.compile(r"counted for you|^Right\.")
+IN_FAVOUR = re.compile(r"accepted\.|^Right\.")
 LENGTH = re.compile(r"too (long|short) by ([\d.]+)")
 TURN = re.compile(r"turned ([\d.]+)°")
 

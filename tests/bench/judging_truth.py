@@ -20,16 +20,16 @@ By code:
 - `sense_reversed`, `normal_reversed`, `normal_missing`, `normal_from_absolute`, `arithmetic`,
   `parallel_for_perpendicular`, `wrong_link`, `wrong_intersection`, `image_mirrored`: the vectors that
   end in the node of the changed step, as above; what is drawn from it follows.
-- `other_variant`: the crank as sketched, where the sketch is seen and asked for; else the driven link's
+- `other_variant`: the crank as sketched, where the sketch is seen and asked for; else the driving link's
   first vector, held against the exact plan. Its other vectors are either (the same mistake again), all
   else is by the student's own nodes, where only data that differ (lengths, guides) make a step wrong.
-  Where the driven link's speed differs too, a declared scale looks wrong instead: then either.
+  Where the driving link's speed differs too, a declared scale looks wrong instead: then either.
 - `other_assembly`: the links of the joint that lies on the wrong side. Where no criterion asks for them,
   or no sketch is seen, either verdict for the vectors of the first node that shows it; the rest follows.
-- `figure_rotated`: the driven link's vector of that plan; the rest is drawn rightly in the turned plan.
-- `scale_wrong`: the criterion of the scale where one was declared, or in its place the driven link's
+- `figure_rotated`: the driving link's vector of that plan; the rest is drawn rightly in the turned plan.
+- `scale_wrong`: the criterion of the scale where one was declared, or in its place the driving link's
   vector; all else is right by the scale that it follows. Undeclared it may be the student's choice:
-  either for the driven link's vector of that plan, and nothing that must be named.
+  either for the driving link's vector of that plan, and nothing that must be named.
 - `rpm_not_converted`: velocities and scales are both too large, so the drawing is right: the declared
   kv is wrong, ka either (the same mistake again). Undeclared, nothing shows.
 - `vector_missing`: nothing to judge; to credit it in full is wrong where it is not optional.
@@ -89,7 +89,7 @@ def ends_of(construction: Construction) -> dict[str, Ends]:
 
 
 def is_driven(construction: Construction, node: str) -> bool:
-    """Whether a node of a plan is laid off from the data alone: the driven link's."""
+    """Whether a node of a plan is laid off from the data alone: the driving link's."""
     step = construction.step(node)
     is_of_plan = node not in {one.node for one in construction.figures["mechanism"]}
     return is_of_plan and isinstance(step, Given) and isinstance(step.length, Scaled)
@@ -132,7 +132,7 @@ class Held:
         return {name: tuple(one[name] for one in found) for name in self.right.construction.links}
 
     def vectors(self, *, data_charged: bool) -> dict[str, tuple[Forms, ...]]:
-        """Every vector. Another student's data are charged at the driven link unless they are already."""
+        """Every vector. Another student's data are charged at the driving link unless they are already."""
         of_another = any(one.code == "other_variant" for one in self.work.task.mistakes)
         found: dict[str, tuple[Forms, ...]] = {}
         for figure in self.right.construction.poles:
@@ -212,7 +212,7 @@ def charged_once(work: StudentWork, due: Mapping[str, Due], said: Mapping[str, s
     """The verdicts due, where a mistake is charged at one of several criteria that show it.
 
     A wrong line moves its node, and all vectors that end there; letters exchanged touch several vectors: one
-    of them pays. A plan at a wrong scale is as well charged at the driven link's vector, from which the rest
+    of them pays. A plan at a wrong scale is as well charged at the driving link's vector, from which the rest
     follows.
 
     Arguments: `said` is the judge's verdict by criterion.
@@ -289,7 +289,7 @@ def _between(nodes: Mapping[str, ComplexArray], vector: Vector) -> complex:
 
 
 def _scales_of_another(work: StudentWork) -> set[str]:
-    """Scales at which another student's driven link looks as if only the scale was wrong."""
+    """Scales at which another student's driving link looks as if only the scale was wrong."""
     if not any(one.code == "other_variant" for one in work.task.mistakes):
         return set()
     right, tolerance = work.task.right, work.rubric.tolerance
@@ -379,7 +379,7 @@ class _Drawn:
                 return
 
     def _shows_where_made(self, mistake: StudentMistake, node: str) -> bool:
-        """Whether it is charged at its own node; another student's data at the driven link's vectors."""
+        """Whether it is charged at its own node; another student's data at the driving link's vectors."""
         ends = ends_of(self.work.construction)
         if any(one == "wrong" and ends[name][1] == node for name, one in self.due.items()):
             return True
@@ -393,7 +393,7 @@ def _touches_swap(work: StudentWork, name: str) -> bool:
 
 
 def _is_charged_before(work: StudentWork, name: str, *, data_charged: bool) -> bool:
-    """Of another student's data: charged at the crank, the driven link's first vector, or at its scale."""
+    """Of another student's data: charged at the crank, the driving link's first vector, or at its scale."""
     vectors = work.construction.vectors
     of_another = any(one.code == "other_variant" for one in work.task.mistakes)
     if not of_another or name not in vectors or not is_driven(work.construction, vectors[name].head):
@@ -404,7 +404,7 @@ def _is_charged_before(work: StudentWork, name: str, *, data_charged: bool) -> b
 
 
 def _is_scale_unknown(work: StudentWork, name: str) -> bool:
-    """The driven link's vector, drawn at a scale that nobody declared and the rule does not give."""
+    """The driving link's vector, drawn at a scale that nobody declared and the rule does not give."""
     wrong = {one.at for one in work.task.mistakes if one.code == "scale_wrong"}
     vector = work.construction.vectors.get(name)
     if vector is None or work.declares or vector.scale not in wrong:

@@ -1,5 +1,7 @@
 """The table and the picture of the rooms are those of the folders: run `python -m docs.make_architecture`."""
 
+import re
+
 from docs import make_architecture as architecture
 
 
@@ -11,6 +13,14 @@ def test_the_table_of_rooms_is_that_of_the_folders():
 
 def test_the_picture_of_the_rooms_is_that_of_the_imports():
     assert architecture.PICTURE.read_text(encoding="utf-8") == architecture.picture()
+
+
+def test_the_guide_to_changes_leads_to_files_that_are_there():
+    page = architecture.PAGE.read_text(encoding="utf-8")
+    guide = page.partition("## Where to change what")[2].partition("\n## ")[0]
+    named = re.findall(r"`([\w/]+\.py)`", guide)
+    assert len(named) > 10
+    assert [name for name in named if not (architecture.ROOT / name).is_file()] == []
 
 
 def test_no_room_is_above_its_ceiling():

@@ -1,4 +1,4 @@
-"""Every text that people read stands on the page of all sentences, in all languages, with an example."""
+"""Every text that people read is on one of the pages of sentences, in all languages, with an example."""
 
 import re
 
@@ -25,7 +25,7 @@ def test_every_text_of_the_catalogues_is_on_it_in_every_language():
 def test_every_parameter_has_an_example():
     named = {one for text in messages() for one in re.findall(r"%\((\w+)\)s", str(text))}
     assert named - set(sentences.EXAMPLES) == set()
-    assert not re.search(r"%\(\w+\)|\{\w+\}", sentences.page())
+    assert not re.search(r"%\(\w+\)|\{\w+\}", "".join(sentences.pages().values()))
 
 
 @pytest.mark.parametrize(

@@ -3,9 +3,11 @@
 import re
 from pathlib import Path
 
+from docs.make_sentences import ASSIGNMENTS, TOPICS
+
 ROOT = Path(__file__).resolve().parent.parent.parent
 SETTINGS = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
-MADE = {"sentences.md", "faults.md"}
+MADE = {"faults.md", f"{ASSIGNMENTS[0]}.md", *(f"{name}.md" for name in TOPICS)}
 """Pages that are made when the site is built."""
 
 

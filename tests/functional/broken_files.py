@@ -207,7 +207,7 @@ CASES = [
     _m("key of another table", "rpm = 120", "rpm = 120\nlengths = [1, 2]", "$.crank.lengths"),
     _m("two speeds", "rpm = 120", "rpm = 120\nomega = 3", "$.crank"),
     _m("no speed", "rpm = 120\n", "", "$.crank"),
-    _m("no driven link", MECHANISM[MECHANISM.index("[crank]") : MECHANISM.index("[[group]]")], "", "$"),
+    _m("no driving link", MECHANISM[MECHANISM.index("[crank]") : MECHANISM.index("[[group]]")], "", "$"),
     _m("unknown unit", 'length_unit = "mm"', 'length_unit = "in"', "$.length_unit"),
     _m("no unit", 'length_unit = "mm"\n', "", "$.length_unit"),
     _m("metres in a millimetre file", "lengths = [210, 165]", "lengths = [0.21, 0.16]", ".group[0].lengths"),

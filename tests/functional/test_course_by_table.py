@@ -154,7 +154,7 @@ def test_a_fault_in_the_table_stops_every_command_before_anything_is_written(pla
     table.write_text(table.read_text(encoding="utf-8").replace("95,230", "95 mm,23O"), encoding="utf-8")
     ran = planmark("plan", conveyor, "--all", "--csv", "all.csv")
     assert ran.returncode == 2
-    assert "conveyor.csv: 2 fault(s)" in ran.stderr
+    assert "conveyor.csv: 2 faults" in ran.stderr
     assert "line 4, column a: '95 mm' is no number: the unit stands in the heading, as a [mm]" in ran.stderr
     assert "line 4, column b: '23O' is no number" in ran.stderr
     assert not (tmp_path / "all.csv").exists()

@@ -87,7 +87,7 @@ def test_any_numbers_are_marked_for_any_mechanism(mechanism: Mechanism, lot):
     [
         # A length that only a computer can write: a scale followed it, infinitely wrong.
         ("pump-230", 6, {"v_A": "1e-320", "kv": "0.188 (m/s)/mm"}),
-        # The driven link's vector without a length.
+        # The driving link's vector without a length.
         ("pump-collinear", 17, {"v_A": "0", "a_A": "10", "kv": "10"}),
         # Values so large that their share of what is right is infinite.
         ("piston", 1, {"v_A_value": "1e308", "v_AB_value": "1e308"}),

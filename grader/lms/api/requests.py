@@ -1,4 +1,4 @@
-"""Requests to a platform: the plan of the calls, where they go, and whose submission is whose."""
+"""Requests to a platform: the plan of the calls, their addresses, and the owners of submissions."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""One grey picture of a coloured one: strokes of any pencil are dark, the paper's own rulings are not."""
+"""Convert a colour picture to grey: strokes of any pencil are dark, the paper's own rulings are not."""
 
 from dataclasses import dataclass
 from functools import reduce

@@ -1,4 +1,4 @@
-"""The printed squares of graph paper: known by period, phase and direction, and taken out of a page.
+"""The printed squares of graph paper: found by period, phase and direction, and removed from a page.
 
 Lines are numbered, and the number of the line on which a place lies is a polynomial of the place: so a turn,
 a copier's bend and a lens are followed. How dark a line is across itself is the same all along it and at its

@@ -1,8 +1,8 @@
-"""What is written on plain paper: scales, the student's number, a name of the roster.
+"""Read handwriting on plain paper: scales, the student's number, a name of the roster.
 
-Each line of writing is searched for the words that may stand there. A word's evidence is the logarithm of
-its likelihood against that of any signs in any order, so that it is 0 at most; what stands behind a label is
-then read as the text in a printed box is.
+Each line of writing is searched for the words that may stand there. A word's evidence is the logarithm of its
+likelihood against that of any signs in any order, so that it is 0 at most; the text behind a label is then
+read like that in a printed box.
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -17,46 +17,46 @@ from grader.scan.handwriting.model import COLUMN, JUNK, Lattice
 from grader.tables.scale_text import parse_scale
 
 _STRANGE = 3e-4
-"""Probability that a sign is written in a way that the recogniser does not know, for each sign."""
+"""Probability, for each sign, that it is written in a way unknown to the recogniser."""
 _SKIPPED, _SIGN_SKIPPED = -3.0, -14.0
-"""A piece of ink within a word that is no letter of it: dust or a diacritic sign, one as high as a letter."""
+"""Log likelihood of ink within a word not of its letters: dust or a diacritic, and as high as a letter."""
 _LOW = 0.35
-"""Of a line's height: lower pieces may be dust or diacritic signs."""
+"""Share of a line's height: lower pieces may be dust or diacritics."""
 _UNKNOWN = -1.5
-"""A letter that the recogniser has no sign for, against the likeliest sign."""
+"""Log likelihood of a letter without a sign in the recogniser, against the likeliest sign."""
 _LOST, _EACH_LOST = -12.0, -0.5
-"""A word so much less likely than signs at will is not followed; for each letter of it so much less."""
+"""A word this much less likely than signs at will is not followed; the second is for each letter of it."""
 _TELLING, _ALIKE = 3.0, 1.5
-"""Nats by which each letter of a word tells it from signs at will, of a form of its own and of another's."""
+"""Nats by which a word's letter differs from signs at will: with a form of its own, and with another's."""
 _PLACES, _FIRSTS = 5.0, 3.0
-"""Logarithm of how many words a page has, and of how many of them stand first in a line."""
+"""Logarithms of the number of words on a page, and of those that begin a line."""
 _DOUBTFUL = -2.0
-"""Log odds of a word from which it is worth a look."""
+"""Log odds of a word from which it is examined."""
 _LOOKS: Mapping[str, str] = {
     "и": "uH", "й": "uH", "н": "H", "т": "Tm", "к": "k", "в": "B", "г": "r", "л": "nπ", "п": "πn",
     "м": "Mm", "μ": "μum", "К": "k", "l": "1", "I": "1", "i": "1", "=": "=-", "W": "ω", "w": "ω", "5": "5s",
     "Y": "y", "L": "L1", "У": "y", "Г": "r", "П": "πn", "И": "uH", "Н": "H",
 }  # fmt: skip
-"""Signs of the recogniser that a letter may look like, where it has another form than they."""
+"""Signs of the recogniser that a letter of another form may resemble."""
 
 
 _Places = dict[int, tuple[float, int]]
-"""Log likelihood and first piece of what ends before a piece."""
+"""Log likelihood, and first piece, of the word that ends before a piece."""
 _NOWHERE = (-np.inf, -1)
 
 
 def spotters(where: InkMap, look: Look | None = None) -> list["Spotter"]:
-    """The lines of writing on a page, ready to be searched; arguments as of `find_lines`."""
+    """Return the lines of writing on a page, ready to be searched; arguments as of `find_lines`."""
     return [Spotter(line) for line in find_lines(where, look)]
 
 
 def surer(one: Written | None, other: Written | None) -> Written | None:
-    """The surer of two readings of one thing."""
+    """Return the surer of two readings of one thing."""
     return max((read for read in (one, other) if read), key=lambda read: read.confidence, default=None)
 
 
 class Spotter:
-    """A line of writing in which words are looked for.
+    """A line of writing in which words are searched.
 
     Attributes
     ----------
@@ -87,9 +87,9 @@ class Spotter:
         self._spotted: dict[tuple[int | None, str], _Places] = {}
 
     def spot(self, word: str, begin: int | None = None) -> "_Places":
-        """Where the word may end: by the piece behind it, its log likelihood and the piece where it begins.
+        """Return possible ends of the word: by the piece behind it, its log likelihood and its first piece.
 
-        Arguments: the word begins before the piece `begin`, by default wherever one may.
+        Arguments: the word begins before the piece `begin`, by default wherever a word may begin.
         """
         key = begin, word
         if key not in self._spotted:
@@ -102,7 +102,7 @@ class Spotter:
         return self._spotted[key]
 
     def _worth(self, letter: str) -> list[float]:
-        """The log likelihood of each segment as this letter."""
+        """Return the log likelihood of each segment as this letter."""
         if letter not in self._letters:
             columns = [COLUMN[sign] for sign in _LOOKS.get(letter, letter) if sign in COLUMN]
             worth = self.log[:, columns].max(axis=1) if columns else self.best + _UNKNOWN
@@ -110,7 +110,7 @@ class Spotter:
         return self._letters[letter]
 
     def _followed(self, before: "_Places", word: str) -> "_Places":
-        """Where a word may end by where it may without its last letter; dust may stand behind it."""
+        """Extend the possible ends of a word without its last letter by that letter; dust may follow it."""
         worth, least = self._worth(word[-1]), _LOST + _EACH_LOST * len(word)
         behind: _Places = {}
         for place, (log, origin) in before.items():
@@ -127,7 +127,7 @@ class Spotter:
         return behind
 
     def label(self, word: str) -> Iterable[tuple[int, float]]:
-        """The pieces before which the word may end, and the logarithm of its odds there."""
+        """Yield the pieces before which the word may end, and the log odds of each."""
         telling = sum(_TELLING if letter in COLUMN else _ALIKE * (letter in _LOOKS) for letter in word)
         reached = -np.inf
         for place, (log, origin) in sorted(self.spot(word).items(), reverse=True):
@@ -138,34 +138,34 @@ class Spotter:
             reached = max(reached, odds)
 
     def part(self, begin: int, end: int) -> Lattice:
-        """The signs from one piece up to, not including, another."""
+        """Return the signs from one piece up to, not including, another."""
         inside = [s for s in self.line.signs.segments if s.first >= begin and s.last <= end]
         shifted = (replace(s, first=s.first - begin, last=s.last - begin) for s in inside)
         return Lattice(end - begin, tuple(shifted))
 
     def ends(self, begin: int) -> list[int]:
-        """Where a text that begins before this piece may end: before wide gaps, and with the line."""
+        """Return possible ends of a text that begins before this piece: before wide gaps, and the end."""
         return [place for place in range(begin + 1, len(self.free)) if self.line.parts[place]]
 
 
 # Scales -------------------------------------------------------------------------------------------
 
 _SYMBOLS = ("k", "μ")
-"""Letters that scales are called by."""
+"""Letters that denote scales."""
 _RATIO_WORDS = ("M", "Scara", "scara", "Scale", "scale", "Масштаб", "масштаб")
-"""What stands before a ratio such as 1:5."""
+"""Words before a ratio such as 1:5."""
 _LEAST = 0.01
-"""What is less likely than that is left out."""
+"""Less probable texts are left out."""
 _MOST_SURE = 0.98
-"""No caption is surer: whose scale stands there, only the drawing can tell."""
+"""Highest confidence of a caption: only the drawing shows whose scale it is."""
 
 
 def captioned_scales(
     lines: Sequence[Spotter], names: Iterable[str], units: Mapping[str, str] | None = None
 ) -> dict[str, Written]:
-    """The scales `kL`, `kv`, `ka` that stand on a page with their label, of those asked for.
+    """Return the requested scales `kL`, `kv`, `ka` that stand on a page with their label.
 
-    Arguments: `units` are the units of bare numbers where the assignment says them, by scale.
+    Arguments: `units` are the units of bare numbers if the assignment gives them, by scale.
     """
     scales = {}
     for name in names:
@@ -177,7 +177,7 @@ def captioned_scales(
 
 
 def _scales_in(spotter: Spotter, name: str, unit: str | None) -> Iterable[Written]:
-    """What stands behind each label of a scale in a line."""
+    """Yield the texts behind each label of a scale in a line."""
     symbol = "L" if name == "kL" else name[1]
     for letter in _SYMBOLS:
         for behind, odds in spotter.label(f"{letter}{symbol}="):
@@ -194,7 +194,7 @@ def _scales_in(spotter: Spotter, name: str, unit: str | None) -> Iterable[Writte
 def _read_behind(
     spotter: Spotter, name: str, label: tuple[int, float], unit: str | None
 ) -> Iterable[Written]:
-    """The likeliest of what stands behind a label, up to where the text may end.
+    """Yield the likeliest texts behind a label, up to where the text may end.
 
     Arguments: `label` is the piece behind it and the logarithm of its odds.
     """
@@ -208,16 +208,16 @@ def _read_behind(
 
 
 _ENDS = 2
-"""Ends of a text that are tried, from the line's own backwards."""
+"""Number of possible ends of a text that are tried, from the line's own backwards."""
 
 
 def _chance(odds: float) -> float:
-    """The probability with this logarithm of its odds."""
+    """Return the probability with these log odds."""
     return float(1.0 / (1.0 + np.exp(-odds)))
 
 
 def _together(name: str, read: Sequence[Written]) -> Written:
-    """One scale written in several places: those that mean the same support it, others contradict it."""
+    """Combine readings of one scale in several places: equal meanings support it, others contradict it."""
     chances: dict[object, tuple[Written, float, float]] = {}
     for one in read:
         meaning = meaning_of(parse_scale(name, one.text))
@@ -243,21 +243,21 @@ NUMBER_WORDS = (
     "n=", "N=", "nr", "Nr", "NR", "No", "no", "вариант", "Вариант", "вар", "Вар", "variant", "Variant",
     "varianta", "Varianta", "var", "Var", "Number", "number",
 )  # fmt: skip
-"""What stands before the number of a variant, without its point or colon."""
+"""Words before the number of a variant, without their point or colon."""
 POSITION_WORDS = (
     "position", "Position", "pos", "Pos", "pozitia", "Pozitia", "poz", "Poz", "положение", "Положение",
 )  # fmt: skip
 _BETWEEN = ("", ".", ":", "=", ".:")
 _ANYTHING = -5.5
-"""Log likelihood that what stands behind the word is none of the numbers."""
+"""Log likelihood that the text behind the word is none of the numbers."""
 
 
 def written_number(
     lines: Sequence[Spotter], numbers: Collection[int], words: Sequence[str]
 ) -> Written | None:
-    """The number written behind one of the words, of those that may stand there; None where none is.
+    """Return the number written behind one of the words, of those possible; None if there is none.
 
-    What else stands there than a number lowers its confidence.
+    Any other text there lowers its confidence.
     """
     found: dict[int, float] = {}
     for spotter in lines:
@@ -272,7 +272,7 @@ def written_number(
 
 
 def _numbers_in(spotter: Spotter, numbers: Collection[int], words: Sequence[str]) -> dict[int, float]:
-    """The probability of each number by a line alone."""
+    """Return the probability of each number by a line alone."""
     behind: dict[int, float] = {}
     for word in words:
         for place, odds in spotter.label(word):
@@ -297,7 +297,7 @@ def _numbers_in(spotter: Spotter, numbers: Collection[int], words: Sequence[str]
 
 
 def written_name(lines: Sequence[Spotter], names: Mapping[str, Collection[str]]) -> tuple[str | None, float]:
-    """Whose name stands on a page, and the probability of it; None where it is nobody's of these.
+    """Return the person whose name stands on a page, and its probability; None if it is none of these.
 
     Arguments: `names` are the ways in which each person may write the name, by person.
     """

@@ -1,4 +1,4 @@
-"""What stands in the printed boxes of an answer sheet: scales and measured lengths."""
+"""Read the printed boxes of an answer sheet: scales and measured lengths."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -39,42 +39,42 @@ _SPELT: Mapping[str, tuple[str, ...]] = {
     "*": ("x",),
     ",": ("'",),
 }
-"""Signs that a letter of the text may look like: a Cyrillic m is a small M, a Cyrillic s a c."""
+"""Signs that a letter of the text may resemble: a Cyrillic m is a small M, a Cyrillic s a c."""
 _MOST_DIGITS = 7
-"""Of a number, its decimals included; more are not followed."""
+"""Most digits of a number that are followed, decimals included."""
 _BEAM = 60
-"""The likeliest texts up to a piece of ink, which are followed further."""
+"""Number of the likeliest texts up to a piece of ink that are followed further."""
 _MISSHAPEN = -4.0
-"""A letter of a unit that looks like none, or two that touch, against the likeliest sign."""
+"""Log likelihood of an unrecognised letter of a unit, or of two that touch, against the likeliest sign."""
 _MARK_LOST = -3.0
-"""A decimal mark behind a leading nought that left no ink."""
+"""Log likelihood of a decimal mark behind a leading nought that left no ink."""
 _FAR = 18.0
-"""Nats: texts so much less likely than signs at will are not followed."""
+"""Nats: texts this much less likely than signs at will are not followed."""
 _SKIPPED, _SIGN_SKIPPED = -2.0, -5.0
-"""A piece of ink taken for no sign, as low as a point and as high as a sign: beside its own probability of
-being none."""
+"""Log likelihood of ink taken for no sign, as low as a point and as high as a sign, besides its own
+probability of being none."""
 _MISPLACED = -4.0
-"""A sign whose size or place in the line is another sign's."""
+"""Log likelihood of a sign whose size or position in the line is another sign's."""
 _SMALL = 0.35
-"""Of the line's height: lower is a point or a comma, no digit."""
+"""Share of the line's height: anything lower is a point or a comma, no digit."""
 _TALL = 0.6
-"""Of the line's height: higher is no point."""
+"""Share of the line's height: anything higher is no point."""
 _DOTS = frozenset(".'")
 _FLAT = frozenset("-=:")
 _LOW, _HIGH = 0.72, 0.35
-"""Of the line's height from its top: middles below the first, above the second."""
+"""Shares of the line's height from its top: middles below the first are low, above the second high."""
 _FOOT = 0.45
-"""Of the line's height: what is smaller and low in the line is a point or a comma, of this probability."""
+"""Share of the line's height: a smaller piece low in the line is a point or a comma, by `_CERTAIN`."""
 _CERTAIN = float(np.log(0.95))
 _BAR, _WIDE_BAR, _HIGHEST_PAIR = 0.3, 0.3, 0.95
-"""Of the line's height: lower are bars and points; bars are wider; so high are two over each other."""
+"""Shares of the line's height: bars and points are lower; bars are wider; stacked signs are this high."""
 _MERGED = -0.7
-"""For each further piece of ink that a sign is taken to be made of."""
+"""Log likelihood of each further piece of ink that a sign is made of."""
 
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """One sign written: the column's sign, what it adds to the text, and the state after it."""
+    """One written sign: its column, the text that it adds, and the state after it."""
 
     sign: str
     text: str
@@ -85,16 +85,16 @@ class Move:
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """Where in the box's text one stands.
+    """The position in a box's text.
 
     Attributes
     ----------
     kind : `start`, `number`, `tail` or `end`
-    digits : how many of the number are written
-    marked : whether its decimal mark is
+    digits : number of digits written so far
+    marked : whether its decimal mark is written
     bare_mark : whether nothing stands behind the mark yet
     is_nought : whether a leading nought stands alone: nobody writes more digits without a mark then
-    after : what may follow, texts spelt sign by sign
+    after : texts that may follow, spelt sign by sign
     """
 
     kind: str
@@ -114,14 +114,14 @@ class State:
 
     @property
     def is_end(self) -> bool:
-        """Whether the text may stop here."""
+        """True if the text may stop here."""
         number = self.kind == "number" and self.digits > 0 and not self.bare_mark and not self.is_nought
         return "" in self.after and (self.kind == "tail" or number)
 
 
 @cache
 def units(name: str) -> tuple[str, ...]:
-    """The units of a scale as people write them, and none."""
+    """Return the units of a scale as people write them, and none."""
     spellings = [""]
     for real, paper in product(_LENGTHS, _LENGTHS[1:]):
         if name == "kL":
@@ -136,7 +136,7 @@ def units(name: str) -> tuple[str, ...]:
 
 @cache
 def rules(name: str) -> tuple[str, ...]:
-    """Rules by which a scale may be declared."""
+    """Return rules by which a scale may be declared."""
     if name == "kL":
         return ()
     speeds = ("ω",) if name == "kv" else ("ω2", "ω^2")
@@ -148,7 +148,7 @@ def rules(name: str) -> tuple[str, ...]:
 
 
 def start(name: str) -> State:
-    """Before the first sign of the box of `kL`, `kv` or `ka`."""
+    """Return the state before the first sign of the box of `kL`, `kv` or `ka`."""
     texts = [f"{label}{rest}" for label in ("", f"{name}=") for rest in ("#", *rules(name))]
     texts += [f"{rule}=#" for rule in rules(name)]
     if name == "kL":
@@ -158,7 +158,7 @@ def start(name: str) -> State:
 
 @cache
 def moves(name: str, state: State) -> tuple[Move, ...]:
-    """Every sign that may come next. `#` in `after` stands for a number and its unit."""
+    """Return every sign that may come next. `#` in `after` stands for a number and its unit."""
     return tuple(_moves(name, state))
 
 
@@ -197,7 +197,7 @@ def _tails(name: str, after: tuple[str, ...]) -> Iterable[Move]:
             firsts.setdefault(text[0], []).append(text[1:])
     for first, rests in firsts.items():
         if first == "^":
-            # The raised 2 alone is written; the sign for a power is only ours.
+            # People write only the raised 2; the sign for a power is internal.
             for rest in rests:
                 yield Move(rest[0], f"^{rest[0]}", State("tail", after=(rest[1:],)), in_tail=True)
             continue
@@ -213,17 +213,17 @@ def _tails(name: str, after: tuple[str, ...]) -> Iterable[Move]:
 
 @dataclass(frozen=True, slots=True)
 class ScaleText:
-    """A text that may be written, and the logarithm of its likelihood."""
+    """A possible text, and its log likelihood."""
 
     text: str
     log: float
 
 
 def texts_of(lattice: Lattice, name: str) -> tuple[list[ScaleText], float]:
-    """Texts that the box of a scale may hold, likeliest first; and the log likelihood of signs at will.
+    """Return texts that a scale's box may hold, likeliest first; and the log likelihood of signs at will.
 
-    The second value is what the ink would be worth if any signs might stand in any order: a text that
-    is much less likely than that was read into the ink.
+    The second value is what the ink would be worth if any signs might stand in any order: a much less likely
+    text is an over-interpretation of the ink.
     """
     by_piece: list[list[_Candidate]] = [[] for _ in range(lattice.count)]
     high = _BAR * _line(lattice)[0]
@@ -285,7 +285,7 @@ def _candidate(segment: Segment, log: FloatArray, *, dust: bool) -> _Candidate:
 
 @cache
 def _steps(name: str, state: State) -> tuple[tuple[int, str, State, float, bool], ...]:
-    """What may come next: the sign's column, its text, the state after it, its cost, whether in a unit.
+    """Return the next signs: column, text, state after it, cost, and whether it is in a unit.
 
     Two letters of a unit that touch have no column.
     """
@@ -307,7 +307,7 @@ def _keep(target: dict[tuple[State, str], float], key: tuple[State, str], score:
 
 
 def _line(lattice: Lattice) -> tuple[float, float, float]:
-    """Height of the line's signs, and its top and bottom, px."""
+    """Return the height of the line's signs, and its top and bottom, px."""
     boxes = np.array([s.box for s in lattice.segments if s.last == s.first + 1], dtype=np.float64)
     if len(boxes) == 0:
         return 1.0, 0.0, 1.0
@@ -317,7 +317,7 @@ def _line(lattice: Lattice) -> tuple[float, float, float]:
 
 
 def placed(lattice: Lattice) -> list[tuple[Segment, FloatArray]]:
-    """Each segment with (signs,) log probabilities, with what size and place in the line say of each sign.
+    """Return each segment with (signs,) log probabilities that include its size and position in the line.
 
     Shapes alone do not tell a point from an o: a small mark at the foot of the line is a point or a
     comma, whatever it looks like; two small marks over each other are a colon or an equals sign.
@@ -365,40 +365,40 @@ def _placed(
 # Scales -------------------------------------------------------------------------------------------
 
 PX_PER_MM = 12.0
-"""Resolution at which writing is read: a digit of 3 mm is as high as the recogniser's picture, and more."""
+"""Resolution at which writing is read: a digit of 3 mm is at least as high as the recogniser's picture."""
 _BORDER_MM, _CELL_BORDER_MM = 0.55, 0.4
-"""Inside of a box's and of a cell's printed line, with the print's and the registration's error."""
+"""Margin inside a box's and a cell's printed line, for the errors of print and registration."""
 _PAPER = 0.8
 """Quantile of a box's pixels that is paper: writing never fills a fifth of it."""
 _FOREIGN = 0.25
-"""Log likelihood by sign that a text may lack against signs at will, before it is doubted."""
+"""Log likelihood per sign that a text may lack against signs at will before it is doubted."""
 _LARGE, _HARDLY = 1000.0, -4.0
-"""From here on, a number lost its decimal point more likely than that anybody chose the scale."""
+"""From this value on, a lost decimal point is more likely than that anybody chose the scale."""
 _RARE, _RARE_UNITS = -2.0, ("mm/s", "cm/s", "cm/mm", "mm/mm", "/cm", "·cm", "*cm")
-"""Scales that few people write: for each such unit in the text."""
+"""Log prior of scales that few people write, for each such unit in the text."""
 _MOST_TEXTS = 200
-"""The likeliest, among which those that mean the same are put together."""
+"""Number of the likeliest texts among which those of equal meaning are combined."""
 _DIGITS = "0123456789"
 _LEAST_PEAK = 40
-"""Of 255: a cell whose darkest ink is fainter is empty."""
+"""Contrast of 255: a cell whose darkest ink is fainter is empty."""
 _INK = 0.4
-"""Of a cell's darkest ink: what is fainter is blur."""
+"""Share of a cell's darkest ink: anything fainter is blur."""
 _LEAST_MM = 1.0
 """Ink no higher than this is no digit: dust, a dot, the border of the next cell."""
 _DUST_MM = 0.35
-"""Nor is it a part of one."""
+"""Nor is ink this low a part of one."""
 _SOFTEN_MM = 0.11
 """A pencil's grain breaks strokes: they are closed before dust is left out."""
 _FULL = 0.97
 """Share of a cell that is less inked than the middle of a stroke."""
 _NO_TENTHS = 0.5
-"""Confidence in whole millimetres where the cell of the tenths is left empty: a shifted number looks so."""
+"""Confidence in whole millimetres if the cell of the tenths is empty: a shifted number looks the same."""
 
 
 def written_scales(page: Page, sheet: Sheet, units: Mapping[str, str] | None = None) -> dict[str, Written]:
-    """What stands in the boxes of a printed sheet, by scale; empty boxes, and a plain sheet, give nothing.
+    """Return the contents of a printed sheet's boxes, by scale; nothing for empty boxes or a plain sheet.
 
-    Arguments: `units` are the units of bare numbers where the assignment says them, by scale.
+    Arguments: `units` are the units of bare numbers if the assignment gives them, by scale.
     """
     names = [SCALE_OF[figure] for figure in sheet.zones if figure in SCALE_OF]
     if not names:
@@ -412,7 +412,7 @@ def written_scales(page: Page, sheet: Sheet, units: Mapping[str, str] | None = N
 
 
 def read_scale(lattice: Lattice, name: str, bare_unit: str | None = None) -> Written:
-    """The likeliest scale in a line of writing."""
+    """Return the likeliest scale in a line of writing."""
     texts, at_will = texts_of(lattice, name)
     meant = _by_meaning(texts[:_MOST_TEXTS], name, bare_unit)
     if not meant:
@@ -428,7 +428,7 @@ def read_scale(lattice: Lattice, name: str, bare_unit: str | None = None) -> Wri
 
 
 def _by_meaning(texts: list[ScaleText], name: str, bare_unit: str | None) -> dict[object, tuple[str, float]]:
-    """Texts that mean the same put together: the likeliest spelling, and the log of their sum."""
+    """Combine texts of equal meaning: the likeliest spelling, and the log of their sum."""
     meanings: dict[object, tuple[str, float]] = {}
     for candidate in texts:
         meaning = meaning_of(parse_scale(name, candidate.text, bare_unit=bare_unit))
@@ -442,7 +442,7 @@ def _by_meaning(texts: list[ScaleText], name: str, bare_unit: str | None) -> dic
 
 
 def meaning_of(parsed: ParsedScale) -> object | None:
-    """What is the same for all texts that declare the same scale; None for those that declare none."""
+    """Return a key that is equal for all texts that declare the same scale; None if they declare none."""
     match parsed:
         case Declared(per_mm=value):
             return float(f"{value:.9g}")
@@ -453,7 +453,7 @@ def meaning_of(parsed: ParsedScale) -> object | None:
 
 
 def writing(page: Page, sheet: Sheet, box: Box, border_mm: float) -> GreyImage:
-    """Contrast inside a printed box without its border, upright, 12 px/mm; empty outside of the picture."""
+    """Return the contrast inside a printed box without its border, upright, 12 px/mm; empty if outside."""
     x, y, wide, high = box
     inner = x + border_mm, y + border_mm, wide - 2.0 * border_mm, high - 2.0 * border_mm
     grey = cut_out(page.grey, sheet.mm_to_px, inner, PX_PER_MM)
@@ -469,10 +469,10 @@ def writing(page: Page, sheet: Sheet, box: Box, border_mm: float) -> GreyImage:
 def written_lengths(
     page: Page, sheet: Sheet, cells: Mapping[str, Sequence[Box]]
 ) -> dict[str, tuple[float, float]]:
-    """Millimetres and the probability that they are what is written, by name; nothing for empty boxes.
+    """Return lengths, mm, with the probability that they are as written, by name; nothing for empty boxes.
 
     Arguments: `cells` are the boxes of a name's digits in sheet mm, from the left, the last for the tenths.
-    What is no number (a gap between digits, a sign that is no digit) has the probability 0.
+    Anything that is no number (a gap between digits, a sign that is no digit) has the probability 0.
     """
     pictures: list[GreyImage] = []
     sizes: list[tuple[float, float]] = []
@@ -494,7 +494,7 @@ def written_lengths(
 
 
 def _sign(grey: GreyImage) -> GreyImage | None:
-    """What is written in a cell, cut out; None where it is empty."""
+    """Cut out the sign written in a cell; None if it is empty."""
     if grey.size == 0 or grey.max() < _LEAST_PEAK:
         return None
     soft = cv2.GaussianBlur(grey, (0, 0), _SOFTEN_MM * PX_PER_MM)
@@ -510,7 +510,7 @@ def _sign(grey: GreyImage) -> GreyImage | None:
 
 
 def _length(places: Sequence[int | None], probability: FloatArray) -> tuple[float, float]:
-    """The number in a row of cells, and the probability that every digit of it is right."""
+    """Return the number in a row of cells, and the probability that every digit of it is right."""
     columns = [COLUMN[digit] for digit in _DIGITS]
     value, sure = 0.0, 1.0
     for place in places:

@@ -1,4 +1,4 @@
-"""Letters on a drawing, beside its nodes."""
+"""Find letters on a drawing, beside its nodes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,58 +15,58 @@ from grader.scan.handwriting.model import COLUMN, JUNK, SIGNS
 from grader.scan.pixels import BoolArray, Float32Array, lengths_and_directions
 
 DETECTED = (*"o123456789", *"aAbBcdDeEfFgGhHJkLmMnNprRstTuvxyz", *"πωεμ", "'")
-"""The signs that the detector knows; points, dashes and brackets are too like ends and pieces of lines."""
+"""The signs that the detector knows; points, dashes and brackets resemble ends and pieces of lines."""
 PX_PER_MM = 6.0
-"""Of the ink map that it looks at."""
+"""Resolution of the ink map that the detector uses."""
 _COARSE = 1.1
-"""Maps of pages of so much less resolution are made finer: the networks know signs by their size."""
+"""Maps of coarser pages by this factor are refined: the networks know signs by their size."""
 CELL_PX = 4
-"""Side of the cells for which it answers."""
+"""Side of the cells for which the detector answers."""
 TILE_PX, _MARGIN_PX = 96, 16
-"""It looks at tiles of this side; what lies nearer to a tile's border is left to the neighbour."""
+"""Side of the detector's tiles; signs nearer to a tile's border are left to the neighbour."""
 _AT_ONCE = 16
-"""Tiles whose planes fit into the processor's cache together."""
+"""Number of tiles whose planes fit into the processor's cache together."""
 UNIT_PX = 8.0
-"""Its distances to a sign's borders are in this unit."""
+"""Unit of its distances to a sign's borders."""
 _LEAST = -2.0
-"""Places with lower log odds are no sign's middle."""
+"""Positions with lower log odds are no sign's middle."""
 CROP_PX, _AROUND, _LEAST_CROP_PX = 32, 1.4, 9.0
-"""A box with its surroundings is brought to this size; a prime has at least so many pixels about it."""
+"""A box with its surroundings is scaled to this size; a prime has at least this many pixels around it."""
 _COOLING, _STRANGE = 1.05, 0.005
-"""In hands that nobody has seen: what the scores of the signs are multiplied by, and the share of signs of
-which nothing is known. Fitted to fonts left out."""
+"""Calibration for unknown handwriting: factor of the signs' scores, and share of signs of which nothing is
+known. Fitted to fonts left out."""
 _WEIGHTS = (1.26, 0.64, -0.35)
-"""Of the detector's and the other network's log odds that it is a sign, and what is added. Fitted as well."""
+"""Weights of both networks' log odds that it is a sign, and a constant. Fitted as well."""
 _SAME = 0.5
-"""Boxes that share so much of the smaller one's area are one sign."""
+"""Boxes that share this much of the smaller one's area are one sign."""
 _FAINT = 20
-"""Of 255: fainter is paper."""
+"""Contrast of 255: fainter ink is paper."""
 _SHARE = 0.2
-"""Of the usual darkness of the sheet's ink: fainter is squared paper, or the back showing through."""
+"""Share of the usual darkness of the sheet's ink: anything fainter is squared paper, or show-through."""
 _GROWN_MM = 0.16
-"""Strokes are taken out with so much more than their width: the hand's wobble and the blur."""
+"""Strokes are removed with this much more than their width: wobble and blur."""
 _LONG_MM = 6.0
 """Shorter strokes may be the letters' own."""
 _REST_PX, _REST = 8, 0.1
-"""A square of this side is looked at where so much of it is ink that no long stroke explains."""
+"""Squares of this side are examined if this share of them is ink that no long stroke explains."""
 _ABOUT_MM = 9.0
 """Letters of nodes are no farther from a long stroke."""
 _GAP, _LEVEL = 0.9, 0.4
-"""Signs of one line of writing: so many heights apart, so much of the lower one's height at one level."""
+"""Signs of one line: largest gap in heights, and least common height as a share of the lower one."""
 _FEW, _ENOUGH = 8, 32
-"""Fewer signs do not tell which way up they stand; of more, those are asked that are likeliest signs."""
+"""Fewer signs do not show which way up they stand; of more, only the likeliest signs are used."""
 _NATS, STAND_UPRIGHT = 3.0, 6.0
-"""One sign alone tells no more: a p on its head is a d; and from where on all together tell."""
+"""Most nats of a single sign: a p on its head is a d; and the total from which they decide."""
 _WORDS = 7
 """More signs in a line are words or a calculation, no letter of a node."""
 
 
 def find_letters(ink: Ink, boxes: Sequence[Box] | None = None) -> Letters:
-    """Every sign that can be a node's letter, with its probabilities, also where lines run through it.
+    """Return every sign that can be a node's letter, with its probabilities, even if lines run through it.
 
     Words and calculations are left out.
 
-    Arguments: `boxes` is where to look, sheet mm; the whole sheet by default.
+    Arguments: `boxes` are the areas to search, sheet mm; the whole sheet by default.
     """
     unit = ink.where.px_per_mm
     left, top, grey = _window(ink, boxes)
@@ -88,9 +88,9 @@ def find_letters(ink: Ink, boxes: Sequence[Box] | None = None) -> Letters:
 
 
 def upright_nats(ink: Ink | None) -> float | None:
-    """How much better the likeliest signs are read as they stand than on their heads; None of few signs.
+    """Return how much better the likeliest signs are read upright than upside down; None for few signs.
 
-    Of 23 sheets 8 to 25 where they stood upright, at most 1 where they did not.
+    On 23 sheets it was 8 to 25 for upright ones, at most 1 for others.
     """
     if ink is None or ink.letters is None or len(ink.letters) < _FEW:
         return None
@@ -112,7 +112,7 @@ def _part(top: int, low: int, left: int, right: int) -> tuple[slice, slice]:
 
 
 def _window(ink: Ink, boxes: Sequence[Box] | None) -> tuple[int, int, GreyImage]:
-    """Left column, top row and contrast of the part of the map that holds the boxes."""
+    """Return left column, top row and contrast of the part of the map that holds the boxes."""
     picture, unit = ink.where.ink, ink.where.px_per_mm
     if boxes is None:
         return 0, 0, picture
@@ -122,7 +122,7 @@ def _window(ink: Ink, boxes: Sequence[Box] | None) -> tuple[int, int, GreyImage]
 
 
 def _tiles(grey: GreyImage, drawn: GreyImage) -> list[tuple[int, int]]:
-    """Left columns and top rows of tiles that hold all ink that long strokes do not explain."""
+    """Return left columns and top rows of tiles that hold all ink that long strokes do not explain."""
     some = grey[::11, ::11]
     some = some[some > 2 * _FAINT]
     if len(some) == 0:
@@ -145,7 +145,7 @@ def _tiles(grey: GreyImage, drawn: GreyImage) -> list[tuple[int, int]]:
 
 
 def _coarse(plane: GreyImage) -> GreyImage:
-    """Means over squares, those at the right and lower border with paper beyond."""
+    """Return means over squares, those at the right and lower border filled up with paper."""
     beyond = [-side % _REST_PX for side in plane.shape]
     whole = cv2.copyMakeBorder(plane, 0, beyond[0], 0, beyond[1], cv2.BORDER_CONSTANT)
     size = whole.shape[1] // _REST_PX, whole.shape[0] // _REST_PX
@@ -154,14 +154,14 @@ def _coarse(plane: GreyImage) -> GreyImage:
 
 @cache
 def network(name: str) -> cv2.dnn.Net:
-    """One of the two networks: `detector` or `signs`."""
+    """Load one of the two networks: `detector` or `signs`."""
     # OpenCV 5's other engine, its default, takes twice as long.
     classic = {"engine": cv2.dnn.ENGINE_CLASSIC} if hasattr(cv2.dnn, "ENGINE_CLASSIC") else {}
     return cv2.dnn.readNetFromONNX(str(Path(__file__).with_name(f"{name}.onnx")), **classic)
 
 
 def answers(name: str, pictures: NDArray[np.uint8]) -> Float32Array:
-    """What a network says of (n, h, w) pictures, 255 = ink."""
+    """Return a network's answers for (n, h, w) pictures, 255 = ink."""
     of = network(name)
     parts = []
     for first in range(0, len(pictures), _AT_ONCE):
@@ -171,7 +171,7 @@ def answers(name: str, pictures: NDArray[np.uint8]) -> Float32Array:
 
 
 def _signs(grey: GreyImage, tiles: Sequence[tuple[int, int]]) -> tuple[FloatArray, FloatArray]:
-    """Boxes (k, 4) x, y, w, h in pixels of `grey`, and (k, signs) probabilities of the signs in the tiles."""
+    """Return boxes (k, 4) x, y, w, h in pixels of `grey`, and (k, signs) probabilities, of all signs."""
     if not tiles:
         return np.zeros((0, 4)), np.zeros((0, len(SIGNS)))
     around = np.pad(grey, TILE_PX)
@@ -187,7 +187,7 @@ def _signs(grey: GreyImage, tiles: Sequence[tuple[int, int]]) -> tuple[FloatArra
 
 
 def crops(grey: GreyImage, box: FloatArray) -> NDArray[np.uint8]:
-    """(k, 32, 32) pictures of what stands in boxes (k, 4) x, y, w, h, with a margin."""
+    """Return (k, 32, 32) pictures of the contents of boxes (k, 4) x, y, w, h, with a margin."""
     side = np.maximum(_AROUND * box[:, 2:].max(axis=1), _LEAST_CROP_PX)
     corner = box[:, :2] + box[:, 2:] / 2.0 - side[:, None] / 2.0
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
@@ -201,7 +201,7 @@ def crops(grey: GreyImage, box: FloatArray) -> NDArray[np.uint8]:
 
 
 def spread(told: Float32Array) -> Float32Array:
-    """(n, planes, high, wide) answers by cell: the network gives those of two by two cells at one place."""
+    """Return (n, planes, high, wide) answers by cell: the network gives those of 2 x 2 cells together."""
     count, planes, high, wide = told.shape
     told = told.reshape(count, planes // 4, 2, 2, high, wide).transpose(0, 1, 4, 2, 5, 3)
     return np.ascontiguousarray(told).reshape(count, planes // 4, 2 * high, 2 * wide)
@@ -209,11 +209,11 @@ def spread(told: Float32Array) -> Float32Array:
 
 @dataclass(frozen=True, slots=True)
 class Peaks:
-    """Places that are likelier the middle of a sign than those about them.
+    """Positions that are likelier the middle of a sign than those around them.
 
     Attributes
     ----------
-    tile : (k,) in which tile
+    tile : (k,) index of the tile
     box : (k, 4) x, y, w, h of the sign in the tile's pixels
     odds : (k,) log odds that it is a sign
     """
@@ -224,7 +224,7 @@ class Peaks:
 
 
 def peaks(told: Float32Array, margin: int) -> Peaks:
-    """The peaks in tiles; `told` as `spread` gives it, `margin` cells at the border are left out."""
+    """Return the peaks in tiles; `told` as `spread` gives it, without `margin` cells at the border."""
     odds = told[:, 0]
     highest = np.stack([cv2.dilate(plane, np.ones((3, 3), np.uint8)) for plane in odds])
     inner = np.zeros(odds.shape[1:], dtype=bool)
@@ -238,7 +238,7 @@ def peaks(told: Float32Array, margin: int) -> Peaks:
 
 
 def probabilities(odds: FloatArray, scores: Float32Array) -> FloatArray:
-    """(k, signs) of every sign: the two networks' words together, tempered."""
+    """Combine the two networks' answers to (k, signs) probabilities, tempered."""
     named = np.exp(_COOLING * (scores[:, :-1] - scores[:, :-1].max(axis=1, keepdims=True)).astype(np.float64))
     against = np.logaddexp.reduce(scores[:, :-1].astype(np.float64), axis=1) - scores[:, -1]
     sign = 1.0 / (1.0 + np.exp(-(_WEIGHTS[0] * odds + _WEIGHTS[1] * against + _WEIGHTS[2])))
@@ -250,7 +250,7 @@ def probabilities(odds: FloatArray, scores: Float32Array) -> FloatArray:
 
 
 def _distinct(box: FloatArray, odds: FloatArray) -> IntArray:
-    """One row for each sign: of boxes that overlap the one that is likeliest a sign."""
+    """Return one row for each sign: of overlapping boxes the one that is likeliest a sign."""
     order = np.argsort(-odds, kind="stable")
     low, far = box[order, :2], box[order, :2] + box[order, 2:]
     shared = np.maximum(np.minimum(far[:, None], far) - np.maximum(low[:, None], low), 0.0).prod(axis=2)
@@ -263,7 +263,7 @@ def _distinct(box: FloatArray, odds: FloatArray) -> IntArray:
 
 
 def _in_words(box: FloatArray) -> BoolArray:
-    """Which boxes stand in a line with many others."""
+    """Return which boxes stand in a line with many others."""
     x, y, w, h = box.T[:, :, None]
     beside = x.T - x - w < _GAP * np.maximum(h, h.T)
     level = np.minimum(y + h, (y + h).T) - np.maximum(y, y.T) > _LEVEL * np.minimum(h, h.T)
@@ -273,7 +273,7 @@ def _in_words(box: FloatArray) -> BoolArray:
 
 
 def _drawn(ink: Ink, corner: tuple[int, int], shape: Sequence[int]) -> GreyImage:
-    """255 where a long fitted stroke runs; rings are not among them: a letter o is one."""
+    """Return 255 where a long fitted stroke runs; rings are excluded: a letter o is one."""
     unit, shift = ink.where.px_per_mm, 4
     fine = 1 << shift
     drawn = np.zeros(tuple(shape), dtype=np.uint8)

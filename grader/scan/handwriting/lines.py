@@ -1,4 +1,4 @@
-"""Lines of writing on plain paper: pieces of ink in a row that belong to no drawn line."""
+"""Find lines of writing on plain paper: pieces of ink in a row that belong to no drawn line."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,34 +14,34 @@ from grader.scan.handwriting.model import Lattice, lattice_of
 from grader.scan.pixels import BoolArray
 
 _COARSE = 2
-"""The map is reduced so much to find lines: letters of one word may touch there."""
+"""Reduction of the map for finding lines: letters of one word may touch there."""
 _FAINT = 30
-"""Of 255: fainter is paper, or the back showing through."""
+"""Contrast of 255: fainter ink is paper, or show-through."""
 _SHARE = 0.4
-"""Of the darkest ink in a letter's surroundings: fainter is its blur."""
+"""Share of the darkest ink in a letter's surroundings: anything fainter is its blur."""
 _PEAK_MM = 3.0
 """Surroundings of a letter: its neighbours are as dark."""
 _ACROSS_MM, _UPRIGHT_MM = 16.0, 8.0
 """Longer runs of ink along a row and along a column of pixels are ruled lines: letters of a broad pen touch
 along the first, none is as high as the second."""
 _LEAST_MM, _HIGHEST_MM, _LONGEST_MM = 1.0, 9.0, 25.0
-"""Letters are higher, and lower; so long may a word be whose letters touch."""
+"""Least and largest height of letters, and the longest word whose letters touch."""
 _LEVEL = 0.45
-"""Neighbours in a line share so much of the lower one's height."""
+"""Neighbours in a line share this much of the lower one's height."""
 _LIKE = 3.0
 """Neighbours in a line differ in height by this factor at most: indices are two thirds."""
 _GAP = 2.6
-"""Of the higher neighbour's height: wider gaps part two lines of writing."""
+"""Gaps wider than this many heights of the higher neighbour separate two lines of writing."""
 _AROUND = 0.45
-"""Of a line's height, above and below it: raised powers and lowered indices."""
+"""Margin above and below a line, as a share of its height: raised powers and lowered indices."""
 _LEAST_SIGNS = 3
 """Shorter lines are letters of nodes and vectors; `n=7` has three signs."""
 _MOST_PIECES, _MOST_LINES = 1500, 80
-"""No drawing has more: squared paper and hatching have."""
+"""Limits that no drawing reaches: squared paper and hatching do."""
 _THIN = 0.25
-"""Of a line's height: wider pieces are no remains of a ruled line."""
+"""Share of a line's height: wider pieces are no remains of a ruled line."""
 _WORD, _TEXT = 0.32, 1.3
-"""Of a line's height: wider gaps part words, and texts."""
+"""Shares of a line's height: wider gaps separate words, and texts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +50,10 @@ class Line:
 
     Attributes
     ----------
-    box : where it stands, sheet mm
-    signs : what its signs may be, in the order of writing
-    gaps : (signs.count + 1,) free room before each piece, of the line's height; infinite at both ends
-    thin : (signs.count + 1,) whether a thin piece stands before, which may be left of a ruled line
+    box : its position, sheet mm
+    signs : its possible signs, in the order of writing
+    gaps : (signs.count + 1,) free room before each piece, in line heights; infinite at both ends
+    thin : (signs.count + 1,) whether a thin piece stands before, perhaps the rest of a ruled line
     """
 
     box: Box
@@ -79,13 +79,13 @@ class Line:
 
 
 Look = Callable[[Box], GreyImage]
-"""Gives the contrast inside a box of the sheet, 255 = ink, 12 px/mm."""
+"""Returns the contrast inside a box of the sheet, 255 = ink, 12 px/mm."""
 
 
 def find_lines(where: InkMap, look: Look | None = None) -> list[Line]:
-    """The lines of writing on a page, in no order.
+    """Return the lines of writing on a page, in no order.
 
-    Arguments: signs are looked at on the page by `look`, else on the map, where narrow ones touch.
+    Arguments: `look` shows signs on the page; without it they are read from the map, where narrow ones touch.
     """
     unit = where.px_per_mm / _COARSE
     labels, pieces = _pieces(where)
@@ -105,7 +105,7 @@ def find_lines(where: InkMap, look: Look | None = None) -> list[Line]:
 
 
 def _enlarged(where: InkMap, box: tuple[int, int, int, int]) -> GreyImage:
-    """A part of the map, given by its sides on the coarse one, enlarged to 12 px/mm."""
+    """Return a part of the map, given by its sides on the coarse one, enlarged to 12 px/mm."""
     left, top, right, bottom = (_COARSE * side for side in box)
     finer = PX_PER_MM / where.px_per_mm
     grey = cv2.resize(
@@ -115,7 +115,7 @@ def _enlarged(where: InkMap, box: tuple[int, int, int, int]) -> GreyImage:
 
 
 def _pieces(where: InkMap) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """The labels of the pieces of ink on a coarse map without its ruled lines, and (n, 5) their extents.
+    """Return labels of the pieces of ink on a coarse map without ruled lines, and (n, 5) their extents.
 
     Extents are left, top, right and bottom, px, and the label.
     """
@@ -153,7 +153,7 @@ class _Row:
 
 
 def _rows(pieces: NDArray[np.int32], unit: float) -> list[_Row]:
-    """Pieces that stand in a row, each with the points, signs and indices about it."""
+    """Return pieces that stand in a row, each with the points, signs and indices around it."""
     is_letter = pieces[:, 3] - pieces[:, 1] >= _LEAST_MM * unit
     letters, small = pieces[is_letter], pieces[~is_letter]
     if not 0 < len(letters) <= _MOST_PIECES:
@@ -188,7 +188,7 @@ def _rows(pieces: NDArray[np.int32], unit: float) -> list[_Row]:
 
 
 def _line(box: Box, signs: Lattice, high: float) -> Line:
-    """A line, with the free room between its pieces, `high` px of which are its height."""
+    """Return a line, with the free room between its pieces, for a height of `high` px."""
     alone = {s.first: s.box for s in signs.segments if s.last == s.first + 1}
     gaps, thin = np.full(signs.count + 1, np.inf), np.zeros(signs.count + 1, dtype=np.bool_)
     reached = -np.inf

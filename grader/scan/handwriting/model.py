@@ -59,21 +59,21 @@ COLUMN: dict[str, int] = {**_OWN, **{sign: _OWN[twin] for sign, twin in TWINS.it
 SIDE_PX = 28
 """Side of a sign's picture; the sign's longer side fills all but the margin."""
 _MARGIN_PX = 3
-"""Around the sign: its border's gradient lies inside the picture."""
+"""Margin around the sign: its border's gradient lies inside the picture."""
 _ORIENTATIONS = 8
-"""Directions that borders are sorted by."""
+"""Number of directions of borders."""
 _CELLS, _ZONES = 6, 7
 """Cells along a side: for the directions of borders, and for the ink."""
 _LOBE = 0.6
 """A border counts for a direction as far as its part along it exceeds this share of its strength."""
 _LEAST_PX = 1.0
-"""No side of a crop counts as shorter."""
+"""Least side of a crop that is used in a division."""
 _AT_ONCE = 32
-"""Pictures whose numbers fit into the processor's cache together."""
+"""Number of pictures whose numbers fit into the processor's cache together."""
 
 
 def normalised(crop: GreyImage) -> GreyImage:
-    """(28, 28) uint8 picture of a sign: its crop, 255 = ink, at the one size, proportions kept."""
+    """Return (28, 28) uint8 picture of a sign: its crop, 255 = ink, at one size, proportions kept."""
     high, wide = crop.shape
     scale = (SIDE_PX - 2 * _MARGIN_PX) / max(high, wide)
     size = max(1, round(wide * scale)), max(1, round(high * scale))
@@ -86,7 +86,7 @@ def normalised(crop: GreyImage) -> GreyImage:
 
 
 def features(pictures: Sequence[GreyImage] | NDArray[np.uint8], sizes_px: FloatArray) -> Float32Array:
-    """(n, 338) what tells signs apart, from (n, 28, 28) pictures and (n, 2) width and height of the crops."""
+    """Return (n, 338) features of (n, 28, 28) pictures with (n, 2) width and height of their crops."""
     stacked = np.asarray(pictures, dtype=np.uint8)
     parts = [slice(first, first + _AT_ONCE) for first in range(0, len(stacked), _AT_ONCE)]
     return np.concatenate([_features(stacked[part], sizes_px[part]) for part in parts])
@@ -104,7 +104,7 @@ def _features(pictures: NDArray[np.uint8], sizes_px: FloatArray) -> Float32Array
 
 
 def _directions(grey: Float32Array) -> Float32Array:
-    """(n, 8 x 6 x 6) strength of the borders by direction and cell, as square roots of unit length."""
+    """Return (n, 8 x 6 x 6) border strength by direction and cell, as square roots of unit length."""
     padded = np.pad(grey, ((0, 0), (1, 1), (1, 1)))
     gx = padded[:, 1:-1, 2:] - padded[:, 1:-1, :-2]
     gy = padded[:, 2:, 1:-1] - padded[:, :-2, 1:-1]
@@ -119,7 +119,7 @@ def _directions(grey: Float32Array) -> Float32Array:
 
 
 def _pooled(planes: Float32Array, cells: int) -> Float32Array:
-    """(n, m, cells, cells) sums over overlapping cells, weighted by nearness, of (n, m, 28, 28) planes."""
+    """Return (n, m, cells, cells) sums over overlapping cells, by nearness, of (n, m, 28, 28) planes."""
     weights = _weights(cells)
     return np.asarray(weights @ planes @ weights.T, dtype=np.float32)
 
@@ -143,7 +143,7 @@ class Model:
     Attributes
     ----------
     weights, biases : a matrix (inputs, outputs) and a row for each layer
-    cooling : what scores are multiplied by before they become probabilities
+    cooling : factor of the scores before they become probabilities
     """
 
     weights: tuple[Float32Array, ...]
@@ -151,14 +151,14 @@ class Model:
     cooling: float
 
     def scores(self, inputs: Float32Array) -> FloatArray:
-        """(n, signs) scores of features (n, m)."""
+        """Return (n, signs) scores of features (n, m)."""
         layer = inputs
         for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
             layer = np.maximum(layer @ weight + bias, np.float32(0.0))
         return np.asarray(layer @ self.weights[-1] + self.biases[-1], dtype=np.float64)
 
     def probability(self, inputs: Float32Array) -> FloatArray:
-        """(n, signs) probabilities, each row's sum 1."""
+        """Return (n, signs) probabilities, each row's sum 1."""
         scores = self.cooling * self.scores(inputs)
         grown = np.exp(scores - scores.max(axis=1, keepdims=True))
         return np.asarray(grown / grown.sum(axis=1, keepdims=True))
@@ -171,7 +171,7 @@ class Model:
 
     @classmethod
     def load(cls, path: Path) -> "Model":
-        """Read the layers. Raises ValueError where they were trained for other signs."""
+        """Read the layers. Raises ValueError if they were trained for other signs."""
         with np.load(path) as stored:
             if tuple(str(sign) for sign in stored["signs"]) != SIGNS:
                 raise ValueError(f"{path} was trained for other signs than {''.join(SIGNS)}")
@@ -183,16 +183,16 @@ class Model:
 
 @cache
 def shipped() -> Model:
-    """The model that comes with the program, read once."""
+    """Return the model that comes with the program, read once."""
     return Model.load(MODEL)
 
 
 def recognise(pictures: NDArray[np.uint8] | list[GreyImage], sizes_px: FloatArray) -> FloatArray:
-    """(n, signs) probability of each sign of `SIGNS` for (n, 28, 28) normalised pictures.
+    """Return (n, signs) probability of each sign of `SIGNS` for (n, 28, 28) normalised pictures.
 
     Arguments
     ---------
-    sizes_px : (n, 2) width and height of what was cut out
+    sizes_px : (n, 2) width and height of the crops
     """
     if len(pictures) == 0:
         return np.zeros((0, len(SIGNS)))
@@ -202,23 +202,23 @@ def recognise(pictures: NDArray[np.uint8] | list[GreyImage], sizes_px: FloatArra
 # Signs of a line ----------------------------------------------------------------------------------
 
 _LEAST_PEAK = 40
-"""Of 255: a line whose darkest ink is fainter is empty."""
+"""Contrast of 255: a line whose darkest ink is fainter is empty."""
 _INK = 0.3
-"""Of the darkest: pencil's grain leaves gaps at half."""
+"""Share of the darkest ink: at half, pencil's grain leaves gaps."""
 _SOFT_MM = 0.06
-"""Less than a pencil's stroke: its grain fades."""
+"""Smoothing that removes a pencil's grain: less than its stroke."""
 _DUST_MM = 0.22
 """Smaller pieces are dust."""
 _WIDE = 0.95
-"""Wider than so many heights of the line: probably two signs that touch."""
+"""Pieces wider than this many heights of the line are probably two signs that touch."""
 _MOST_PIECES = 60
-"""No scale is written with so many signs."""
+"""Most signs of a scale."""
 _SHARED = 0.7
-"""Of the smaller one's extent: two pieces of one sign share so much of it."""
+"""Two pieces of one sign share this much of the smaller one's extent."""
 _BROKEN_PX = 2
-"""Gap of a stroke that the pencil's grain broke."""
+"""Largest gap in a stroke broken by the pencil's grain."""
 _MERGED = 3
-"""A sign is of at most so many pieces of ink."""
+"""Most pieces of ink in a sign."""
 
 
 _Box = tuple[int, int, int, int]
@@ -249,7 +249,7 @@ class Lattice:
 
 
 def lattice_of(grey: GreyImage, px_per_mm: float) -> Lattice:
-    """The lattice of a line of writing.
+    """Return the lattice of a line of writing.
 
     Arguments: `grey` (h, w) uint8 contrast of the line alone, 255 = ink, upright.
     """
@@ -286,7 +286,7 @@ class _Piece:
 
 
 def _pieces(grey: GreyImage, unit: float) -> list[_Piece]:
-    """Pieces of ink from left to right, wide ones cut where they are thinnest."""
+    """Return pieces of ink from left to right, wide ones cut where they are thinnest."""
     if grey.size == 0:
         return []
     soft = cv2.GaussianBlur(grey, (0, 0), _SOFT_MM * unit)
@@ -308,7 +308,7 @@ def _pieces(grey: GreyImage, unit: float) -> list[_Piece]:
 
 
 def _parted(piece: _Piece, line: float) -> list[_Piece]:
-    """A piece cut at the thin places where two signs may touch; they are candidates together as well."""
+    """Cut a piece at the thin places where two signs may touch; they are candidates together as well."""
     x, y, w, h = piece.box
     if w <= _WIDE * line or h < 0.35 * line:
         return [piece]

@@ -1,1 +1,1 @@
-"""Where a sheet lies in its image: pixels to millimetres."""
+"""Register a sheet in its image: pixels to millimetres."""

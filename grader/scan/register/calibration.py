@@ -1,4 +1,4 @@
-"""The calibration page read: the errors of scale, skew and length of printer and scanner.
+"""Read the calibration page: the errors of scale, skew and length of printer and scanner.
 
 The printed markers give the scales along the sheet's axes and their skew by a linear fit to their
 middles, which ink that spreads does not move. Segments of known length, read as strokes of a drawing

@@ -1,4 +1,4 @@
-"""Homographies between the sheet's millimetres and pixels, and what they are fitted to."""
+"""Homographies between the sheet's millimetres and pixels, and the evidence that they are fitted to."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Which long lines are the sheet's edges and frame: every plausible quadrilateral is tried."""
+"""Find the long lines that are the sheet's edges and frame: every plausible quadrilateral is tried."""
 
 from dataclasses import dataclass, replace
 from itertools import combinations

@@ -1,4 +1,4 @@
-"""Ends of strokes: where ink ends, how dark it is, and the tips of arrowheads."""
+"""Ends of strokes: the end of the ink, its darkness, and the tips of arrowheads."""
 
 from dataclasses import dataclass
 from functools import cache

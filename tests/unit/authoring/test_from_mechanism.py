@@ -92,7 +92,7 @@ def test_titles_are_those_of_the_mechanism_in_its_languages(tmp_path):
     assert (title.ro, title.ru) == ("Mecanism cu șase elemente: viteze și accelerații", None)
     rubric = rubric_of(load_assignment(new.assignment))
     titles = {criterion.id: criterion.title for criterion in rubric.criterion}
-    assert titles["a_CB_t"].en == "Tangential acceleration of C about B"
+    assert titles["a_CB_t"].en == "Tangential acceleration of C relative to B"
     assert titles["a_B_n"].ru == "Нормальное ускорение точки B"
 
 

@@ -48,7 +48,7 @@ def test_what_a_person_decided_may_be_beyond_a_tolerance():
 
 def test_numbers_held_against_the_data_are_not_those_of_the_row():
     said = (
-        "It may follow rightly from your own earlier work; held against the data: It is too short by 9.0 mm."
+        "It may be consistent with your own earlier work; compared with the data: It is too short by 9.0 mm."
     )
     assert found(row("review", None, said), score=None, score_range=(0.0, 5.0)) == []
 

@@ -65,7 +65,7 @@ def test_what_waits_and_what_a_person_added_is_told():
         max_score=10.0, score=None, score_range=(6.0, 11.0), added=1.0,
     )  # fmt: skip
     assert told == (
-        "The points of all criteria add up to 5. What waits for a person adds 0 to 5. A person added 1."
+        "The points of all criteria add up to 5. Criteria under review add 0 to 5. A person added 1."
     )
     assert line(criterion("v_A"), max_score=5.0, score=4.5, added=-0.5).endswith("A person took off 0.5.")
 

@@ -111,7 +111,7 @@ def test_of_several_limits_that_are_near_one_is_told():
         Reason("near_limit", {"what": "length", "off": 1.0, "tolerance": 1.0, "se": se}) for se in (0.2, 0.3)
     ]
     told = criterion_feedback(outcome("review", *near), "en")
-    assert told.count("near the limit") == 1
+    assert told.count("too close to the limit") == 1
     assert "0.20" in told
 
 
@@ -137,7 +137,7 @@ def test_what_was_read_is_not_called_unread():
     read = replace(
         outcome("review", doubtful, unread), measured=Quantity(length_mm=48.1, direction_deg=255.0)
     )
-    told = "It was read with too little certainty (n_BA, on which it hangs, was not read for certain)."
+    told = "It was read with too little certainty (n_BA, on which it depends, was not read for certain)."
     assert criterion_feedback(read, "en") == told
     assert criterion_feedback(read, "en", "hint") == "It was read with too little certainty."
     assert criterion_feedback(outcome("review", unread), "en").startswith("It could not be read")
@@ -155,13 +155,11 @@ def test_what_was_hardly_read_is_not_called_near_a_limit():
     told = criterion_feedback(
         outcome("review", Reason("doubtful", {"confidence": 0.07}), TOO_LONG, near), "en"
     )
-    assert "near the limit" not in told
+    assert "close to the limit" not in told
 
 
 def test_what_is_not_judged_says_why_also_without_a_reason():
-    assert (
-        criterion_feedback(outcome("not_judged"), "en") == "Nothing was drawn that it could be held against."
-    )
+    assert criterion_feedback(outcome("not_judged"), "en") == "There is no drawing to compare it with."
 
 
 def test_what_follows_rightly_is_not_called_off():
@@ -177,7 +175,7 @@ def test_the_likely_cause_is_named_where_points_are_lost():
 @pytest.mark.parametrize("what", ["nodes", "scale", "vector", "value", "something new"])
 def test_following_from_an_earlier_value_says_that_it_is_charged_once(what):
     told = criterion_feedback(outcome("follow_through", Reason("follows", {"what": what, "of": "v_A"})), "en")
-    assert "charged once" in told
+    assert "costs points only once" in told
 
 
 def test_a_reason_without_a_sentence_is_told_by_its_code():

@@ -248,5 +248,5 @@ def test_what_hangs_on_something_open_says_so_unless_there_is_a_better_reason():
     hangs = criterion("v_C", "review", None).model_copy(update={"reasons": ["follows", "too_long"]})
     near = criterion("v_D", "review", None).model_copy(update={"reasons": ["follows", "near_limit"]})
     waiting = page_of(report(criteria=[hangs, near], mistakes=[])).waiting
-    assert waiting[0][0] == "it hangs on what is still open"
-    assert waiting[1][0].startswith("so near the limit")
+    assert waiting[0][0] == "it depends on an open question"
+    assert waiting[1][0].startswith("too close to the limit")

@@ -44,7 +44,7 @@ def test_copied_values_are_told_in_results_on_the_page_and_in_the_terminal(resul
     assert "the same measured values" in (tmp_path / "out" / "index.html").read_text()
     tell_class(results, tmp_path / "out")
     said = capsys.readouterr().out
-    assert "Look alike (no accusation; hold both beside each other):" in said
+    assert "Similar sheets (no accusation; compare them side by side):" in said
     assert "s3, position 1" in said
 
 

@@ -159,8 +159,8 @@ def test_nothing_is_hinged_to_a_point_that_lies_under_a_slider_for_an_instant(jo
         ),
         ([("crank", "omega", 3)], "$.crank", "needs one speed: either omega (rad/s) or rpm (rev/min)"),
         ([("crank", "rpm", MISSING)], "$.crank", "needs one speed"),
-        ([("crank", MISSING)], "$", "needs one driven link: either [crank] or [driven_slider]"),
-        ([("driven_slider", A_SLIDER)], "$", "needs one driven link"),
+        ([("crank", MISSING)], "$", "needs one driving link: either [crank] or [driven_slider]"),
+        ([("driven_slider", A_SLIDER)], "$", "needs one driving link"),
         (
             [("crank", MISSING), ("driven_slider", {**A_SLIDER, "speed": "1e"})],
             "$.driven_slider.speed",
