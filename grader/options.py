@@ -17,7 +17,7 @@ Level = Literal["symbol", "hint", "full"]
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """How a field is offered.
+    """The way in which a field is offered.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ def offered(record: type) -> list[tuple[Field[Any], Option]]:
 
 
 def is_record(kind: Any) -> bool:  # noqa: ANN401 - any annotation
-    """Whether it is a record that is offered as options."""
+    """Return whether it is a record that is offered as options."""
     return is_dataclass(kind) and isinstance(kind, type) and bool(offered(kind))
 
 
@@ -61,7 +61,7 @@ def taken(record: type, source: object) -> dict[str, Any]:
 
 
 PRINTABLE = r"^[^\x00-\x1f\x7f]*$"
-"""Of a text from the web: PostgreSQL stores no NUL, and the other signs have no meaning in a line."""
+"""Texts from the web have no control characters: PostgreSQL stores no NUL, others mean nothing in a line."""
 
 
 def model_of(
@@ -116,7 +116,7 @@ def _port(default: int) -> Any:  # noqa: ANN401 - as above
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VariantOptions:
-    """Which variant."""
+    """The choice of a variant."""
 
     n: int | None = option("The student's number, if the data depend on it.")
     position: int | None = option("The position, if the assignment has any.")
@@ -179,7 +179,7 @@ class CheckOptions(VariantOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClassOptions:
-    """What stays the same whenever a class is graded again: a run's note keeps it."""
+    """Options that stay the same whenever a class is graded again: a run's note keeps it."""
 
     roster: Path | None = option("The class: roster.csv.", key="roster")
     pages_per_student: int | None = option("Of one class file, in the roster's order.", key="pages", least=1)
@@ -212,7 +212,7 @@ class GradeOptions(ClassOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExportOptions:
-    """What an export heeds; None or empty where not given."""
+    """Options of an export; None or empty if not given."""
 
     to: str = option(
         "csv, moodle, canvas, canvas-api, openedx, google-classroom, ms-education, brightspace,"
@@ -266,7 +266,7 @@ class ExportCall(ExportOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PublicationOptions:
-    """What an instructor sets of a publication; what is None stays."""
+    """Settings of a publication by an instructor; None leaves one as it is."""
 
     title: str | None = option("as students see it", longest=120)
     term: str | None = option("of which all publications can be deleted at once", longest=40)

@@ -313,7 +313,7 @@ class NodeView:
 
 @dataclass(frozen=True, slots=True)
 class NodePlaces:
-    """Where nodes lie by the ink about them: a mixture of normal distributions for each.
+    """Places of nodes by the ink about them: a mixture of normal distributions for each.
 
     Attributes
     ----------

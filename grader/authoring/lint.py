@@ -173,10 +173,7 @@ def _rows(
 def _least(
     figures: Mapping[str, FloatArray], count: int, pages: Mapping[str, int] | None = None
 ) -> list[LintLeast | None]:
-    """The least of several arrays for each variant; None where there is none that is finite.
-
-    Arguments: `pages` are the pages of figures of answer sheets, by name, from 1.
-    """
+    """Return the least of several arrays for each variant, `pages` by name; None if none is finite."""
     if not figures:
         return [None] * count
     names, values = list(figures), np.stack([np.broadcast_to(each, (count,)) for each in figures.values()])

@@ -56,7 +56,7 @@ def fit_of(rows: Rows, is_own: BoolArray) -> FloatArray:
 
 
 def _lies_straight(rows: Rows, residuals: FloatArray) -> bool:
-    """Whether no sheet is turned, by the medians of the residuals of its directions against the own data."""
+    """Return whether no sheet is turned, by the medians of its directions' residuals against the own data."""
     turned = (residuals[rows.is_angle & (rows.sheet == sheet)] for sheet in set(rows.sheet.tolist()))
     return all(abs(np.median(one)) <= math.radians(STRAIGHT_DEG) for one in turned if len(one))
 

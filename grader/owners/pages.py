@@ -34,7 +34,7 @@ _ALMOST = 0.8
 
 
 class How(Enum):
-    """What says whose a page is, in the order in which they decide: codes of clauses."""
+    """Sources of a page's owner, in the order in which they decide: codes of clauses."""
 
     PERSON = "by_person"
     CODE = "by_code"
@@ -90,7 +90,7 @@ class _Claim:
 
     @property
     def parameter(self) -> dict[str, Value]:
-        """What it says, by the name of a problem's parameter."""
+        """The claim, by the name of a problem's parameter."""
         return {self.how.value: self.text}
 
 

@@ -434,9 +434,9 @@ TEMPERATURE = 3.0
 """Scores are divided by this: errors of one student's strokes are not independent."""
 WEIGHTS = {"placed": 0.2, "named": 0.5, "off_mm": -2.2, "marked": 2.4}
 CONSTANT = -1.85
-"""Of a logistic regression on 1,800 vectors of eleven kinds of sheets, each kind judged by the other ten, the
-constant lowered by 0.6, since a wrong mark costs more than a look. A line's thinness, a mistaken plan,
-further tips, and how surely the ink has a node at both ends add nothing to them."""
+"""Coefficients of a logistic regression on 1,800 vectors of eleven kinds of sheets, each kind judged by the
+other ten, the constant lowered by 0.6, since a wrong mark costs more than a check. A line's thinness, a
+mistaken plan, further tips, and how surely the ink has a node at both ends add nothing to them."""
 PLACED_AND = 0.3
 """Largest excess of a confidence over the geometric probability, whose standard errors are wide."""
 HIGHEST = 0.985

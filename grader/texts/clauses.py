@@ -130,4 +130,4 @@ CLAIMS: dict[str, tuple[str, str]] = {
     "by_roster": (N_("the roster: %(claim)s"), N_("the roster")),
     "by_content": (N_("the file's content: %(claim)s"), N_("the file's content")),
 }
-"""What a source says of an owner, by the name of the parameter; and the source alone."""
+"""Claim of a source about an owner, by the name of the parameter; and the source alone."""

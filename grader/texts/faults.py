@@ -1,4 +1,4 @@
-"""What is wrong in a file that people wrote: the clauses behind the place of a fault.
+"""Faults of files that people write: the clauses behind the place of a fault.
 
 Each code has its texts, the most precise first: the first one is said whose parameters are all known.
 """

@@ -133,7 +133,7 @@ def clauses(code: str) -> Sequence[str]:
 
 
 def _placed(text: str, said: Mapping[str, str], speaker: Tongue) -> str:
-    """What is wrong behind its place: a path in a document, or a line, a column of it, or both."""
+    """Return a fault behind its place: a path in a document, or a line, a column of it, or both."""
     line = speaker.gettext(ON_LINE) % {"number": said["line"]} if "line" in said else ""
     return ": ".join(filter(None, (", ".join(filter(None, (line, said.get("cell", "")))), text)))
 
@@ -202,12 +202,12 @@ def sentence(
 
 
 def clause(reason: Coded, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES) -> str:
-    """Why something is not read or understood, as a part of a sentence; the code of one without words."""
+    """Return why something is not read or understood, as part of a sentence; the code if it has no words."""
     return filled(clauses(reason.code), spoken(reason.parameters, speaker, names), speaker) or reason.code
 
 
 def fault(reason: Coded, speaker: Tongue = ENGLISH) -> str:
-    """What is wrong in a file that people wrote, behind its place: `line` and `cell` say which it is."""
+    """Return a fault of a file that people wrote, behind its place: `line` and `cell` say which it is."""
     return _placed(clause(reason, speaker), spoken(reason.parameters, speaker), speaker)
 
 
@@ -222,12 +222,12 @@ def of_error(error: PlanmarkError, file: str | None = None) -> Reason:
 
 
 def told_parameters(reason: Reason) -> dict[str, Any]:
-    """What a problem's sentence names, as an error's parameters: its own words are the error's message."""
+    """Return what a problem's sentence names, as an error's parameters; its own words are the message."""
     return {key: value for key, value in reason.parameters.items() if key != "detail"}
 
 
 def refusal(reason: Reason, speaker: Tongue = ENGLISH) -> str:
-    """What is said of a refused request; of an error its own words, in other languages its sentence."""
+    """Return a refused request's sentence; of an error its own words, in other languages its sentence."""
     if reason.code in REFUSALS:
         return speaker.gettext(REFUSALS[reason.code]) % reason.parameters
     return (speaker is not ENGLISH and sentence(reason, speaker)) or message(reason, speaker)
@@ -247,7 +247,7 @@ class RefusedError(PlanmarkError):
 
 
 def told_of(error: PlanmarkError, speaker: Tongue) -> str:
-    """What is said of an error in a language."""
+    """Return the sentence of an error in a language."""
     return refusal(error.reason if isinstance(error, RefusedError) else of_error(error), speaker)
 
 

@@ -9,7 +9,7 @@ QUESTION = re.compile(r'^ *r?"""(What|Where|When|Who|Whose|Of|How|Why|Whether|Wh
 
 MOST = {
     "grader/cli": 15, "grader/comparison": 50, "grader/folder": 60, "grader/tables": 35, "grader/lms": 30,
-    "grader/lms/api": 5, "grader/marking": 35, "grader/options": 5, "grader/pipeline": 5, "grader/review": 30,
+    "grader/lms/api": 5, "grader/marking": 35, "grader/pipeline": 5, "grader/review": 30,
     "grader/scan": 10, "grader/scan/decode": 35, "grader/scan/register": 50, "grader/scan/strokes": 45,
     "grader/web": 75,
 }  # fmt: skip

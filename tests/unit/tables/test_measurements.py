@@ -80,7 +80,7 @@ def test_a_column_that_the_misspelt_one_may_mean_and_that_is_there_too_is_judged
 
 
 def test_a_file_without_any_known_column_is_refused(entered):
-    with pytest.raises(TableError, match="no column of measurements is known"):
+    with pytest.raises(TableError, match="no known column of measurements"):
         entered("student_id,colour\ns01,red\n")
 
 
