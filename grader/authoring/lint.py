@@ -154,7 +154,7 @@ def _rows(
             name = f"{figure.replace('_', ' ')} on page {index + 1}"
             zones[name], pages[name] = room, index + 1
     transmission, crossing = _least(conditions.transmission, count), _least(conditions.crossing_deg, count)
-    shortest, least_room = _least(lengths, count), _least(zones, count, pages)
+    shortest, least_room = _least(lengths, count), _least(zones, count, **pages)
     short = asked.short(WELL_READ_MM).sum(axis=0) if asked.names else np.zeros(count, dtype=int)
     return [
         _row(
@@ -170,20 +170,16 @@ def _rows(
     ]
 
 
-def _least(
-    figures: Mapping[str, FloatArray], count: int, pages: Mapping[str, int] | None = None
-) -> list[LintLeast | None]:
-    """Return the least of several arrays for each variant, `pages` by name; None if none is finite."""
+def _least(figures: Mapping[str, FloatArray], count: int, **pages: int) -> list[LintLeast | None]:
+    """Return the least of several arrays for each variant, on `pages` by name; None if none is finite."""
     if not figures:
         return [None] * count
     names, values = list(figures), np.stack([np.broadcast_to(each, (count,)) for each in figures.values()])
     which = np.argmin(values, axis=0)
     least = values[which, np.arange(count)]
     return [
-        LintLeast(value=float(value), at=names[index], page=(pages or {}).get(names[index]))
-        if np.isfinite(value)
-        else None
-        for value, index in zip(least, which, strict=True)
+        LintLeast(value=value, at=at, page=pages.get(at)) if np.isfinite(value) else None
+        for value, at in zip(least.tolist(), (names[index] for index in which), strict=True)
     ]
 
 
