@@ -35,7 +35,7 @@ from grader.reading import page_scale
 from grader.reading.corrected import corrected
 from grader.reading.read import read_figures
 from grader.reading.sketch import drawings
-from grader.records import PageRef, Reading, Reason, ScannedPage, Value
+from grader.records import PageRef, Reading, Reason, ScannedPage, Value, of_error
 from grader.rubric import Asked, RubricFile
 from grader.scan.handwriting import captions
 from grader.scan.handwriting.fields import written_lengths
@@ -43,7 +43,6 @@ from grader.scan.page import open_page, timed, turned, writing_on
 from grader.scan.strokes.nodes import node_places
 from grader.tables.measurements import NOTHING_MEASURED, Measurements, StudentSubmission
 from grader.tables.scale_text import SURE, declared_scales, sure_texts, understood_scales
-from grader.texts.spoken import of_error
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.construction.graph import Construction
 from reference.construction.mistakes import Drawing

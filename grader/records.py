@@ -12,6 +12,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.errors import PlanmarkError
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 GreyImage = NDArray[np.uint8]
@@ -45,6 +47,11 @@ class Reason:
     code: str
     parameters: Mapping[str, Value] = field(default_factory=dict)
     file: str | None = None
+
+
+def of_error(error: PlanmarkError, file: str | None = None) -> Reason:
+    """Convert an error to a problem: its parameters, and its own words as the `detail`."""
+    return Reason(error.code, {**error.parameters, "detail": error.message}, file)
 
 
 @dataclass(frozen=True, slots=True)
@@ -299,13 +306,7 @@ class InkMap:
 
 @dataclass(frozen=True, slots=True)
 class NodeView:
-    """A node of a plan as far as it is known, and all vectors of the plan: complex mm, y up.
-
-    Attributes
-    ----------
-    at : the node
-    vectors : (k, 2) tails and heads
-    """
+    """A node of a plan, `at`, and tails and heads (k, 2) of the plan's vectors, as far as known: mm, y up."""
 
     at: complex
     vectors: NDArray[np.complex128]

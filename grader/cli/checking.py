@@ -17,13 +17,14 @@ from grader.feedback.sentences import mistake_feedback
 from grader.files import shown_text, write_whole
 from grader.language import N_, Tongue, tongue
 from grader.options import CheckOptions, Level, VariantOptions
+from grader.records import of_error
 from grader.rubric import RubricFile, rubric_of
 from grader.self_check.advice import RESULTS, CheckedLine
 from grader.self_check.results import LEVELS, likely_mistakes
 from grader.self_check.values import check_values
 from grader.tables.measurements import Measurements, columns_of, names_of, read_measurements
 from grader.tables.reader import TableError
-from grader.texts.spoken import message, of_error, problem_documents, sentence
+from grader.texts.spoken import message, problem_documents, sentence
 from reference.authored.assignment import Assignment, Variant, built_in, load_assignment
 from reference.errors import CallError, MechanismError
 

@@ -17,12 +17,11 @@ from types import MappingProxyType
 from grader.files import Stamp, shown_text, stamp_of, write_whole
 from grader.folder.cache import PageCache, packed, unpacked
 from grader.folder.workers import ENDED, Pool
-from grader.records import PageRef, Reason
+from grader.records import PageRef, Reason, of_error
 from grader.scan.decode.limits import load
 from grader.scan.decode.pages import count_pages, decode
 from grader.scan.register.registration import register
 from grader.tables.measurements import Measurements, Names, read_measurements, students_in
-from grader.texts.spoken import of_error
 from reference.errors import InputFileError
 
 # The files handed in ------------------------------------------------------------------------------

@@ -19,11 +19,11 @@ from typing import Any
 
 from grader.documents import UnmatchedDocument
 from grader.owners.pages import How, Owned, PageOwners, student_of_name
-from grader.records import Reason, Value
+from grader.records import Reason, Value, of_error
 from grader.tables.measurements import Measurements, StudentSubmission, combined
 from grader.tables.reader import why_no_id
 from grader.tables.roster import Roster, RosterRow
-from grader.texts.spoken import of_error, unmatched_document
+from grader.texts.spoken import unmatched_document
 from reference.authored.assignment import Assignment, Variant
 from reference.errors import CallError
 

@@ -23,8 +23,8 @@ from pebble import ProcessExpired, ProcessPool
 from pebble.pool.process import WORKERS_NAME
 
 from grader.files import CANNOT_WRITE, OutputError, log_to
-from grader.records import Reason
-from grader.texts.spoken import message, of_error, told_parameters
+from grader.records import Reason, of_error
+from grader.texts.spoken import message, told_parameters
 from reference.errors import InputFileError, PlanmarkError
 
 Result = TypeVar("Result")

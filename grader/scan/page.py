@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from hashlib import blake2b
 
-from grader.records import PageRef, Reading, Reason, ScannedPage, Sheet, Unread
+from grader.records import PageRef, Reading, Reason, ScannedPage, Sheet, Unread, of_error
 from grader.scan.decode.pages import decode, is_blank
 from grader.scan.handwriting.captions import Spotter, spotters
 from grader.scan.handwriting.fields import writing, written_scales
@@ -15,7 +15,6 @@ from grader.scan.quality import flaws
 from grader.scan.register.distortion import straighten
 from grader.scan.register.registration import register
 from grader.scan.strokes.ink import find_ink
-from grader.texts.spoken import of_error
 from reference.errors import InputFileError
 
 

@@ -5,7 +5,7 @@ from typing import Any, Protocol, cast
 
 from grader.documents import ProblemDocument, UnmatchedDocument, UnreadDocument
 from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
-from grader.records import Reason, Unread, Value
+from grader.records import Reason, Unread, Value, of_error
 from grader.texts.clauses import CLAIMS, CLAUSES
 from grader.texts.faults import FAULTS, ON_LINE
 from grader.texts.problems import PROBLEMS
@@ -214,11 +214,6 @@ def fault(reason: Coded, speaker: Tongue = ENGLISH) -> str:
 def message(reason: Coded, speaker: Tongue = ENGLISH) -> str:
     """Return an error's own words, else the problem's sentence; its code if it has neither."""
     return str(reason.parameters.get("detail", "")) or sentence(reason, speaker) or reason.code
-
-
-def of_error(error: PlanmarkError, file: str | None = None) -> Reason:
-    """Convert an error to a problem: its parameters, and its own words as the `detail`."""
-    return Reason(error.code, {**error.parameters, "detail": error.message}, file)
 
 
 def told_parameters(reason: Reason) -> dict[str, Any]:

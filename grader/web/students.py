@@ -22,11 +22,11 @@ from grader.files import make_folder, result_folders, write_whole
 from grader.folder.workers import guarded, result_of
 from grader.language import tongue
 from grader.lms.export import read_results
-from grader.records import Reason
+from grader.records import Reason, of_error
 from grader.review.server import page_file
 from grader.scan.decode.limits import load
 from grader.scan.decode.pages import count_pages
-from grader.texts.spoken import RefusedError, of_error, refusal
+from grader.texts.spoken import RefusedError, refusal
 from grader.web.guard import forbidden, missing
 from grader.web.places import assignment_of
 from grader.web.self_check import checked_form, form_of, variant_of

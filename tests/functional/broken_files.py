@@ -293,7 +293,7 @@ CASES = [
     _decided("unknown criterion", "s01,,v_B", "s01,,v_K", "line 2"),
     _decided("points beyond the maximum", "full,2", "full,9", "line 2"),
     # Tables of platforms.
-    _ids("misspelt column", "student_id,id", "student_id,user", "first line"),
+    _ids("misspelt column", "student_id,id", "student_id,user", "line 1"),
     _ids("student twice", "s02,12", "s01,12", "line 3"),
     _worksheet("comma in a grade", "b@x.ro,,5.00", 'b@x.ro,"3,5",5.00', "row 3"),
     _worksheet("bare numbers", "Participant 2", "2", "row 3"),

@@ -30,7 +30,7 @@ def graded(planmark, tmp_path):
         (["nowhere"], "no such folder"),
         (["."], "run planmark grade first"),
         (["out", "--host", "0.0.0.0"], "--token"),  # noqa: S104 - refused
-        (["out", "--host", "0.0.0.0", "--token", "short"], "8 signs"),  # noqa: S104 - refused
+        (["out", "--host", "0.0.0.0", "--token", "short"], "8 characters"),  # noqa: S104 - refused
         (["out", "--lang", "fr"], "en, ro, ru"),
     ],
 )

@@ -95,7 +95,7 @@ def test_a_check_loads_no_masked_arrays(folder):
 @pytest.mark.parametrize(
     ("command", "needed"),
     [
-        ("--help", "cli files options"),
+        ("--help", "cli files language options"),
         ("plan pump --n 7 --json", "cli files language options solution"),
         ("check pump --measured measured.json", JUDGING),
     ],

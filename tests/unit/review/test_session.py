@@ -3,14 +3,17 @@
 import io
 import json
 import threading
+from dataclasses import replace
 
 import pytest
 from PIL import Image
 
 from grader.folder.decisions import basis_of
+from grader.records import ACCELERATION_PLAN, Figure
 from grader.review.server import application
 from grader.review.session import mark_of
 from grader.tables.decisions import Decision, DecisionFile
+from reference.construction.derive import construction_of
 from tests.examples import slow
 from tests.unit.review.conftest import PUMP, Page, silent
 from tests.waiting import until
@@ -55,7 +58,8 @@ def test_why_a_verdict_waits_is_told_in_the_reviewers_language(session):
     told = {}
     for lang in ("en", "ro", "ru"):
         page = Page(application(session, lang), base_url="http://127.0.0.1:8321")
-        waiting = [row for row in page.rows().values() if row["verdict"] == "review" and row["proposed"]]
+        rows = page.rows().values()
+        waiting = [row for row in rows if row["verdict"] == "review" and row["proposed"] in {"full", "none"}]
         asked = {"student": waiting[0]["student"], "criterion": waiting[0]["criterion"]}
         told[lang] = page.get("/api/question", params=asked).json()["why"]
     assert len(set(told.values())) == 3
@@ -64,7 +68,8 @@ def test_why_a_verdict_waits_is_told_in_the_reviewers_language(session):
 
 
 def test_a_question_says_why_it_waits_and_what_the_student_will_read(page):
-    waiting = [row for row in page.rows().values() if row["verdict"] == "review" and row["proposed"]]
+    rows = page.rows().values()
+    waiting = [row for row in rows if row["verdict"] == "review" and row["proposed"] in {"full", "none"}]
     assert waiting
     asked = {"student": waiting[0]["student"], "criterion": waiting[0]["criterion"]}
     question = page.get("/api/question", params=asked).json()
@@ -75,8 +80,23 @@ def test_a_question_says_why_it_waits_and_what_the_student_will_read(page):
     assert (settled["sentence"], settled["why"]) == (question["sentence"], "")
 
 
+def with_an_unsure_node(page, figure, node):
+    """The page where a node, and the vectors that touch it, are as good as unread."""
+    read = page.reading.figures.get(figure)
+    if read is None:
+        return page
+    vectors = construction_of(PUMP.mechanism(PUMP.variants())).vectors
+    ends = {one.name: {one.tail, one.head} for one in vectors.values()}
+    nodes = {**read.nodes, node: replace(read.nodes[node], confidence=0.5)}
+    touched = {name: replace(one, confidence=0.5) for name, one in read.vectors.items() if node in ends[name]}
+    figures = {**page.reading.figures, figure: Figure(nodes, {**read.vectors, **touched})}
+    return replace(page, reading=replace(page.reading, figures=figures))
+
+
 def test_what_is_expected_of_a_stroke_is_judged_with_the_likeliest_answer(page, session):
     student = session.student(SCANNED)
+    student.pages = [with_an_unsure_node(one, ACCELERATION_PLAN, "a'") for one in session.pages_of(student)]
+    student.report, student.version = session.report_if(student, ()), student.version + 1
     offered = [one for one in session.doubts(student, counted=True) if one.kind == "node" and one.default]
     assert offered
     for doubt in offered:

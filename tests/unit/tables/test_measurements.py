@@ -5,9 +5,10 @@ import json
 import pytest
 
 from grader.language import tongue
+from grader.records import of_error
 from grader.tables.measurements import MAX_BYTES, combined, names_of, read_measurements, students_in
 from grader.tables.reader import TableError
-from grader.texts.spoken import message, of_error
+from grader.texts.spoken import message
 from reference.authored.assignment import load_assignment
 
 NAMES = names_of(load_assignment("pump"))

@@ -4,11 +4,11 @@ import pytest
 
 from grader.language import LANGUAGES, tongue
 from grader.lms.table import with_ids
+from grader.records import of_error
 from grader.tables.decisions import read_table
 from grader.tables.measurements import names_of, read_measurements
 from grader.tables.reader import TableError, real_number, whole_number
 from grader.tables.roster import read_roster
-from grader.texts.spoken import of_error
 from reference.authored.assignment import load_assignment
 
 NAMES = names_of(load_assignment("pump"))

@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 
 from grader.language import LANGUAGES, tongue
-from grader.records import Reason, Unread
+from grader.records import Reason, Unread, of_error
 from grader.texts.clauses import CLAIMS, CLAUSES
 from grader.texts.faults import FAULTS
 from grader.texts.problems import PROBLEMS
 from grader.texts.reasons import FOLLOWS, FULL, HINTS, reason_sentence
 from grader.texts.refusals import REFUSALS
-from grader.texts.spoken import ENGLISH, clause, fault, message, of_error, sentence, unread_document
+from grader.texts.spoken import ENGLISH, clause, fault, message, sentence, unread_document
 from reference.errors import InputFileError
 
 ROOT = Path(__file__).parents[3]

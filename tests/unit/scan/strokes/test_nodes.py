@@ -44,10 +44,9 @@ def test_bare_paper_tells_no_place_as_exactly_as_ink_does() -> None:
 
 
 def test_views_are_answered_each_by_itself() -> None:
-    ink = drawn(PX_PER_MM)
     views = [view_from(NODE), NodeView(HEAD, np.array([[NODE, HEAD]]))]
-    together = node_places(ink, views)
+    together = node_places(drawn(PX_PER_MM), views)
     for row, view in enumerate(views):
-        alone = node_places(ink, [view])
+        alone = node_places(drawn(PX_PER_MM), [view])
         assert np.allclose(together.at[row], alone.at[0], atol=1e-4)
         assert np.allclose(together.share[row], alone.share[0], atol=1e-4)
