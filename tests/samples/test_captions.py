@@ -68,7 +68,7 @@ def test_nothing_is_looked_for_that_the_roster_says(pages, monkeypatch):
     variant, sheet, page = pages[0]
     declared = {name: f"{value} m/mm" for name, value in sheet.truth["scales"]["declared"].items()}
     submission = StudentSubmission("m01", variant, (page.ref,), declared=declared)
-    monkeypatch.setattr("grader.pipeline.spotters", None)
+    monkeypatch.setattr("grader.scan.page.spotters", None)
     assert missing_scales(submission) == ()
     (read,) = read_submission(submission, [page], PUMP, Asked())
     assert read.reading.written == {}
