@@ -184,10 +184,7 @@ class Charges:
         Else nothing, or an open mark where one of them is in doubt; and the first one not charged, if the
         mark shows it.
         """
-        causes, order = (
-            self.causes(one),
-            {step.node: i for i, step in enumerate(self.task.construction.steps)},
-        )
+        causes = self.causes(one)
         unpaid = causes - self.charged - self.either
         if not unpaid and not causes & self.doubtful & self.settled.keys():
             return mark, frozenset()
