@@ -1,7 +1,8 @@
-"""Simulated students' sheets to learn from: any assignment, hand, pen and scanner."""
+"""Simulated students' sheets to learn from, of any assignment, hand, pen and scanner, and the command line."""
 
+import argparse
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -35,3 +36,28 @@ def simulated_pages(seed: int) -> Iterator[tuple[ScannedPage, dict[str, Any]]]:
             page = open_page(PageRef("sheet", path=sheet.save(Path(place) / "sheet")))
         if page.ink is not None and page.image is not None and page.sheet is not None:
             yield page, sheet.truth
+
+
+def run(
+    description: str | None,
+    keep: Callable[[Path, int], None],
+    train: Callable[[Path, int, Path], None],
+    steps: int,
+) -> None:
+    """Carry out a training script's command: `keep` each student's sheets in a folder, or `train` on them."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawTextHelpFormatter)
+    acts = parser.add_subparsers(dest="act", required=True)
+    sheets, network = acts.add_parser("sheets"), acts.add_parser("network")
+    for act in (sheets, network):
+        act.add_argument("folder", type=Path)
+    sheets.add_argument("--first", type=int, default=0)
+    sheets.add_argument("--last", type=int, default=300)
+    network.add_argument("--steps", type=int, default=steps)
+    network.add_argument("--out", type=Path, required=True)
+    told = parser.parse_args()
+    if told.act == "sheets":
+        told.folder.mkdir(parents=True, exist_ok=True)
+        for seed in range(told.first, told.last):
+            keep(told.folder, seed)
+    else:
+        train(told.folder, told.steps, told.out)

@@ -10,7 +10,6 @@ Student's distributions (six degrees of freedom) of where the node is, one for e
 nowhere near.
 """
 
-import argparse
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +22,7 @@ from torch import nn
 from grader.records import InkMap, NodeView
 from grader.scan.strokes.nodes import CELLS, HALF_MM, NARROWEST, SIDE_PX, USUAL, WIDEST, window_of
 from tests.bench.reading_truth import OnPaper
-from tests.training.pages import simulated_pages
+from tests.training.pages import run, simulated_pages
 
 PX_PER_MM = 6.0
 ONE_NODE_MM = 0.45
@@ -38,27 +37,6 @@ BARE = 0.25
 """Share of windows without their node that have no ink at all."""
 OUTLIERS = 0.005
 DEGREES = 6.0
-
-
-def main() -> None:
-    """Draw what is learnt from, or learn."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    acts = parser.add_subparsers(dest="act", required=True)
-    sheets = acts.add_parser("sheets")
-    sheets.add_argument("folder", type=Path)
-    sheets.add_argument("--first", type=int, default=0)
-    sheets.add_argument("--last", type=int, default=300)
-    network = acts.add_parser("network")
-    network.add_argument("folder", type=Path)
-    network.add_argument("--steps", type=int, default=12000)
-    network.add_argument("--out", type=Path, required=True)
-    told = parser.parse_args()
-    if told.act == "sheets":
-        told.folder.mkdir(parents=True, exist_ok=True)
-        for seed in range(told.first, told.last):
-            keep(told.folder, seed)
-    else:
-        train(told.folder, told.steps, told.out)
 
 
 # What is learnt from ------------------------------------------------------------------------------
@@ -217,4 +195,4 @@ def train(folder: Path, steps: int, out: Path) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run(__doc__, keep, train, steps=12000)

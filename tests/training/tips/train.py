@@ -1,13 +1,12 @@
 """Trains the network that finds the ends of vectors along strokes (`grader/scan/strokes/ends.py`).
 
     pip install torch onnx
-    python -m tests.training.tips.train drawings FOLDER --first 0 --last 300
+    python -m tests.training.tips.train sheets FOLDER --first 0 --last 300
     python -m tests.training.tips.train network FOLDER --steps 8000 --out grader/scan/strokes/tips.onnx
 
 The drawings are simulated sheets of every built-in assignment, hand, pen and scanner.
 """
 
-import argparse
 import pickle
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from torch.nn import functional
 
 from grader.scan.pixels import flatten
 from grader.scan.strokes.ends import BEYOND_MM, CELL, HALF, KINDS, LEAST_MM, STEP_MM, strip_of
-from tests.training.pages import simulated_pages
+from tests.training.pages import run, simulated_pages
 
 OFF_MM, FAR_OFF_MM, TILT = 0.5, 0.9, 0.16
 """How far a drawn vector may lie off the stroke that was found for it, at its nearer and its farther end."""
@@ -28,31 +27,10 @@ WINDOW = 144
 BATCH = 48
 
 
-def main() -> None:
-    """Draw what is learnt from, or learn."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    acts = parser.add_subparsers(dest="act", required=True)
-    drawings = acts.add_parser("drawings")
-    drawings.add_argument("folder", type=Path)
-    drawings.add_argument("--first", type=int, default=0)
-    drawings.add_argument("--last", type=int, default=300)
-    network = acts.add_parser("network")
-    network.add_argument("folder", type=Path)
-    network.add_argument("--steps", type=int, default=8000)
-    network.add_argument("--out", type=Path, required=True)
-    told = parser.parse_args()
-    if told.act == "drawings":
-        told.folder.mkdir(parents=True, exist_ok=True)
-        for seed in range(told.first, told.last):
-            draw(told.folder, seed)
-    else:
-        train(told.folder, told.steps, told.out)
-
-
 # What is learnt from ------------------------------------------------------------------------------
 
 
-def draw(folder: Path, seed: int) -> None:
+def keep(folder: Path, seed: int) -> None:
     """One simulated student's strokes as bands, with the ends of the vectors drawn along each."""
     for number, (seen, truth) in enumerate(simulated_pages(seed)):
         strokes = seen.ink.strokes
@@ -216,4 +194,4 @@ def _window(
 
 
 if __name__ == "__main__":
-    main()
+    run(__doc__, keep, train, steps=8000)
