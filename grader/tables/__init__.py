@@ -1,1 +1,1 @@
-"""What people write: one reader of tables, rosters, measurements, decisions; scales; the class file."""
+"""Files that people write: one reader of tables, rosters, measurements, decisions; scales; the class file."""

@@ -90,7 +90,7 @@ def _loaded(path: Path) -> BaseModel:
 
 
 def _faults(path: Path, values: dict[str, Any], platforms: Collection[str]) -> Iterator[Finding]:
-    """What the values name and is not there."""
+    """Report files and platforms that the values name and that do not exist."""
     name, roster, platform = (values.get(key) for key in ("assignment", "roster", "platform"))
     if name is not None and not is_file(locate("assignment", name)):
         known = f"the built-in ones are {', '.join(built_in())}"

@@ -8,7 +8,7 @@ from grader.tables.scale_text import TextError
 
 TURNS = (0, 90, 180, 270)
 LARGEST = 100_000.0
-"""Of a coordinate or of points: scans have fewer pixels a side."""
+"""Largest coordinate, and most points: scans have fewer pixels a side."""
 _NUMBER = r"[+-]?[0-9]+(?:[.][0-9]+)?"
 _PAIR = re.compile(rf"({_NUMBER})\s*[,;\s]\s*({_NUMBER})")
 _DECIMAL_COMMAS = re.compile(r"([+-]?[0-9]+,[0-9]+)\s*[;\s]\s*([+-]?[0-9]+,[0-9]+)")
@@ -17,7 +17,7 @@ _DECIMAL_COMMAS = re.compile(r"([+-]?[0-9]+,[0-9]+)\s*[;\s]\s*([+-]?[0-9]+,[0-9]
 
 @dataclass(frozen=True, slots=True)
 class PageDecision:
-    """What a person says of a page.
+    """A person's decision on a page.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ ANSWERS = ("right", "wrong", "unclear")
 
 @dataclass(frozen=True, slots=True)
 class AuditAnswer:
-    """What a person found of a settled verdict: one of `ANSWERS`, and the verdict that it is about."""
+    """A person's check of a settled verdict: one of `ANSWERS`, and the verdict that was checked."""
 
     answer: str
     said: str

@@ -57,7 +57,7 @@ COLUMNS = ("student_id", "position", "criterion", "verdict", "points", "comment"
 VERDICTS = ("full", "partial", "none", "follow_through", "not_judged")
 Kind = Literal["verdict", "audit", "node", "page", "total", "comment"]
 Key = tuple[str, int | None, str]
-"""What a row is about: student, position, criterion; of a page the page alone."""
+"""Subject of a row: student, position, criterion; of a page the page alone."""
 
 _TABLE = TableKind(
     "decisions", COLUMNS, ("student_id", "criterion", "verdict"), 50_000_000, 200_000, is_strict=True
@@ -109,7 +109,7 @@ class Decision:
 
     @property
     def kind(self) -> Kind:
-        """What sort of thing it is about."""
+        """The kind of decision, by its criterion."""
         start = self.criterion.partition(":")[0]
         match start:
             case "audit" | "node" | "page" if ":" in self.criterion:
@@ -120,7 +120,7 @@ class Decision:
 
     @property
     def key(self) -> Key:
-        """What it is about; two rows with the same key decide the same."""
+        """The subject; two rows with the same key decide the same."""
         if self.kind != "page":
             return self.student_id, self.position, self.criterion
         ref = parse_scan(self.criterion.removeprefix("page:"))
@@ -144,7 +144,7 @@ class Decision:
 
     @property
     def place(self) -> tuple[float, float]:
-        """Where the node was put, x and y in mm of the sheet, y down. Raises TextError."""
+        """The place of the node, x and y in mm of the sheet, y down. Raises TextError."""
         return place(self.verdict)
 
     @property
@@ -154,7 +154,7 @@ class Decision:
 
     @property
     def page(self) -> PageDecision:
-        """What was decided on the page. Raises TextError."""
+        """The decision on the page. Raises TextError."""
         return page_decision(self.verdict)
 
 

@@ -70,12 +70,12 @@ OWN_TABLE = replace(CLASS_TABLE, required=())
 MAX_LENGTH_MM = 2000.0
 """Longer than any sheet: a length in other units, or a slip of the pen."""
 NO_SIZE = 1e-12
-"""What is smaller is zero: nothing is drawn or computed so finely, and a quotient by it may overflow."""
+"""Smaller values are zero: nothing is drawn or computed so finely, and a quotient by it may overflow."""
 
 
 @dataclass(frozen=True, slots=True)
 class Measurements:
-    """What one student measured, for one variant.
+    """The measurements of one student, for one variant.
 
     Attributes
     ----------
@@ -103,12 +103,12 @@ class Measurements:
 
     @property
     def place(self) -> str:
-        """Where they stand: the file, and behind a colon the line of one that has lines."""
+        """The file, and after a colon the line if the file has lines."""
         return self.source if self.line is None else f"{self.source}:{self.line}"
 
     @property
     def numbers(self) -> dict[str, float]:
-        """What was entered by the names of a CSV file's columns: mm, ``NAME_deg``, ``NAME_value``."""
+        """The entered numbers by the names of a CSV file's columns: mm, ``NAME_deg``, ``NAME_value``."""
         entered: dict[str, float] = {}
         for figure in self.reading.figures.values():
             for name, vector in figure.vectors.items():
@@ -124,7 +124,7 @@ NOTHING_MEASURED = Measurements(None, None, None, {}, Reading({}), {}, "")
 
 @dataclass(frozen=True, slots=True)
 class StudentSubmission:
-    """What one student handed in for one variant.
+    """One student's submission for one variant.
 
     Attributes
     ----------
@@ -157,7 +157,7 @@ class StudentSubmission:
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """What can be measured: vectors with the plan each is in, and angular quantities."""
+    """Names of measurable quantities: vectors with the plan each is in, and angular quantities."""
 
     vectors: Mapping[str, str]
     rates: tuple[str, ...]
@@ -166,7 +166,7 @@ class Names:
 
     @property
     def values(self) -> tuple[str, ...]:
-        """What has a computed value."""
+        """Names of the quantities with a computed value."""
         return (*self.vectors, *self.rates)
 
 
@@ -223,7 +223,7 @@ def read_measurements(
 
 
 def measurements_in(cells: Mapping[str, str], names: Names, file: str, lang: str) -> Measurements:
-    """What one student typed into a form: texts by columns of a CSV file, with decimal commas or points.
+    """Read what one student typed into a form: texts by columns of a CSV file, with decimal commas or points.
 
     Raises TableError, in the language, where none of the columns is known.
     """
@@ -274,13 +274,13 @@ def _unknown(header: Sequence[str], columns: Mapping[str, object]) -> dict[str, 
 
 
 def _entry(name: str, column: str, shown: str) -> Unread:
-    """What cannot be used of an entry, as it was written: not read for the vector of this name."""
+    """Return an entry that cannot be used, as it was written: the vector of this name is unread."""
     return Unread(name, Reason("entry", {"entries": (f"{column}: {shown}",)}))
 
 
 @dataclass(slots=True)
 class _Entries:
-    """What one student entered, while it is being read; what is refused costs that entry alone.
+    """The entries of one student while they are read; a refused one is left out alone.
 
     Attributes
     ----------
@@ -364,7 +364,7 @@ def _checked(table: str, text: str, value: float) -> float | Reason:
 
 
 def _line(row: Row, meant: Mapping[str, tuple[str, ...]], entries: _Entries, *, is_own: bool) -> Measurements:
-    """What one line says; what is wrong in it is left out and reported."""
+    """Read one line; faulty entries are left out and reported."""
     if row.is_too_wide():
         row.text = {"student_id": row["student_id"]} if row.header[0] == "student_id" else {}
     student = row.student(may_be_blank=is_own)
@@ -468,7 +468,7 @@ def _shown(value: object) -> str:
 
 
 MOST_DIGITS = 18
-"""Of a whole number that fits 64 bits."""
+"""Most digits of a whole number that fits 64 bits."""
 
 
 def _whole_number(digits: str) -> int | float:
@@ -540,7 +540,7 @@ KEYS_OF_DOCUMENT = tuple(MeasurementsDocument.model_fields)
 
 
 def _about(data: Mapping[str, object], file: str) -> tuple[str | None, int | None, int | None]:
-    """Whose they are, n and position. Raises TableError with all faults in what is left of the file."""
+    """Return the student, n and position. Raises TableError with all faults in what is left of the file."""
     found = [(key, why) for key, value in data.items() if (why := _misfit(key, value)) is not None]
     if found:
         faults = [at(why, None, f"$.{key[:40]}") for key, why in found]
@@ -554,7 +554,7 @@ def _about(data: Mapping[str, object], file: str) -> tuple[str | None, int | Non
 
 
 def _misfit(key: str, value: object) -> Reason | None:
-    """Why a key of a document, or its value, cannot be used; None where it can."""
+    """Return why a key of a document, or its value, cannot be used; None if it can."""
     if isinstance(value, Reason):
         return value
     if key not in KEYS_OF_DOCUMENT:

@@ -1,4 +1,4 @@
-"""The one reader of what people write as tables: its text, its columns, its lines, and what is wrong, where.
+"""Read tables that people write: text, columns and lines, with each fault and its place.
 
 Comma, semicolon or tab separated, whichever the first line has most of; beside semicolons numbers have
 decimal commas. UTF-8, or UTF-16 with its mark. A fault is a `Reason` with the code of a clause of
@@ -24,7 +24,7 @@ _STUDENT_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 _DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECASE)
 """Windows opens a device in place of a file or folder of such a name, whatever its extension."""
 _RESULT_FILES = frozenset({"results.json", "summary.csv", "index.html", "decisions.csv"})
-"""What lies beside the students' folders of results."""
+"""Files beside the students' folders of results."""
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 _COMMENT = re.compile(r'^[ \t]*"?#[^\n]*', re.MULTILINE)
 MARK = "\ufeff"
@@ -58,12 +58,12 @@ Check = Callable[[Sequence[str]], Iterable[Reason]]
 
 @dataclass(frozen=True, slots=True)
 class TableKind:
-    """How a table must be.
+    """The form that a table must have.
 
     Attributes
     ----------
     code, unreadable, encoding : of the error of one that cannot be used, opened, or is no UTF-8
-    columns : that there are, as they are told
+    columns : names that are known, as messages list them
     required : those of them without which nothing can be read
     has_comments : lines that begin with ``#`` are passed over
     is_strict : a column that is not known is a fault
@@ -164,7 +164,7 @@ class Row:
         return self.text.get(column, "")
 
     def is_too_wide(self) -> bool:
-        """Whether it has more fields than there are columns; notes that fault."""
+        """Return whether it has more fields than there are columns, which is noted as a fault."""
         count, wide = len(self.cells), len(self.header)
         is_too_wide = any(cell.strip() for cell in self.cells[wide:])
         if is_too_wide:
@@ -252,7 +252,7 @@ def real_number(text: str, delimiter: str) -> float | Reason:
 
 
 def why_no_id(text: str) -> Reason | None:
-    """Why a text cannot be a student's id, which names the student's folder of results; None where it can."""
+    """Return why a text cannot be a student's id, which names a folder of results; None if it can."""
     if _STUDENT_ID.fullmatch(text) is None:
         return Reason("id_letters")
     if text.startswith(".") or text.endswith("."):
@@ -265,7 +265,7 @@ def why_no_id(text: str) -> Reason | None:
 
 
 def refused_id(text: str) -> Reason | None:
-    """What is wrong with a cell that must hold a student's id; None where nothing is."""
+    """Return the fault of a cell that must hold a student's id; None if there is none."""
     why = why_no_id(text)
     if why is None or not text:
         return None if text else Reason("cell_empty")

@@ -21,7 +21,7 @@ from reference.errors import MOST_FINDINGS
 
 COLUMNS = ("student_id", "name", "n", "position", "email", *SCALE_NAMES, "lang", "scans")
 DRAFT_COLUMNS = ("why", "sure")
-"""What `planmark match` adds for the person who checks its draft; without meaning here."""
+"""Columns that `planmark match` adds for the person who checks its draft; ignored here."""
 ROSTER = TableKind("authored_file", COLUMNS, ("student_id", "name"), most_bytes=20_000_000, most_lines=20_000)
 """No class has more students and positions; so many lines of a thousand characters."""
 _ALMOST = 0.75
@@ -39,7 +39,7 @@ class ScanRef:
         return self.file if self.page is None else f"{self.file}#{self.page}"
 
     def covers(self, file: str, page: int) -> bool:
-        """Whether a page of a file is meant."""
+        """Return whether it names this page of the file."""
         return self.file == file and self.page in (None, page)
 
 

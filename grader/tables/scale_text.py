@@ -99,7 +99,7 @@ class TextError(ValueError):
 
 
 def parse_scale(name: str, text: str | float, *, bare_unit: str | None = None) -> ParsedScale:
-    """What a declared scale means.
+    """Return the meaning of a declared scale.
 
     Arguments
     ---------
@@ -357,7 +357,7 @@ class _Reader:
 
 
 def _quantities(text: str) -> list[_Quantity]:
-    """What the text says: read strictly, then with everything after a slash as the denominator."""
+    """Return the quantities in a text: read strictly, then with all after a slash as the denominator."""
     return [_Reader(text, rest_is_divisor=later).read() for later in (False, True)]
 
 
@@ -397,7 +397,7 @@ def _correspondence(name: str, paper_text: str, real: list[_Quantity]) -> float 
 
 
 def sure_texts(readings: Sequence[Mapping[str, Written]]) -> dict[str, str]:
-    """What is surely read in the boxes of some pages, by scale; before anything else was read there."""
+    """Return the surely read texts in the boxes of some pages, by scale; nothing else is read yet."""
     texts: dict[str, str] = {}
     for name in SCALE_NAMES:
         boxes = [written[name] for written in readings if name in written]

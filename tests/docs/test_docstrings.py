@@ -8,10 +8,9 @@ from docs import make_architecture as architecture
 QUESTION = re.compile(r'^ *r?"""(What|Where|When|Who|Whose|Of|How|Why|Whether|Which|That)\b', re.MULTILINE)
 
 MOST = {
-    "grader/cli": 15, "grader/comparison": 50, "grader/folder": 60, "grader/tables": 35, "grader/lms": 30,
-    "grader/lms/api": 5, "grader/marking": 35, "grader/pipeline": 5, "grader/review": 30,
-    "grader/scan": 10, "grader/scan/decode": 35, "grader/scan/register": 50, "grader/scan/strokes": 45,
-    "grader/web": 75,
+    "grader/cli": 15, "grader/comparison": 44, "grader/folder": 57, "grader/lms": 26, "grader/lms/api": 3,
+    "grader/marking": 35, "grader/pipeline": 1, "grader/review": 27, "grader/scan": 9,
+    "grader/scan/decode": 20, "grader/scan/register": 45, "grader/scan/strokes": 24, "grader/web": 74,
 }  # fmt: skip
 """Most such docstrings by room, none elsewhere. The numbers only fall: rewrite some, then lower them."""
 

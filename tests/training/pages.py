@@ -1,4 +1,4 @@
-"""Simulated students' sheets to learn from, of any assignment, hand, pen and scanner, and the command line."""
+"""Simulated students' sheets to learn from, of any assignment, hand, pen and scanner; command line."""
 
 import argparse
 import tempfile

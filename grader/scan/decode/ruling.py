@@ -55,7 +55,7 @@ def without_ruling(grey: GreyImage) -> tuple[GreyImage, Ruling | None]:
 _AROUND_PX = 81
 """As wide as the widest squares."""
 _CLIP = 16
-"""Of 255: a line counts as much as a stroke, whatever their darkness."""
+"""Most darkness of a pixel, of 255: a line counts as much as a stroke, whatever their darkness."""
 _STRIP_PX = 16
 """Narrow enough that a line 5 degrees askew stays near its own width."""
 _WINDOW_PX = 512
@@ -63,11 +63,11 @@ _WINDOW_PX = 512
 _PITCH_PX, _PITCH_STEP = (4.5, 110.0), 0.004
 """From 1 mm on a photo that shows more than the sheet, to 10 mm on A4; relative distance of those tried."""
 _HIGHEST = 0.45
-"""Of the sampling rate: harmonics up to it."""
+"""Highest harmonic, as a share of the sampling rate."""
 _LEAST_BIN = 2.5
 """Lower frequencies are the light's and the window's."""
 _STRIPS = 16
-"""Whose power is taken together: a part of the page 40 mm wide."""
+"""Number of strips whose power is added: a part of the page 40 mm wide."""
 _FLOOR_BINS = 25
 """Frequencies around a harmonic whose median is that of what is drawn."""
 _LOG_CAP = 4.0
@@ -100,7 +100,7 @@ def _combs() -> tuple[FloatArray, FloatArray]:
 
 
 def _darkness(small: GreyImage) -> GreyImage:
-    """How much darker than around it each pixel is, up to a limit."""
+    """Return how much darker each pixel is than its surroundings, up to a limit."""
     around = cv2.blur(small, (_AROUND_PX, _AROUND_PX))
     return np.asarray(np.minimum(cv2.subtract(around, small), _CLIP), dtype=np.uint8)
 
@@ -148,7 +148,7 @@ def find_pitch(dark: GreyImage) -> tuple[float, float]:
 # Which line a place lies on --------------------------------------------------------------------------
 
 _DEGREE = 4
-"""Of the polynomial: perspective, a lens's bend, and paper that a copier drew in unevenly."""
+"""Degree of the polynomial: perspective, a lens's bend, and paper that a copier drew in unevenly."""
 _TERMS = np.array([(i, j) for i in range(_DEGREE + 1) for j in range(_DEGREE + 1 - i)]).T
 """Powers of x and of y in each term."""
 _PERIODS = 8
@@ -157,7 +157,7 @@ _LEAST_WINDOW_PX = 96
 _SMOOTH = 3.0
 """Windows and strips whose phases are taken together."""
 _ROUNDS, _TUKEY = 6, 4.7
-"""Of a robust fit: enough to settle; strays are left out as usual."""
+"""Rounds and Tukey's constant of a robust fit: enough to settle; outliers are left out as usual."""
 _REACH_PX, _STEP_PX = 3.5, 0.5
 """To either side of a line, at the reduced size: 0.6 mm; distance of samples there, at the full one."""
 _COLUMNS, _SEGMENTS = 100, 25
@@ -318,15 +318,15 @@ def _by_middles(cuts: _Cuts, shape: tuple[int, ...]) -> FloatArray:
 # Out of the page ------------------------------------------------------------------------------------
 
 _QUANTILE = 0.93
-"""Of the darkness along the lines: lines that were printed or scanned unevenly are seldom darker."""
+"""Quantile of the darkness along the lines: lines that were printed or scanned unevenly are seldom darker."""
 _LEAST, _MARGIN = 0.012, 1.1
 """Contrast that is paper, and what is taken off for each of darkness: no specks are left."""
 _REPEATS, _REPEATED = (1, 2, 4, 5, 10), 6
 """Every second, fourth, fifth or tenth line may be heavier, if there are so many of them."""
 _OWN = (0.8, 1.4)
-"""How far the darkness of a line may be from that of its likes: more is a stroke along it."""
+"""Bounds of a line's darkness relative to similar lines: a stroke along it adds more."""
 _OWN_PX = 1.5
-"""How far beside its place a line may be printed."""
+"""Farthest that a line may be printed from its place."""
 _BINS = 256
 """From one line to the next."""
 _COARSE_PX = 32
@@ -334,7 +334,7 @@ _COARSE_PX = 32
 _BAND_PX = 64
 """Rows of a page whose pictures fit the processor's cache together."""
 _LEANS = (-2.5, -1.2, -0.5, 0.0, 0.5, 1.2, 2.5)
-"""Of strokes that cross a line, against its normal: up to 68 degrees. More joins strokes that are apart."""
+"""Slopes of strokes that cross a line, from its normal: up to 68 degrees. More joins separate strokes."""
 _SEEN = 0.03
 """Contrast at a line's border."""
 
@@ -399,7 +399,7 @@ def _lightened(flat: Flat, families: Sequence[_Family]) -> GreyImage:
 
 
 def _taken(shape: tuple[int, ...], family: _Family) -> Callable[[slice], GreyImage]:
-    """What a family of lines takes of the light, of 255, in given rows of a page."""
+    """Return a function that gives a family's darkness, of 255, in some rows of a page."""
     high, wide = shape
     # One place beyond each border.
     x, y = (

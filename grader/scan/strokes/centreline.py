@@ -30,7 +30,7 @@ _REACH_MM = 0.8
 _CAPTURE_MM = 0.1
 """Ink beside a guess by more than half its width and this is another's."""
 _SINGLE, _THIN = 1.5, 0.4
-"""Of the pen: wider ink is of several strokes, thinner ink a border that was only touched."""
+"""Bounds of a cut's width relative to the pen: wider ink is of several strokes, thinner ink a border."""
 _NEAR_MM = 0.18
 """A border of a band belongs to a stroke whose line it puts no farther off."""
 _BLOT_WEIGHT = 0.3
@@ -52,11 +52,11 @@ _MOST_NEIGHBOURS = 6
 _LONG_MM = 20.0
 """Neighbours of a longer stroke need not be as long as itself."""
 _HIDDEN = 0.5
-"""What a cut hidden in other strokes counts for a stroke that is said to be there."""
+"""Weight of a cut hidden in other strokes, for a stroke that is known to be there."""
 _LEAST_CUTS, _LEAST_LONE = 5, 6
 """Cuts that a line needs, and those where a stroke is alone that its width needs."""
 _USED = 0.05
-"""Of its weight beforehand: a cut that keeps less does not agree with the line."""
+"""Least share of its weight that a cut keeps if it agrees with the line."""
 _NOISE_MM = 0.03
 """The middle of a stroke's ink is not known better in a single cut."""
 _SURE = 0.5
@@ -204,7 +204,7 @@ def rejoined(fitted: Fitted, px_per_mm: float) -> tuple[FloatArray, BoolArray]:
 
 
 def _goes_on(own: FloatArray, others: FloatArray, px_per_mm: float) -> tuple[BoolArray, FloatArray]:
-    """Whether others lie on their segment's line, beside it and beyond its end; their ends along it.
+    """Return whether others lie on their segment's line, beside it and beyond its end; their ends along it.
 
     Arguments: segments (..., 2, 2) in pairs. A segment does not go on as itself.
     """
@@ -236,7 +236,7 @@ def _by_length(
 
 @dataclass(frozen=True, slots=True)
 class _Middles:
-    """What cuts (k, n) say of where their strokes run.
+    """Middles of strokes as cuts (k, n) show them.
 
     Attributes
     ----------
@@ -338,7 +338,7 @@ def _middles(
 
 
 def _of_guesses(cuts: Cuts, guesses: Fitted, taken: FloatArray, unit: float) -> _Middles:
-    """What cuts say of guesses, where the strokes `taken` (t, 2, 2) are fitted already."""
+    """Return the middles of guesses by their cuts, where the strokes `taken` (t, 2, 2) are fitted already."""
     every = np.ones(cuts.along.shape, dtype=bool)
     pen = guesses.width[:, None] / 2.0
     offsets = cuts.left + pen, cuts.right - pen
@@ -358,7 +358,7 @@ def _of_guesses(cuts: Cuts, guesses: Fitted, taken: FloatArray, unit: float) -> 
 def _beside_neighbours(
     cuts: Cuts, strokes: Fitted, rows: NDArray[np.intp], beside: NDArray[np.intp], unit: float
 ) -> _Middles:
-    """What cuts say of some rows of known strokes, whose neighbours are `beside` (k, t), -1 for none."""
+    """Return the middles of some rows of known strokes, whose neighbours are `beside` (k, t), -1 for none."""
     own, there = strokes.ends[rows][:, None], np.maximum(beside, 0)
     at, cosine = crossings(own, strokes.ends[there], cuts.along[:, None], _PAST_MM * unit)
     at = np.where((beside >= 0)[..., None], at, np.inf)
@@ -382,7 +382,7 @@ def _beside_neighbours(
 def crossings(
     own: FloatArray, others: FloatArray, along: FloatArray, past: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Where cuts across segments meet other segments: offset across, inf where they do not; cosine of both.
+    """Return where cuts across segments meet others: offset across, inf if they do not; cosine of both.
 
     Arguments
     ---------

@@ -16,9 +16,9 @@ from grader.scan.strokes.centreline import Fitted
 from grader.scan.strokes.regions import near_pairs
 
 _BEYOND_MM = 9.0
-"""How far beyond a fitted end a stroke may go on: over a joint's circle and a gap."""
+"""Farthest that a stroke may go on beyond a fitted end: over a joint's circle and a gap."""
 _INSIDE_MM = 2.0
-"""Where following starts: fitted ends may lie outside of the ink."""
+"""Start of following inside a fitted end: fitted ends may lie outside of the ink."""
 _STEP_MM = 0.15
 """Half of a pen's width: no gap is stepped over."""
 _GAP_MM = 0.9
@@ -30,7 +30,7 @@ _OFF_MM = 0.11
 _REACH_MM = 0.8
 """Beyond its width, how far to either side the ink is looked at."""
 _INKED = 0.45
-"""Of the stroke's own darkness."""
+"""Least darkness of ink, as a share of the stroke's own."""
 _BAND_MM = 40.0
 """A stroke is followed through another's ink over at most this length."""
 _BAND_STEP_MM = 0.3
@@ -44,14 +44,14 @@ _LEAST_BAND_MM = 2.5
 _LEAST_LED_MM = 8.0
 """The direction of a shorter stroke is not known well enough to follow it."""
 _PROBES = np.array([-0.4, 0.0, 0.4])
-"""Of a stroke's width: places across it at which ink is looked for."""
+"""Places across a stroke at which ink is looked for, as shares of its width."""
 _OWN, _OTHER, _PAPER = 2, 1, 0
 _ACROSS = np.linspace(-0.6, 0.6, 5)
-"""Of a stroke's width: places across it, a little beyond both borders."""
+"""Places across a stroke, a little beyond both borders, as shares of its width."""
 _LIGHT = 0.6
-"""Of the stroke's dark level; a pencil's grain varies less over a millimetre."""
+"""Darkest light part, as a share of the dark level; a pencil's grain varies less over a millimetre."""
 _DARK_QUANTILE = 0.75
-"""Of the levels along a stroke: its dark part's, if that is a quarter of it."""
+"""Quantile of the levels along a stroke: its dark part's level, if that is a quarter of it."""
 _SMOOTH_MM = 1.05
 """Running median: a crossing stroke is narrower than half of this."""
 _LEAST_LIGHT_MM = 1.5
@@ -246,11 +246,11 @@ def _runs(level: FloatArray) -> list[tuple[int, int]]:
 # Tips of arrowheads -------------------------------------------------------------------------------
 
 STEP_MM = 0.15
-"""Of the bands' pixels, along and across."""
+"""Step between a band's pixels, along and across."""
 HALF = 15
 """Pixels of a band to either side of its stroke."""
 BEYOND_MM = 3.0
-"""Of a band past its stroke's ends: an arrowhead is shorter."""
+"""Length of a band past its stroke's ends: an arrowhead is shorter."""
 GAP = 20
 """Empty columns between bands."""
 CELL = 2
@@ -269,7 +269,8 @@ CERTAINTY = (2.76, 1.61)
 """The network's log odds times the first, and the second more: trained by focal loss, it says 0.7 where it
 is right in 97 of 100. Logistic regression on 4,900 peaks along the vectors of 99 simulated sheets."""
 LEAST_SURE, MOST_SURE = 0.04, 0.9
-"""Where more is said 97 of 100 are right; but what misleads the network misleads those who follow it."""
+"""Bounds of a tip's probability. Above the second 97 of 100 are right, but errors are shared by all
+that follows from the network."""
 ASIDE_MM = 0.5
 """A tip lies in its own cell or the next."""
 KINDS = 4

@@ -13,7 +13,7 @@ from reference.geometry import ComplexArray
 
 PX_PER_MM = 6.0
 HALF_MM, SIDE_PX, CELLS = 4.0, 48, 12
-"""A window reaches so far from its middle; its pixels, and the network's cells, along a side."""
+"""Reach of a window from its middle; its pixels, and the network's cells, along a side."""
 LINE_MM = 0.17
 """Standard deviation of the blur with which expected vectors are drawn."""
 AT_NODE_MM = 0.3
@@ -21,7 +21,7 @@ AT_NODE_MM = 0.3
 FARTHEST_MM = 1.45 * HALF_MM
 """A line farther from the middle is not in the window, however it is turned."""
 NARROWEST, WIDEST, USUAL = -3.3, 0.5, -1.5
-"""Of the logarithm of a standard error: bounds, and what the network's zero stands for."""
+"""Bounds of a standard error's logarithm, and its value where the network says zero."""
 HEAVY_TAILS = 1.5
 """Variance of Student's distribution with six degrees of freedom, which was learnt, of a unit scale."""
 
@@ -31,10 +31,7 @@ _MIDDLES = (np.arange(CELLS) + 0.5) * (2.0 * HALF_MM / CELLS) - HALF_MM
 
 
 def node_places(where: InkMap, views: Sequence[NodeView]) -> NodePlaces:
-    """Where each of some nodes lies by the ink about it.
-
-    Arguments: `views`, one or more.
-    """
+    """Return the places of nodes by the ink about each; `views` are one or more."""
     network = _network()
     network.setInput(np.stack([window_of(where, view) for view in views]))
     cells, nowhere = (np.asarray(told, np.float64) for told in network.forward(["cells", "none"]))
