@@ -9,12 +9,12 @@ import pytest
 from PIL import Image
 
 from grader.folder.decisions import basis_of
-from grader.records import ACCELERATION_PLAN, Figure
+from grader.records import ACCELERATION_PLAN
 from grader.review.server import application
 from grader.review.session import mark_of
 from grader.tables.decisions import Decision, DecisionFile
-from reference.construction.derive import construction_of
 from tests.examples import slow
+from tests.unit.marking.test_answers import unsure
 from tests.unit.review.conftest import PUMP, Page, silent
 from tests.waiting import until
 
@@ -80,22 +80,13 @@ def test_a_question_says_why_it_waits_and_what_the_student_will_read(page):
     assert (settled["sentence"], settled["why"]) == (question["sentence"], "")
 
 
-def with_an_unsure_node(page, figure, node):
-    """The page where a node, and the vectors that touch it, are as good as unread."""
-    read = page.reading.figures.get(figure)
-    if read is None:
-        return page
-    vectors = construction_of(PUMP.mechanism(PUMP.variants())).vectors
-    ends = {one.name: {one.tail, one.head} for one in vectors.values()}
-    nodes = {**read.nodes, node: replace(read.nodes[node], confidence=0.5)}
-    touched = {name: replace(one, confidence=0.5) for name, one in read.vectors.items() if node in ends[name]}
-    figures = {**page.reading.figures, figure: Figure(nodes, {**read.vectors, **touched})}
-    return replace(page, reading=replace(page.reading, figures=figures))
-
-
 def test_what_is_expected_of_a_stroke_is_judged_with_the_likeliest_answer(page, session):
     student = session.student(SCANNED)
-    student.pages = [with_an_unsure_node(one, ACCELERATION_PLAN, "a'") for one in session.pages_of(student)]
+    student.pages = [
+        replace(one, reading=unsure(one.reading, "a'", figure=ACCELERATION_PLAN))
+        for one in session.pages_of(student)
+        if ACCELERATION_PLAN in one.reading.figures
+    ]
     student.report, student.version = session.report_if(student, ()), student.version + 1
     offered = [one for one in session.doubts(student, counted=True) if one.kind == "node" and one.default]
     assert offered
