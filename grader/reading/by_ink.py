@@ -40,8 +40,7 @@ def held_against_ink(fit: NodeFit, edges: Sequence[Edge], look: Look) -> NodeFit
             pull[block] += towards
     cov = np.asarray(np.linalg.inv(precision))
     state = cov @ pull
-    at = state[0::2] + 1j * state[1::2]
-    return replace(fit, at=at, cov=WIDER**2 * cov)
+    return replace(fit, at=state[0::2] + 1j * state[1::2], cov=WIDER**2 * cov)
 
 
 def _site(at: FloatArray, cov: FloatArray, places: NodePlaces) -> tuple[FloatArray, FloatArray]:

@@ -43,6 +43,8 @@ LEAST_PLAN = 12.0
 """Nats: a figure with a smaller score may be chance."""
 SURE_PLAN = 40.0
 """Nats from which a plan's strokes belong to no other plan."""
+MOST_SHARED = 0.5
+"""Share of a plan's strokes that another plan may take as well: both may use a line or two."""
 LEAST_DRAWN_MM, MOST_DRAWN_MM = 15.0, 200.0
 """Lengths of the vectors given at the start of a plan: they fit on a sheet and can be measured."""
 SAME_SCALE = 0.95
@@ -98,11 +100,14 @@ def read_figures(
     followed = [page.sketch.drawing for page in pages if page.sketch is not None] if variant is None else []
     drawing = _measurable((followed or own)[0], assignment, variant)
     velocity = _find_plan(pages, [drawing], VELOCITY_PLAN, {}, renamed)
-    velocities = {} if velocity is None else _nodes(velocity)
     if _asks_accelerations(wanted, drawing):
         _set_apart(pages, velocity)
+        velocities = {} if velocity is None else _nodes(velocity)
         at_scales = [drawing] if velocity is None else _at_velocity_scales(drawing, velocities)
         _find_plan(pages, at_scales, ACCELERATION_PLAN, velocities, renamed)
+        for page in filter(_has_no_velocities, pages):
+            page.plans.clear()
+            _find_plan(pages, [drawing], ACCELERATION_PLAN, {}, renamed)
     return [
         lettered(reading, page.ink.letters, drawing.construction, renamed)
         for reading, page in zip(_readings(pages, drawing, wanted), pages, strict=True)
@@ -245,6 +250,15 @@ def _sketched(page: _PageReading, pages: Sequence[_PageReading]) -> tuple[Nodes,
     return {
         name: np.asarray(at) for name, at in zip(names, sketch.fit.at, strict=True)
     }, sketch.guide_turn_rad
+
+
+def _has_no_velocities(page: _PageReading) -> bool:
+    """Return whether the velocity plan is made of strokes that the acceleration plan explains better."""
+    velocity, acceleration = map(page.plans.get, (VELOCITY_PLAN, ACCELERATION_PLAN))
+    if velocity is None or acceleration is None:
+        return False
+    shared = float(np.isin(velocity.members, acceleration.members).mean())
+    return velocity.score < acceleration.score and shared > MOST_SHARED
 
 
 def _set_apart(pages: Sequence[_PageReading], plan: PlanReading | None) -> None:

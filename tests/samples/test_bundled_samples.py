@@ -20,6 +20,7 @@ from grader.scan.page import open_page
 from grader.tables.measurements import names_of, read_measurements
 from grader.tables.roster import read_roster
 from reference.authored.assignment import load_assignment
+from tests.examples import slow
 from tests.samples.counting import counted
 
 SAMPLES = Path(__file__).resolve().parents[2] / "samples"
@@ -108,3 +109,11 @@ def marks(name, student):
     variant = assignment.variant(row.n, row.position)
     readings = [page.reading for page in read_pages(seen, assignment, variant, row.scales, wanted)]
     return counted(truths, readings)
+
+
+@pytest.mark.parametrize(("student", "n"), [("s01", 7), *slow(("s02", 12), ("s07", 15))])
+def test_an_acceleration_plan_alone_is_read_as_no_velocity_plan_too(student, n):
+    assignment = load_assignment("pump")
+    ref = PageRef("second page", path=SAMPLES / "pump" / f"{student}_2.jpg")
+    (page,) = read_pages([open_page(ref)], assignment, assignment.variant(n, None), {}, ())
+    assert set(page.reading.figures) == {"mechanism", "acceleration_plan"}
