@@ -1,6 +1,5 @@
 """Exports: read the results, choose what a platform takes, validate it, write it whole or not at all."""
 
-import json
 import math
 import re
 import zipfile
@@ -16,7 +15,7 @@ from grader.files import create_whole, replacing, write_whole
 from grader.lms import gradebooks, moodle, moodle_guide, scores
 from grader.lms.api import canvas, classroom, graph, openedx
 from grader.lms.grades import Content, Delivery, Grade, Options, grades_of, in_a_row, ready
-from grader.lms.table import criteria_text, not_as_meant, summary_text
+from grader.lms.table import criteria_text, not_as_meant, parsed, summary_text
 from reference.authored.toml_file import findings_of
 from reference.errors import CallError, InputFileError, lines_of
 
@@ -25,7 +24,7 @@ def read_results(out_dir: Path) -> ResultsDocument:
     """`results.json` of an output folder; InputFileError where it is missing or not one."""
     path = out_dir / "results.json"
     try:
-        return ResultsDocument.model_validate(_of_a_known_version(json.loads(path.read_bytes()), path))
+        return ResultsDocument.model_validate(_of_a_known_version(parsed(path.read_bytes()), path))
     except FileNotFoundError as error:
         raise InputFileError(
             "results_missing", f"{path}: there is no such file; run planmark grade first"
@@ -36,7 +35,7 @@ def read_results(out_dir: Path) -> ResultsDocument:
         faults = lines_of(list(findings_of(error, ResultsDocument)))
         message = f"{path}: is not a planmark results file; grade again\n{faults}"
         raise InputFileError("results_wrong", message) from error
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise InputFileError("results_wrong", f"{path}: is not JSON ({error}); grade again") from error
 
 

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from grader.documents import CriterionDocument, ReportDocument, Verdict
 from grader.language import Tongue, tongue
 from grader.lms.grades import Grade, Options, ready
-from grader.lms.table import bytes_of, read_table
+from grader.lms.table import bytes_of, parsed, read_table
 from grader.overlay.scene import MARKS
 from reference.errors import CallError, InputFileError, lines_of
 
@@ -347,8 +347,8 @@ def _criteria_of(path: Path) -> list[PlatformEntry]:
 def read_answer(path: Path) -> Any:  # noqa: ANN401 - whatever a platform answers
     """A platform's JSON; InputFileError for what is none."""
     try:
-        return json.loads(bytes_of(path, "criteria"))
-    except (ValueError, RecursionError) as error:
+        return parsed(bytes_of(path, "criteria"))
+    except ValueError as error:
         raise InputFileError("criteria", f"{path}: is not JSON ({error})") from error
 
 

@@ -3,6 +3,7 @@
 import csv
 import html
 import io
+import json
 import re
 import unicodedata
 from abc import ABC, abstractmethod
@@ -12,7 +13,9 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from pathlib import Path
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
+
+from pydantic_core import from_json
 
 from grader.documents import CriterionDocument, ReportDocument, ResultsDocument
 from grader.files import OutputError, guarded, write_whole
@@ -184,6 +187,11 @@ def bytes_of(path: Path, code: str) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise InputFileError(code, f"{path}: cannot be read ({error.strerror})") from error
+
+
+def parsed(data: bytes) -> Any:  # noqa: ANN401 - whatever a JSON file holds
+    """A JSON file's content; ValueError for none, and for half of a surrogate pair in a text."""
+    return from_json(data.decode(json.detect_encoding(data)))
 
 
 # Files changed in single cells, everything else the same to the byte ------------------------------
