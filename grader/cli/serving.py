@@ -18,6 +18,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from grader.cli import terminal
 from grader.cli.reviewing import listener_on
 from grader.options import ServeOptions
+from grader.review.server import LOOPBACK
 from reference.errors import CallError
 
 MISSING = "planmark serve needs its extra: install it with pip install 'planmark[web]'"
@@ -90,7 +91,7 @@ def serve(data: Path, options: ServeOptions) -> None:
     host, address = options.host, options.address
     try:
         from grader.web.app import application, first_invitation
-        from grader.web.settings import LOOPBACK, settings_of
+        from grader.web.settings import settings_of
     except ImportError as error:
         raise CallError("extra_missing", f"{MISSING} ({error})") from error
     if address is None and host not in LOOPBACK:

@@ -3,7 +3,6 @@
 import cmath
 import math
 from collections.abc import Iterator, Mapping
-from urllib.parse import urlencode
 
 from markupsafe import Markup
 
@@ -19,12 +18,17 @@ from grader.review.doubts import SURE, Choice, Doubt
 from grader.review.questions import (
     UNSURE,
     Facts,
+    answer_facts,
     badge,
     doubt_sentence,
     look_of,
+    node_facts,
     per_cent,
     question_facts,
+    scan_address,
     state_of,
+    verdict_badge,
+    whole_title,
 )
 from grader.review.session import OPEN, Session, Standing, Student, mark_of
 from reference.quantities import SCALE_OF
@@ -55,7 +59,7 @@ MOST_NAMED = 3
 
 
 def asked_question(session: Session, student: Student, name: str, speaker: Tongue) -> Facts:
-    """One question on a student: an open one by its id, or a criterion."""
+    """Return one question on a student: an open one by its id, or a criterion."""
     doubt = session.doubt(student, name)
     if doubt is not None and (doubt.kind != "verdict" or doubt.id not in doubt.criteria):
         return _doubt_facts(session, student, doubt, speaker)
@@ -63,7 +67,7 @@ def asked_question(session: Session, student: Student, name: str, speaker: Tongu
 
 
 def asked_facts(session: Session, student: Student, speaker: Tongue, *, counted: bool) -> list[Facts]:
-    """The open questions on a student: what the script lists in the place of the rows that they cover."""
+    """Return the open questions on a student, which replace the rows that they cover."""
     standing = session.standing()
     rows = {one.id: one for one in student.report.criteria}
     return [
@@ -87,7 +91,7 @@ def asked_facts(session: Session, student: Student, speaker: Tongue, *, counted:
 
 
 def title_of(session: Session, doubt: Doubt, speaker: Tongue) -> Markup:
-    """The title of a question."""
+    """Return the title of a question."""
     names = {one.id: one for one in session.batch.rubric.criterion}
     if doubt.kind == "owner":
         return Markup.escape(speaker.gettext(WHOSE))
@@ -102,14 +106,12 @@ def title_of(session: Session, doubt: Doubt, speaker: Tongue) -> Markup:
             speaker.gettext(WHICH_SCALE) % {"scale": names[doubt.id].name if doubt.id in names else doubt.id}
         )
     if doubt.id in names:
-        title = names[doubt.id].title.in_language(speaker.lang)
-        drawn = "" if names[doubt.id].name in title else names[doubt.id].name
-        return Markup("{} {}").format(symbols(title), symbols(drawn)) if drawn else symbols(title)
+        return whole_title(names[doubt.id].title.in_language(speaker.lang), names[doubt.id].name)
     return symbols(speaker.gettext(ARE_RIGHT) % {"vectors": drawn + more})
 
 
 def _settles(doubt: Doubt | None, speaker: Tongue) -> str:
-    """Tell how many further verdicts an answer settles; empty where it settles one alone."""
+    """Say how many further verdicts an answer settles; empty if it settles one alone."""
     more = 0 if doubt is None else doubt.settles - 1
     return speaker.ngettext("settles %d more", "settles %d more", more) % more if more > 0 else ""
 
@@ -118,7 +120,7 @@ def _settles(doubt: Doubt | None, speaker: Tongue) -> str:
 
 
 def _doubt_facts(session: Session, student: Student, doubt: Doubt, speaker: Tongue) -> Facts:
-    """A question whose answer is a place, a scale or whose drawing it is, or several verdicts at once."""
+    """Return a question about a place, a scale, an owner, or several verdicts at once."""
     standing, default = session.standing(), doubt.default
     first = student.criterion(doubt.criteria[0])
     choices = [
@@ -145,7 +147,6 @@ def _doubt_facts(session: Session, student: Student, doubt: Doubt, speaker: Tong
         "proposed": "" if default is None else default.key,
         "decided": "",
         "comment": "",
-        "position": "",
         "seen": mark_of(standing.of(student, doubt.id)),
         "numbers": list(_doubt_numbers(student, doubt, after, speaker)),
         "state": state_of(first, None, "", speaker),
@@ -163,35 +164,25 @@ def _choice_facts(
     student: Student, doubt: Doubt, number: int, choice: Choice, standing: Standing, speaker: Tongue
 ) -> Facts:
     if choice.at is not None:
-        label = _letter(choice.key, speaker.gettext(PLACE) % {"letter": choice.key.upper()})
+        letter = choice.key.upper()
+        label = badge(f"place-{choice.key}", letter, speaker.gettext(PLACE) % {"letter": letter})
     elif choice.key == "neither":
-        label = badge("none", speaker.gettext(NEITHER))
+        label = verdict_badge("none", speaker.gettext(NEITHER))
     else:
         is_own = any(name == doubt.id for name, _ in choice.rows)
         words = {"owner": OF_OWNER, "scale": OF_SCALE if is_own else UNDECLARED}.get(doubt.kind, OF_GROUP)
         mark = choice.key if choice.key in MARKS else "follow_through"
-        label = badge(mark, speaker.gettext(words.get(choice.key, VERDICTS.get(choice.key, ""))))
+        label = verdict_badge(mark, speaker.gettext(words.get(choice.key, VERDICTS.get(choice.key, ""))))
     return {
         "key": str(number),
         "label": label,
         "pressed": False,
         "default": choice is doubt.default,
         "answers": [
-            {
-                "student": student.key,
-                "criterion": name,
-                "verdict": verdict,
-                "seen": mark_of(standing.of(student, name)),
-            }
+            answer_facts(student, name, verdict, mark_of(standing.of(student, name)))
             for name, verdict in choice.rows
         ],
     }
-
-
-def _letter(key: str, words: str) -> Markup:
-    return Markup('<span class="badge place-{}" aria-hidden="true">{}</span> {}').format(
-        key, key.upper(), words
-    )
 
 
 def _doubt_numbers(
@@ -224,7 +215,7 @@ def _doubt_numbers(
 
 
 def _doubt_look(session: Session, student: Student, doubt: Doubt, first: CriterionDocument) -> Facts | None:
-    """The part of a scan to show: both strokes of a place, the writing of a scale, else the first vector."""
+    """Return the part of a scan to show: the strokes of a place, the text of a scale, or the first vector."""
     look = look_of(session, student, first)
     if look is None:
         return None
@@ -247,37 +238,24 @@ def _doubt_look(session: Session, student: Student, doubt: Doubt, first: Criteri
 
 
 def _on_the_sketch(session: Session, student: Student) -> Facts:
-    """The sheet with the sketch, and its joints; nothing where there is none."""
+    """Return the sheet with the sketch, and its joints; nothing if there is none."""
     standing = session.standing()
     for sheet, document in enumerate(student.report.reading.sheets):
         figure = document.figures.get("mechanism")
         if figure is not None:
-            asked = {"student": student.key, "sheet": sheet, "run": session.runs}
-            nodes = [
-                {
-                    "figure": MECHANISM,
-                    "name": name,
-                    "x": node.x_mm,
-                    "y": node.y_mm,
-                    "seen": mark_of(standing.of(student, f"node:{MECHANISM}:{name}")),
-                }
-                for name, node in figure.nodes.items()
-            ]
-            return {"sheet": sheet, "scan": "scan?" + urlencode(asked), "nodes": nodes}
+            nodes = node_facts(student, standing, MECHANISM, figure)
+            return {"sheet": sheet, "scan": scan_address(session, student, sheet), "nodes": nodes}
     return {}
 
 
 def _place_marks(choice: Choice, wide_mm: float) -> Markup:
-    """A candidate stroke with its letter."""
+    """Return a candidate stroke with its letter."""
     (x, y), (sx, sy) = choice.at or (0.0, 0.0), choice.start or choice.at or (0.0, 0.0)
     size = wide_mm / 100.0
     away = complex(x - sx, y - sy)
     away = away / abs(away) if away else 1.0
     beside = {"a": -1j, "b": 1j}.get(choice.key, 1.0 + 0j)
-    lx, ly = (
-        x + size * (2.2 * away + 2.6 * away * beside).real,
-        y + size * (2.2 * away + 2.6 * away * beside).imag,
-    )
+    label = complex(x, y) + size * away * (2.2 + 2.6 * beside)
     # No style attributes: the page's policy refuses them.
     return Markup(
         '<g class="place place-{key}">'
@@ -286,13 +264,13 @@ def _place_marks(choice: Choice, wide_mm: float) -> Markup:
         '<circle cx="{x:.2f}" cy="{y:.2f}" r="{r:.2f}" stroke-width="{thin:.2f}"/>'
         '<text x="{lx:.2f}" y="{ly:.2f}" font-size="{font:.2f}" stroke-width="{halo:.2f}">{letter}</text></g>'
     ).format(
-        key=choice.key, sx=sx, sy=sy, x=x, y=y, r=0.9 * size, lx=lx, ly=ly, letter=choice.key.upper(),
-        thin=0.4 * size, dash=2.0 * size, gap=1.2 * size, font=4.0 * size, halo=0.8 * size,
+        key=choice.key, letter=choice.key.upper(), sx=sx, sy=sy, x=x, y=y, lx=label.real, ly=label.imag,
+        r=0.9 * size, thin=0.4 * size, dash=2.0 * size, gap=1.2 * size, font=4.0 * size, halo=0.8 * size,
     )  # fmt: skip
 
 
 def _written_at(session: Session, student: Student, doubt: Doubt, look: Facts) -> Facts:
-    """The box of a printed sheet that a scale is written in; the place of a caption is not known.
+    """Return the box of a printed sheet for a scale; the place of a caption is not known.
 
     Then the lower right quarter is shown, where title blocks are, and the page says so.
     """
@@ -302,8 +280,8 @@ def _written_at(session: Session, student: Student, doubt: Doubt, look: Facts) -
             x, y, wide, high = SCALE_BOXES[scale]
             margin = 0.25 * wide
             box = (x - margin, y - margin, wide + 2 * margin, high + 2 * margin)
-            asked = {"student": student.key, "sheet": sheet, "run": session.runs}
-            return {"sheet": sheet, "scan": "scan?" + urlencode(asked), "box": box, "marks": "", "nodes": []}
+            scan = scan_address(session, student, sheet)
+            return {"sheet": sheet, "scan": scan, "box": box, "marks": "", "nodes": []}
     wide, high = look["page_mm"]
     return {
         "box": (0.5 * wide, 0.6 * high, 0.5 * wide, 0.4 * high),

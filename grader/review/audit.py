@@ -16,14 +16,13 @@ from grader.tables.decision_texts import ANSWERS, AuditAnswer
 from grader.texts.spoken import RefusedError
 
 SHORT = 24
-"""Verdicts of the sample before the least sure ones are asked: all right, at most 12 % are wrong."""
+"""Verdicts of the sample before the least sure ones are asked: if all are right, at most 12 % are wrong."""
 SHOWN = ("title", "numbers", "sentence", "look", "seen", "student", "criterion")
-"""Of a question's facts: not the probability, nor why a person is asked."""
+"""Facts of a question that are shown: not the probability, nor why a person is asked."""
 SAYS = N_("The program says: %(verdict)s. Is that right?")
 ALL_CHECKED = N_("Every settled verdict has been checked.")
 TEXTS = {
-    "gone": questions.TEXTS["gone"],
-    "no_scan": questions.TEXTS["no_scan"],
+    **{name: questions.TEXTS[name] for name in ("gone", "no_scan", "no_picture", "close")},
     "instead": N_("What is right instead?"),
     "opened": N_("Similar verdicts are in the review now."),
     "undone": N_("Nothing was decided in this window."),
@@ -31,7 +30,7 @@ TEXTS = {
 
 
 class Checked(Said):
-    """What a person found of a settled verdict, `said`: one of `ANSWERS`; `seen` marks the one before."""
+    """A person's check of a settled verdict, `said`; `answer` is one of `ANSWERS`, `seen` as in `Answer`."""
 
     student: str
     criterion: str
@@ -41,12 +40,12 @@ class Checked(Said):
 
 
 def texts(speaker: Tongue) -> dict[str, str]:
-    """What the script says."""
+    """Return the texts of the script in a language."""
     return {name: speaker.gettext(text) for name, text in TEXTS.items()}
 
 
 def audit_facts(session: Session, speaker: Tongue) -> dict[str, Any]:
-    """What was found so far, and the next verdict to check."""
+    """Return the results so far, and the next verdict to check."""
     reports = [student.report for student in session.students]
     verdicts = checkable(reports)
     trust = trust_of(reports, session.batch.rubric.doubt.settle)
@@ -61,7 +60,7 @@ def audit_facts(session: Session, speaker: Tongue) -> dict[str, Any]:
 
 
 def _next(verdicts: list[Checkable]) -> Checkable | None:
-    """The next one of the random sample; once that is long enough, first the least sure ones."""
+    """Return the next of the random sample; once that is long enough, first the least sure ones."""
     asked = next_to_check(verdicts, 1)
     least = asked[1:] if len(sample(verdicts)) >= SHORT else []
     return next(iter([*least, *asked]), None)
@@ -91,10 +90,9 @@ def _student(session: Session, one: Checkable) -> Student:
 
 
 def check(session: Session, said: Checked) -> None:
-    """Write what a person found. Raises as `Session.decide`."""
+    """Write a person's check. Raises as `Session.decide`."""
     if said.answer not in ANSWERS or said.said not in VERDICTS:
         raise RefusedError(400, "answer_refused", "no_answer", given=said.answer[:40])
-    student = session.student(said.student)
-    name = f"audit:{student.criterion(said.criterion).id}"
-    answer = Answer(said.student, name, str(AuditAnswer(said.answer, said.said)), seen=said.seen)
-    session.move(answer, said.by, said.window)
+    verdict = str(AuditAnswer(said.answer, said.said))
+    answer = Answer(said.student, f"audit:{said.criterion}", verdict, seen=said.seen)
+    session.decide([answer], said.by, said.window)

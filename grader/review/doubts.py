@@ -8,7 +8,7 @@ else the answer settles.
 import cmath
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -34,7 +34,7 @@ APART_MM = 1.0
 """Two places nearer than this are one: the tolerance of a short vector is a little more."""
 MOST_PLACES = 3
 OTHERWISE = 0.6
-"""Of nodes that do not lie where they were read, so many lie at one of the other places offered."""
+"""The share of misread nodes that lie at one of the other places offered."""
 LIKELY_WHOLE = 2
 """So many open verdicts or more with one reason are one question."""
 
@@ -96,7 +96,7 @@ class Doubt:
 
     @property
     def likeliest(self) -> Choice | None:
-        """The choice that is taken for the answer where what it settles is counted."""
+        """The choice whose consequences are counted."""
         known = [one for one in self.choices if one.probability is not None]
         return max(known, key=lambda one: one.probability or 0.0, default=None) or next(
             iter(self.choices), None
@@ -104,7 +104,7 @@ class Doubt:
 
 
 def doubts_of(task: Task, report: ReportDocument, figures: Mapping[str, Figure]) -> list[Doubt]:
-    """The questions of a report, those that concern most first.
+    """Return the questions of a report, those that concern most first.
 
     Arguments: `figures` as read on the sheets, with what else each vector may be.
     """
@@ -124,7 +124,7 @@ def doubts_of(task: Task, report: ReportDocument, figures: Mapping[str, Figure])
 
 
 def in_order(doubts: Sequence[Doubt]) -> list[Doubt]:
-    """Questions in the order in which they are asked: by kind, then by what they settle.
+    """Return questions in the order in which they are asked: by kind, then by what they settle.
 
     A verdict on which others hang is asked with the nodes.
     """
@@ -142,8 +142,8 @@ class _Asked:
 
     task: Task
     waiting: Sequence[CriterionDocument]
-    figures: Mapping[str, Figure] = field(default_factory=dict)
-    vouched: frozenset[str] = frozenset()
+    figures: Mapping[str, Figure]
+    vouched: frozenset[str]
 
     @property
     def least(self) -> float:
@@ -152,7 +152,7 @@ class _Asked:
 
 
 def of_verdict(criterion: CriterionDocument) -> Doubt:
-    """The question of one verdict."""
+    """Return the question of one verdict."""
     order = ("full", "partial", "none", "follow_through")
     choices = tuple(
         Choice(
@@ -166,7 +166,7 @@ def of_verdict(criterion: CriterionDocument) -> Doubt:
 
 
 def known_probability(criterion: CriterionDocument) -> float | None:
-    """The probability of what is proposed; None where nothing speaks for it."""
+    """Return the probability of the proposed verdict; None if nothing speaks for it."""
     return None if criterion.probability == EVEN else criterion.probability
 
 
@@ -174,7 +174,7 @@ def known_probability(criterion: CriterionDocument) -> float | None:
 
 
 def _owners(asked: _Asked) -> Iterator[Doubt]:
-    """One question for all verdicts that wait because the whole drawing is not the student's own task."""
+    """Yield one question for all verdicts that wait because the drawing may be of another task."""
     for code in OF_OWNER:
         about = [one for one in asked.waiting if code in one.reasons]
         if len(about) < LIKELY_WHOLE:
@@ -190,7 +190,7 @@ def _owners(asked: _Asked) -> Iterator[Doubt]:
 
 
 def _scales(asked: _Asked) -> Iterator[Doubt]:
-    """The scales that wait, each with the vectors that wait for it."""
+    """Yield the scales that wait, each with the vectors that wait for it."""
     by_scale = {one.name: one.id for one in asked.task.rubric.criterion if one.name in SCALE_NAMES}
     for scale in SCALE_NAMES:
         own = [one for one in asked.waiting if one.id == by_scale.get(scale)]
@@ -213,7 +213,7 @@ def _scales(asked: _Asked) -> Iterator[Doubt]:
 
 
 def _waits_for(task: Task, criterion: CriterionDocument, scale: str) -> bool:
-    """Whether a vector is right at the scale drawn with, and wrong at the one that was assumed."""
+    """Return whether a vector is right at the scale drawn with, and wrong at the one that was assumed."""
     segment = task.segments.get(criterion.vector or "")
     codes = set(criterion.reasons)
     return segment is not None and segment.scale == scale and {"scale_assumed", "follows"} <= codes
@@ -223,7 +223,7 @@ def _waits_for(task: Task, criterion: CriterionDocument, scale: str) -> bool:
 
 
 def _nodes(asked: _Asked) -> Iterator[Doubt]:
-    """The nodes that were read in doubt and on which open verdicts hang, in the order of construction."""
+    """Yield the doubtful nodes on which open verdicts depend, in the order of construction."""
     left = {one.id: one for one in asked.waiting if one.vector is not None}
     for step in asked.task.construction.steps:
         figure = asked.task.construction.figure_of(step.node)
@@ -249,9 +249,9 @@ def _vector(asked: _Asked, criterion: CriterionDocument) -> Vector:
 
 
 def _in_doubt(asked: _Asked, criterion: CriterionDocument) -> set[str]:
-    """The nodes that were not read for certain and on which an open vector hangs; its ends before all.
+    """Return the doubtful nodes on which an open vector depends, above all its ends.
 
-    None where it is open for another reason than its reading.
+    It is empty if the vector is open for another reason than its reading.
     """
     codes, vector = set(criterion.reasons), _vector(asked, criterion)
     figure = asked.figures.get(asked.task.construction.figure_of(vector.head))
@@ -265,32 +265,33 @@ def _in_doubt(asked: _Asked, criterion: CriterionDocument) -> set[str]:
 
 
 def _is_unread_end(asked: _Asked, criterion: CriterionDocument, node: str) -> bool:
-    """Whether an open vector that was not read ends at a node."""
+    """Return whether a criterion is of a vector that was not read and ends at a node."""
     return criterion.measured.length_mm is None and _vector(asked, criterion).head == node
 
 
 def _sure(asked: _Asked, node: str) -> float:
-    """The confidence in a node; 0 where it was not read."""
+    """Return the confidence in a node; 0 if it was not read."""
     figure = asked.figures.get(asked.task.construction.figure_of(node))
     return figure.nodes[node].confidence if figure is not None and node in figure.nodes else 0.0
 
 
 def _places(asked: _Asked, about: Sequence[CriterionDocument], node: str, figure: str) -> tuple[Choice, ...]:
-    """Where a node may lie: as read, as another reading has it, as is expected; then none of these."""
+    """Return the places where a node may lie: as read, as read otherwise, as expected; then none of these."""
     read = asked.figures[figure].nodes.get(node)
     touching = [one for one in about if node in {_vector(asked, one).tail, _vector(asked, one).head}]
     candidates = [] if read is None else [read.at]
-    for place in (*_of_others(asked, touching, node, figure), *_expected(asked, touching, node)):
+    for place in _elsewhere(asked, touching, node, figure):
         if all(abs(place - one) > APART_MM for one in candidates):
             candidates.append(place)
     sure = _right_as_read(touching, read)
     likely = sorted(_shared(candidates[:MOST_PLACES], sure), key=lambda one: -one[1])
-    starts = [(one, _start(asked, _vector(asked, one), node)) for one in touching]
-    if all(at is None for _, at in starts):
-        starts = [(one, _start(asked, _vector(asked, one), node, least=0.0)) for one in touching]
-    vector, start = next(
-        ((_vector(asked, one), at[0].at) for one, at in starts if at is not None), (None, None)
+    starts = (
+        (vector, found[0])
+        for least in (asked.least, 0.0)
+        for vector in (_vector(asked, one) for one in touching)
+        if (found := _start(asked, vector, node, least)) is not None
     )
+    vector, start = next(starts, (None, None))
     known: tuple[tuple[str, str], ...] = ()
     if vector is not None and start is not None:
         other = vector.tail if node == vector.head else vector.head
@@ -316,7 +317,7 @@ def _places(asked: _Asked, about: Sequence[CriterionDocument], node: str, figure
 
 
 def _joint(asked: _Asked, about: Sequence[CriterionDocument], node: str, figure: str) -> tuple[Choice, ...]:
-    """Where a joint lies on which vectors hang: as it was read; elsewhere a person puts it."""
+    """Return the place where a joint was read; a person may put it elsewhere."""
     read = asked.figures[figure].nodes.get(node)
     if read is None:
         return ()
@@ -326,7 +327,7 @@ def _joint(asked: _Asked, about: Sequence[CriterionDocument], node: str, figure:
 
 
 def _credit(about: Sequence[CriterionDocument]) -> tuple[Choice, ...]:
-    """The choices where every vector at a node is right as it was read, doubtful as that is; else none.
+    """Return the choices if every vector at a node is right as read, however doubtful; else none.
 
     Wherever the node lies, the verdicts are the same: there is nothing to tell apart.
     """
@@ -341,58 +342,51 @@ def _credit(about: Sequence[CriterionDocument]) -> tuple[Choice, ...]:
 
 
 def _shared(places: Sequence[complex], sure: float) -> list[tuple[complex, float]]:
-    """The places with their probabilities: of the first one, what is left shared among the others."""
+    """Return the places with their probabilities: `sure` of the first, the rest shared among the others."""
     rest = OTHERWISE * (1.0 - sure) / max(len(places) - 1, 1)
     return [(place, rest if index else sure) for index, place in enumerate(places)]
 
 
 def _right_as_read(about: Sequence[CriterionDocument], read: ReadNode | None) -> float:
-    """The probability that a node lies where it was read: that of its surest vector."""
+    """Return the probability that a node lies where it was read: that of its surest vector."""
     if read is None:
         return EVEN
     return max((one.confidence for one in about), default=read.confidence)
 
 
-def _of_others(
+def _elsewhere(
     asked: _Asked, about: Sequence[CriterionDocument], node: str, figure: str
 ) -> Iterator[complex]:
-    """Where other readings of its vectors have a node."""
-    for criterion in about:
-        vector = _vector(asked, criterion)
-        start, read = _start(asked, vector, node), asked.figures[figure].vectors.get(vector.name)
-        if start is None or read is None:
-            continue
-        for other in read.others:
-            along = cmath.rect(other.length_mm, math.radians(other.direction_deg))
-            yield start[0].at + start[1] * along
+    """Yield the places of a node by other readings of its vectors, then those expected of them."""
+    starts = [(one, _start(asked, _vector(asked, one), node, asked.least)) for one in about]
+    known = [(one, *start) for one, start in starts if start is not None]
+    for criterion, start, sign in known:
+        read = asked.figures[figure].vectors.get(criterion.vector or "")
+        for other in () if read is None else read.others:
+            yield start + sign * cmath.rect(other.length_mm, math.radians(other.direction_deg))
+    for criterion, start, sign in known:
+        along = along_of(criterion.expected)
+        if along is not None:
+            yield start + sign * along
 
 
-def _expected(asked: _Asked, about: Sequence[CriterionDocument], node: str) -> Iterator[complex]:
-    """Where a node is expected from the other ends of its vectors."""
-    for criterion in about:
-        start, along = _start(asked, _vector(asked, criterion), node), along_of(criterion.expected)
-        if start is not None and along is not None:
-            yield start[0].at + start[1] * along
+def _start(asked: _Asked, vector: Vector, node: str, least: float) -> tuple[complex, float] | None:
+    """Return the other end of one of a node's vectors, and the vector's sign from there.
 
-
-def _start(
-    asked: _Asked, vector: Vector, node: str, least: float | None = None
-) -> tuple[ReadNode, float] | None:
-    """The other end of a vector, if it was read for certain, and the sign of the vector from there."""
-    if node not in {vector.tail, vector.head}:
-        return None
+    None if the confidence in that end is less than `least`.
+    """
     other, sign = (vector.tail, 1.0) if node == vector.head else (vector.head, -1.0)
     figure = asked.figures[asked.task.construction.figure_of(other)]
-    if other not in figure.nodes or _sure(asked, other) < (asked.least if least is None else least):
+    if other not in figure.nodes or _sure(asked, other) < least:
         return None
-    return figure.nodes[other], sign
+    return figure.nodes[other].at, sign
 
 
 # What was read --------------------------------------------------------------------------------------
 
 
 def reading_of(document: ReadingDocument) -> Reading:
-    """The record of a document; covariances are as if they were the same in all directions."""
+    """Return the record of a document, with covariances that are equal in all directions."""
     figures: dict[str, Figure] = {}
     for kind, figure in document.figures.items():
         nodes = {
@@ -408,7 +402,7 @@ def reading_of(document: ReadingDocument) -> Reading:
 
 
 def figures_read(report: ReportDocument, pages: Sequence[ScannedPage]) -> dict[str, Figure]:
-    """The figures of a report with what else each vector may be, as its pages were first read."""
+    """Return the figures of a report, with the other readings of each vector on its pages."""
     found: dict[str, Figure] = {}
     for document, page in zip(report.reading.sheets, pages, strict=False):
         for name, figure in reading_of(document).figures.items():

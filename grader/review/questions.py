@@ -6,7 +6,7 @@ from urllib.parse import urlencode
 
 from markupsafe import Markup
 
-from grader.documents import CriterionDocument, Quantity
+from grader.documents import CriterionDocument, FigureDocument, Quantity
 from grader.feedback.numbers import quantity_cells, score_text, tolerance_cells
 from grader.feedback.sentences import feedback_again
 from grader.feedback.words import VERDICTS, problem_sentence, symbols, unmatched_sentence
@@ -52,7 +52,7 @@ TEXTS = {
     ),
     "now_finish": N_("Bring the pages up to date and export the grades; then look through the class's page."),
 }
-"""What the script says, in braces what it fills in itself."""
+"""Texts of the script, which fills in the braces."""
 CLASH = N_("%(who)s has decided this in the meantime: %(verdict)s. Yours was not written.")
 TAKEN_BACK = N_("Somebody has taken this decision back in the meantime. Yours was not written.")
 SOMEBODY = N_("somebody")
@@ -66,11 +66,11 @@ GO_ON = N_("Go on")
 UNSURE = N_("No default below %(least)s: choose")
 FAULT = "decision_fault"
 WHOLE_MARGIN = 0.03
-"""Of a figure's size, where nothing else says what to look at."""
+"""Part of a figure's size that is shown around it."""
 
 
 def texts(speaker: Tongue) -> Facts:
-    """What the script says in a language."""
+    """Return the texts of the script in a language."""
     return {
         **{name: speaker.gettext(text) for name, text in TEXTS.items()},
         "verdicts": {verdict: speaker.gettext(word) for verdict, word in VERDICTS.items()},
@@ -82,7 +82,7 @@ def texts(speaker: Tongue) -> Facts:
 
 
 def label_of(student: Student, speaker: Tongue) -> str:
-    """What a student is called: id, name, position."""
+    """Return a student's id, name and position."""
     report = student.report
     label = " ".join(part for part in (report.student_id, student.name) if part)
     if report.position is None:
@@ -97,7 +97,7 @@ def student_facts(
     speaker: Tongue,
     questions: Sequence[Facts] = (),
 ) -> Facts:
-    """A student and the rows of the criteria, to be ordered by the script."""
+    """Return a student and the rows of the criteria, to be ordered by the script."""
     report = student.report
     titles = {one.id: one.title.in_language(speaker.lang) for one in rubric.criterion}
     return {
@@ -125,12 +125,11 @@ def _row(
 ) -> Facts:
     row = standing.of(student, criterion.id)
     request = student.requests.get(criterion.id)
-    drawn = "" if criterion.drawn in title else criterion.drawn
     return {
         "student": student.key,
         "criterion": criterion.id,
         "order": order,
-        "title": Markup("{} {}").format(symbols(title), symbols(drawn)) if drawn else symbols(title),
+        "title": whole_title(title, criterion.drawn),
         "verdict": criterion.verdict,
         "proposed": criterion.proposed,
         "probability": criterion.probability,
@@ -141,11 +140,21 @@ def _row(
     }
 
 
+def whole_title(title: str, drawn: str) -> Markup:
+    """Return a criterion's title, with the name of what was drawn if the title lacks it."""
+    return symbols(title if drawn in title else f"{title} {drawn}")
+
+
+def answer_facts(student: Student, name: str, verdict: str, seen: str) -> Facts:
+    """Return the answer that a button posts."""
+    return {"student": student.key, "criterion": name, "verdict": verdict, "seen": seen}
+
+
 # One question -------------------------------------------------------------------------------------
 
 
 def question_facts(session: Session, student: Student, name: str, speaker: Tongue) -> Facts:
-    """One question on a student: what was handed in, what is right, what is proposed, where to look."""
+    """Return one question on a student: what was handed in, what is right, the proposal, where to look."""
     criterion, standing = student.criterion(name), session.standing()
     title = next(one.title for one in session.batch.rubric.criterion if one.id == name)
     row = _row(student, criterion, standing, title.in_language(speaker.lang))
@@ -162,7 +171,6 @@ def question_facts(session: Session, student: Student, name: str, speaker: Tongu
         "proposed": proposed if is_default else None,
         "decided": criterion.verdict if decision and criterion.decided else "",
         "comment": decision.comment if decision else "",
-        "position": "",
         "numbers": list(_numbers(criterion, speaker)),
         "state": state_of(criterion, decision, said, speaker),
         "brief": said or speaker.gettext(VERDICTS[criterion.verdict]),
@@ -180,36 +188,37 @@ def question_facts(session: Session, student: Student, name: str, speaker: Tongu
 def _verdicts(
     student: Student, criterion: CriterionDocument, seen: str, decision: Decision | None, speaker: Tongue
 ) -> list[Facts]:
-    """The buttons of a verdict, in an order that never changes."""
+    """Return the buttons of a verdict, always in the same order."""
     is_decided = decision is not None and criterion.decided is not None
     return [
         {
             "key": str(number),
-            "label": badge(verdict, speaker.gettext(VERDICTS[verdict])),
+            "label": verdict_badge(verdict, speaker.gettext(VERDICTS[verdict])),
             "pressed": is_decided and criterion.verdict == verdict,
             "default": criterion.verdict == OPEN and is_sure(criterion) and criterion.proposed == verdict,
-            "answers": [
-                {"student": student.key, "criterion": criterion.id, "verdict": verdict, "seen": seen}
-            ],
+            "answers": [answer_facts(student, criterion.id, verdict, seen)],
         }
         for number, verdict in enumerate(("full", "partial", "none", "follow_through"), 1)
     ]
 
 
-def badge(verdict: str, words: str) -> Markup:
-    """A verdict's sign and its words."""
-    return Markup('<span class="badge v-{}" aria-hidden="true">{}</span> {}').format(
-        verdict, MARKS[verdict], words
-    )
+def badge(look: str, sign: str, words: str) -> Markup:
+    """Return a sign in a circle, then words; `look` is a class of the style sheet."""
+    return Markup('<span class="badge {}" aria-hidden="true">{}</span> {}').format(look, sign, words)
+
+
+def verdict_badge(verdict: str, words: str) -> Markup:
+    """Return a verdict's sign, then words."""
+    return badge(f"v-{verdict}", MARKS[verdict], words)
 
 
 def is_sure(criterion: CriterionDocument) -> bool:
-    """Whether what is proposed for a criterion is sure enough to be the default."""
+    """Return whether a criterion's proposal is sure enough to be the default."""
     return criterion.proposed is not None and (criterion.probability or 0.0) >= SURE
 
 
 def _accept(criterion: CriterionDocument, what: str, speaker: Tongue) -> Markup:
-    """The words of the button that accepts the proposal, or why there is none."""
+    """Return the words of the button that accepts the proposal, or why there is none."""
     if criterion.verdict != OPEN or is_sure(criterion):
         accept = ACCEPT if criterion.verdict == OPEN else GO_ON
         return Markup("<kbd>Enter</kbd> {}").format(speaker.gettext(accept) % {"verdict": what})
@@ -221,7 +230,7 @@ def _accept(criterion: CriterionDocument, what: str, speaker: Tongue) -> Markup:
 def _why(
     session: Session, student: Student, criterion: CriterionDocument, *, asked: bool, speaker: Tongue
 ) -> Markup:
-    """Why a person is asked: the doubt, or the student's request."""
+    """Return the reason why a person is asked: the doubt, or the student's request."""
     if asked:
         said = speaker.gettext(ASKED) % {"text": student.requests[criterion.id].text}
         return Markup.escape(said)
@@ -229,21 +238,19 @@ def _why(
 
 
 def doubt_sentence(session: Session, criterion: CriterionDocument, speaker: Tongue) -> Markup:
-    """Why a criterion waits, in the reviewer's language."""
+    """Return the reason why a criterion waits, in the reviewer's language."""
     batch = session.batch
     return symbols(feedback_again(criterion, speaker.lang, batch.level, batch.assignment.file.names))
 
 
 def per_cent(probability: float) -> str:
-    """A probability as people read it: never rounded up to certainty."""
+    """Return a probability as people read it: never rounded up to certainty."""
     return f"{int(100 * probability)}\N{NO-BREAK SPACE}%"
 
 
 def state_of(criterion: CriterionDocument, decision: Decision | None, said: str, speaker: Tongue) -> Markup:
-    """The verdict that stands, and who decided it or what is proposed."""
-    shown = Markup('<span class="badge v-{}" aria-hidden="true">{}</span> {}').format(
-        criterion.verdict, MARKS[criterion.verdict], speaker.gettext(VERDICTS[criterion.verdict])
-    )
+    """Return the verdict that stands, and who decided it or the proposal."""
+    shown = verdict_badge(criterion.verdict, speaker.gettext(VERDICTS[criterion.verdict]))
     if criterion.decided is not None and criterion.verdict != OPEN:
         said = speaker.gettext(CHECKED) % {"who": criterion.decided.by or speaker.gettext(SOMEBODY)}
     elif criterion.decided is None and decision is not None:
@@ -277,13 +284,9 @@ def _points(criterion: CriterionDocument, speaker: Tongue) -> str:
 
 
 def look_of(session: Session, student: Student, criterion: CriterionDocument) -> Facts | None:
-    """The part of a scan that a question is about, with what was read there; None without a scan."""
+    """Return the part of a scan that a question is about, with the reading there; None without a scan."""
     names = session.batch.assignment.file.names
     pages, standing = session.pages_of(student), session.standing()
-
-    def seen_of(figure: str, node: str) -> str:
-        return mark_of(standing.of(student, f"node:{figure}:{node}"))
-
     first: Facts | None = None
     for sheet, page in enumerate(pages):
         scene = session.scene(student, sheet)
@@ -296,15 +299,15 @@ def look_of(session: Session, student: Student, criterion: CriterionDocument) ->
         box = seen[0] if seen else _box_of(read.get(figure), scene.page_mm)  # type: ignore[call-overload]
         facts = {
             "sheet": sheet,
-            "scan": "scan?" + urlencode({"student": student.key, "sheet": sheet, "run": session.runs}),
+            "scan": scan_address(session, student, sheet),
             "page_mm": scene.page_mm,
             "box": box,
             "marks": seen[1] if seen else "",
             "nodes": [
-                {"figure": kind, "name": name, "x": node.x_mm, "y": node.y_mm, "seen": seen_of(kind, name)}
+                node
                 for kind, one in read.items()
                 if kind == figure or (figure == "" and kind != MECHANISM)
-                for name, node in one.nodes.items()
+                for node in node_facts(student, standing, kind, one)
             ],
         }
         if seen or figure in read:
@@ -313,8 +316,24 @@ def look_of(session: Session, student: Student, criterion: CriterionDocument) ->
     return first
 
 
+def scan_address(session: Session, student: Student, sheet: int) -> str:
+    """Return the address of a page's picture, to which the page adds the part that it wants."""
+    return "scan?" + urlencode({"student": student.key, "sheet": sheet, "run": session.runs})
+
+
+def node_facts(student: Student, standing: Standing, kind: str, figure: FigureDocument) -> list[Facts]:
+    """Return the nodes of a figure that a person may move."""
+    return [
+        {
+            "figure": kind, "name": name, "x": node.x_mm, "y": node.y_mm,
+            "seen": mark_of(standing.of(student, f"node:{kind}:{name}")),
+        }
+        for name, node in figure.nodes.items()
+    ]  # fmt: skip
+
+
 def _box_of(figure: Any, page_mm: tuple[float, float]) -> Box:  # noqa: ANN401 - a figure's document, or None
-    """A box around a figure's nodes, the whole page without them."""
+    """Return a box around a figure's nodes, the whole page without nodes."""
     nodes = list(figure.nodes.values()) if figure else []
     if not nodes:
         return (0.0, 0.0, *page_mm)
@@ -330,14 +349,14 @@ def _box_of(figure: Any, page_mm: tuple[float, float]) -> Box:  # noqa: ANN401 -
 
 
 def pages_facts(session: Session, speaker: Tongue) -> Facts:
-    """The pages that are nobody's or were refused, and those whom they may be given to."""
+    """Return the pages without an owner or that were refused, and the students who may own them."""
     standing = session.standing()
     pages = []
     for ref, problem in session.waiting_pages():
         row = standing.rows.get(("", None, page_criterion(ref)))
         said = None if row is None else row.page
         try:
-            (width, height), turn = session.scans.size(ref), session.scans.turn(ref)
+            width, height, turn = session.scans.format(ref)
         except Exception:  # noqa: BLE001 - a page that cannot be decoded can still be given to somebody
             width, height, turn = 0, 0, 0
         owner = session.owner_of(ref, row)
@@ -363,7 +382,7 @@ def pages_facts(session: Session, speaker: Tongue) -> Facts:
 
 
 def _idle(session: Session, speaker: Tongue) -> Iterator[str]:
-    """The decisions that the last run could not apply, each with the reason."""
+    """Yield the decisions that the last run could not apply, each with the reason."""
     results = None if session.graded is None else session.graded.results
     for one in [] if results is None else results.stale:
         what = speaker.gettext(VERDICTS[one.verdict]) if one.verdict in VERDICTS else one.verdict

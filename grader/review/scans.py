@@ -21,25 +21,25 @@ class Scans:
         self._lock = threading.Lock()
 
     def part(self, page: ScannedPage, box: Box, px_per_mm: float) -> bytes:
-        """A part of a registered page as JPEG; `box` in sheet millimetres. Raises InputFileError."""
+        """Return a part of a registered page as JPEG; `box` in sheet millimetres. Raises InputFileError."""
         pixels, sheet = self._opened(page.ref, page.sheet)
         return cut(pixels, sheet, box, px_per_mm)
 
     def whole(self, ref: PageRef, longest_px: float) -> bytes:
-        """A page as it is stored, at most so many pixels long, as JPEG. Raises InputFileError."""
+        """Return a page as it is stored, at most so many pixels long, as JPEG. Raises InputFileError."""
         pixels, _ = self._opened(ref, None)
         height, width = pixels.grey.shape
         scale = min(1.0, longest_px / max(height, width))
         return cut(pixels, None, (-0.5, -0.5, float(width), float(height)), scale)
 
-    def size(self, ref: PageRef) -> tuple[int, int]:
-        """Width and height of a stored page in pixels. Raises InputFileError."""
-        height, width = self._opened(ref, None)[0].grey.shape
-        return width, height
+    def format(self, ref: PageRef) -> tuple[int, int, int]:
+        """Return a stored page's width and height in pixels, and the turn that its file asks viewers for.
 
-    def turn(self, ref: PageRef) -> int:
-        """The turn that the page's file asks viewers to apply, degrees counter-clockwise."""
-        return self._opened(ref, None)[0].turn_deg
+        The turn is in degrees counter-clockwise. Raises InputFileError.
+        """
+        pixels, _ = self._opened(ref, None)
+        height, width = pixels.grey.shape
+        return width, height, pixels.turn_deg
 
     def _opened(self, ref: PageRef, sheet: Sheet | None) -> tuple[Page, Sheet | None]:
         bend = 0.0 if sheet is None or sheet.lens is None else sheet.lens.bend
@@ -57,5 +57,5 @@ class Scans:
 
 
 def page_of(pages: Sequence[PageRef], file: str, page: int) -> PageRef | None:
-    """The page of a file's name and number, None where there is none."""
+    """Return the page of a file's name and number; None if there is none."""
     return next((ref for ref in pages if (ref.file, ref.page) == (file, page)), None)

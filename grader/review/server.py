@@ -11,7 +11,7 @@ import math
 import threading
 import time
 from collections.abc import Awaitable, Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
@@ -21,9 +21,12 @@ from jinja2 import PackageLoader
 from pydantic import Field, ValidationError
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import MutableHeaders
+from starlette.middleware import Middleware
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, RedirectResponse, Response
 from starlette.routing import Route
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from grader.feedback.words import VERDICTS, environment
 from grader.language import N_, Tongue, tongue
@@ -50,10 +53,10 @@ from reference.errors import PlanmarkError
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
 COOKIE = "planmark"
 MOST_BYTES = 1_000_000
-"""Of what is posted: a thousand answers have a tenth of it."""
+"""The most of a post: a thousand answers have a tenth of it."""
 LONGEST_PX = 2000.0
 COUNTING_S = 2.0
-"""So long a person waits for a class of hundreds; what was not counted is when its student is asked about."""
+"""A person waits so long for a class of hundreds; other questions are counted when they are asked."""
 HEADERS = {
     "Content-Security-Policy": "default-src 'none'; img-src 'self' data:; style-src 'self';"
     " script-src 'self'; connect-src 'self'; form-action 'none'; base-uri 'none'; frame-ancestors 'none'",
@@ -66,7 +69,6 @@ EXPORTS = ("moodle", "canvas", "gradescope")
 WORKING = N_("Bringing the pages up to date: %(done)d of %(total)d")
 UP_TO_DATE = N_("The pages are up to date.")
 CLASS_PAGE, TABLE = N_("the class's page"), N_("the table of grades")
-Handler = Callable[[Request], Awaitable[Response]]
 
 
 @dataclass(slots=True)
@@ -103,25 +105,20 @@ class Review:
     # Pages of the interface -----------------------------------------------------------------------
 
     def index(self, _request: Request) -> Response:
-        """The page itself."""
-        made = environment(self.lang).overlay(loader=PackageLoader("grader.review"))
-        title = self.session.batch.assignment.file.title.in_language(self.lang)
-        page = made.get_template("review.html").render(
-            title=title,
-            texts=questions.texts(self.speaker),
-            by=_user() if self.by is None else self.by,
-            is_known=self.by is not None,
-            verdicts=VERDICTS,
-        )
-        return Response(page, media_type="text/html")
+        """Show the page itself."""
+        return self._page("review.html", questions.texts(self.speaker))
 
     def audit_page(self, _request: Request) -> Response:
-        """The page on which settled verdicts are checked."""
+        """Show the page on which settled verdicts are checked."""
+        return self._page("audit.html", audit.texts(self.speaker))
+
+    def _page(self, name: str, texts: dict[str, Any]) -> Response:
         made = environment(self.lang).overlay(loader=PackageLoader("grader.review"))
-        page = made.get_template("audit.html").render(
+        page = made.get_template(name).render(
             title=self.session.batch.assignment.file.title.in_language(self.lang),
-            texts=audit.texts(self.speaker),
+            texts=texts,
             by=_user() if self.by is None else self.by,
+            is_known=self.by is not None,
             verdicts=VERDICTS,
         )
         return Response(page, media_type="text/html")
@@ -129,7 +126,7 @@ class Review:
     # The class ------------------------------------------------------------------------------------
 
     def class_facts(self, request: Request) -> Response:
-        """All students, or those that changed since the version that the page has."""
+        """Return all students, or those that changed since the version that the page has."""
         self.session.refresh()
         return JSONResponse(self._facts(_whole(request.query_params.get("since", "-1"))))
 
@@ -145,19 +142,19 @@ class Review:
         }
 
     def audit_facts(self, _request: Request) -> Response:
-        """The next settled verdict to check, and what was found so far."""
+        """Return the next settled verdict to check, and the results so far."""
         self.session.refresh()
         return JSONResponse(audit.audit_facts(self.session, self.speaker))
 
     def _students(self, students: Sequence[Student], standing: Standing) -> Iterator[dict[str, Any]]:
-        """What is told of each; what its questions settle is counted as long as that does not take long."""
+        """Yield the facts of each student; the consequences of questions are counted for `COUNTING_S`."""
         until = time.monotonic() + COUNTING_S
         for one in students:
             open_ones = asked.asked_facts(self.session, one, self.speaker, counted=time.monotonic() < until)
             yield questions.student_facts(one, standing, self.session.batch.rubric, self.speaker, open_ones)
 
     def question(self, request: Request) -> Response:
-        """One question."""
+        """Return one question."""
         wanted = request.query_params
         student = self.session.student(wanted.get("student", ""))
         return JSONResponse(
@@ -165,13 +162,13 @@ class Review:
         )
 
     def pages(self, _request: Request) -> Response:
-        """The pages that are nobody's or were refused."""
+        """Return the pages without an owner or that were refused."""
         return JSONResponse(questions.pages_facts(self.session, self.speaker))
 
     # Pictures -------------------------------------------------------------------------------------
 
     def scan(self, request: Request) -> Response:
-        """A part of a registered page."""
+        """Return a part of a registered page."""
         asked = request.query_params
         student, sheet = self.session.student(asked.get("student", "")), _whole(asked.get("sheet", ""))
         pages = self.session.pages_of(student)
@@ -185,7 +182,7 @@ class Review:
         return Response(picture, media_type="image/jpeg", headers={"Cache-Control": "private, max-age=600"})
 
     def page_picture(self, request: Request) -> Response:
-        """A page as it is stored."""
+        """Return a page as it is stored."""
         asked = request.query_params
         ref = page_of(self.session.pages, asked.get("file", ""), _whole(asked.get("page", "")))
         if ref is None:
@@ -193,48 +190,39 @@ class Review:
         return Response(self.session.scans.whole(ref, LONGEST_PX), media_type="image/jpeg")
 
     def out(self, request: Request) -> Response:
-        """A page of the results."""
-        top = self.session.batch.out.resolve()
-        path = (top / request.path_params["path"]).resolve()
-        is_shown = path.suffix in {".html", ".png", ".csv"} and path.is_relative_to(top)
-        if (
-            not is_shown
-            or not path.is_file()
-            or any(part.startswith(".") for part in path.relative_to(top).parts)
-        ):
-            return Response("not found", 404)
-        return page_file(path)
+        """Return a page of the results."""
+        return result_file(self.session.batch.out, request.path_params["path"])
 
     # Decisions ------------------------------------------------------------------------------------
 
     def decide(self, said: "Answers") -> dict[str, Any]:
-        """Verdicts on criteria, all of them or none."""
+        """Write verdicts on criteria, all of them or none."""
         since = self.session.version
         self.session.decide(said.answers, said.by, said.window)
         return self._facts(since)
 
     def check(self, said: audit.Checked) -> dict[str, Any]:
-        """What a person found of a settled verdict."""
+        """Take a check of a settled verdict."""
         audit.check(self.session, said)
         return audit.audit_facts(self.session, self.speaker)
 
     def whole(self, said: Whole) -> dict[str, Any]:
-        """A comment on a whole submission, and points added."""
+        """Write a comment on a whole submission, and points added."""
         since = self.session.version
         self.session.decide_whole(said)
         return self._facts(since)
 
     def node(self, said: "Moved") -> dict[str, Any]:
-        """A node put elsewhere; it snaps to the ink there."""
+        """Put a node elsewhere; it snaps to the ink there."""
         since = self.session.version
         figure = said.node.partition(":")[0]
         at = self.session.snapped(said.student, said.sheet, figure, (said.x, said.y))
         answer = Answer(said.student, f"node:{said.node}", place_text(*at), seen=said.seen)
-        self.session.move(answer, said.by, said.window)
+        self.session.decide([answer], said.by, said.window)
         return self._facts(since)
 
     def page(self, said: "OnPage") -> dict[str, Any]:
-        """Whose a page is, its turn, its corners."""
+        """Set a page's owner, turn and corners."""
         ref = page_of(self.session.pages, said.file, said.page)
         if ref is None:
             raise RefusedError(400, "page_missing", "no_page")
@@ -249,7 +237,7 @@ class Review:
         return self._facts(self.session.version)
 
     def undo(self, said: Said) -> dict[str, Any]:
-        """The last decision of a window taken back."""
+        """Take back the last decision of a window."""
         since = self.session.version
         students, row = self.session.undo(said.window, said.by)
         undone = "" if row is None else f"{students[0].key}/{row.criterion}" if students else row.criterion
@@ -289,15 +277,12 @@ class Review:
             run.running = False
 
     def finished(self, _request: Request) -> Response:
-        """How far that is, and what it wrote."""
+        """Return the progress of that run, and the files that it wrote."""
         out = self.session.batch.out
         return JSONResponse(
             {
-                "running": self.run.running,
-                "progress": self.run.progress,
-                "message": self.run.message,
+                **asdict(self.run),
                 "summary": self.speaker.gettext(UP_TO_DATE),
-                "files": self.run.files,
                 "commands": []
                 if self.by is not None
                 else [f"planmark export {_quoted(out)} --to {name}" for name in EXPORTS],
@@ -305,8 +290,21 @@ class Review:
         )
 
 
+def result_file(folder: Path, name: str) -> FileResponse:
+    """Return a page, picture or table from a folder of results, by its path there.
+
+    Raises RefusedError for any other file, a hidden one, or one that is not there.
+    """
+    top = folder.resolve()
+    path = top if "\0" in name else (top / name).resolve()
+    is_shown = path.suffix in {".html", ".png", ".csv"} and path.is_relative_to(top) and path.is_file()
+    if not is_shown or any(part.startswith(".") for part in path.relative_to(top).parts):
+        raise RefusedError(404, "not_found", "no_page")
+    return page_file(path)
+
+
 def page_file(path: Path) -> FileResponse:
-    """A page or picture that `planmark grade` wrote, which has its styles and its script in it.
+    """Return a page or picture that `planmark grade` wrote, with its styles and its script in it.
 
     It is alone in a sandbox: whatever it does, it reaches neither cookies nor the server.
     """
@@ -353,7 +351,7 @@ class Moved(Said):
 
 
 class OnPage(Said):
-    """Whose a page is (a student's key), its turn in degrees, its corners in stored pixels."""
+    """A page's owner (a student's key), its turn in degrees, its corners in stored pixels."""
 
     file: str
     page: Number
@@ -384,7 +382,7 @@ def _number(value: object) -> float:
 
 
 def application(session: Session, lang: str = "en", token: str = "", by: str | None = None) -> Starlette:
-    """The web application of a class; with a `token`, only for those who have it.
+    """Return the web application of a class; with a `token`, only for those who have it.
 
     Arguments: `by` is who decides, where another application has let them in, and guards this one.
     """
@@ -402,6 +400,7 @@ def application(session: Session, lang: str = "en", token: str = "", by: str | N
         "/page": review.page_picture,
         "/out/{path:path}": review.out,
         "/review.js": _static("review.js", "text/javascript"),
+        "/viewer.js": _static("viewer.js", "text/javascript"),
         "/review.css": _static("review.css", "text/css"),
     }
     posts: dict[str, tuple[type[Said], Callable[[Any], dict[str, Any]]]] = {
@@ -415,15 +414,11 @@ def application(session: Session, lang: str = "en", token: str = "", by: str | N
     }
     return Starlette(
         routes=[
-            *(
-                Route(path, _guarded(review, _read(review, act)), methods=["GET"])
-                for path, act in gets.items()
-            ),
-            *(
-                Route(path, _guarded(review, _posted(review, *one)), methods=["POST"])
-                for path, one in posts.items()
-            ),
-        ]
+            *(Route(path, act) for path, act in gets.items()),
+            *(Route(path, _posted(review, *one), methods=["POST"]) for path, one in posts.items()),
+        ],
+        middleware=[Middleware(Guarded, review=review)],
+        exception_handlers={PlanmarkError: lambda _request, error: _refused(error, review)},
     )
 
 
@@ -432,14 +427,9 @@ def _static(name: str, kind: str) -> Callable[[Request], Response]:
     return lambda _request: Response(text, media_type=kind)
 
 
-def _read(review: Review, act: Callable[[Request], Response]) -> Handler:
-    async def handler(request: Request) -> Response:
-        return await run_in_threadpool(lambda: _told(review, lambda: act(request)))
-
-    return handler
-
-
-def _posted(review: Review, model: type[Said], act: Callable[[Any], dict[str, Any]]) -> Handler:
+def _posted(
+    review: Review, model: type[Said], act: Callable[[Any], dict[str, Any]]
+) -> Callable[[Request], Awaitable[Response]]:
     async def handler(request: Request) -> Response:
         body = bytearray()
         async for part in request.stream():
@@ -454,50 +444,56 @@ def _posted(review: Review, model: type[Said], act: Callable[[Any], dict[str, An
             return JSONResponse({"message": f"{where}: {fault['msg']}".lstrip(": ")}, 400)
         if review.by is not None:  # who decides is known, and takes back what is their own
             said = said.model_copy(update={"by": review.by, "window": f"{review.by} {said.window}"})
-        return await run_in_threadpool(lambda: _told(review, lambda: JSONResponse(act(said))))
+        return JSONResponse(await run_in_threadpool(act, said))
 
     return handler
 
 
-def _told(review: Review, act: Callable[[], Response]) -> Response:
-    """The response, or in words why there is none."""
+def _refused(error: Exception, review: Review) -> Response:
+    """Return an error in words."""
     speaker = review.speaker
-    try:
-        return act()
-    except ChangedError as error:
-        there = error.there
-        if there is None:
-            return JSONResponse({"message": speaker.gettext(questions.TAKEN_BACK), "clash": True}, 409)
-        verdict = speaker.gettext(VERDICTS[there.verdict]) if there.verdict in VERDICTS else there.verdict
-        who = there.by or speaker.gettext(questions.SOMEBODY)
-        message = speaker.gettext(questions.CLASH) % {"who": who, "verdict": verdict}
-        return JSONResponse({"message": message, "clash": True}, 409)
-    except TableError as error:
-        return JSONResponse({"message": error.told(speaker).message, "code": error.code}, 400)
-    except PlanmarkError as error:
-        return _refused(error, review)
-
-
-def _refused(error: PlanmarkError, review: Review) -> Response:
+    if isinstance(error, ChangedError):
+        return JSONResponse({"message": _clash(error.there, speaker), "clash": True}, 409)
+    assert isinstance(error, PlanmarkError)  # noqa: S101 - these alone are handled here
+    told = error.told(speaker).message if isinstance(error, TableError) else told_of(error, speaker)
     status = error.status if isinstance(error, RefusedError) else 400
-    return JSONResponse({"message": told_of(error, review.speaker), "code": error.code}, status)
+    return JSONResponse({"message": told, "code": error.code}, status)
+
+
+def _clash(there: Decision | None, speaker: Tongue) -> str:
+    """Say what somebody else has decided in the meantime."""
+    if there is None:
+        return speaker.gettext(questions.TAKEN_BACK)
+    verdict = speaker.gettext(VERDICTS[there.verdict]) if there.verdict in VERDICTS else there.verdict
+    who = there.by or speaker.gettext(questions.SOMEBODY)
+    return speaker.gettext(questions.CLASH) % {"who": who, "verdict": verdict}
 
 
 # Who may use it -----------------------------------------------------------------------------------
 
 
-def _guarded(review: Review, handler: Handler) -> Handler:
-    async def guarded(request: Request) -> Response:
-        response = refusal(request, review) or await handler(request)
-        for name, value in HEADERS.items():
-            response.headers.setdefault(name, value)
-        return response
+@dataclass(slots=True)
+class Guarded:
+    """ASGI application that refuses requests of others, and adds `HEADERS` to every answer."""
 
-    return guarded
+    app: ASGIApp
+    review: Review
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """ASGI."""
+
+        async def with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                for name, value in HEADERS.items():
+                    headers.setdefault(name, value)
+            await send(message)
+
+        await (refusal(Request(scope), self.review) or self.app)(scope, receive, with_headers)
 
 
 def refusal(request: Request, review: Review) -> Response | None:
-    """Why a request is not answered; None where it is."""
+    """Return the answer to a request of somebody who may not make it; None to all others."""
     host, token, is_let_in = request.headers.get("host", ""), review.token, review.by is not None
     if not token and not is_let_in and urlsplit(f"//{host}").hostname not in LOOPBACK:
         return _refused(RefusedError(403, "refused", "review_host"), review)

@@ -60,7 +60,7 @@ class Request:
     at: float
 
     def is_answered(self, row: Decision | None) -> bool:
-        """Whether a row was decided after the request."""
+        """Return whether a row was decided after the request."""
         try:
             return row is not None and datetime.fromisoformat(row.at).timestamp() > self.at
         except ValueError:  # people write this file, too
@@ -88,7 +88,7 @@ class Student:
         return self.job.folder
 
     def criterion(self, name: str) -> CriterionDocument:
-        """A criterion by its id. Raises RefusedError."""
+        """Return a criterion by its id. Raises RefusedError."""
         for criterion in self.report.criteria:
             if criterion.id == name:
                 return criterion
@@ -111,6 +111,8 @@ class Answer:
     Attributes
     ----------
     student : the key
+    criterion, verdict : ``node:FIGURE:NODE`` with ``x,y`` in sheet mm puts a node somewhere else,
+        ``audit:CRITERION`` with an answer of the audit checks a settled verdict
     seen : `mark_of` what stood decided when the question was shown
     """
 
@@ -139,15 +141,11 @@ class Change:
 
 
 Note = Callable[[str, str, str, str], None]
-"""Told of a change of a mark: who made it, what it is about, before, after."""
-
-
-def unnoted(_who: str, _about: str, _before: str, _after: str) -> None:
-    """Nobody asks who changed a mark."""
+"""Called with a change of a mark: who made it, what it is about, before, after."""
 
 
 def moves(results: ResultsDocument) -> Iterator[tuple[str, str, str]]:
-    """The marks that a run changed: about whom, before, after."""
+    """Yield the marks that a run changed: about whom, before, after."""
     for one in results.moved:
         about = one.student_id if one.position is None else f"{one.student_id} {one.position}"
         yield about, _stands(one.before), _stands(one.after)
@@ -193,10 +191,10 @@ class Session:
     version: int = 0
     runs: int = 0
     made: int = 0
-    """How many decisions were made here since the pages were brought up to date."""
+    """Number of decisions made here since the pages were brought up to date."""
     scans: Scans = field(default_factory=Scans)
     graded: Graded | None = None
-    note: Note = unnoted
+    note: Note = lambda *_: None
     _file: DecisionFile = field(init=False)
     _stamp: tuple[int, int] = (0, 0)
     _rows: list[Decision] = field(default_factory=list)
@@ -209,7 +207,7 @@ class Session:
     # The class ------------------------------------------------------------------------------------
 
     def bring_up_to_date(self, progress: Callable[[str, int, int], None], by: str = "") -> Graded:
-        """Grade what has changed, so that results and pages on the disk are of all decisions.
+        """Grade what has changed, so that results and pages on the disk have all decisions.
 
         Raises as `grader.folder.batch.graded`.
 
@@ -235,14 +233,14 @@ class Session:
         return run
 
     def student(self, key: str) -> Student:
-        """A student by the key. Raises RefusedError."""
+        """Return a student by the key. Raises RefusedError."""
         for student in self.students:
             if student.key == key:
                 return student
         raise RefusedError(400, "student_unknown", name=key)
 
     def pages_of(self, student: Student) -> list[ScannedPage]:
-        """The pages as the last run read them."""
+        """Return the pages as the last run read them."""
         if self.graded is None:
             return []
         if student.pages is None:
@@ -251,7 +249,7 @@ class Session:
         return student.pages
 
     def ask(self, requests: Mapping[tuple[str, int | None], Mapping[str, Request]]) -> None:
-        """Take in what students ask to look at again, by student and position, and criterion."""
+        """Take over the students' requests, by student and position, and criterion."""
         with self._lock:
             self.version += 1
             for student in self.students:
@@ -266,7 +264,7 @@ class Session:
         return Standing(self._file.all())
 
     def decide(self, answers: Sequence[Answer], by: str, window: str) -> list[Student]:
-        """Write what a person decided, all of it or nothing; the students whom it concerns, marked anew.
+        """Write decisions, all of them or none; return the students concerned, marked again.
 
         Raises ChangedError where somebody else was quicker, RefusedError for an answer that cannot be used.
         """
@@ -276,14 +274,14 @@ class Session:
             for answer in answers:
                 student = self.student(answer.student)
                 if not answer.criterion.startswith("node:"):
-                    student.criterion(answer.criterion)
+                    student.criterion(answer.criterion.removeprefix("audit:"))
                 row = self._row(student, answer.criterion, answer.verdict, by, there)
                 wanted.append((replace(row, comment=answer.comment), answer.seen))
             self._write(wanted, there, window, by)
             return self._marked_anew({answer.student for answer in answers})
 
     def decide_whole(self, answer: Whole) -> list[Student]:
-        """Write a comment on a whole submission and points added to it; an empty one takes it back.
+        """Write a comment on a whole submission and points added; an empty one takes it back.
 
         Raises as `decide`.
         """
@@ -299,19 +297,8 @@ class Session:
             self._write(kept, there, answer.window, answer.by, gone)
             return self._marked_anew({answer.student})
 
-    def move(self, answer: Answer, by: str, window: str) -> list[Student]:
-        """Write where a node lies: ``node:FIGURE:NODE`` as the criterion, ``x,y`` in sheet mm as the verdict.
-
-        Raises as `decide`.
-        """
-        with self._lock:
-            student, there = self.student(answer.student), self.standing()
-            row = self._row(student, answer.criterion, answer.verdict, by, there)
-            self._write([(row, answer.seen)], there, window, by)
-            return self._marked_anew({answer.student})
-
     def decide_page(self, ref: PageRef, row: Decision, seen: str, window: str) -> None:
-        """Write whose a page is, how it is turned, where its corners are; it counts from the next run on.
+        """Write a page's owner, turn and corners; they count from the next run on.
 
         Raises as `decide`.
         """
@@ -320,7 +307,7 @@ class Session:
             self._write([(dated, seen)], self.standing(), window, row.by)
 
     def undo(self, window: str, by: str = "") -> tuple[list[Student], Decision | None]:
-        """Take back the last thing decided in a window: the students concerned, and a row of it.
+        """Take back the last decision of a window; return the students concerned, and a row of it.
 
         Raises ChangedError where somebody has changed it since.
         """
@@ -342,12 +329,12 @@ class Session:
             return fitting, row
 
     def comments(self) -> list[str]:
-        """The comments written so far, the commonest first."""
+        """Return the comments written so far, the commonest first."""
         texts = [row.comment for row in self._file.all() if row.kind == "verdict" and row.comment]
         return sorted(dict.fromkeys(texts), key=lambda text: -texts.count(text))[:MOST_COMMENTS]
 
     def refresh(self) -> None:
-        """Take in what others wrote into the file in the meantime."""
+        """Take over what others wrote into the file in the meantime."""
         with self._lock:
             if self._file_stamp() != self._stamp:
                 self._marked_anew(set())
@@ -384,14 +371,14 @@ class Session:
         self._tell(by, rows, (*before, *out))
 
     def _tell(self, by: str, written: Sequence[Decision], before: Sequence[Decision]) -> None:
-        """Note what stands decided now, and what stood there before or was marked without a person."""
+        """Note each decision, and the one before it or the program's own mark."""
         there, now = ({row.key: row for row in rows} for rows in (before, written))
         for key in {**there, **now}:
             about = " ".join(str(part) for part in key if part not in {"", None})
             self.note(by, about, _said(there.get(key)) or self._marked(key), _said(now.get(key)))
 
     def _marked(self, key: Key) -> str:
-        """The program's own mark of a decision's subject."""
+        """Return the program's own mark of a decision's subject."""
         for student in self.students:
             if key[0] == student.report.student_id and key[1] in {None, student.report.position}:
                 return next((one.verdict for one in student.report.criteria if one.id == key[2]), "")
@@ -407,7 +394,7 @@ class Session:
     # Marks ----------------------------------------------------------------------------------------
 
     def _marked_anew(self, keys: Collection[str]) -> list[Student]:
-        """These students, and those of whom rows of the file changed, marked with what is decided now."""
+        """Mark these students again, and those with changed rows; return them."""
         self._stamp = self._file_stamp()
         rows = self._file.all()
         changed = {row.student_id for row in {*rows} ^ {*self._rows}}
@@ -420,7 +407,7 @@ class Session:
         return students + self._opened_by_audit(rows)
 
     def _opened_by_audit(self, rows: Sequence[Decision]) -> list[Student]:
-        """Those of whom an audit opens, or no longer opens, settled verdicts; marked anew."""
+        """Mark the students again whose settled verdicts an audit opens, or no longer opens; return them."""
         if not any(row.kind == "audit" for row in rows) and not any(
             one.job.submission.opened for one in self.students
         ):
@@ -437,14 +424,14 @@ class Session:
         return found
 
     def _report(self, student: Student, rows: Sequence[Decision]) -> ReportDocument:
-        """The report with what is decided in some rows of the file."""
+        """Return the report with the decisions of some rows of the file."""
         batch, report = self.batch, student.report
         own = [row for row in rows if row.kind == "page" or row.student_id == report.student_id]
         submission = decided(student.job.submission, own, batch.assignment, batch.rubric)
         return self._with_questions(student, submission)
 
     def _with_questions(self, student: Student, submission: StudentSubmission) -> ReportDocument:
-        """The report; of a submission of which nothing could be read, as if a person began to settle it."""
+        """Return the report; of an unreadable submission, as if a person had begun to settle it."""
         batch, pages = self.batch, self.pages_of(student)
         report, _ = mark(submission, pages, batch.assignment, batch.rubric, batch.level)
         if report.status != "unreadable" or report.criteria or submission.variant is None:
@@ -462,7 +449,7 @@ class Session:
         return opened.model_copy(update={"criteria": criteria})
 
     def sentence_if(self, student: Student, criterion: CriterionDocument) -> str:
-        """The sentence that the student reads if the proposal is accepted."""
+        """Return the sentence that the student reads if the proposal is accepted."""
         if criterion.verdict != OPEN or criterion.proposed is None:
             return criterion.feedback
         after = {
@@ -471,7 +458,7 @@ class Session:
         return after[criterion.id].feedback if criterion.id in after else criterion.feedback
 
     def report_if(self, student: Student, answers: Sequence[tuple[str, str]]) -> ReportDocument:
-        """The report with these answers, verdicts or places by criterion, besides what is decided."""
+        """Return the report with these answers, verdicts or places by criterion, added to the decisions."""
         with self._lock:
             report = student.report
             said = [Decision(report.student_id, report.position, *answer) for answer in answers]
@@ -480,7 +467,7 @@ class Session:
     # Questions ------------------------------------------------------------------------------------
 
     def doubts(self, student: Student, *, counted: bool = True) -> list[Doubt]:
-        """The open questions on a student, in the order in which they are asked.
+        """Return the open questions on a student, in the order in which they are asked.
 
         Arguments: `counted` judges the submission with the likeliest answer to each, to see what it settles.
         """
@@ -498,7 +485,7 @@ class Session:
         return found
 
     def _counted(self, student: Student, doubt: Doubt) -> Doubt:
-        """A question with the number of verdicts that its likeliest answer settles."""
+        """Return a question with the number of verdicts that its likeliest answer settles."""
         likely = doubt.likeliest
         if likely is None:
             return doubt
@@ -507,11 +494,11 @@ class Session:
         return replace(doubt, settles=len(before - after))
 
     def doubt(self, student: Student, name: str) -> Doubt | None:
-        """An open question by its id; None where there is none, so that a criterion is meant."""
+        """Return an open question by its id; None if there is none."""
         return next((one for one in self.doubts(student) if one.id == name), None)
 
     def snapped(self, key: str, sheet: int, figure: str, at: tuple[float, float]) -> tuple[float, float]:
-        """The point of the ink that is meant by a place on a page, both in sheet millimetres.
+        """Return the point of the ink that a place on a page means, both in sheet millimetres.
 
         Raises RefusedError for a page that there is not.
         """
@@ -524,7 +511,7 @@ class Session:
     # Pages ----------------------------------------------------------------------------------------
 
     def waiting_pages(self) -> list[tuple[PageRef, ProblemDocument]]:
-        """The pages that are nobody's, then those that could not be placed, each with its problem."""
+        """Return the pages without an owner, then those that were refused, each with its problem."""
         if self.graded is None:
             return []
         found: dict[tuple[str, int], ProblemDocument] = {}
@@ -540,7 +527,7 @@ class Session:
         return [(refs[place], problem) for place, problem in found.items() if place in refs]
 
     def owner_of(self, ref: PageRef, row: Decision | None) -> Student | None:
-        """The owner of a page, by a decision or as found."""
+        """Return the owner of a page, by a decision or as found."""
         said = None if row is None else row.page.owner
         for student in self.students:
             report = student.report
@@ -554,7 +541,7 @@ class Session:
     # What is seen ---------------------------------------------------------------------------------
 
     def scene(self, student: Student, sheet: int) -> Scene | None:
-        """The scene of what was read on one of a student's pages; None for a refused page."""
+        """Return the scene of the reading of one of a student's pages; None for a refused page."""
         construction = self._construction(student)
         page = self.pages_of(student)[sheet]
         if page.sheet is None or construction is None:
@@ -567,7 +554,7 @@ class Session:
         )  # fmt: skip
 
     def ghost(self, student: Student, sheet: int, criterion: CriterionDocument) -> Ghost | None:
-        """The vector or link expected, laid off from where the drawn one starts; None if that is unread."""
+        """Return the expected vector or link from the start of the drawn one; None if that is unread."""
         construction, figure = self._construction(student), self.figure_of(student, criterion)
         read = reading_of(student.report.reading.sheets[sheet]).figures.get(figure)
         expected = expected_vector(criterion)
@@ -588,25 +575,21 @@ class Session:
         return task_of(self.batch.assignment, self.batch.rubric, variant).construction
 
     def figure_of(self, student: Student, criterion: CriterionDocument) -> str:
-        """The figure that a criterion's vector or link is in; empty for a scale or an angular quantity."""
+        """Return the figure of a criterion's vector or link; empty for a scale or an angular quantity."""
+        if criterion.link:
+            return MECHANISM
         construction = self._construction(student)
-        if criterion.link or construction is None:
-            return MECHANISM if criterion.link else ""
-        figures = (
-            figure
-            for figure in construction.poles
-            if any(vector.name == criterion.vector for vector in construction.vectors_of(figure))
-        )
-        return next(figures, "")
+        vector = construction.vectors.get(criterion.vector or "") if construction else None
+        return construction.figure_of(vector.head) if construction and vector else ""
 
 
 def page_criterion(ref: PageRef) -> str:
-    """The name of a page in decisions."""
+    """Return the name of a page in decisions."""
     return f"page:{ref.file}#{ref.page}"
 
 
 def mark_of(row: Decision | None) -> str:
-    """A mark of what stands decided; empty where nothing is."""
+    """Return a text by which a decision is recognised; empty if there is none."""
     return "" if row is None else f"{row.at} {row.by} {row.verdict} {row.points} {row.comment}"
 
 

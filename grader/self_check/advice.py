@@ -14,7 +14,7 @@ from grader.outcomes import Judgement, NamedMistake
 from grader.records import Reason
 from grader.self_check.results import Checked, Result, certain_mistakes, checked_values
 from grader.texts.reasons import reason_sentence
-from reference.authored.assignment import SCALE_NAMES
+from reference.authored.assignment import SCALE_NAMES, Assignment
 
 RESULTS: Mapping[Result, tuple[str, str]] = {
     "right": ("✓", N_("right")),
@@ -171,18 +171,14 @@ def checked_lines(
     judgement: Judgement,
     level: Level,
     speaker: Tongue,
-    names: Mapping[str, str],
-    driven: str,
+    assignment: Assignment,
     unread: Collection[str] | None = None,
 ) -> list[CheckedLine]:
     """Return the submitted values, each with its hint and one line of advice as the level allows.
 
-    Arguments
-    ---------
-    names : renames what students know by another name
-    driven : the driving link's pin
-    unread : of a drawing, the vectors that could not be read on it; None for entered measurements
+    Arguments: `unread` are the vectors of a drawing that could not be read; None for entered measurements.
     """
+    names, driven = assignment.file.names, assignment.mechanism_file.driver.pin
     values = checked_values(judgement, level, unread or ())
     other = next((one for one in judgement.mistakes if one.code == "other_variant"), None)
     of_other = [one for one in values if any(reason.code == "other_variant" for reason in one.reasons[:1])]

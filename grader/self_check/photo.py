@@ -48,7 +48,6 @@ def photo_check(
         pictures = tuple(overlay(page.backdrop, page.reading, {}, {}) for page in pages if page.backdrop)
         return SelfCheck(problems=_said(known, speaker), flaws=spoilt, pictures=pictures)
     task, judgement, _ = answer
-    names, driven = assignment.file.names, assignment.mechanism_file.driver.pin
     drawn = {figure for reading in readings for figure in reading.figures}
     figures = {
         name: task.construction.figure_of(vector.head) for name, vector in task.construction.vectors.items()
@@ -58,7 +57,7 @@ def photo_check(
         figure for figure in PLANS_UNSEEN if figure in {figures.get(one) for one in rubric.vectors} - drawn
     ]
     told = [*(speaker.gettext(PLANS_UNSEEN[figure]) for figure in absent), *_said(problems, speaker)]
-    lines = checked_lines(judgement, level, speaker, names, driven, unread)
+    lines = checked_lines(judgement, level, speaker, assignment, unread)
     pictures = pictures_of(pages, NOTHING_MEASURED, task.construction, judgement, show_expected=False)
     return SelfCheck(tuple(lines), tuple(told), judgement, spoilt, pictures)
 

@@ -5,7 +5,7 @@ instructors, has the numbers and the most likely mistake. A result holds nothing
 """
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from grader.documents import Quantity, Tolerance
@@ -78,22 +78,13 @@ def _is_handed_in(outcome: Outcome) -> bool:
 
 
 def _checked(outcome: Outcome, level: Level) -> Checked:
-    result = _result(outcome)
+    known = Checked(outcome.criterion, outcome.name, _result(outcome))
     if level == "symbol":
-        return Checked(outcome.criterion, outcome.name, result)
+        return known
     if level == "hint":
-        hints = tuple(_without_numbers(reason) for reason in outcome.reasons)
-        return Checked(outcome.criterion, outcome.name, result, hints)
-    return Checked(
-        outcome.criterion,
-        outcome.name,
-        result,
-        outcome.reasons,
-        outcome.measured,
-        outcome.expected,
-        outcome.tolerance,
-        outcome.mistake,
-    )
+        return replace(known, reasons=tuple(_without_numbers(reason) for reason in outcome.reasons))
+    shown = ("reasons", "measured", "expected", "tolerance", "mistake")
+    return replace(known, **{name: getattr(outcome, name) for name in shown})
 
 
 def _result(outcome: Outcome) -> Result:

@@ -54,6 +54,5 @@ def check_values(
     """
     evidence = Submission(measured=entered.reading, values=entered.values, declared=entered.scales)
     judgement = judge(task_of(assignment, rubric_of(assignment), variant), evidence)
-    names, driven = assignment.file.names, assignment.mechanism_file.driver.pin
     problems = tuple(message(one, speaker) for one in (*entered.problems, *entered.reading.problems))
-    return SelfCheck(tuple(checked_lines(judgement, level, speaker, names, driven)), problems, judgement)
+    return SelfCheck(tuple(checked_lines(judgement, level, speaker, assignment)), problems, judgement)

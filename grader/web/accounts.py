@@ -1,7 +1,6 @@
 """Accounts of instructors: sign in, invite, passwords, the second factor, tokens for programs."""
 
 import hmac
-import secrets
 import time
 from collections.abc import Collection
 from typing import Annotated, Any
@@ -14,15 +13,7 @@ from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
 from grader.texts.spoken import RefusedError
-from grader.web.guard import (
-    INVITATION,
-    MAILED,
-    NO_TOKENS,
-    RESET,
-    hash_of,
-    is_password,
-    missing,
-)
+from grader.web.guard import INVITATION, MAILED, NO_TOKENS, RESET, hash_of, is_password, issued, missing
 from grader.web.service import Call, Called, Key, Route, Row
 from grader.web.store import Account, Visit, digest_of
 from grader.web.students import Strict
@@ -34,13 +25,13 @@ Token = Annotated[str, Field(min_length=1, max_length=200)]
 Code = Annotated[str, Field(pattern=r"^([0-9]{6})?$")]
 Email = Annotated[str, Field(max_length=200, pattern=r"^[A-Za-z0-9.!#$%&'*+/=?^_`{|}~-]+@[A-Za-z0-9.-]+$")]
 VALID_S = {INVITATION: 7 * 86400.0, RESET: 7 * 86400.0, MAILED: 3600.0}
-"""How long what was sent is valid: a letter is read soon, and lies about for long."""
+"""Seconds for which an invitation or a link is valid: a letter is read soon, and lies about for long."""
 STEP_S = 30
-"""A code of a device is for so long (RFC 6238)."""
+"""Seconds for which a code of a device is valid (RFC 6238)."""
 
 
 class SignIn(Strict):
-    """Who signs in; `code` of the second factor, where the account has one."""
+    """Name and password to sign in; `code` of the second factor, where the account has one."""
 
     name: Name
     password: Password
@@ -48,33 +39,33 @@ class SignIn(Strict):
 
 
 class Reset(Strict):
-    """Who chooses a new password by an administrator's link."""
+    """A new password, chosen by a link."""
 
     token: Token
     password: Password
 
 
 class Invited(Reset):
-    """Who answers an invitation, or sets the server up, by a token."""
+    """Name and password of a new account, made by an invitation."""
 
     name: Name
 
 
 class NewPassword(Strict):
-    """A password in the place of another."""
+    """The current password and a new one."""
 
     old: Password
     password: Password
 
 
 class Forgotten(Strict):
-    """Where a link to a new password is to be sent."""
+    """The e-mail address of an account whose password is forgotten."""
 
     email: Email
 
 
 class OwnEmail(Forgotten):
-    """Where the own links are to be sent."""
+    """An e-mail address for the own account, with its password."""
 
     password: Password
 
@@ -93,7 +84,7 @@ def sign_in(call: Called, who: SignIn) -> dict[str, Any]:
 
     Tries count by address: nobody can keep the owner out by trying.
     """
-    call.service.guard.count("sign_in", [call.visitor.address])
+    call.service.guard.count("sign_in", call.visitor.address)
     account = call.session.scalar(select(Account).where(Account.name == who.name))
     if not is_password(account, who.password) or account is None:
         call.note("sign-in refused", who.name)
@@ -139,12 +130,11 @@ def join(call: Called, who: Invited) -> dict[str, Any]:
 
 @router.post("/accounts/{number}/reset", status_code=201)
 def allow_reset(call: Called, number: Row) -> dict[str, str]:
-    """A link by which somebody chooses a new password, once, within a week."""
-    admin, account = call.admin, call.session.get(Account, number)
-    if account is None or not account.password:
+    """Create a link to choose a new password, once, within a week."""
+    admin, account = call.admin, call.row(Account, number, "account")
+    if not account.password:
         raise missing("account")
-    token = secrets.token_urlsafe(32)
-    call.session.add(Visit(id=digest_of(token), account=account, title=RESET, links={}))
+    token = issued(call.session, account, RESET)
     call.note("reset allowed", f"{account.name} by {admin.name}")
     return {"name": account.name, "address": f"{call.service.settings.address}/reset?token={token}"}
 
@@ -164,14 +154,14 @@ def forgotten(call: Called, who: Forgotten) -> dict[str, str]:
     """Send a link to a new password, good for an hour; whether the address is an account's is not told."""
     if not call.service.settings.mail:
         raise missing()
-    call.service.guard.count("forgotten", [call.visitor.address])
+    call.service.guard.count("forgotten", call.visitor.address)
     call.service.mail.put(who.email.lower(), call.lang)
     return {"state": "asked"}
 
 
 @router.put("/account/email")
 def set_email(call: Called, new: OwnEmail) -> dict[str, str]:
-    """Say where links to a new password are to be sent."""
+    """Set the e-mail address for links to a new password."""
     account = _proved(call, new.password)
     account.email = new.email.lower()
     call.note("e-mail set", account.name)
@@ -195,7 +185,7 @@ def change_password(call: Called, new: NewPassword) -> dict[str, Any]:
 
 @router.post("/account/second-factor")
 def offer_second_factor(call: Called) -> dict[str, str]:
-    """A new secret for a device, as text, as an address and as a picture; it counts once it is proved."""
+    """Offer a new secret for a device, as text, address and picture; it counts once it is proved."""
     secret = pyotp.random_base32()
     address = pyotp.TOTP(secret).provisioning_uri(name=call.account.name, issuer_name="planmark")
     return {"secret": secret, "address": address, "picture": segno.make(address).svg_data_uri(scale=4)}
@@ -213,10 +203,8 @@ def set_second_factor(call: Called, new: SecondFactor) -> dict[str, str]:
 
 @router.delete("/accounts/{number}/second-factor")
 def remove_second_factor(call: Called, number: Row) -> dict[str, str]:
-    """Ask for codes no longer, of somebody whose device is lost."""
-    admin, account = call.admin, call.session.get(Account, number)
-    if account is None:
-        raise missing("account")
+    """Remove the second factor of somebody whose device is lost."""
+    admin, account = call.admin, call.row(Account, number, "account")
     account.totp = ""
     call.note("second factor removed", f"{account.name} by {admin.name}")
     return {"state": "removed"}
@@ -226,7 +214,7 @@ def _check_code(call: Call, account: Account, secret: str, code: str) -> None:
     """Raise RefusedError for a code that is wrong, or was used."""
     if not code:
         raise RefusedError(401, "second_factor", "code_needed")
-    call.service.guard.count("code", [f"account {account.id}"])
+    call.service.guard.count("code", f"account {account.id}")
     totp, now = pyotp.TOTP(secret), int(time.time()) // STEP_S
     for step in range(now - 1, now + 2):
         if step > account.totp_used and hmac.compare_digest(totp.generate_otp(step), code):
@@ -254,9 +242,7 @@ def remove_account(call: Called, number: Row) -> dict[str, str]:
     """Remove an instructor; the publications stay."""
     if call.admin.id == number:
         raise RefusedError(409, "own_account")
-    found = call.session.get(Account, number)
-    if found is None:
-        raise missing("account")
+    found = call.row(Account, number, "account")
     call.session.execute(delete(Visit).where(Visit.account_id == number))
     call.session.delete(found)
     call.note("account removed", found.name)
@@ -265,11 +251,11 @@ def remove_account(call: Called, number: Row) -> dict[str, str]:
 
 @router.post("/tokens", status_code=201)
 def new_token(call: Called, title: Annotated[Name, Query()]) -> dict[str, str]:
-    """A token for a program, shown once: it may do what its instructor may."""
-    account, token = call.account, secrets.token_urlsafe(32)
+    """Create a token for a program, shown once: it may do what its instructor may."""
+    account = call.account
     if title in NO_TOKENS:
         raise RefusedError(422, "title", "token_title")
-    call.session.add(Visit(id=digest_of(token), account=account, title=title, links={}))
+    token = issued(call.session, account, title)
     call.note("token made", title)
     return {"title": title, "token": token}
 
@@ -283,9 +269,9 @@ def tokens(call: Called) -> list[dict[str, Any]]:
 
 @router.delete("/tokens/{number}")
 def remove_token(call: Called, number: Key) -> dict[str, str]:
-    """Take a token back."""
-    found = call.session.get(Visit, number)
-    if found is None or found.account_id != call.account.id or not found.title:
+    """Revoke a token."""
+    found = call.row(Visit, number, "token")
+    if found.account_id != call.account.id or not found.title:
         raise missing("token")
     call.session.delete(found)
     call.note("token removed", found.title)
@@ -293,19 +279,19 @@ def remove_token(call: Called, number: Key) -> dict[str, str]:
 
 
 def invitation(session: Session, name: str, *, is_admin: bool) -> str:
-    """A token by which somebody makes their account. Raises RefusedError where the name is taken."""
+    """Return a token to create an account. Raises RefusedError where the name is taken."""
     account = session.scalar(select(Account).where(Account.name == name))
     if account is not None and account.password:
         raise RefusedError(409, "name_taken", name=name)
-    account = account or Account(name=name, is_admin=is_admin)
-    token = secrets.token_urlsafe(32)
-    session.add_all([account, Visit(id=digest_of(token), account=account, title=INVITATION, links={})])
-    return token
+    return issued(session, account or Account(name=name, is_admin=is_admin), INVITATION)
 
 
 def _answered(call: Call, token: str, kinds: Collection[str]) -> tuple[Visit, Account]:
-    """What a link that was sent stands for. Raises RefusedError for one that is used, too old, or none."""
-    call.service.guard.count("sign_in", [call.visitor.address])
+    """Return the visit and the account of a link that was sent.
+
+    Raises RefusedError for a link that is used, too old, or unknown.
+    """
+    call.service.guard.count("sign_in", call.visitor.address)
     waiting = call.session.get(Visit, digest_of(token))
     if waiting is None or waiting.title not in kinds or waiting.account is None:
         raise RefusedError(403, "invitation")
@@ -315,8 +301,8 @@ def _answered(call: Call, token: str, kinds: Collection[str]) -> tuple[Visit, Ac
 
 
 def _proved(call: Call, password: str) -> Account:
-    """The instructor who is signed in, and has said the password again. Raises RefusedError."""
-    call.service.guard.count("sign_in", [call.visitor.address])
+    """Return the instructor who is signed in. Raises RefusedError for a program or a wrong password."""
+    call.service.guard.count("sign_in", call.visitor.address)
     if call.visitor.is_program or not is_password(call.account, password):
         raise RefusedError(403, "password", "wrong_password")
     return call.account

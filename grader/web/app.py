@@ -17,6 +17,7 @@ from starlette.exceptions import HTTPException
 
 from grader import __version__
 from grader.language import tongue
+from grader.review.server import LOOPBACK
 from grader.texts.spoken import RefusedError, told_of
 from grader.web import accounts, claims, instructors, lti, pages, students
 from grader.web.guard import Guard, Rim, language_of
@@ -25,7 +26,7 @@ from grader.web.queue import Photo, Queue
 from grader.web.reviews import Reviews
 from grader.web.self_check import checked_photo
 from grader.web.service import Call, Service
-from grader.web.settings import LOOPBACK, Settings
+from grader.web.settings import Settings
 from grader.web.store import Account, Store
 from reference.errors import PlanmarkError
 
@@ -37,18 +38,18 @@ Everything that the pages of planmark do. A program sends a token, made on the a
 """
 
 REFUSALS = (400, 401, 403, 404, 408, 409, 413, 415, 421, 422, 429, 503)
-"""Statuses of what is not answered, each with a `Fault`."""
+"""Statuses of refused requests, each with a `Fault`."""
 
 
 class Fault(BaseModel):
-    """What is wrong, where, and what to do."""
+    """An error: what is wrong, where, and what to do."""
 
     code: str
     message: str
 
 
 def application(settings: Settings, photo: Photo = checked_photo) -> FastAPI:
-    """The web application.
+    """Return the web application.
 
     Raises CallError for a data base that cannot be opened.
     """
@@ -74,15 +75,8 @@ def application(settings: Settings, photo: Photo = checked_photo) -> FastAPI:
         responses={code: {"description": HTTPStatus(code).phrase, **_refusal(code)} for code in REFUSALS},
     )  # fmt: skip
     app.state.service = service
-    for router in (
-        students.router,
-        accounts.router,
-        instructors.router,
-        lti.router,
-        claims.router,
-        pages.router,
-    ):
-        app.include_router(router)
+    for part in (students, accounts, instructors, lti, claims, pages):
+        app.include_router(part.router)
     app.mount("/review", Reviews(service))
     app.add_exception_handler(PlanmarkError, _told)
     app.add_exception_handler(RequestValidationError, _invalid)
@@ -93,14 +87,17 @@ def application(settings: Settings, photo: Photo = checked_photo) -> FastAPI:
 
 
 def _refusal(code: int) -> dict[str, Any]:
-    """What a status answers: the model once, which FastAPI makes anew for each route, then by its name."""
+    """Return the schema of an error: the model for one status, for the others a reference to it.
+
+    FastAPI would copy the model for each route and status.
+    """
     if code == HTTPStatus.UNPROCESSABLE_ENTITY:
         return {"model": Fault}
     return {"content": {"application/json": {"schema": {"$ref": "#/components/schemas/Fault"}}}}
 
 
 async def _forget(store: Store, days: float, ended: asyncio.Event) -> None:
-    """Delete day by day what is kept no longer, until the server ends."""
+    """Delete once a day what is older than it is kept, until the server ends."""
     while not ended.is_set():
         await run_in_threadpool(store.forget, days=days)
         with suppress(TimeoutError):
@@ -108,7 +105,7 @@ async def _forget(store: Store, days: float, ended: asyncio.Event) -> None:
 
 
 def first_invitation(settings: Settings) -> str | None:
-    """The address at which an administrator makes the account; None while one has a password."""
+    """Return the address to create the first administrator's account; None once one has a password."""
     with closing(Store(settings.database)) as store, store.session() as session:
         admins = session.scalars(select(Account).where(Account.is_admin)).all()
         if any(one.password for one in admins):
@@ -144,11 +141,11 @@ async def _fault(request: Request, error: Exception) -> Response:
 
 
 def _answer(request: Request, status: int, code: str, message: str) -> Response:
-    """An error as JSON; on the pages as a page, with the way to sign in where that helps."""
+    """Return an error as JSON; on the pages as a page, with a link to sign in where that helps."""
     service: Service = request.app.state.service
     path = request.url.path
     message = service.settings.without_folder(message.encode(errors="replace").decode())
-    if path.startswith(("/api/", "/lti/", "/static/")):
+    if path.startswith(("/api/", "/lti/", "/review/", "/static/")):
         return JSONResponse({"code": code, "message": message}, status)
     with service.store.session() as session:
         visitor = service.guard.visitor(_without_token(request), session)
@@ -157,6 +154,6 @@ def _answer(request: Request, status: int, code: str, message: str) -> Response:
 
 
 def _without_token(request: Request) -> Request:
-    """The request as a browser's: the page of an error needs nobody's token."""
+    """Return the request without its token: the page of an error shows nobody's data."""
     headers = [(name, value) for name, value in request.scope["headers"] if name != b"authorization"]
     return Request({**request.scope, "headers": headers})

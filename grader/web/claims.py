@@ -11,25 +11,20 @@ from typing import Any
 from fastapi import APIRouter
 from sqlalchemy import select, update
 
-from grader.tables.roster import RosterRow, read_roster
+from grader.tables.roster import RosterRow
 from grader.texts.spoken import RefusedError
 from grader.web.launch import Message
-from grader.web.service import Call, Called, Key, Route, Row
-from grader.web.store import Link, LtiClaim, LtiUser, Publication
-from reference.errors import PlanmarkError
+from grader.web.service import Call, Called, Own, Route, Row
+from grader.web.store import Link, LtiClaim, LtiUser, Publication, columns_of
 
 router = APIRouter(route_class=Route, prefix="/api/v1/publications/{key}/lti/claims", tags=["lti"])
 _CLAIMING = threading.Lock()
-"""Of two who come as the same student at once, one is first."""
+"""Held while a claim is made: of two people who come as the same student at once, one is first."""
 
 
 def row_of(call: Call, publication: Publication, message: Message) -> RosterRow | None:
-    """The student's line of the roster: by the platform's id of the person, or by e-mail."""
-    roster = call.places(publication).roster
-    try:
-        rows = read_roster(roster).rows if roster.is_file() else ()
-    except PlanmarkError:
-        return None
+    """Return the student's line of the roster: by the platform's id of the person, or by e-mail."""
+    rows = call.places(publication).students()
     ids = {one for one in (message.person and message.person.person_sourcedid, message.sub) if one}
     email = (message.email or "").casefold()
     named = [row for row in rows if row.student_id in ids]
@@ -39,7 +34,7 @@ def row_of(call: Call, publication: Publication, message: Message) -> RosterRow 
 
 
 def claimed(call: Call, user: LtiUser, publication: Publication, student: str, message: Message) -> LtiClaim:
-    """The claim by which somebody is the student. Raises RefusedError where another came first."""
+    """Return the claim of somebody to be the student. Raises RefusedError where another came first."""
     of_publication = LtiClaim.publication_id == publication.id
     with _CLAIMING:
         others = call.session.scalars(select(LtiClaim).where(of_publication)).all()
@@ -69,20 +64,18 @@ def claimed(call: Call, user: LtiUser, publication: Publication, student: str, m
 
 
 @router.get("")
-def listed(call: Called, key: Key) -> list[dict[str, Any]]:
-    """Who has come from platforms as which student, those first of whom several want to be the same."""
-    own = call.own(key)
+def listed(call: Called, own: Own) -> list[dict[str, Any]]:
+    """List who came from platforms as which student, first those whom several people claim to be."""
     found = call.session.scalars(select(LtiClaim).where(LtiClaim.publication_id == own.id)).all()
-    names = ("id", "student_id", "who", "holds", "created")
     waiting = {one.student_id for one in found if not one.holds}
-    rows = [{name: getattr(one, name) for name in names} for one in found]
+    rows = [columns_of(one, "id", "student_id", "who", "holds", "created") for one in found]
     return sorted(rows, key=lambda row: (row["student_id"] not in waiting, row["student_id"], row["id"]))
 
 
 @router.put("/{number}")
-def decide(call: Called, key: Key, number: Row) -> dict[str, str]:
-    """Say that this one is the student; whoever was it before is it no more."""
-    claim = call.own_row(key, LtiClaim, number, "claim")
+def decide(call: Called, own: Own, number: Row) -> dict[str, str]:
+    """Decide that this person is the student; nobody else is any more."""
+    claim = call.row_of(own, LtiClaim, number, "claim")
     others = call.session.scalars(
         select(LtiClaim).where(
             LtiClaim.publication_id == claim.publication_id, LtiClaim.id != claim.id, LtiClaim.holds,
@@ -93,17 +86,17 @@ def decide(call: Called, key: Key, number: Row) -> dict[str, str]:
         other.holds = False
     take_back_links(call, [one.id for one in others])
     claim.holds = True
-    call.note("claim decided", f"{key} {claim.student_id}")
+    call.note("claim decided", f"{own.key} {claim.student_id}")
     return {"state": "decided"}
 
 
 @router.delete("/{number}")
-def refuse(call: Called, key: Key, number: Row) -> dict[str, str]:
-    """Say that this one is not the student, and take back what the launch gave."""
-    claim = call.own_row(key, LtiClaim, number, "claim")
+def refuse(call: Called, own: Own, number: Row) -> dict[str, str]:
+    """Decide that this person is not the student, and revoke the links that the launch gave."""
+    claim = call.row_of(own, LtiClaim, number, "claim")
     take_back_links(call, [claim.id])
     call.session.delete(claim)
-    call.note("claim refused", f"{key} {claim.student_id}")
+    call.note("claim refused", f"{own.key} {claim.student_id}")
     return {"state": "refused"}
 
 

@@ -22,11 +22,11 @@ from grader.web.store import Attempt, Audit, Job, Link, LtiClaim, Publication, R
 from reference.authored.variant_table import delimiter_of
 
 PAGES = ("index.html", "summary.csv")
-"""Of the whole class: they name the student, and the next run writes them anew."""
+"""Files of the whole class: they name the student, and the next run writes them again."""
 
 
 def erase_student(session: Session, publication: Publication, places: Places, student: str) -> list[str]:
-    """Delete a student; the files that stay because they hold others, too.
+    """Delete a student; return the names of the files that stay because they hold others, too.
 
     The class must not be graded meanwhile.
     """
@@ -54,7 +54,7 @@ def erase_student(session: Session, publication: Publication, places: Places, st
 
 
 def _owners(places: Places) -> dict[str, set[str]]:
-    """Whose each file is, as the last run found it, or as the table says."""
+    """Return the owners of each file, as the last run found them, or as the table has them."""
     owners: dict[str, set[str]] = {}
     for report in _reports(places).reports:
         for sheet in report.reading.sheets:
@@ -72,12 +72,12 @@ def _reports(places: Places) -> ResultsDocument:
 
 
 def _student_named(stem: str, students: Iterable[str]) -> str | None:
-    """The student with whose id a file's name begins: of ``s1`` and ``s1_2`` the longer one."""
+    """Return the student whose id begins a file's name: of ``s1`` and ``s1_2`` the longer one."""
     return max((one for one in students if f"{stem}_".startswith(f"{one}_")), key=len, default=None)
 
 
 def _erase_audit(session: Session, publication: Publication, student: str, students: Iterable[str]) -> None:
-    """Put a digest in the place of the student's id, and of names of files that begin with it."""
+    """Replace the student's id, and names of files that begin with it, by a digest."""
     told = Audit.about.startswith(f"{publication.key} ", autoescape=True)
     texts = (Audit.about, Audit.before, Audit.after)
     named = or_(*(text.contains(student, autoescape=True) for text in texts))
@@ -88,14 +88,14 @@ def _erase_audit(session: Session, publication: Publication, student: str, stude
 
 
 def _without(word: str, student: str, students: Iterable[str]) -> str:
-    """A word of the audit trail; a digest where it is the student, or a file or page of theirs."""
+    """Return a word of the audit trail; a digest if it is the student, or a file or page of theirs."""
     bare = word.removeprefix("page:").removeprefix("owner=").rstrip(";:")
     is_own = student in {bare, _student_named(Path(bare).stem, students)}
     return f"({digest_of(student)[:8]})" if is_own else word
 
 
 def _erase_rows(places: Places, student: str) -> None:
-    """Take the student's lines out of the roster and of the decisions."""
+    """Remove the student's lines from the roster and the decisions."""
     if places.roster.is_file():
         text = decoded(places.roster.read_bytes()).removeprefix(MARK)
         lines = list(io.StringIO(text, newline=""))

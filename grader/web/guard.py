@@ -14,7 +14,6 @@ import re
 import secrets
 import time
 from collections import Counter
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from ipaddress import ip_address, ip_network
 from math import inf
@@ -34,6 +33,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from zxcvbn import zxcvbn
 
 from grader.language import LANGUAGES, tongue
+from grader.review.server import HEADERS as REVIEW_HEADERS
 from grader.texts.spoken import RefusedError, told_of
 from grader.web.settings import Settings
 from grader.web.store import Account, Link, Publication, Store, Visit, digest_of
@@ -53,19 +53,16 @@ SESSION_S = 7 * 86400.0
 IDLE_S = 12 * 3600.0
 """A working day: an instructor who was away longer signs in again."""
 LEAST_GUESSES = 1e10
-"""To find a password by its words, names and patterns: more than is tried on a stolen hash in years."""
+"""Guesses to find a password by words, names and patterns: more than years of trying on a stolen hash."""
 LEAST_PASSWORD = 12
 """Signs of a password (NIST SP 800-63B asks for at least 8, and for 15 where nothing else is asked)."""
 HEADERS = {
+    **REVIEW_HEADERS,
     "Content-Security-Policy": "default-src 'none'; img-src 'self' data: blob:; style-src 'self';"
     " script-src 'self'; connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'",
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "no-referrer",
-    "Cross-Origin-Resource-Policy": "same-origin",
     "Cross-Origin-Opener-Policy": "same-origin",
     "Permissions-Policy": "geolocation=(), microphone=()",
     "X-Robots-Tag": "noindex",
-    "Cache-Control": "no-store",
 }
 RATES: dict[str, RateLimitItem] = {
     "sign_in": RateLimitItemPerMinute(10),
@@ -84,21 +81,21 @@ _HASHER = PasswordHasher()
 _LOOKED_AT = 72
 """Signs of a password that are weighed: the time grows with their square."""
 _NOBODY = _HASHER.hash(secrets.token_urlsafe())
-"""Compared with where there is no such account: the time tells nothing."""
+"""Compared with if there is no such account, so that the time does not tell."""
 
 
 def forbidden(why: str) -> RefusedError:
-    """The error for those who may not."""
+    """Return the error for visitors without the right."""
     return RefusedError(403, "forbidden", why)
 
 
 def missing(what: str = "page") -> RefusedError:
-    """The error for what is not there, or is not the visitor's to see: both read the same."""
+    """Return the error for what is not there, or not the visitor's to see: both read the same."""
     return RefusedError(404, "not_found", f"no_{what}")
 
 
 def language_of(request: Request) -> str:
-    """The language that a visitor chose, else the browser's, else English."""
+    """Return the language that a visitor chose, else the browser's, else English."""
     chosen = request.query_params.get("lang") or request.cookies.get("planmark_lang", "")
     wanted = [chosen, *request.headers.get("accept-language", "").split(",")]
     codes = (one.strip()[:2].lower() for one in wanted)
@@ -106,7 +103,7 @@ def language_of(request: Request) -> str:
 
 
 def hash_of(password: str, name: str) -> str:
-    """What is stored of a password of somebody. Raises RefusedError for a short or a common one."""
+    """Return the hash of a password, to be stored. Raises RefusedError for a short or a common one."""
     if not LEAST_PASSWORD <= len(password) <= 200:
         raise RefusedError(422, "password_short", least=LEAST_PASSWORD)
     if zxcvbn(password[:_LOOKED_AT], [name, "planmark"])["guesses"] < LEAST_GUESSES:
@@ -115,7 +112,7 @@ def hash_of(password: str, name: str) -> str:
 
 
 def is_password(account: Account | None, password: str) -> bool:
-    """Whether an account has a password; takes as long where there is no account."""
+    """Return whether a password is an account's; takes as long where there is no account."""
     stored = account.password if account is not None and account.password else _NOBODY
     try:
         return _HASHER.verify(stored, password[:200]) and account is not None and bool(account.password)
@@ -124,20 +121,25 @@ def is_password(account: Account | None, password: str) -> bool:
 
 
 def address_of(scope: Scope) -> str:
-    """Whose a request is, for counting: an address, of IPv6 the network that one household has."""
+    """Return the sender's address, for counting; of IPv6 the network that one household has."""
     text = str((scope.get("client") or ("",))[0])
     try:
-        return (
-            text
-            if ip_address(text).version == 4
-            else str(ip_network(f"{text.partition('%')[0]}/64", strict=False))
-        )
+        if ip_address(text).version == 4:
+            return text
+        return str(ip_network(f"{text.partition('%')[0]}/64", strict=False))
     except ValueError:  # a socket of this machine
         return text
 
 
+def issued(session: Session, account: Account, title: str) -> str:
+    """Return a new secret, shown once, and store its digest as a visit: of an invitation, link or token."""
+    token = secrets.token_urlsafe(32)
+    session.add(Visit(id=digest_of(token), account=account, title=title))
+    return token
+
+
 def _is_over(visit: Visit) -> bool:
-    """Whether an instructor signs in again; a student's personal link has an end of its own."""
+    """Return whether an instructor must sign in again; a student's personal link expires by itself."""
     now = time.time()
     is_old = now - visit.used > IDLE_S or now - visit.created > SESSION_S
     return visit.account_id is not None and is_old
@@ -145,7 +147,7 @@ def _is_over(visit: Visit) -> bool:
 
 @dataclass(slots=True)
 class Visitor:
-    """Who makes a request.
+    """The sender of a request.
 
     Attributes
     ----------
@@ -166,11 +168,11 @@ class Visitor:
 
     @property
     def name(self) -> str:
-        """For the audit trail."""
+        """The name for the audit trail."""
         return self.account.name if self.account is not None else f"visitor {digest_of(self.secret)[:8]}"
 
     def is_member(self, publication: Publication) -> bool:
-        """Whether a publication is the instructor's own, or a colleague let them in."""
+        """Return whether the instructor may change a publication: a member, or an administrator."""
         account = self.account
         return account is not None and (
             account.is_admin or any(one.id == account.id for one in publication.members)
@@ -194,7 +196,7 @@ class Guard:
     # Visits ---------------------------------------------------------------------------------------
 
     def visitor(self, request: Request, session: Session) -> Visitor:
-        """Who a request is from. Raises RefusedError for a token that is not known."""
+        """Return the sender of a request. Raises RefusedError for an unknown token."""
         address = address_of(request.scope)
         kind, _, token = request.headers.get("authorization", "").partition(" ")
         if kind.lower() == "bearer":
@@ -213,7 +215,7 @@ class Guard:
     def begin(
         self, session: Session, visitor: Visitor, account: Account | None = None, link: Link | None = None
     ) -> Visit:
-        """The visit as stored; a sign-in and a personal link give it a new secret.
+        """Return the visit as stored; a sign-in and a personal link give it a new secret.
 
         Whoever put the cookie into a browser that many use does not know the new one.
         """
@@ -245,12 +247,12 @@ class Guard:
     # Forms ----------------------------------------------------------------------------------------
 
     def form_token(self, visitor: Visitor) -> str:
-        """What a page of ours must send with whatever changes something."""
+        """Return the text that our pages must send with every change."""
         key = self.settings.secret.encode()
         return hmac.new(key, b"form " + visitor.secret.encode(), hashlib.sha256).hexdigest()
 
     def check_form(self, request: Request, visitor: Visitor) -> None:
-        """Raises RefusedError for a request that no page of ours has made."""
+        """Raise RefusedError for a request that none of our pages has made."""
         if visitor.is_program:
             return
         origin = request.headers.get("origin")
@@ -261,43 +263,35 @@ class Guard:
 
     # How often ------------------------------------------------------------------------------------
 
-    def count(self, rate: str, who: Iterable[str]) -> None:
+    def count(self, rate: str, who: str) -> None:
         """Count a use of something. Raises RefusedError where there are too many in a minute."""
-        for one in who:
-            if not self._limiter.hit(RATES[rate], rate, one):
-                raise RefusedError(429, "too_often")
+        if not self._limiter.hit(RATES[rate], rate, who):
+            raise RefusedError(429, "too_often")
 
     # Links ----------------------------------------------------------------------------------------
 
     def link_text(self, link: Link) -> str:
-        """The address of a personal link."""
+        """Return the address of a personal link."""
         return f"{self.settings.address}/s/{self._links.dumps(link.id)}"
 
     def opened(self, session: Session, token: str) -> Link:
-        """The link that a token is of. Raises RefusedError for one that is forged, revoked or too old."""
+        """Return the link of a token. Raises RefusedError for one that is forged, revoked or too old."""
         try:
             number = self._links.loads(token)
         except BadSignature:
             number = None
         link = session.get(Link, number) if isinstance(number, int) else None
-        return self._valid(link)
-
-    @staticmethod
-    def _valid(link: Link | None) -> Link:
-        if link is None or link.is_revoked or link.expires < time.time():
+        if link is None or not link.is_valid:
             raise RefusedError(404, "link")
         return link
 
-    def own_link(self, session: Session, visitor: Visitor, publication: Publication) -> Link | None:
-        """The personal link by which a visitor came to a publication, while it is valid."""
+    @staticmethod
+    def own_link(session: Session, visitor: Visitor, publication: Publication) -> Link | None:
+        """Return the personal link by which a visitor came to a publication, while it is valid."""
         number = None if visitor.visit is None else visitor.visit.links.get(str(publication.id))
-        if number is None:
-            return None
         found = select(Link).where(Link.id == number, Link.publication_id == publication.id)
-        try:
-            return self._valid(session.scalar(found))
-        except RefusedError:
-            return None
+        link = None if number is None else session.scalar(found)
+        return link if link is not None and link.is_valid else None
 
 
 # Around every request -----------------------------------------------------------------------------
@@ -375,7 +369,7 @@ class Rim:
             await _refuse(scope, send, refused)
 
     def _ended(self, sender: str) -> float:
-        """Forget a body that is being sent; a time that never comes."""
+        """Forget a body that was being sent; return a time that never comes."""
         self._sending[sender] -= 1
         self._sending = +self._sending
         return inf
@@ -393,13 +387,13 @@ class Rim:
 
 
 GRACE_S = 30.0
-"""For a body to come, besides the time that it needs at `LEAST_PACE`."""
+"""Seconds for a body to arrive, besides the time that it needs at `LEAST_PACE`."""
 LEAST_PACE = 50_000.0
 """Bytes a second of a bad mobile network: a photo of 5 MB then takes 100 s."""
 MOST_SENDING = 60
 """Bodies that come from one address at one time: a class behind a school's address that sends its photos."""
 SHARE = 2 / 3
-"""Of the room for all bodies that one address may take."""
+"""Part of the room for all bodies that one address may take."""
 _FILES = re.compile(
     r"/api/v1/publications/[^/]+/(?:(?P<photo>photos|sheets)|(?:assignment/|roster/|exports/[^/]+/)?files/.+)/?"
 )
@@ -407,7 +401,7 @@ _FILES = re.compile(
 
 
 def _name_of(host: str) -> str | None:
-    """The name in a host header, without its port; None where it has none."""
+    """Return the name in a host header, without its port; None if it has none."""
     try:
         return urlsplit(f"//{host}").hostname
     except ValueError:
@@ -419,7 +413,7 @@ def _crowded() -> RefusedError:
 
 
 async def _in_time(receive: Receive, until: float) -> tuple[Message, RefusedError | None]:
-    """The next part of a body, or why it is waited for no longer."""
+    """Return the next part of a body, or the error of one that came too slowly."""
     try:
         async with asyncio.timeout_at(until):
             return await receive(), None

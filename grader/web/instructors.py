@@ -1,8 +1,6 @@
 """Actions of instructors: publish, upload, grade, release, export, answer, delete."""
 
 import pathlib
-import secrets
-import shutil
 import tempfile
 import time
 from dataclasses import replace
@@ -36,8 +34,9 @@ from grader.web.places import (
     store,
     stored_name,
 )
-from grader.web.service import FILE_BODY, LARGEST_ROW, Body, Call, Called, Key, Route, Row
+from grader.web.service import FILE_BODY, LARGEST_ROW, Body, Call, Called, Key, Own, Route, Row
 from grader.web.store import (
+    UNFINISHED,
     Account,
     Audit,
     Job,
@@ -46,8 +45,10 @@ from grader.web.store import (
     Publication,
     Regrading,
     Sheet,
+    columns_of,
     digest_of,
     last_job,
+    unanswered,
 )
 from grader.web.students import (
     HANDING_IN,
@@ -61,7 +62,6 @@ from grader.web.students import (
     trial_of,
 )
 from reference.authored.assignment import built_in
-from reference.errors import PlanmarkError
 
 router = APIRouter(route_class=Route, prefix="/api/v1", tags=["instructors"])
 FileName = Annotated[str, Path(max_length=400)]
@@ -76,7 +76,7 @@ SETTINGS = tuple(one.name for one, _ in offered(PublicationOptions))
 
 
 class Settings(model_of("Settings", PublicationOptions, Strict, SETTINGS)):  # type: ignore[misc]
-    """What an instructor sets of a publication; what is left out stays."""
+    """The settings of a publication; what is left out stays."""
 
 
 @router.get("/assignments")
@@ -89,14 +89,12 @@ def assignments(call: Called) -> list[str]:
 @router.get("/publications")
 def publications(call: Called) -> list[dict[str, Any]]:
     """The instructor's publications, the newest first."""
-    account = call.account
-    found = call.session.scalars(select(Publication).order_by(Publication.id.desc()))
-    return [facts(one) for one in found if account.is_admin or call.visitor.is_member(one)]
+    return [facts(one) for one in call.all_own()]
 
 
 @router.post("/publications", status_code=201)
 def publish(call: Called, settings: Settings) -> dict[str, Any]:
-    """A new publication; with a built-in assignment it can be opened at once."""
+    """Create a publication; with a built-in assignment it can be opened at once."""
     publication = Publication(members=[call.account])
     call.session.add(publication)
     call.session.flush()
@@ -106,47 +104,41 @@ def publish(call: Called, settings: Settings) -> dict[str, Any]:
 
 
 @router.get("/publications/{key}")
-def publication(call: Called, key: Key) -> dict[str, Any]:
+def publication(call: Called, own: Own) -> dict[str, Any]:
     """A publication: settings, files, roster, the last job, requests that wait."""
-    own = call.own(key)
     places = call.places(own)
     job = last_job(call.session, own)
     of_own = LtiActivity.publication_id == own.id
-    waiting = call.session.scalars(
-        select(Regrading).where(Regrading.publication_id == own.id, Regrading.answered.is_(None))
-    ).all()
     return {
         **facts(own),
         "authored": sorted(path.name for path in places.authored.glob("*")),
         "files": files_of(call.session, own, places),
-        "students": students_of(places.roster),
+        "students": students_of(places),
         "job": None if job is None else state_of(call, job).model_dump(),
-        "requests": len(waiting),
+        "requests": len(unanswered(call.session, own)),
         "has_results": (places.results / "results.json").is_file(),
         "has_activities": call.session.scalar(select(LtiActivity.id).where(of_own).limit(1)) is not None,
     }
 
 
 @router.get("/publications/{key}/lint")
-def lint_assignment(call: Called, key: Key) -> LintDocument:
-    """What `planmark lint` says of the assignment: every variant's figures, and findings."""
-    own, service = call.own(key), call.service
+def lint_assignment(call: Called, own: Own) -> LintDocument:
+    """Run `planmark lint` on the assignment: every variant's figures, and findings."""
+    service = call.service
     return result_of(service.queue.workers, linted, service.settings.data, own.key, own.assignment)
 
 
 @router.patch("/publications/{key}")
-def change(call: Called, key: Key, settings: Settings) -> dict[str, Any]:
+def change(call: Called, own: Own, settings: Settings) -> dict[str, Any]:
     """Change settings."""
-    own = call.own(key)
     change_settings(call, own, settings)
-    call.note("changed", f"{key} {', '.join(settings.model_fields_set)}")
+    call.note("changed", f"{own.key} {', '.join(settings.model_fields_set)}")
     return facts(own)
 
 
 @router.delete("/publications/{key}")
-def remove(call: Called, key: Key) -> dict[str, str]:
+def remove(call: Called, own: Own) -> dict[str, str]:
     """Delete a publication with all that was handed in."""
-    own = call.own(key)
     _remove(call, own)
     return {"state": "removed"}
 
@@ -156,9 +148,7 @@ def remove_term(
     call: Called, term: Annotated[str, Path(max_length=40, pattern=WITHOUT_NUL)]
 ) -> dict[str, int]:
     """Delete all publications of a term that are the instructor's own."""
-    account = call.account
-    found = call.session.scalars(select(Publication).where(Publication.term == term)).all()
-    own = [one for one in found if account.is_admin or call.visitor.is_member(one)]
+    own = [one for one in call.all_own() if one.term == term]
     if not own:
         raise missing("term")
     for one in own:
@@ -167,26 +157,23 @@ def remove_term(
 
 
 @router.put("/publications/{key}/members/{number}")
-def add_member(call: Called, key: Key, number: Row) -> dict[str, Any]:
+def add_member(call: Called, own: Own, number: Row) -> dict[str, Any]:
     """Let a colleague in."""
-    own, account = call.own(key), call.session.get(Account, number)
-    if account is None:
-        raise missing("account")
+    account = call.row(Account, number, "account")
     if account not in own.members:
         own.members.append(account)
-    call.note("member added", f"{key} {account.name}")
+    call.note("member added", f"{own.key} {account.name}")
     return facts(own)
 
 
 @router.delete("/publications/{key}/members/{number}")
-def remove_member(call: Called, key: Key, number: Row) -> dict[str, Any]:
+def remove_member(call: Called, own: Own, number: Row) -> dict[str, Any]:
     """Let a colleague out; one always stays."""
-    own = call.own(key)
     left = [one for one in own.members if one.id != number]
     if not left:
         raise RefusedError(409, "last_member")
     own.members = left
-    call.note("member removed", f"{key} {number}")
+    call.note("member removed", f"{own.key} {number}")
     return facts(own)
 
 
@@ -212,7 +199,7 @@ def check_assignment(data: pathlib.Path, key: str, name: str) -> None:
 
 
 def linted(data: pathlib.Path, key: str, name: str) -> LintDocument:
-    """What `planmark lint` finds, in a worker."""
+    """Return what `planmark lint` finds, in a worker."""
     assignment = assignment_of(data, Publication(key=key, assignment=name))
     return lint_document(lint(assignment, rubric_of(assignment)))
 
@@ -220,17 +207,12 @@ def linted(data: pathlib.Path, key: str, name: str) -> LintDocument:
 def facts(publication: Publication) -> dict[str, Any]:
     """A publication's settings."""
     members = [{"id": one.id, "name": one.name} for one in publication.members]
-    known = {name: getattr(publication, name) for name in ("key", *SETTINGS, "created")}
-    return {**known, "members": members}
+    return {**columns_of(publication, "key", *SETTINGS, "created"), "members": members}
 
 
-def students_of(roster: pathlib.Path) -> list[dict[str, Any]]:
-    """The students on a roster, each once; none where there is none that can be used."""
-    try:
-        rows = read_roster(roster).rows if roster.is_file() else ()
-    except PlanmarkError:
-        return []
-    names = {row.student_id: row.name for row in rows}
+def students_of(places: Places) -> list[dict[str, Any]]:
+    """Return the students on the roster, each once."""
+    names = {row.student_id: row.name for row in places.students()}
     return [{"student_id": student, "name": name} for student, name in names.items()]
 
 
@@ -257,35 +239,29 @@ def _remove(call: Call, publication: Publication) -> None:
 
 
 @router.put("/publications/{key}/assignment/files/{name}", openapi_extra=FILE_BODY)
-def put_authored(call: Called, key: Key, name: FileName, body: Body) -> dict[str, Any]:
+def put_authored(call: Called, own: Own, name: FileName, body: Body) -> dict[str, Any]:
     """Store a file of the assignment; it is checked when it is chosen."""
-    own = call.own(key)
     safe = safe_name(name, AUTHORED)
     is_same = store(call.places(own).authored / safe, body, replace=True)
-    call.note("assignment file", f"{key} {safe}")
+    call.note("assignment file", f"{own.key} {safe}")
     return {"name": safe, "is_same": is_same}
 
 
 @router.put("/publications/{key}/roster/files/roster.csv", openapi_extra=FILE_BODY)
-def put_roster(call: Called, key: Key, body: Body) -> dict[str, Any]:
+def put_roster(call: Called, own: Own, body: Body) -> dict[str, Any]:
     """Store the roster, if nothing is wrong with it."""
-    own = call.own(key)
-    places = call.places(own)
-    trial = places.top / f"roster-{secrets.token_hex(6)}.csv"
-    try:
+    with tempfile.TemporaryDirectory() as folder:
+        trial = pathlib.Path(folder) / "roster.csv"
         store(trial, body)
         count = len(read_roster(trial, "roster.csv").rows)
-    finally:
-        trial.unlink(missing_ok=True)
-    store(places.roster, body, replace=True)
-    call.note("roster", f"{key}: {count} lines")
+    store(call.places(own).roster, body, replace=True)
+    call.note("roster", f"{own.key}: {count} lines")
     return {"lines": count}
 
 
 @router.put("/publications/{key}/files/{name:path}", openapi_extra=FILE_BODY)
-def put_file(call: Called, key: Key, name: FileName, body: Body, *, replace: bool = False) -> dict[str, Any]:
+def put_file(call: Called, own: Own, name: FileName, body: Body, *, replace: bool = False) -> dict[str, Any]:
     """Store a sheet, a class file or measurements that were handed in."""
-    own = call.own(key)
     call.count("upload")
     called = person_name(name, SUBMITTED)
     if PurePath(called).name.lower() in {"roster.csv", "decisions.csv"}:
@@ -304,20 +280,19 @@ def put_file(call: Called, key: Key, name: FileName, body: Body, *, replace: boo
             call.session.add(sheet)
             call.session.commit()
             trial.unlink()
-    call.note("file", f"{key} {called}")
+    call.note("file", f"{own.key} {called}")
     return {"name": called, "is_same": is_same}
 
 
 @router.delete("/publications/{key}/files/{name:path}")
-def remove_file(call: Called, key: Key, name: FileName) -> dict[str, str]:
+def remove_file(call: Called, own: Own, name: FileName) -> dict[str, str]:
     """Delete a file that was handed in."""
-    own = call.own(key)
     places = call.places(own)
     path = next((path for path, called in places.called().items() if called == name), None)
     if path is None:
         raise missing("file")
     places.delete(path)
-    call.note("file removed", f"{key} {name}")
+    call.note("file removed", f"{own.key} {name}")
     return {"state": "removed"}
 
 
@@ -325,37 +300,36 @@ def remove_file(call: Called, key: Key, name: FileName) -> dict[str, str]:
 
 
 @router.post("/publications/{key}/jobs", status_code=202)
-def grade_class(call: Called, key: Key) -> JobState:
+def grade_class(call: Called, own: Own) -> JobState:
     """Grade what is new or has changed."""
-    own = call.own(key)
     assignment_of(call.service.settings.data, own)
     job = last_job(call.session, own)
-    if job is not None and job.state in {"queued", "running"}:
+    if job is not None and job.state in UNFINISHED:
         return state_of(call, job)
-    call.note("grading", key)
+    call.note("grading", own.key)
     return queued(call, Job(publication=own, kind="grade", asked={"by": call.account.name}))
 
 
 @router.get("/publications/{key}/jobs/{job}")
-def job_state(call: Called, key: Key, job: Key) -> JobState:
-    """How far a job is."""
-    return state_of(call, _job(call, key, job))
+def job_state(call: Called, own: Own, job: Key) -> JobState:
+    """Return the progress of a job."""
+    return state_of(call, _job(call, own, job))
 
 
 @router.delete("/publications/{key}/jobs/{job}")
-def cancel(call: Called, key: Key, job: Key) -> dict[str, str]:
+def cancel(call: Called, own: Own, job: Key) -> dict[str, str]:
     """Cancel a job; what was marked is kept."""
-    found = _job(call, key, job)
-    call.note("grading cancelled", key)
+    found = _job(call, own, job)
+    call.note("grading cancelled", own.key)
     call.session.commit()
     call.service.queue.cancel(found.id)
     return {"state": "cancelled"}
 
 
 @router.get("/publications/{key}/results")
-def results(call: Called, key: Key) -> Response:
+def results(call: Called, own: Own) -> Response:
     """`results.json` of the last run."""
-    path = call.places(call.own(key)).results / "results.json"
+    path = call.places(own).results / "results.json"
     if not path.is_file():
         raise missing("result")
     return Response(path.read_bytes(), media_type="application/json")
@@ -373,33 +347,29 @@ def _options(platform: str, chosen: Chosen, **more: Any) -> Options:  # noqa: AN
 
 
 @router.get("/publications/{key}/exports/{platform}")
-def export_file(call: Called, key: Key, platform: str, chosen: Annotated[Chosen, Query()]) -> Response:
+def export_file(call: Called, own: Own, platform: str, chosen: Annotated[Chosen, Query()]) -> Response:
     """The file for a platform, as `planmark export` writes it without the platform's own file."""
-    return _exported(call, key, _options(platform, chosen))
+    return _exported(call, own, _options(platform, chosen))
 
 
 @router.post("/publications/{key}/exports/{platform}/files/{name}", openapi_extra=FILE_BODY)
 def filled_in(
     call: Called,
-    key: Key,
+    own: Own,
     platform: str,
     name: FileName,
     body: Body,
     chosen: Annotated[Chosen, Query()],
 ) -> Response:
     """The platform's own worksheet or gradebook, which is sent as the body, filled in."""
-    folder = call.places(call.own(key)).top / f"form-{secrets.token_hex(6)}"
     called = person_name(name, (".csv", ".xls", ".txt"))
-    form = folder / stored_name(called)
-    try:
+    with tempfile.TemporaryDirectory() as folder:
+        form = pathlib.Path(folder) / stored_name(called)
         store(form, body)
-        return _exported(call, key, _options(platform, chosen, form=form, called=called))
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
+        return _exported(call, own, _options(platform, chosen, form=form, called=called))
 
 
-def _exported(call: Call, key: str, options: Options) -> Response:
-    own = call.own(key)
+def _exported(call: Call, own: Publication, options: Options) -> Response:
     if options.to not in TARGETS:
         raise RefusedError(404, "not_found", "no_export", known=", ".join(TARGETS))
     places = call.places(own)
@@ -410,13 +380,12 @@ def _exported(call: Call, key: str, options: Options) -> Response:
         path = pathlib.Path(folder) / name
         export(read_results(places.results), path, options)
         content = path.read_bytes()
-    call.note("exported", f"{key} {name}")
+    call.note("exported", f"{own.key} {name}")
     head = {"Content-Disposition": f'attachment; filename="{name}"'}
     return Response(content, media_type="application/octet-stream", headers=head)
 
 
-def _job(call: Call, key: str, job: str) -> Job:
-    own = call.own(key)
+def _job(call: Call, own: Publication, job: str) -> Job:
     found = call.session.scalar(select(Job).where(Job.key == job, Job.publication_id == own.id))
     if found is None:
         raise missing("job")
@@ -427,25 +396,19 @@ def _job(call: Call, key: str, job: str) -> Job:
 
 
 @router.post("/publications/{key}/links", status_code=201)
-def make_links(call: Called, key: Key, student: str | None = None) -> list[dict[str, str]]:
-    """A personal link for one student of the roster, or for all that have no valid one; shown once."""
-    own = call.own(key)
-    known = [one["student_id"] for one in students_of(call.places(own).roster)]
+def make_links(call: Called, own: Own, student: str | None = None) -> list[dict[str, str]]:
+    """Create a personal link for one student of the roster, or for all that have no valid one."""
+    known = [one["student_id"] for one in students_of(call.places(own))]
     if student is not None and student not in known:
         raise missing("student")
-    valid = set(
-        call.session.scalars(
-            select(Link.student_id).where(
-                Link.publication_id == own.id, Link.is_revoked.is_(False), Link.expires > time.time()
-            )
-        )
-    )
+    there = call.session.scalars(select(Link).where(Link.publication_id == own.id))
+    valid = {one.student_id for one in there if one.is_valid}
     wanted = [student] if student is not None else [one for one in known if one not in valid]
     expires = time.time() + call.service.settings.link_days * 86400.0
     links = [Link(publication=own, student_id=one, expires=expires) for one in wanted]
     call.session.add_all(links)
     call.session.flush()
-    call.note("links made", f"{key}: {len(links)}")
+    call.note("links made", f"{own.key}: {len(links)}")
     guard = call.service.guard
     return [
         {"id": str(one.id), "student_id": one.student_id, "address": guard.link_text(one)} for one in links
@@ -453,24 +416,19 @@ def make_links(call: Called, key: Key, student: str | None = None) -> list[dict[
 
 
 @router.get("/publications/{key}/links")
-def links(call: Called, key: Key) -> list[dict[str, Any]]:
+def links(call: Called, own: Own) -> list[dict[str, Any]]:
     """The personal links, with their addresses."""
-    own = call.own(key)
     found = call.session.scalars(select(Link).where(Link.publication_id == own.id).order_by(Link.id))
-    guard = call.service.guard
-    return [
-        {"id": one.id, "student_id": one.student_id, "expires": one.expires, "is_revoked": one.is_revoked,
-         "address": guard.link_text(one)}
-        for one in found
-    ]  # fmt: skip
+    guard, names = call.service.guard, ("id", "student_id", "expires", "is_revoked")
+    return [{**columns_of(one, *names), "address": guard.link_text(one)} for one in found]
 
 
 @router.delete("/publications/{key}/links/{number}")
-def revoke(call: Called, key: Key, number: Row) -> dict[str, str]:
+def revoke(call: Called, own: Own, number: Row) -> dict[str, str]:
     """Revoke a personal link at once."""
-    link = call.own_row(key, Link, number, "link")
+    link = call.row_of(own, Link, number, "link")
     link.is_revoked = True
-    call.note("link revoked", f"{key} {link.student_id}")
+    call.note("link revoked", f"{own.key} {link.student_id}")
     return {"state": "revoked"}
 
 
@@ -481,31 +439,29 @@ class Answer(Strict):
 
 
 @router.get("/publications/{key}/requests")
-def requests(call: Called, key: Key) -> list[dict[str, Any]]:
+def requests(call: Called, own: Own) -> list[dict[str, Any]]:
     """Students' requests for regrading, those that wait first."""
-    own = call.own(key)
-    found = call.session.scalars(select(Regrading).where(Regrading.publication_id == own.id)).all()
+    found = call.session.scalars(select(Regrading).where(Regrading.publication_id == own.id))
     names = ("id", "student_id", "position", "criterion", "text", "answer", "created", "answered")
-    rows = [{name: getattr(one, name) for name in names} for one in found]
+    rows = [columns_of(one, *names) for one in found]
     return sorted(rows, key=lambda row: (row["answered"] is not None, row["created"]))
 
 
 @router.put("/publications/{key}/requests/{number}")
-def answer(call: Called, key: Key, number: Row, said: Answer) -> dict[str, str]:
+def answer(call: Called, own: Own, number: Row, said: Answer) -> dict[str, str]:
     """Answer a request."""
-    request = call.own_row(key, Regrading, number, "request")
+    request = call.row_of(own, Regrading, number, "request")
     request.answer, request.answered = said.answer, time.time()
-    call.note("request answered", f"{key} {request.student_id}")
+    call.note("request answered", f"{own.key} {request.student_id}")
     return {"state": "answered"}
 
 
 @router.delete("/publications/{key}/students/{student}")
-def remove_student(call: Called, key: Key, student: StudentId) -> dict[str, Any]:
+def remove_student(call: Called, own: Own, student: StudentId) -> dict[str, Any]:
     """Delete all that is kept of a student; files that hold other students, too, are told and stay."""
-    own = call.own(key)
     call.idle(own)
     kept = erase_student(call.session, own, call.places(own), student)
-    call.note("student removed", f"{key} {digest_of(student)[:8]}")
+    call.note("student removed", f"{own.key} {digest_of(student)[:8]}")
     return {"state": "removed", "kept": kept}
 
 
@@ -518,4 +474,4 @@ def audit(
     asked = select(Audit).order_by(Audit.id.desc()).limit(200)
     asked = asked if before is None else asked.where(Audit.id < before)
     names = ("id", "at", "who", "act", "about", "before", "after")
-    return [{name: getattr(one, name) for name in names} for one in call.session.scalars(asked)]
+    return [columns_of(one, *names) for one in call.session.scalars(asked)]

@@ -12,9 +12,9 @@ from grader.folder.workers import guarded
 from grader.records import Reason
 
 MOST_JUDGES = 4
-"""Of 110 MB each: 100 values a second and more."""
+"""Processes of 110 MB each: they judge 100 values a second and more."""
 MOST_POOLS = 3
-"""In which a call is tried, each time its pool breaks: another call may have killed the process."""
+"""Pools in which a call is tried when its pool breaks: another call may have killed the process."""
 Result = TypeVar("Result")
 
 
@@ -42,7 +42,7 @@ class Judges:
             yield index, self._result(function, *call)
 
     def _result(self, function: Callable[..., Result], *call: object) -> Result | Reason:
-        """What a call gives; where a process was killed, which breaks the pool, in a new one."""
+        """Return the result of a call; where a process was killed, which breaks the pool, from a new one."""
         for _ in range(MOST_POOLS):
             pool = self._pool
             try:
@@ -62,12 +62,10 @@ class Judges:
 def end_with_parent() -> None:
     """Let this process end with its parent."""
     parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
 
+    def end() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
 
-def _end_with(sentinel: int) -> None:
-    from multiprocessing.connection import wait  # noqa: PLC0415
-
-    wait([sentinel])
-    os._exit(1)
+    threading.Thread(target=end, daemon=True).start()

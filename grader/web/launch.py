@@ -67,7 +67,7 @@ class _Choice(_Part):
 
 
 class Message(_Part):
-    """What a platform says in a launch; what planmark does not use is passed over."""
+    """The claims of a launch; those that planmark does not use are ignored."""
 
     iss: str
     sub: Annotated[Text, Field(min_length=1)]
@@ -90,12 +90,12 @@ class Message(_Part):
 
     @property
     def is_teacher(self) -> bool:
-        """Whether the person teaches the course that the activity is in."""
+        """True if the person teaches the course of the activity."""
         return not TEACHES.isdisjoint(self.roles)
 
 
-def began(call: Call, platform: LtiPlatform, form: Mapping[str, str]) -> Response:
-    """The browser sent to the platform, with the record of a launch that has begun."""
+def began(call: Call, platform: LtiPlatform, hints: Mapping[str, str]) -> Response:
+    """Send the browser to the platform, and keep a record of the launch that has begun."""
     state, nonce, browser = (secrets.token_urlsafe(32) for _ in range(3))
     now = time.time()
     call.session.execute(delete(LtiState).where(LtiState.expires < now))
@@ -105,7 +105,7 @@ def began(call: Call, platform: LtiPlatform, form: Mapping[str, str]) -> Respons
         "scope": "openid", "response_type": "id_token", "response_mode": "form_post", "prompt": "none",
         "client_id": platform.client_id, "redirect_uri": f"{call.service.settings.address}/lti/launch",
         "state": state, "nonce": nonce,
-        **{name: form[name] for name in ("login_hint", "lti_message_hint") if form.get(name)},
+        **{name: hint for name, hint in hints.items() if hint},
     }  # fmt: skip
     joint = "&" if "?" in platform.auth_login_url else "?"
     response = RedirectResponse(f"{platform.auth_login_url}{joint}{urlencode(asked)}", 303)
@@ -119,7 +119,7 @@ def began(call: Call, platform: LtiPlatform, form: Mapping[str, str]) -> Respons
 
 
 def checked(call: Call, state: str, token: str) -> tuple[Message, LtiPlatform]:
-    """What a platform says, and which platform. Raises RefusedError."""
+    """Return the checked claims of a launch and its platform. Raises RefusedError."""
     record = _taken(call, state)
     platform = call.session.get(LtiPlatform, record["platform"])
     if platform is None:
@@ -148,7 +148,7 @@ def checked(call: Call, state: str, token: str) -> tuple[Message, LtiPlatform]:
 
 
 def _taken(call: Call, state: str) -> dict[str, Any]:
-    """The record of a launch that this browser began, which is then gone."""
+    """Return the record of a launch that this browser began, and delete it."""
     name, session = digest_of(state), call.session
     record = session.get(LtiState, name)
     browser = call.request.cookies.get(_cookie_of(state), "")
@@ -187,7 +187,7 @@ def _check(message: Message, platform: LtiPlatform, nonce: str) -> None:
 
 
 def _key(call: Call, platform: LtiPlatform, name: str) -> Any:  # noqa: ANN401 - of each algorithm its own
-    """A key of the platform, fetched now."""
+    """Fetch a key of the platform."""
     try:
         answer = caller(is_local=call.service.settings.is_local).get(platform.key_set_url)
         keys = jwt.PyJWKSet.from_dict(json.loads(answer.content))
@@ -200,7 +200,7 @@ def _key(call: Call, platform: LtiPlatform, name: str) -> Any:  # noqa: ANN401 -
 
 
 def platform_of(call: Call, issuer: str, client_id: str) -> LtiPlatform | None:
-    """A registered platform; `client_id` may be empty where its issuer is registered once."""
+    """Return a registered platform; `client_id` may be empty if its issuer is registered once."""
     own = select(LtiPlatform).where(LtiPlatform.issuer == issuer)
     found = call.session.scalars(
         own if not client_id else own.where(LtiPlatform.client_id == client_id)

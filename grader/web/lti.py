@@ -12,10 +12,10 @@ from collections.abc import Iterator, Mapping
 from typing import Annotated, Any
 
 import requests
-from fastapi import APIRouter, Form
+from fastapi import APIRouter, Form, Query
 from fastapi.responses import JSONResponse, RedirectResponse, Response
 from jwcrypto.jwk import JWK
-from pydantic import Field
+from pydantic import BaseModel, Field
 from pylti1p3.assignments_grades import AssignmentsGradesService
 from pylti1p3.deep_link_resource import DeepLinkResource
 from pylti1p3.exception import LtiException
@@ -33,7 +33,7 @@ from grader.web.claims import claimed, row_of, take_back_links
 from grader.web.guard import missing
 from grader.web.launch import STATE_S, Message, began, checked, platform_of
 from grader.web.outside import caller, why_not_asked
-from grader.web.service import Call, Called, Key, Route, Row
+from grader.web.service import Call, Called, Key, Own, Route, Row
 from grader.web.settings import Settings
 from grader.web.store import (
     Account,
@@ -46,6 +46,7 @@ from grader.web.store import (
     Member,
     Publication,
     Visit,
+    columns_of,
     digest_of,
 )
 from grader.web.students import Strict
@@ -94,16 +95,14 @@ def register(call: Called, platform: Platform) -> dict[str, Any]:
 def platforms(call: Called) -> list[dict[str, Any]]:
     """The registered platforms."""
     _ = call.admin
-    names = ("id", *Platform.model_fields)
-    return [{name: getattr(one, name) for name in names} for one in call.session.scalars(select(LtiPlatform))]
+    found = call.session.scalars(select(LtiPlatform))
+    return [columns_of(one, "id", *Platform.model_fields) for one in found]
 
 
 @router.delete("/api/v1/lti/platforms/{number}")
 def unregister(call: Called, number: Row) -> dict[str, str]:
     """Remove a platform, and with it what launches from it gave: membership, visits, students' links."""
-    admin, found = call.admin, call.session.get(LtiPlatform, number)
-    if found is None:
-        raise missing("platform")
+    admin, found = call.admin, call.row(LtiPlatform, number, "platform")
     session, users = call.session, select(LtiUser.id).where(LtiUser.platform_id == number)
     take_back_links(call, session.scalars(select(LtiClaim.id).where(LtiClaim.user_id.in_(users))).all())
     session.execute(delete(Member).where(Member.platform_id == number))
@@ -135,7 +134,7 @@ def members(call: Called) -> list[dict[str, Any]]:
 
 @router.get("/lti/config")
 def config(call: Called) -> dict[str, Any]:
-    """What the platform asks for when planmark is registered there."""
+    """Return what a platform asks for when planmark is registered there."""
     address = call.service.settings.address
     return {
         "title": "planmark",
@@ -196,36 +195,29 @@ def registration_of(platform: LtiPlatform, settings: Settings) -> Registration:
 # Launches -------------------------------------------------------------------------------------------
 
 
-def _login(call: Call, form: Mapping[str, str]) -> Response:
-    platform = platform_of(call, form.get("iss", ""), form.get("client_id", ""))
-    if platform is None or not form.get("login_hint"):
-        why = "login_unregistered" if platform is None else "login_for_nobody"
-        raise RefusedError(400, "lti_login", why)
-    return began(call, platform, form)
+class Login(BaseModel):
+    """The first request of a launch."""
+
+    iss: Annotated[str, Field(max_length=500)] = ""
+    login_hint: Annotated[str, Field(max_length=4000)] = ""
+    client_id: Annotated[str, Field(max_length=200)] = ""
+    lti_message_hint: Annotated[str, Field(max_length=4000)] = ""
 
 
 @router.get("/lti/login")
-def login_by_address(call: Called) -> Response:
-    """The first request of a launch."""
-    return _login(call, dict(call.request.query_params))
+def login_by_address(call: Called, asked: Annotated[Login, Query()]) -> Response:
+    """Begin a launch, asked for by an address."""
+    return login(call, asked)
 
 
 @router.post("/lti/login")
-def login(
-    call: Called,
-    iss: Annotated[str, Form(max_length=500)] = "",
-    login_hint: Annotated[str, Form(max_length=4000)] = "",
-    client_id: Annotated[str, Form(max_length=200)] = "",
-    lti_message_hint: Annotated[str, Form(max_length=4000)] = "",
-) -> Response:
-    """The first request of a launch, as a form."""
-    form = {
-        "iss": iss,
-        "login_hint": login_hint,
-        "client_id": client_id,
-        "lti_message_hint": lti_message_hint,
-    }
-    return _login(call, form)
+def login(call: Called, asked: Annotated[Login, Form()]) -> Response:
+    """Begin a launch, asked for by a form."""
+    platform = platform_of(call, asked.iss, asked.client_id)
+    if platform is None or not asked.login_hint:
+        why = "login_unregistered" if platform is None else "login_for_nobody"
+        raise RefusedError(400, "lti_login", why)
+    return began(call, platform, asked.model_dump(include={"login_hint", "lti_message_hint"}))
 
 
 @router.post("/lti/launch")
@@ -235,10 +227,10 @@ def launch(
     state: Annotated[str, Form(max_length=200)] = "",
     error: Annotated[str, Form(max_length=200)] = "",
 ) -> Response:
-    """The second request of a launch, which the platform has signed."""
+    """Take the second request of a launch, which the platform has signed."""
     if error:
         raise RefusedError(400, "lti_launch", "launch_ended")
-    call.service.guard.count("address", [call.visitor.address])
+    call.service.guard.count("address", call.visitor.address)
     message, platform = checked(call, state, id_token)
     user = _user(call, platform, message)
     return _taught(call, user, message) if message.is_teacher else _learnt(call, user, message)
@@ -353,7 +345,7 @@ def _led(call: Call, path: str) -> Response:
 
 
 def _kept(call: Call, what: Mapping[str, Any]) -> str:
-    """A name for what an instructor is asked about now."""
+    """Store a question to an instructor; return its name."""
     name = secrets.token_urlsafe(24)
     visit = call.visitor.visit
     said = {**what, "visit": "" if visit is None else visit.id}
@@ -364,13 +356,12 @@ def _kept(call: Call, what: Mapping[str, Any]) -> str:
 def choices(call: Call, name: str) -> list[Publication]:
     """The publications that the instructor may choose. Raises RefusedError without a launch that waits."""
     _asked(call, name)
-    found = call.session.scalars(select(Publication).order_by(Publication.id.desc()))
-    return [one for one in found if call.visitor.is_member(one)]
+    return call.all_own()
 
 
 @router.post("/api/v1/lti/chosen/{name}")
 def choose(call: Called, name: Key, key: str) -> Response:
-    """Say which publication an activity shows; to a deep link the signed answer is given."""
+    """Set the publication that an activity shows; return the signed answer to a deep link."""
     state, publication = _asked(call, name), call.own(key)
     what = state.what
     call.session.delete(state)
@@ -378,18 +369,16 @@ def choose(call: Called, name: Key, key: str) -> Response:
         call.session.get_one(LtiActivity, what["activity"]).publication_id = publication.id
         call.note("activity chosen", key)
         return JSONResponse({"address": f"/publications/{key}"})
-    platform = call.session.get(LtiPlatform, what["platform"])
-    if platform is None:
-        raise missing("platform")
+    platform = call.row(LtiPlatform, what["platform"], "platform")
     answer = _deep_link(call, platform, what, publication)
     call.note("deep link", key)
     return JSONResponse({"address": what["settings"]["deep_link_return_url"], "JWT": answer})
 
 
 def _asked(call: Call, name: str) -> LtiState:
-    account, state = call.account, call.session.get(LtiState, digest_of(name))
-    visit = call.visitor.visit
-    if state is None or visit is None or state.what.get("visit") != visit.id or account is None:
+    _ = call.account
+    state, visit = call.session.get(LtiState, digest_of(name)), call.visitor.visit
+    if state is None or visit is None or state.what.get("visit") != visit.id:
         raise RefusedError(404, "lti_choice")
     return state
 
@@ -410,13 +399,12 @@ def _deep_link(call: Call, platform: LtiPlatform, what: Mapping[str, Any], publi
 
 
 @router.post("/api/v1/publications/{key}/lti/scores")
-def send_scores(call: Called, key: Key) -> dict[str, Any]:
+def send_scores(call: Called, own: Own) -> dict[str, Any]:
     """Send the grades that are new or have changed to the activities that show the publication.
 
     What a platform refuses is told for each student, and sent again the next time; who waits for a person, or
     has never launched the activity, is told, too.
     """
-    own = call.own(key)
     activities = call.session.scalars(select(LtiActivity).where(LtiActivity.publication_id == own.id)).all()
     if not activities:
         raise RefusedError(404, "lti_activity")
@@ -436,19 +424,18 @@ def send_scores(call: Called, key: Key) -> dict[str, Any]:
         document = json.loads(str(delivery.content))
         students = {subject: student for student, subject in users.items()}
         for student, why in _sent(call, activity, document, students):
-            match why:
-                case "sent" | "same":
-                    told[why].append(student)
-                case _:
-                    told["refused"][student] = why
-    call.note("grades sent", f"{key}: {len(told['sent'])}")
+            if why in {"sent", "same"}:
+                told[why].append(student)
+            else:
+                told["refused"][student] = why
+    call.note("grades sent", f"{own.key}: {len(told['sent'])}")
     return told
 
 
 def _sent(
     call: Call, activity: LtiActivity, document: Mapping[str, Any], students: Mapping[str, str]
 ) -> Iterator[tuple[str, str]]:
-    """Each student with ``sent``, ``same``, or why the platform did not take the grade."""
+    """Send grades; yield each student with ``sent``, ``same``, or the reason of a refusal."""
     platform = call.session.get_one(LtiPlatform, activity.platform_id)
     settings = call.service.settings
     registration = registration_of(platform, settings)

@@ -7,7 +7,6 @@ account's cannot be seen by the answer or its time.
 import contextlib
 import logging
 import queue
-import secrets
 import smtplib
 import ssl
 import threading
@@ -20,9 +19,10 @@ from sqlalchemy import select
 from sqlalchemy.exc import SQLAlchemyError
 
 from grader.language import N_, tongue
-from grader.web.guard import MAILED
-from grader.web.settings import LOOPBACK, Settings
-from grader.web.store import Account, Store, Visit, digest_of
+from grader.review.server import LOOPBACK
+from grader.web.guard import MAILED, issued
+from grader.web.settings import Settings
+from grader.web.store import Account, Store, Visit
 
 LOG = logging.getLogger("planmark")
 TIMEOUT_S = 10.0
@@ -40,7 +40,7 @@ UNASKED = N_("If it was not you, do nothing: your password stays as it is.")
 
 
 class Mail:
-    """What sends links, one after the other, in a thread of its own."""
+    """Sends links, one after the other, in a thread of its own."""
 
     def __init__(self, settings: Settings, store: Store) -> None:
         self._settings, self._store = settings, store
@@ -75,8 +75,7 @@ class Mail:
                     continue
                 for one in before:
                     session.delete(one)
-                token, site = secrets.token_urlsafe(32), self._settings.address
-                session.add(Visit(id=digest_of(token), account=account, title=MAILED, links={}))
+                token, site = issued(session, account, MAILED), self._settings.address
                 self._store.note(session, "planmark", "reset mailed", account.name)
                 text = speaker.gettext(TEXT) % {"name": account.name, "address": site}
                 letter = EmailMessage()

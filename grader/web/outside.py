@@ -17,14 +17,14 @@ from urllib3.connection import HTTPConnection, HTTPSConnection
 from urllib3.connectionpool import HTTPConnectionPool, HTTPSConnectionPool
 from urllib3.util.connection import create_connection
 
-from grader.web.settings import LOOPBACK
+from grader.review.server import LOOPBACK
 
 TIMEOUT_S = (5.0, 20.0)
-"""For a platform to answer: to connect, and between two parts of an answer."""
+"""Longest wait for a platform: to connect, and between two parts of an answer."""
 MOST_S = 30.0
-"""For a whole answer: people wait for it."""
+"""Longest wait for a whole answer: people wait for it."""
 MOST_BYTES = 1_000_000
-"""Of an answer: a set of keys, or a list of line items, has a hundredth of it."""
+"""The most of an answer: a set of keys, or a list of line items, has a hundredth of it."""
 NAT64 = IPv6Network("64:ff9b::/96")
 """Addresses that stand for those of IPv4 (RFC 6052)."""
 
@@ -34,7 +34,7 @@ class InsideError(OSError):
 
 
 def is_outside(address: str) -> bool:
-    """Whether an address is one of the internet, whatever it is written in or wrapped into."""
+    """Return whether an address belongs to the internet, however it is written or wrapped."""
     ip: IPv4Address | IPv6Address | None = ip_address(address.partition("%")[0])
     if isinstance(ip, IPv6Address):
         inner = IPv4Address(int(ip) & 0xFFFFFFFF) if ip in NAT64 else ip.ipv4_mapped or ip.sixtofour
@@ -43,7 +43,7 @@ def is_outside(address: str) -> bool:
 
 
 def addresses_of(host: str, port: int, *, is_loopback: bool = False) -> list[str]:
-    """Where a name leads: to the internet alone, or to this machine alone.
+    """Return the addresses of a name, all in the internet or, with `is_loopback`, all of this machine.
 
     Raises InsideError where one of the addresses is any other, OSError for a name that leads nowhere.
     """
@@ -55,7 +55,7 @@ def addresses_of(host: str, port: int, *, is_loopback: bool = False) -> list[str
 
 
 def why_not_asked(url: str, *, is_local: bool) -> str | None:
-    """Why the server must not ask an address: a code; None where it may.
+    """Return the reason, as a code, why the server must not ask an address; None if it may.
 
     A name that leads nowhere now is let pass: it is looked up again for every connection.
 
@@ -84,7 +84,7 @@ def why_not_asked(url: str, *, is_local: bool) -> str | None:
 
 
 def caller(*, is_local: bool) -> requests.Session:
-    """What asks a platform; any fault is a requests.RequestException.
+    """Return a session to ask a platform; any fault is a requests.RequestException.
 
     Arguments: `is_local` as in `why_not_asked`.
     """
@@ -139,7 +139,7 @@ class _Adapter(HTTPAdapter):
 
 
 def _connected(connection: HTTPConnection, *, is_loopback: bool = False) -> socket.socket:
-    """A socket to the first address that answers, of those that a name leads to now."""
+    """Return a socket to the first address of a name that answers."""
     port = connection.port or connection.default_port
     *others, last = addresses_of(connection.host, port, is_loopback=is_loopback)
     for address in others:

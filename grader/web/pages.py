@@ -1,6 +1,5 @@
 """The pages for browsers. All changes go through the routes of the API."""
 
-from collections.abc import Mapping
 from datetime import UTC, datetime
 from functools import cache
 from importlib.resources import files
@@ -13,16 +12,13 @@ from jinja2 import Environment, PackageLoader
 from grader.feedback.words import STATES, environment
 from grader.language import LANGUAGES, N_, tongue
 from grader.lms.export import TARGETS
-from grader.review.server import page_file
-from grader.tables.roster import read_roster
+from grader.review.server import result_file
 from grader.web import accounts, claims, instructors, lti, students
 from grader.web.guard import HEADERS, missing
 from grader.web.places import assignment_of
 from grader.web.self_check import form_of
-from grader.web.service import Call, Called, Key, Route
-from grader.web.store import Publication
+from grader.web.service import Call, Called, Key, Own, Route
 from reference.authored.assignment import built_in
-from reference.errors import PlanmarkError
 
 router = APIRouter(route_class=Route, include_in_schema=False)
 STATIC = {"app.js": "text/javascript", "app.css": "text/css"}
@@ -90,27 +86,13 @@ def home(call: Called) -> Response:
 
 
 @router.get("/sign-in")
-def sign_in(call: Called) -> Response:
-    """The form to sign in."""
-    return page(call, "sign_in.html", secret="", kind="session")
-
-
 @router.get("/join")
-def join(call: Called, token: str = "") -> Response:
-    """The form by which an invited instructor makes the account."""
-    return page(call, "sign_in.html", secret=token[:200], kind="join")
-
-
 @router.get("/reset")
-def reset(call: Called, token: str = "") -> Response:
-    """The form by which somebody chooses a new password, by a link."""
-    return page(call, "sign_in.html", secret=token[:200], kind="reset")
-
-
 @router.get("/forgotten")
-def forgotten(call: Called) -> Response:
-    """The form by which somebody is sent a link to a new password."""
-    return page(call, "sign_in.html", secret="", kind="forgotten")
+def sign_in(call: Called, token: str = "") -> Response:
+    """Show the form to sign in, to answer an invitation, or to choose or ask for a new password."""
+    kind = call.request.url.path.strip("/")
+    return page(call, "sign_in.html", secret=token[:200] if kind in {"join", "reset"} else "", kind=kind)
 
 
 @router.get("/c/{key}")
@@ -119,16 +101,18 @@ def self_check(call: Called, key: Key) -> Response:
     publication = call.publication(key)
     if call.visitor.visit is None:
         # From now on a student counts by the own visit, not with all others behind the school's address.
-        call.service.guard.count("address", [call.visitor.address])
+        call.service.guard.count("address", call.visitor.address)
         call.service.guard.begin(call.session, call.visitor)
     link = call.link(publication)
     if link is None:
         students.open_for_checks(call, key)
+        own, requests, sheets = [], [], []
+    else:
+        own = students.own_reports(call, link) if publication.is_released else []
+        requests, sheets = students.own_requests(call, key), students.own_sheets(call, key)
     assignment = assignment_of(call.service.settings.data, publication)
-    own = students.own_reports(call, publication) if link is not None and publication.is_released else []
-    requests = [] if link is None else students.own_requests(call, key)
-    sheets = [] if link is None else students.own_sheets(call, key)
-    row = _row(call, publication, "" if link is None else link.student_id)
+    rows = call.places(publication).students() if link is not None else ()
+    row = next((one for one in rows if link is not None and one.student_id == link.student_id), None)
     return page(
         call, "self_check.html", publication=publication, form=form_of(assignment, call.lang), link=link,
         own=own, requests=requests, sheets=sheets, row=row,
@@ -146,30 +130,21 @@ def open_link(call: Called, token: str) -> Response:
 
 
 @router.get("/publications/{key}")
-def publication(call: Called, key: Key) -> Response:
-    """An instructor's page of a class."""
-    known = instructors.publication(call, key)
-    links = {one["student_id"]: one for one in instructors.links(call, key) if not one["is_revoked"]}
+def publication(call: Called, own: Own) -> Response:
+    """Show an instructor's page of a class."""
+    known = instructors.publication(call, own)
+    links = {one["student_id"]: one for one in instructors.links(call, own) if not one["is_revoked"]}
     return page(
-        call, "publication.html", one=known, links=links, requests=instructors.requests(call, key),
+        call, "publication.html", one=known, links=links, requests=instructors.requests(call, own),
         assignments=built_in(), colleagues=accounts.listed(call), platforms=TARGETS, states=STATES,
-        claims=claims.listed(call, key),        address=f"{call.service.settings.address}/c/{key}",
+        claims=claims.listed(call, own), address=f"{call.service.settings.address}/c/{own.key}",
     )  # fmt: skip
 
 
 @router.get("/publications/{key}/results/{path:path}")
-def result_page(call: Called, key: Key, path: str) -> Response:
-    """A page of the results, as `planmark grade` wrote it."""
-    top = call.places(call.own(key)).results.resolve()
-    if "\0" in path:
-        raise missing()
-    wanted = (top / path).resolve()
-    hidden = any(part.startswith(".") for part in path.split("/"))
-    if hidden or not wanted.is_relative_to(top) or wanted.suffix not in {".html", ".png", ".csv"}:
-        raise missing()
-    if not wanted.is_file():
-        raise missing()
-    return page_file(wanted)
+def result_page(call: Called, own: Own, path: str) -> Response:
+    """Show a page of the results, as `planmark grade` wrote it."""
+    return result_file(call.places(own).results, path)
 
 
 @router.get("/account")
@@ -202,13 +177,3 @@ def static(name: str) -> Response:
     if name == "app.css":
         text = (files("grader.feedback") / "templates" / "style.css").read_text(encoding="utf-8") + text
     return Response(text, media_type=STATIC[name], headers={"Cache-Control": "public, max-age=300"})
-
-
-def _row(call: Call, publication: Publication, student: str) -> Mapping[str, Any]:
-    """The number that the roster gives a student; empty where it gives none."""
-    roster = call.places(publication).roster
-    try:
-        rows = read_roster(roster).rows_of(student) if student and roster.is_file() else ()
-    except PlanmarkError:
-        rows = ()
-    return {"name": rows[0].name, "n": rows[0].n, "position": rows[0].position} if rows else {}

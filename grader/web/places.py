@@ -18,16 +18,17 @@ from grader.folder.batch import Batch
 from grader.folder.inventory import is_tool_file
 from grader.rubric import rubric_of
 from grader.tables.reader import why_no_id
+from grader.tables.roster import RosterRow, read_roster
 from grader.texts.spoken import RefusedError
 from grader.web.store import Publication
 from reference.authored.assignment import Assignment, built_in, load_assignment
 from reference.authored.toml_file import MAX_BYTES
-from reference.errors import CallError
+from reference.errors import CallError, PlanmarkError
 
 AUTHORED = (".toml", ".csv")
 SUBMITTED = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".pdf", ".csv", ".json")
 LONGEST_NAME = 120
-"""Of a file: with the folder before it a path stays within every file system's limit."""
+"""Characters of a file's name: with its folder a path stays within every file system's limit."""
 _PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 _NAME_OF_KEY = re.compile(r"[A-Za-z0-9_-]{8,20}")
 
@@ -63,6 +64,13 @@ class Places:
         """The roster, whether there is one or not."""
         return self.handed_in / "roster.csv"
 
+    def students(self) -> tuple[RosterRow, ...]:
+        """Return the lines of the roster; none where there is no usable one."""
+        try:
+            return read_roster(self.roster).rows if self.roster.is_file() else ()
+        except PlanmarkError:
+            return ()
+
     def submitted(self) -> list[Path]:
         """The files handed in, by name."""
         return sorted(
@@ -72,7 +80,7 @@ class Places:
         )
 
     def called(self) -> dict[Path, str]:
-        """What people call each file handed in."""
+        """Return the people's own name of each file handed in."""
         names = {path: self._note_of(path) for path in self.submitted()}
         return {
             path: note.read_text(encoding="utf-8") if note.is_file() else path.name
@@ -80,7 +88,7 @@ class Places:
         }
 
     def keep(self, name: str, content: bytes, *, replace: bool = False) -> bool:
-        """Store a file handed in by what people call it; returns and raises as `store` does."""
+        """Store a file handed in under the people's own name of it; returns and raises as `store` does."""
         path = self.handed_in / stored_name(name)
         if path.name != name:
             write_whole(self._note_of(path), name)
@@ -100,14 +108,14 @@ class Places:
 
 
 def places_of(data: Path, publication: Publication) -> Places:
-    """A publication's folders; they are made as they are needed."""
+    """Return a publication's folders; they are made as they are needed."""
     if not _NAME_OF_KEY.fullmatch(publication.key):
         raise CallError("publication_key", "this publication's key is no name of a folder")
     return Places(data / "publications" / publication.key)
 
 
 def person_name(name: str, endings: tuple[str, ...]) -> str:
-    """What people call a file: in any script, in one line, with the folders of an uploaded folder.
+    """Return the people's own name of a file: in any script, in one line, with the folders of an upload.
 
     Raises RefusedError for a file of another kind, and for one that a system or editor leaves behind.
     """
@@ -121,7 +129,7 @@ def person_name(name: str, endings: tuple[str, ...]) -> str:
 
 
 def stored_name(name: str) -> str:
-    """Where a file is stored: under its own name where that is plain, else under one made of it."""
+    """Return the name to store a file under: its own name if that is plain, else one made of it."""
     if _PLAIN.fullmatch(name) and len(name) <= LONGEST_NAME and why_no_id(PurePath(name).stem) is None:
         return name
     made = hashlib.blake2b(name.encode(), digest_size=12).hexdigest()
@@ -133,7 +141,7 @@ def _other_kind(name: str, endings: tuple[str, ...]) -> RefusedError:
 
 
 def safe_name(name: str, endings: tuple[str, ...]) -> str:
-    """The name under which an assignment's file is stored: letters, digits, ``.``, ``_``, ``-``.
+    """Return the name to store an assignment's file under: letters, digits, ``.``, ``_``, ``-``.
 
     Raises RefusedError for a name of another kind, and for one without any of these.
     """
@@ -148,7 +156,7 @@ def safe_name(name: str, endings: tuple[str, ...]) -> str:
 
 
 def stored(folder: Path, name: str) -> Path:
-    """A file that is in a folder, by its name. Raises RefusedError where there is none."""
+    """Return a file of a folder by its name. Raises RefusedError where there is none."""
     for path in folder.glob("*"):
         if path.name == name and path.is_file():
             return path
@@ -156,7 +164,7 @@ def stored(folder: Path, name: str) -> Path:
 
 
 def store(path: Path, content: bytes, *, replace: bool = False, shown: str = "") -> bool:
-    """Store a file; whether it was there already with the same content.
+    """Store a file; return whether it was there already with the same content.
 
     Raises RefusedError where another file has that name, `shown` to people, and may not be replaced.
     """
@@ -170,7 +178,7 @@ def store(path: Path, content: bytes, *, replace: bool = False, shown: str = "")
 
 
 def assignment_of(data: Path, publication: Publication) -> Assignment:
-    """The published assignment. Raises RefusedError without one, AuthoredFileError for one with faults."""
+    """Return the published assignment. Raises RefusedError without one, AuthoredFileError for faults."""
     if not publication.assignment:
         raise RefusedError(422, "assignment_missing")
     if publication.assignment in built_in():
@@ -182,7 +190,7 @@ def assignment_of(data: Path, publication: Publication) -> Assignment:
 
 
 def _names_elsewhere(path: Path) -> str | None:
-    """A file that an uploaded assignment names by a path: it may be another instructor's."""
+    """Return a file that an uploaded assignment names by a path: it may be another instructor's."""
     try:
         text = path.read_bytes()[: MAX_BYTES + 1].decode("utf-8-sig")
         known = tomllib.loads(text)
@@ -199,7 +207,7 @@ def _names_elsewhere(path: Path) -> str | None:
 
 
 def batch_of(data: Path, publication: Publication, jobs: int = 1) -> Batch:
-    """What `planmark grade` would be called with."""
+    """Return the arguments for grading the class, as `planmark grade` would have them."""
     places, assignment = places_of(data, publication), assignment_of(data, publication)
     for folder in (places.handed_in, places.results):
         folder.mkdir(parents=True, exist_ok=True)

@@ -28,7 +28,7 @@ from grader.texts.spoken import message, told_parameters
 from grader.web.judges import MOST_JUDGES, Judges, end_with_parent
 from grader.web.places import batch_of, places_of
 from grader.web.settings import Settings
-from grader.web.store import Job, Store
+from grader.web.store import UNFINISHED, Job, Store
 from reference.errors import PlanmarkError
 
 LOG = logging.getLogger("planmark")
@@ -55,7 +55,7 @@ class Turns:
             self._changed.notify()
 
     def get(self) -> int | None:
-        """The id of the next job, as soon as there is one; None at the end."""
+        """Return the id of the next job as soon as there is one; None at the end."""
         with self._changed:
             self._changed.wait_for(lambda: self._waiting or self._has_ended)
             if self._has_ended:
@@ -68,7 +68,7 @@ class Turns:
             return job
 
     def before(self, job: Job) -> int:
-        """How many jobs come first; 0 for one that does not wait."""
+        """Return the number of jobs that come first; 0 for one that does not wait."""
         with self._changed:
             own, classes = self._waiting.get(job.publication_id, deque()), list(self._waiting)
             if job.id not in own:
@@ -82,11 +82,11 @@ class Turns:
             return place + sum(others)
 
     def is_empty(self) -> bool:
-        """Whether nothing waits."""
+        """Return whether nothing waits."""
         return not self._waiting
 
     def end(self) -> None:
-        """Give nothing any more."""
+        """Let `get` return None from now on."""
         with self._changed:
             self._has_ended = True
             self._changed.notify_all()
@@ -105,7 +105,7 @@ class Queue:
     _classes: Turns = field(default_factory=Turns)
     _photos: Turns = field(default_factory=Turns)
     _turns: Counter[int] = field(default_factory=Counter)
-    """How often each class that is graded has let others go first."""
+    """Number of times that each class has let others go first."""
     _threads: list[threading.Thread] = field(default_factory=list)
     _workers: Workers | None = None
     judges: Judges = field(init=False)
@@ -117,9 +117,7 @@ class Queue:
         self.judges = Judges(min(os.cpu_count() or 1, MOST_JUDGES))
         self._workers = Workers(self.settings.photos, self.settings.limits, __name__).__enter__()
         with self.store.session() as session:
-            left = session.scalars(
-                select(Job).where(Job.state.in_(("queued", "running"))).order_by(Job.id)
-            ).all()
+            left = session.scalars(select(Job).where(Job.state.in_(UNFINISHED)).order_by(Job.id)).all()
             session.execute(update(Job).where(Job.state == "running").values(state="queued"))
         for job in left:
             self.put(job)
@@ -162,22 +160,20 @@ class Queue:
 
     def cancel(self, job_id: int) -> None:
         """End a job, wherever it is; what was marked is kept."""
-        with self.store.session() as session:
-            waiting = update(Job).where(Job.id == job_id, Job.state.in_(("queued", "running")))
-            session.execute(waiting.values(state="cancelled", ended=time.time()))
+        self.store.change_job(job_id, UNFINISHED, state="cancelled", ended=time.time())
         process = self._running.get(job_id)
         if process is not None:
             process.terminate()
 
     def waiting_before(self, job: Job) -> int:
-        """How many jobs of its kind come first."""
+        """Return the number of jobs of its kind that come first."""
         return self._of_kind(job).before(job)
 
     # Work -----------------------------------------------------------------------------------------
 
     def _work(self, jobs: Turns) -> None:
         while (job_id := jobs.get()) is not None:
-            if not self.store.claimed(job_id):
+            if not self.store.change_job(job_id, {"queued"}, state="running", started=time.time()):
                 continue
             with self.store.session() as session:
                 job = session.get_one(Job, job_id)
@@ -196,18 +192,14 @@ class Queue:
 
     def _end(self, job: Job, state: str, result: dict[str, Any], message: str = "") -> None:
         message = self.settings.without_folder(message)
-        with self.store.session() as session:
-            ended = update(Job).where(Job.id == job.id, Job.state == "running")
-            session.execute(ended.values(state=state, result=result, message=message, ended=time.time()))
+        known = {"result": result, "message": message, "ended": time.time()}
+        self.store.change_job(job.id, {"running"}, state=state, **known)
 
     def _again(self, job: Job) -> None:
         """Let a class that others wait for wait behind them, unless it was cancelled."""
         self._turns[job.id] += 1
-        with self.store.session() as session:
-            waits = update(Job).where(Job.id == job.id, Job.state == "running").values(state="queued")
-            if not session.execute(waits).rowcount:  # type: ignore[attr-defined]
-                return
-        self.put(job)
+        if self.store.change_job(job.id, {"running"}, state="queued"):
+            self.put(job)
 
     def _check(self, job: Job) -> dict[str, Any]:
         """Check a photo, and delete it."""
@@ -241,7 +233,7 @@ class Queue:
             process.join()
 
     def _followed(self, job: Job, reports: Connection) -> dict[str, Any]:
-        """What a process that grades reports, until its end."""
+        """Follow the reports of a process that grades until its end; return the last one."""
         told, began = 0.0, time.monotonic()
         while True:
             try:
@@ -260,9 +252,7 @@ class Queue:
                         raise _TurnOverError
                     if time.monotonic() - told > _TELL_S or done == total:
                         told = time.monotonic()
-                        with self.store.session() as session:
-                            row = update(Job).where(Job.id == job.id)
-                            session.execute(row.values(stage=stage, done=done, total=total))
+                        self.store.change_job(job.id, {"running"}, stage=stage, done=done, total=total)
                 case ("moved", about, before, after):
                     self.store.note_mark(job.publication.key, job.asked.get("by", ""), about, before, after)
                 case ("done", result):

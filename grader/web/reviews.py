@@ -8,10 +8,9 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from sqlalchemy import select
-from sqlalchemy.orm import Session as Store
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request as HttpRequest
-from starlette.responses import JSONResponse, RedirectResponse, Response
+from starlette.responses import RedirectResponse, Response
 from starlette.types import Receive, Scope, Send
 
 from grader.feedback.words import VERDICTS
@@ -19,12 +18,10 @@ from grader.language import tongue
 from grader.review.server import application
 from grader.review.session import Request, Session
 from grader.tables.decisions import DecisionFile
-from grader.texts.spoken import RefusedError, told_of
-from grader.web.guard import language_of
+from grader.texts.spoken import RefusedError
 from grader.web.places import batch_of
 from grader.web.service import Call, Service
-from grader.web.store import Publication, Regrading
-from reference.errors import PlanmarkError
+from grader.web.store import Publication, Regrading, unanswered
 
 MOST = 4
 """Classes whose reviews are kept in memory; another one is opened again in a few seconds."""
@@ -41,24 +38,15 @@ class Reviews:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """ASGI."""
         request = HttpRequest(scope, receive)
-        response: Response
-        try:
-            key, _, path = scope["path"].removeprefix(scope.get("root_path", "")).strip("/").partition("/")
-            session, name, lang = await run_in_threadpool(lambda: self._let_in(request, key))
-        except PlanmarkError as error:
-            status = error.status if isinstance(error, RefusedError) else 422
-            response = JSONResponse(
-                {"code": error.code, "message": told_of(error, tongue(language_of(request)))}, status
-            )
-        else:
-            if path or scope["path"].endswith("/"):
-                app = application(session, lang, by=name)
-                await app({**scope, "path": f"/{path}", "root_path": ""}, receive, send)
-                if scope["method"] == "POST":
-                    await run_in_threadpool(lambda: self._answer(key, session, name))
-                return
-            response = RedirectResponse(f"{scope['path']}/", 307)
-        await response(scope, receive, send)
+        key, _, path = scope["path"].removeprefix(scope.get("root_path", "")).strip("/").partition("/")
+        session, name, lang = await run_in_threadpool(self._let_in, request, key)
+        if not path and not scope["path"].endswith("/"):
+            await RedirectResponse(f"{scope['path']}/", 307)(scope, receive, send)
+            return
+        app = application(session, lang, by=name)
+        await app({**scope, "path": f"/{path}", "root_path": ""}, receive, send)
+        if scope["method"] == "POST":
+            await run_in_threadpool(self._answer, key, session, name)
 
     def _let_in(self, request: HttpRequest, key: str) -> tuple[Session, str, str]:
         """The class under review, who asks, and the language. Raises RefusedError for others."""
@@ -67,7 +55,7 @@ class Reviews:
             call = Call(self.service, store, visitor, request, Response())
             publication = call.own(key)
             job = call.idle(publication)
-            requests = _requests(_waiting(store, publication))
+            requests = _requests(unanswered(store, publication))
             name, lang = call.account.name, call.lang
         with self._lock:
             session = self._session(publication, None if job is None else job.id, name)
@@ -98,7 +86,7 @@ class Reviews:
         rows = {(row.student_id, row.criterion): row for row in decided}
         with self.service.store.session() as store:
             publication = store.scalar(select(Publication).where(Publication.key == key))
-            for request in _waiting(store, publication) if publication else ():
+            for request in unanswered(store, publication) if publication else ():
                 row = rows.get((request.student_id, request.criterion))
                 if row is None or not Request(request.text, request.created).is_answered(row):
                     continue
@@ -106,12 +94,6 @@ class Reviews:
                 request.answer = ". ".join(part for part in (verdict, row.comment) if part)
                 request.answered = time.time()
                 self.service.store.note(store, name, "request answered", f"{key} {request.student_id}")
-
-
-def _waiting(store: Store, publication: Publication) -> list[Regrading]:
-    """The requests that nobody has answered."""
-    own = select(Regrading).where(Regrading.publication_id == publication.id, Regrading.answered.is_(None))
-    return list(store.scalars(own).all())
 
 
 def _requests(rows: Iterable[Regrading]) -> dict[tuple[str, int | None], dict[str, Request]]:

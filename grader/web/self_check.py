@@ -11,7 +11,7 @@ from typing import Any
 from grader.comparison.task import task_of
 from grader.feedback.student_page import AS_MEASURED, SHEET
 from grader.feedback.words import symbols
-from grader.language import Tongue, tongue
+from grader.language import tongue
 from grader.options import Level
 from grader.overlay.closeup import page_views, scan_element, svg
 from grader.overlay.measured import measured_picture
@@ -28,7 +28,7 @@ _BARE = re.compile(r"\d*[.,]?\d+([eE][+-]?\d+)?", re.ASCII)
 
 
 def variant_of(assignment: Assignment, n: int | None, position: int | None) -> Variant:
-    """A variant as a student asks for it; a number that the assignment has not is passed over.
+    """Return the variant that a student asks for; a number that the assignment does not have is ignored.
 
     Raises RefusedError for one that there is not.
     """
@@ -42,7 +42,7 @@ def variant_of(assignment: Assignment, n: int | None, position: int | None) -> V
 
 
 def form_of(assignment: Assignment, lang: str) -> dict[str, Any]:
-    """What a form asks for: fields by group, each with its name, unit and the column it stands for."""
+    """Return the fields of a form, each with its name, group, unit and column, and the ranges of numbers."""
     speaker, names = tongue(lang), assignment.file.names
     fields = []
     for column, unit in columns_of(rubric_of(assignment)).items():
@@ -62,20 +62,16 @@ def form_of(assignment: Assignment, lang: str) -> dict[str, Any]:
     }
 
 
-def checked_form(
+def checked_values(
     name: str, variant: Variant, cells: Mapping[str, str], lang: str, level: Level
 ) -> dict[str, Any]:
-    """As `checked_values`, by the assignment's name or the path of its file; in a process of its own."""
-    return checked_values(load_assignment(name), variant, cells, lang, level)
-
-
-def checked_values(
-    assignment: Assignment, variant: Variant, cells: Mapping[str, str], lang: str, level: Level
-) -> dict[str, Any]:
-    """What a self-check of typed values tells; texts by the names of a measurement file's columns.
+    """Check typed values, texts by the names of a measurement file's columns.
 
     Raises CallError for a variant whose mechanism does not assemble, InputFileError for unusable columns.
+
+    Arguments: `name` of the assignment, or the path of its file.
     """
+    assignment = load_assignment(name)
     filled = {column: _with_unit(column, text.strip()) for column, text in cells.items() if text.strip()}
     entered = measurements_in(filled, names_of(assignment), "", lang) if filled else NOTHING_MEASURED
     check = check_values(entered, assignment, variant, tongue(lang), level)
@@ -91,12 +87,12 @@ def checked_values(
 
 
 def _with_unit(column: str, text: str) -> str:
-    """A scale's text with the unit that stands beside its field, where it is a bare number."""
+    """Return a scale's text, a bare number with the unit that stands beside its field."""
     return f"{text} {unit_of(column)}" if column in SCALE_UNITS and _BARE.fullmatch(text) else text
 
 
 def checked_photo(path: Path, asked: Mapping[str, Any]) -> dict[str, Any]:
-    """What a self-check of a photo tells.
+    """Check a photo.
 
     Arguments: `asked` has the ``assignment``, ``n``, ``position``, ``lang`` and ``level``.
     """
@@ -116,7 +112,7 @@ def checked_photo(path: Path, asked: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _drawings(pictures: Sequence[Picture], assignment: Assignment, lang: str) -> list[str]:
-    """The plans as drawn, or the sheet where it has none, each an SVG element with its own scan in it."""
+    """Return the plans as drawn, or a sheet without plans, each an SVG element with its own scan in it."""
     speaker, names = tongue(lang), assignment.file.names
     drawings = []
     for index, picture in enumerate(pictures):
@@ -127,12 +123,10 @@ def _drawings(pictures: Sequence[Picture], assignment: Assignment, lang: str) ->
             f'<svg width="0" height="0" aria-hidden="true"><defs>{scan_element(picture, index)}</defs></svg>'
         )
         drawings += [scan] if picture.scan else []
-        drawings += [str(svg(view, picture, _description(view.kind, speaker) + shared)) for view in wanted]
+        for view in wanted:
+            what = speaker.gettext(PLACES.get(view.kind, SHEET))
+            drawings.append(str(svg(view, picture, what + shared)))
     return drawings
-
-
-def _description(kind: str, speaker: Tongue) -> str:
-    return speaker.gettext(PLACES.get(kind, SHEET))
 
 
 def _lines(lines: Sequence[CheckedLine], lang: str) -> list[dict[str, str]]:

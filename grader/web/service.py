@@ -1,6 +1,6 @@
-"""Parameters of every route: the user, the publication, the server's parts."""
+"""Parameters of every route: the visitor, the publication, the body, the parts of the server."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import dataclass
 from functools import wraps
 from typing import Annotated, Any, TypeVar
@@ -16,8 +16,20 @@ from grader.web.mail import Mail
 from grader.web.places import Places, places_of
 from grader.web.queue import Queue
 from grader.web.settings import Settings
-from grader.web.store import Account, Job, Link, LtiClaim, Publication, Regrading, Store, last_job
+from grader.web.store import (
+    UNFINISHED,
+    Account,
+    Job,
+    Link,
+    LtiClaim,
+    Publication,
+    Regrading,
+    Store,
+    Table,
+    last_job,
+)
 
+AnyRow = TypeVar("AnyRow", bound=Table)
 OfPublication = TypeVar("OfPublication", Link, LtiClaim, Regrading)
 CHANGING = frozenset({"POST", "PUT", "PATCH", "DELETE"})
 
@@ -73,12 +85,12 @@ class Call:
         """
         visit = self.visitor.visit
         who = f"address {self.visitor.address}" if visit is None else f"visit {visit.id}"
-        self.service.guard.count(rate, [who])
+        self.service.guard.count(rate, who)
         if visit is not None and visit.account_id is None:
-            self.service.guard.count("address", [self.visitor.address])
+            self.service.guard.count("address", self.visitor.address)
 
     def publication(self, key: str) -> Publication:
-        """A publication by its key. Raises RefusedError where there is none."""
+        """Return a publication by its key. Raises RefusedError where there is none."""
         found = self.session.scalar(select(Publication).where(Publication.key == key))
         if found is None:
             self.count("key")
@@ -86,33 +98,46 @@ class Call:
         return found
 
     def own(self, key: str) -> Publication:
-        """A publication that the instructor may change. Raises RefusedError for any other."""
+        """Return a publication that the instructor may change. Raises RefusedError for any other."""
         _ = self.account
         found = self.publication(key)
         if not self.visitor.is_member(found):
             raise missing("publication")
         return found
 
-    def own_row(self, key: str, table: type[OfPublication], number: int, what: str) -> OfPublication:
-        """A row that belongs to a publication of the instructor. Raises RefusedError for any other."""
-        own, row = self.own(key), self.session.get(table, number)
-        if row is None or row.publication_id != own.id:
+    def all_own(self) -> list[Publication]:
+        """Return the publications that the instructor may change, the newest first."""
+        _ = self.account
+        found = self.session.scalars(select(Publication).order_by(Publication.id.desc()))
+        return [one for one in found if self.visitor.is_member(one)]
+
+    def row(self, table: type[AnyRow], key: int | str, what: str) -> AnyRow:
+        """Return a row by its primary key. Raises RefusedError where there is none."""
+        row = self.session.get(table, key)
+        if row is None:
+            raise missing(what)
+        return row
+
+    def row_of(self, own: Publication, table: type[OfPublication], number: int, what: str) -> OfPublication:
+        """Return a row that belongs to a publication. Raises RefusedError for any other."""
+        row = self.row(table, number, what)
+        if row.publication_id != own.id:
             raise missing(what)
         return row
 
     def idle(self, publication: Publication) -> Job | None:
-        """The last job that graded a class. Raises RefusedError while it waits or runs."""
+        """Return the last job that graded a class. Raises RefusedError while it waits or runs."""
         job = last_job(self.session, publication)
-        if job is not None and job.state in {"queued", "running"}:
+        if job is not None and job.state in UNFINISHED:
             raise RefusedError(409, "job_runs")
         return job
 
     def link(self, publication: Publication) -> Link | None:
-        """The personal link by which the visitor came, while it is valid."""
+        """Return the personal link by which the visitor came, while it is valid."""
         return self.service.guard.own_link(self.session, self.visitor, publication)
 
     def places(self, publication: Publication) -> Places:
-        """A publication's folders."""
+        """Return a publication's folders."""
         return places_of(self.service.settings.data, publication)
 
 
@@ -134,7 +159,7 @@ class Route(APIRoute):
 
 
 def called(request: Request, response: Response) -> Iterator[Call]:
-    """A request as routes take it; what changes something must come from our own page, or a program."""
+    """Yield a request as routes take it; a change must come from our own page, or a program."""
     service: Service = request.app.state.service
     with service.store.session() as session:
         visitor = service.guard.visitor(request, session)
@@ -152,19 +177,31 @@ Row = Annotated[int, Path(ge=1, le=LARGEST_ROW)]
 Key = Annotated[str, Path(pattern=r"^[A-Za-z0-9_-]{1,64}$", description="the publication's key")]
 
 
-async def body_of(request: Request, call: Called) -> bytes:
-    """The whole body, whose size `grader.web.guard.Rim` bounds; of a stranger no class's file is read."""
-    if "/files/" in request.url.path:
-        _ = call.account
-        call.session.commit()
-    return await request.body()
+def own_of(call: Called, key: Key) -> Publication:
+    """Return the instructor's own publication that a route is about, before its body is read."""
+    own = call.own(key)
+    call.session.commit()  # see Route
+    return own
 
 
-Body = Annotated[bytes, Depends(body_of)]
+Own = Annotated[Publication, Depends(own_of)]
+
+
+def body_after(asked: Callable[..., object]) -> Callable[..., Awaitable[bytes]]:
+    """Return a reader of a request's body, which `grader.web.guard.Rim` bounds; `asked` permits it first."""
+
+    async def body(request: Request, allowed: Annotated[object, Depends(asked)]) -> bytes:
+        _ = allowed
+        return await request.body()
+
+    return body
+
+
+Body = Annotated[bytes, Depends(body_after(own_of))]
 FILE_BODY = {
     "requestBody": {
         "required": True,
         "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
     }
 }
-"""Of routes that take a file as their body, for the OpenAPI document."""
+"""The body of routes that take a file, for the OpenAPI document."""

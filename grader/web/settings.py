@@ -9,14 +9,14 @@ from urllib.parse import urlsplit
 
 from grader.files import make_folder, write_whole
 from grader.folder.workers import Limits
+from grader.review.server import LOOPBACK
 from reference.errors import CallError
 
 SECRET = "PLANMARK_SECRET"  # noqa: S105 - the name of the variable
 DATABASE = "PLANMARK_DATABASE"
 MAIL = "PLANMARK_MAIL"
-LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
 LEAST_SECRET = 32
-"""Signs of the secret that signs links and forms: fewer could be tried out."""
+"""Characters of the secret that signs links and forms: a shorter one could be found by trying."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,12 +64,12 @@ class Settings:
 
     @property
     def is_https(self) -> bool:
-        """Whether cookies are sent over https alone."""
+        """True if cookies are sent over https alone."""
         return self.address.startswith("https://")
 
     @property
     def is_local(self) -> bool:
-        """Whether only this machine is served."""
+        """True if only this machine is served."""
         return urlsplit(self.address).hostname in LOOPBACK
 
     @property
@@ -78,14 +78,14 @@ class Settings:
         return urlsplit(self.address).netloc
 
     def without_folder(self, text: str) -> str:
-        """A message for people elsewhere: where the data folder lies is not for them."""
+        """Return a message for people elsewhere, without the path of the data folder."""
         return text.replace(f"{self.data.resolve()}{os.sep}", "").replace(f"{self.data}{os.sep}", "")
 
 
 def settings_of(
     data: Path, address: str, database: str | None = None, mail: str | None = None, *, jobs: int = 1
 ) -> Settings:
-    """The settings of a data folder; its secret is made once, if the environment has none.
+    """Return the settings of a data folder; its secret is made once, if the environment has none.
 
     Raises CallError for an address or a mail server that is none and for a short secret, OutputError where
     the folder cannot be written.

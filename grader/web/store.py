@@ -6,7 +6,7 @@ What people hand in, and results, are files (`grader.web.places`). Times are sec
 import hashlib
 import secrets
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -31,16 +31,16 @@ from sqlalchemy.schema import CreateColumn
 from reference.errors import CallError
 
 KEY_BYTES = 9
-"""Of a publication's key: 72 random bits cannot be guessed, and 12 letters can be typed."""
+"""Bytes of a publication's key: 72 random bits cannot be guessed, and 12 letters can be typed."""
 
 
 def new_key() -> str:
-    """A random name for an address."""
+    """Return a random name for an address."""
     return secrets.token_urlsafe(KEY_BYTES)
 
 
 def digest_of(token: str) -> str:
-    """What is stored of a secret: whoever reads the data base cannot use it."""
+    """Return the digest of a secret, which is stored: whoever reads the data base cannot use it."""
     return hashlib.sha256(token.encode()).hexdigest()
 
 
@@ -80,7 +80,7 @@ class Visit(Table):
     account_id: Mapped[int | None] = mapped_column(ForeignKey("accounts.id", ondelete="CASCADE"))
     account: Mapped[Account | None] = relationship(lazy="joined")
     title: Mapped[str] = mapped_column(String(80), default="")
-    """Of a program's token; empty for a browser."""
+    """The name of a program's token; empty for a browser."""
     links: Mapped[dict[str, Any]] = mapped_column(default=dict)
     """Personal links that were opened in it: the link's id by the publication's."""
     created: Mapped[float] = mapped_column(default=time.time)
@@ -139,7 +139,12 @@ class Link(Table):
     is_revoked: Mapped[bool] = mapped_column(default=False)
     created: Mapped[float] = mapped_column(default=time.time)
     claim_id: Mapped[int | None] = mapped_column(ForeignKey("lti_claims.id", ondelete="SET NULL"))
-    """Of a link that a launch gave."""
+    """The claim by which a launch gave the link."""
+
+    @property
+    def is_valid(self) -> bool:
+        """True until the link expires or is revoked."""
+        return not self.is_revoked and self.expires >= time.time()
 
 
 class Sheet(Table):
@@ -165,7 +170,7 @@ class Sheet(Table):
 
 
 class Attempt(Table):
-    """How often somebody has checked a variant."""
+    """The number of times that a student has checked a variant."""
 
     __tablename__ = "attempts"
     __table_args__ = (UniqueConstraint("publication_id", "who", "variant"),)
@@ -196,9 +201,9 @@ class Job(Table):
     done: Mapped[int] = mapped_column(default=0)
     total: Mapped[int] = mapped_column(default=0)
     visit_id: Mapped[str] = mapped_column(String(64), default="")
-    """Whose photo it is."""
+    """The visit that sent the photo."""
     sender: Mapped[str] = mapped_column(String(100), default="", server_default="")
-    """Whose seconds it takes: ``student:ID`` of a personal link, ``account:ID``, else ``visit:ID``."""
+    """Charged with its seconds: ``student:ID`` of a personal link, ``account:ID``, else ``visit:ID``."""
     created: Mapped[float] = mapped_column(default=time.time)
     started: Mapped[float | None] = mapped_column(default=None)
     ended: Mapped[float | None] = mapped_column(default=None)
@@ -252,7 +257,7 @@ class LtiUser(Table):
 
 
 class LtiClaim(Table):
-    """That somebody from a platform is a student of a roster; of several who want to be one, one `holds` it.
+    """A platform user's claim to be a student of a roster; of several users one `holds` it.
 
     Attributes
     ----------
@@ -300,7 +305,7 @@ class LtiState(Table):
 
 
 class Audit(Table):
-    """Who did what, and when; nothing is ever taken out but what is older than is kept.
+    """An entry of the audit trail: who did what, and when. It stays until it is too old to be kept.
 
     Attributes
     ----------
@@ -317,14 +322,27 @@ class Audit(Table):
     after: Mapped[str] = mapped_column(String(200), default="", server_default="")
 
 
+UNFINISHED = frozenset({"queued", "running"})
+"""States of a job that waits or runs."""
 CONNECTIONS = 60
-"""More than all threads that may want one: 40 that answer requests, those of the queue, the server's own."""
+"""More than the threads that may want one: 40 that answer requests, the queue's, the server's own."""
 
 
 def last_job(session: Session, publication: Publication) -> Job | None:
-    """The last job that graded the class."""
+    """Return the last job that graded the class."""
     own = select(Job).where(Job.publication_id == publication.id, Job.kind == "grade")
     return session.scalar(own.order_by(Job.id.desc()).limit(1))
+
+
+def unanswered(session: Session, publication: Publication) -> Sequence[Regrading]:
+    """Return the students' requests for regrading that nobody has answered."""
+    own = select(Regrading).where(Regrading.publication_id == publication.id, Regrading.answered.is_(None))
+    return session.scalars(own).all()
+
+
+def columns_of(row: Table, *names: str) -> dict[str, Any]:
+    """Return some columns of a row by name, as JSON."""
+    return {name: getattr(row, name) for name in names}
 
 
 class Store:
@@ -368,12 +386,11 @@ class Store:
         with self.session() as session:
             self.note(session, who, "mark changed", f"{key} {about}", (before, after))
 
-    def claimed(self, job_id: int) -> bool:
-        """Whether a queued job is now ours to run."""
+    def change_job(self, job_id: int, before: Collection[str], **values: object) -> bool:
+        """Change a job whose state is one of `before`; return whether it was."""
         with self.session() as session:
-            asked = update(Job).where(Job.id == job_id, Job.state == "queued")
-            taken = session.execute(asked.values(state="running", started=time.time()))
-            return bool(taken.rowcount)  # type: ignore[attr-defined]
+            own = update(Job).where(Job.id == job_id, Job.state.in_(before))
+            return bool(session.execute(own.values(**values)).rowcount)  # type: ignore[attr-defined]
 
     def forget(self, *, days: float, now: float | None = None) -> None:
         """Delete visits and audit entries older than so many days, and what photos gave a day ago."""

@@ -6,12 +6,12 @@ import re
 import secrets
 import threading
 import time
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Depends, Query, Request
+from fastapi import APIRouter, Depends, Query
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, ConfigDict, Field
 from sqlalchemy import func, select, update
@@ -29,9 +29,9 @@ from grader.scan.decode.pages import count_pages
 from grader.texts.spoken import RefusedError, refusal
 from grader.web.guard import forbidden, missing
 from grader.web.places import assignment_of
-from grader.web.self_check import checked_form, form_of, variant_of
-from grader.web.service import FILE_BODY, Call, Called, Key, Route
-from grader.web.store import Attempt, Job, Link, Publication, Regrading, Sheet
+from grader.web.self_check import checked_values, form_of, variant_of
+from grader.web.service import FILE_BODY, Call, Called, Key, Route, body_after
+from grader.web.store import Attempt, Job, Link, Publication, Regrading, Sheet, columns_of
 from reference.authored.assignment import Variant
 from reference.errors import InputFileError
 
@@ -39,11 +39,11 @@ router = APIRouter(route_class=Route, prefix="/api/v1", tags=["students"])
 Lang = Literal["en", "ro", "ru"]
 Number = Annotated[int | None, Query(ge=0, le=1_000_000)]
 MOST_CELLS = 400
-"""Of a form: the largest assignment asks for a hundred and some."""
+"""Cells of a form: the largest assignment asks for a hundred and some."""
 MOST_WAITING = 200
 """Photos in the queue: at two seconds each the last one would wait for seven minutes."""
 MOST_SHEETS = 40
-"""That one student may hand in: ten times a plan of four pages."""
+"""Sheets that one student may hand in: ten times a plan of four pages."""
 HANDING_IN = threading.Lock()
 """Two sheets sent at once have two names, and count together."""
 _PICTURES = {
@@ -57,11 +57,11 @@ _PICTURES = {
 
 
 WITHOUT_NUL = r"^[^\x00]*$"
-"""PostgreSQL stores no such sign."""
+"""PostgreSQL cannot store NUL."""
 
 
 class Strict(BaseModel):
-    """A body without anything that is not known."""
+    """A body without unknown fields."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -78,7 +78,7 @@ class Values(Strict):
 
 
 class Line(BaseModel):
-    """What is said of one value; `html` and the sentences are escaped HTML with indices."""
+    """The check of one value; `html` and the sentences are escaped HTML with indices."""
 
     name: str
     html: str
@@ -90,7 +90,7 @@ class Line(BaseModel):
 
 
 class Told(BaseModel):
-    """What a self-check says: `drawing` are SVG elements, `attempts_left` null without a limit."""
+    """The result of a self-check: `drawing` are SVG elements, `attempts_left` is null without a limit."""
 
     lines: list[Line]
     problems: list[str]
@@ -124,7 +124,7 @@ class Again(Strict):
 
 @router.get("/publications/{key}/form")
 def form(call: Called, key: Key, lang: Lang = "en") -> dict[str, Any]:
-    """What a self-check asks for: fields, range of n and position, attempts that are left."""
+    """Return the form of a self-check: fields, ranges of n and position, the level of its hints."""
     publication = open_for_checks(call, key)
     assignment = assignment_of(call.service.settings.data, publication)
     return {**form_of(assignment, lang), "level": publication.level}
@@ -140,22 +140,12 @@ def check(call: Called, key: Key, values: Values) -> Told:
     left = use_attempt(call, publication, variant)
     asked = (str(assignment.path), variant, values.cells, values.lang, _level(publication))
     call.session.commit()
-    told = result_of(call.service.queue.judges, checked_form, *asked)
+    told = result_of(call.service.queue.judges, checked_values, *asked)
     return Told(**told, attempts_left=left)
 
 
-def body_after(asked: Callable[..., object]) -> Callable[..., Awaitable[bytes]]:
-    """What reads the body of a request once `asked` has let it be sent."""
-
-    async def body(request: Request, allowed: Annotated[object, Depends(asked)]) -> bytes:
-        _ = allowed
-        return await request.body()
-
-    return body
-
-
 def may_check_photo(call: Called, key: Key) -> Publication:
-    """The publication of a photo that may be sent now, which is asked before any of it is read."""
+    """Return the publication, if a photo may be sent to it now, before any of it is read."""
     publication = open_for_checks(call, key)
     call.count("photo")
     waiting = select(func.count()).select_from(Job).where(Job.kind == "photo", Job.state == "queued")
@@ -167,7 +157,7 @@ def may_check_photo(call: Called, key: Key) -> Publication:
 
 
 def _sender(call: Call, publication: Publication) -> str:
-    """Whose seconds a file takes: a cookie costs nothing, a personal link is one student's."""
+    """Return who is charged with a file's seconds: a cookie is free, a personal link is one student's."""
     link, visit = call.link(publication), call.visitor.visit
     if call.visitor.account is not None:
         return f"account:{call.visitor.account.id}"
@@ -222,7 +212,7 @@ def check_photo(
 
 @router.get("/photos/{job}")
 def photo(call: Called, job: Key) -> JobState:
-    """How far the check of a photo is; only who sent it may ask."""
+    """Return the progress of the check of a photo, to its sender alone."""
     found = call.session.scalar(select(Job).where(Job.key == job, Job.kind == "photo"))
     if found is None or call.visitor.visit is None or found.visit_id != call.visitor.visit.id:
         raise missing("photo")
@@ -241,16 +231,16 @@ def own_feedback(call: Called, key: Key) -> list[dict[str, Any]]:
     """The student's own reports, once they are released."""
     return [
         {"folder": folder, "report": report.model_dump(mode="json")}
-        for folder, report in own_reports(call, own_publication(call, key))
+        for folder, report in own_reports(call, released(call, key))
     ]
 
 
 @router.get("/publications/{key}/feedback/{place}/{name}", response_class=FileResponse)
 def own_page(call: Called, key: Key, place: str, name: str) -> FileResponse:
     """A file of the student's own feedback: the page, or a picture; `place` is the position, or ``0``."""
-    publication = own_publication(call, key)
-    top = call.places(publication).results
-    for number, (folder, report) in enumerate(own_reports(call, publication)):
+    link = released(call, key)
+    top = call.places(link.publication).results
+    for number, (folder, report) in enumerate(own_reports(call, link)):
         if place == str(report.position if report.position is not None else number):
             files = {path.name: path for path in (top / folder).iterdir()}
             if name in files and re.fullmatch(r"feedback\.html|overlay(_\d+)?\.png", name):
@@ -261,26 +251,21 @@ def own_page(call: Called, key: Key, place: str, name: str) -> FileResponse:
 @router.get("/publications/{key}/regrading")
 def own_requests(call: Called, key: Key) -> list[dict[str, Any]]:
     """The student's own requests, with the answers."""
-    publication = call.publication(key)
-    link = personal(call, publication)
+    link = personal(call, call.publication(key))
     asked = select(Regrading).where(
-        Regrading.publication_id == publication.id, Regrading.student_id == link.student_id
+        Regrading.publication_id == link.publication_id, Regrading.student_id == link.student_id
     )
-    return [
-        {"criterion": one.criterion, "position": one.position, "text": one.text, "answer": one.answer,
-         "created": one.created, "answered": one.answered}
-        for one in call.session.scalars(asked.order_by(Regrading.id))
-    ]  # fmt: skip
+    names = ("criterion", "position", "text", "answer", "created", "answered")
+    return [columns_of(one, *names) for one in call.session.scalars(asked.order_by(Regrading.id))]
 
 
 @router.post("/publications/{key}/regrading", status_code=201)
 def ask_again(call: Called, key: Key, request: Again) -> dict[str, str]:
     """Ask for a mark to be looked at again; it waits in the instructor's queue."""
-    publication = own_publication(call, key)
-    link = personal(call, publication)
+    link = released(call, key)
     call.count("photo")
     fitting = [
-        report for _, report in own_reports(call, publication)
+        report for _, report in own_reports(call, link)
         if request.position in {None, report.position}
         and (not request.criterion or any(one.id == request.criterion for one in report.criteria))
     ]  # fmt: skip
@@ -288,36 +273,35 @@ def ask_again(call: Called, key: Key, request: Again) -> dict[str, str]:
         raise missing("criterion")
     call.session.add(
         Regrading(
-            publication_id=publication.id, student_id=link.student_id, position=request.position,
+            publication_id=link.publication_id, student_id=link.student_id, position=request.position,
             criterion=request.criterion, text=request.text,
         )
     )  # fmt: skip
-    call.note("regrading asked", f"{publication.key} {link.student_id} {request.criterion}")
+    call.note("regrading asked", f"{key} {link.student_id} {request.criterion}")
     return {"state": "waits"}
 
 
-def may_hand_in(call: Called, key: Key) -> tuple[Publication, Link]:
-    """The publication and the student of a sheet that may be sent now, asked before any of it is read."""
-    publication = call.publication(key)
-    link = personal(call, publication)
-    if not publication.takes_sheets:
+def may_hand_in(call: Called, key: Key) -> Link:
+    """Return the link of a student who may hand in a sheet now, before any of it is read."""
+    link = personal(call, call.publication(key))
+    if not link.publication.takes_sheets:
         raise forbidden("no_sheets_now")
     call.count("photo")
     call.session.commit()
-    return publication, link
+    return link
 
 
 @router.post("/publications/{key}/sheets", status_code=201, openapi_extra=FILE_BODY)
 def hand_in(
     call: Called,
-    asked: Annotated[tuple[Publication, Link], Depends(may_hand_in)],
+    link: Annotated[Link, Depends(may_hand_in)],
     body: Annotated[bytes, Depends(body_after(may_hand_in))],
     name: Annotated[
         str, Query(max_length=200, pattern=WITHOUT_NUL, description="as the student calls it")
     ] = "",
 ) -> dict[str, Any]:
     """Hand in a sheet: one more version, stored by its time and content; none is ever replaced."""
-    publication, link = asked
+    publication = link.publication
     folder, ending = call.places(publication).handed_in, ending_of(body)
     with trial_of(call, publication, ending, body) as trial:
         pages = pages_in(call, publication, trial, name)
@@ -364,15 +348,16 @@ def check_pages(
 @router.get("/publications/{key}/sheets")
 def own_sheets(call: Called, key: Key) -> list[dict[str, Any]]:
     """The versions that the student has handed in, in the order of their time."""
-    publication = call.publication(key)
-    link = personal(call, publication)
-    there = {path.name for path in call.places(publication).submitted()}
-    own = select(Sheet).where(Sheet.publication_id == publication.id, Sheet.student_id == link.student_id)
+    link = personal(call, call.publication(key))
+    there = {path.name for path in call.places(link.publication).submitted()}
+    own = select(Sheet).where(
+        Sheet.publication_id == link.publication_id, Sheet.student_id == link.student_id
+    )
     return [version_of(one) for one in call.session.scalars(own.order_by(Sheet.id)) if one.file in there]
 
 
 def version_of(sheet: Sheet) -> dict[str, Any]:
-    """A version as people are told of it."""
+    """Return a version as pages show it."""
     return {"file": sheet.file, "name": sheet.shown, "sent": sheet.sent}
 
 
@@ -380,7 +365,7 @@ def version_of(sheet: Sheet) -> dict[str, Any]:
 
 
 def open_for_checks(call: Call, key: str) -> Publication:
-    """A publication that students may check values against; instructors may try theirs at any time."""
+    """Return a publication that is open for self-checks; to its instructors it always is."""
     publication = call.publication(key)
     if not publication.is_open and not call.visitor.is_member(publication):
         raise forbidden("not_open")
@@ -388,7 +373,7 @@ def open_for_checks(call: Call, key: str) -> Publication:
 
 
 def use_attempt(call: Call, publication: Publication, variant: Variant) -> int | None:
-    """Count an attempt; how many are left. Raises RefusedError where there are none."""
+    """Count an attempt; return how many are left. Raises RefusedError where there are none."""
     if publication.attempts is None or call.visitor.is_member(publication):
         return None
     link = personal(call, publication)
@@ -406,26 +391,24 @@ def use_attempt(call: Call, publication: Publication, variant: Variant) -> int |
 
 
 def personal(call: Call, publication: Publication) -> Link:
-    """The student's personal link. Raises RefusedError for a visitor without a valid one."""
+    """Return the student's personal link. Raises RefusedError for a visitor without a valid one."""
     link = call.link(publication)
     if link is None:
         raise RefusedError(401, "link_needed")
     return link
 
 
-def own_publication(call: Call, key: str) -> Publication:
-    """A publication whose feedback the student may see."""
-    publication = call.publication(key)
-    personal(call, publication)
-    if not publication.is_released:
+def released(call: Call, key: str) -> Link:
+    """Return the student's personal link. Raises RefusedError where the feedback is not released."""
+    link = personal(call, call.publication(key))
+    if not link.publication.is_released:
         raise forbidden("not_released")
-    return publication
+    return link
 
 
-def own_reports(call: Call, publication: Publication) -> list[tuple[str, ReportDocument]]:
-    """The student's own reports, each with its folder below the results."""
-    link = personal(call, publication)
-    results = read_results(call.places(publication).results)
+def own_reports(call: Call, link: Link) -> list[tuple[str, ReportDocument]]:
+    """Return the student's own reports, each with its folder below the results."""
+    results = read_results(call.places(link.publication).results)
     folders = result_folders(results.reports)
     return [
         (folder, report)
@@ -435,7 +418,7 @@ def own_reports(call: Call, publication: Publication) -> list[tuple[str, ReportD
 
 
 def enter(call: Call, token: str) -> Link:
-    """Let a visit be a student's by a personal link."""
+    """Open a personal link: the visit is then the student's. Return the link."""
     call.count("key")
     link = call.service.guard.opened(call.session, token)
     call.service.guard.begin(call.session, call.visitor, link=link)
@@ -444,7 +427,7 @@ def enter(call: Call, token: str) -> Link:
 
 
 def ending_of(body: bytes) -> str:
-    """How a picture is stored, by its first bytes. Raises RefusedError for any other file."""
+    """Return the ending of a picture's file, by its first bytes. Raises RefusedError for other files."""
     ending = next((one for start, one in _PICTURES.items() if body.startswith(start)), None)
     if ending is None:
         raise RefusedError(415, "file_type")
@@ -452,7 +435,7 @@ def ending_of(body: bytes) -> str:
 
 
 def pages_in(call: Call, publication: Publication, path: Path, shown: str = "") -> int:
-    """Number of pages of a stored file, which is called `shown`, counted in a worker in the sender's seconds.
+    """Return the pages of a stored file, called `shown`, counted in a worker in the sender's seconds.
 
     Raises RefusedError for a damaged one, and for a sender who has none left.
     """
@@ -473,14 +456,14 @@ def pages_in(call: Call, publication: Publication, path: Path, shown: str = "") 
 
 
 def counted(path: Path, shown: str) -> tuple[int | Reason, float]:
-    """Number of pages of a file, or why it has none, and how long it took; in a worker."""
+    """Return the pages of a file, or why they cannot be counted, and the seconds taken; in a worker."""
     began = time.process_time()
     return guarded(lambda: count_pages(load(path, shown))), time.process_time() - began
 
 
 @contextlib.contextmanager
 def trial_of(call: Call, publication: Publication, ending: str, body: bytes) -> Iterator[Path]:
-    """A stored file, which is deleted again where what is done with it fails."""
+    """Yield a stored file; it is deleted if what is done with it fails."""
     path = call.places(publication).photos / f"{secrets.token_hex(12)}{ending}"
     try:
         write_whole(path, body)
@@ -491,7 +474,7 @@ def trial_of(call: Call, publication: Publication, ending: str, body: bytes) -> 
 
 
 def queued(call: Call, job: Job) -> JobState:
-    """A job that is stored and waits."""
+    """Store a job and let it wait; return its state."""
     call.session.add(job)
     call.session.flush()
     state = state_of(call, job)
@@ -502,19 +485,17 @@ def queued(call: Call, job: Job) -> JobState:
 
 
 def state_of(call: Call, job: Job) -> JobState:
-    """A job as a page shows it."""
+    """Return a job as a page shows it."""
     before = call.service.queue.waiting_before(job) if job.state == "queued" else 0
     told = job.message
     if job.state == "failed":
-        code, known = job.result["code"], job.result.get("parameters", {})
-        told = refusal(Reason(code, {"detail": job.message, **known}), tongue(call.lang))
+        code, parameters = job.result["code"], job.result.get("parameters", {})
+        told = refusal(Reason(code, {"detail": job.message, **parameters}), tongue(call.lang))
     seconds = None if job.started is None or job.ended is None else round(job.ended - job.started, 2)
-    return JobState(
-        key=job.key, kind=job.kind, state=job.state, stage=job.stage, done=job.done, total=job.total,
-        before=before, message=told, result=job.result, seconds=seconds,
-    )  # fmt: skip
+    known = columns_of(job, "key", "kind", "state", "stage", "done", "total", "result")
+    return JobState(**known, before=before, message=told, seconds=seconds)
 
 
 def _level(publication: Publication) -> Literal["symbol", "hint"]:
-    """Of hints; the answers are never told to students."""
+    """Return the level of hints; students are never told the answers."""
     return "symbol" if publication.level == "symbol" else "hint"

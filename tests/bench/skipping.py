@@ -92,7 +92,7 @@ def moved_node(batch: Batch) -> tuple[list, float]:
         at = session.snapped(student.key, number, PLAN, (node.x_mm + 5.0 * step, node.y_mm))
         there = session.standing().of(student, f"node:{PLAN}:{NODE}")
         moved = Answer(student.key, f"node:{PLAN}:{NODE}", place_text(*at), seen=mark_of(there))
-        session.move(moved, "", "bench")
+        session.decide([moved], "", "bench")
         spent.append(time.process_time() - start)
     return [_verdicts(one.report) for one in session.students], float(np.median(spent))
 

@@ -17,24 +17,19 @@ from grader.files import samples_folder
 from grader.folder.batch import Batch, grade
 from grader.review.server import application
 from grader.review.session import Session
-from grader.rubric import load_rubric
 from grader.solution.document import plan_document
 from grader.tables.decisions import read_table
-from reference.authored.assignment import Variant, load_assignment
+from reference.authored.assignment import Variant
 from reference.plan import exact_plan
 from tests.inline import Inline
+from tests.unit.review.conftest import PUMP, RUBRIC
 
 ROOT = Path(__file__).resolve().parents[2]
-PUMP = load_assignment("pump")
 ENTERED = 29
 """Students with entered measurements, each with one or two entries that only a person can settle."""
 SCANNED = ("s02",)
 PATIENCE_MS = 240_000
 """A page is waited for as long as a busy machine may take; what is there ends the wait at once."""
-AS_MARKED = load_rubric("pump")
-DOUBT = AS_MARKED.doubt.model_copy(update={"settle": 0.9999, "stake": 0.0})
-RUBRIC = AS_MARKED.model_copy(update={"doubt": DOUBT})
-"""So strict that the scanned student has a dozen open questions, and the most points at stake."""
 
 
 def entered_class():

@@ -72,7 +72,7 @@ def test_any_numbers_are_marked_for_every_built_in_assignment(name: str, lot):
     variant, rubric = lot.choice(assignment.variants()), rubric_of(assignment)
     cells = entered(assignment, rubric, variant, lot)
     marked(assignment, rubric, variant, cells)
-    assert checked_values(assignment, variant, cells, "en", "hint")["lines"] is not None
+    assert checked_values(str(assignment.path), variant, cells, "en", "hint")["lines"] is not None
 
 
 @given(mechanism=..., lot=st.randoms(use_true_random=False))
@@ -104,7 +104,7 @@ def test_any_numbers_are_marked_for_any_mechanism(mechanism: Mechanism, lot):
 )  # fmt: skip
 def test_numbers_that_once_ended_a_check_are_told(name, n, cells):
     assignment = load_assignment(name)
-    assert checked_values(assignment, assignment.variant(n), cells, "en", "hint")["lines"]
+    assert checked_values(name, assignment.variant(n), cells, "en", "hint")["lines"]
 
 
 def test_the_press_checked_as_the_pump_is_told_row_by_row(shared):
@@ -114,5 +114,5 @@ def test_the_press_checked_as_the_pump_is_told_row_by_row(shared):
         rows = list(csv.DictReader(file, delimiter=";"))
     for row in rows:
         cells = {name: text for name, text in row.items() if name not in {"student_id", "n", "position"}}
-        assert checked_values(pump, pump.variant(7), cells, "en", "hint")["lines"]
+        assert checked_values("pump", pump.variant(7), cells, "en", "hint")["lines"]
         marked(pump, rubric_of(pump), pump.variant(7), cells)

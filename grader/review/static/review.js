@@ -2,54 +2,14 @@
 // The review page: one question after the other, by keys, mouse or touch. Everything that is decided is sent
 // to the server at once; nothing is kept here but where one is and what is shown.
 
-const $ = (id) => document.getElementById(id);
-const texts = JSON.parse($("texts").textContent);
-const SVG = "http://www.w3.org/2000/svg";
 const VERDICT_KEYS = { 1: "full", 2: "partial", 3: "none", 4: "follow_through", 0: "not_judged" };
-const FIRST_GUESS_S = 6, LONGEST_LOOK_S = 60, LOOKS_COUNTED = 20, POLL_MS = 2500, SETTLE_MS = 160;
+const FIRST_GUESS_S = 6, LONGEST_LOOK_S = 60, LOOKS_COUNTED = 20, POLL_MS = 2500;
 const EIGHT = 8;
 
 const state = {
   students: new Map(), rows: new Map(), version: -1, mode: "student", list: [], at: 0, question: null, busy: false,
   comments: [], looks: [], shown: performance.now(), tiles: [], tile: 0, fetched: new Map(), page: null,
 };
-const stored = {
-  get: (name, otherwise) => { try { return localStorage.getItem(`planmark-${name}`) ?? otherwise; } catch { return otherwise; } },
-  set: (name, value) => { try { localStorage.setItem(`planmark-${name}`, value); } catch { /* not kept */ } },
-};
-const windowId = Math.random().toString(36).slice(2) + Date.now().toString(36);
-
-// The server ---------------------------------------------------------------------------------------
-
-async function call(path, body) {
-  const options = body === undefined ? {} : {
-    method: "POST", body: JSON.stringify({ window: windowId, by: $("by").value.trim(), ...body }),
-    headers: { "Content-Type": "application/json", "X-Planmark": "review" },
-  };
-  let answer;
-  try { answer = await fetch(path, options); } catch { throw { message: texts.gone }; }
-  const data = await answer.json().catch(() => ({}));
-  if (!answer.ok) throw { status: answer.status, message: data.message || answer.statusText, ...data };
-  return data;
-}
-
-function tell(message, buttons = []) {
-  const note = $("note");
-  note.replaceChildren(document.createTextNode(message || ""));
-  for (const [text, act] of buttons) {
-    const button = element("button", { type: "button" }, text);
-    button.onclick = act;
-    note.append(" ", button);
-  }
-  note.hidden = !message;
-}
-
-function element(name, attributes = {}, text = "") {
-  const made = document.createElement(name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  if (text) made.textContent = text;
-  return made;
-}
 
 // What there is to decide --------------------------------------------------------------------------
 
@@ -118,169 +78,6 @@ function looked() {
   state.looks = state.looks.slice(-LOOKS_COUNTED);
 }
 
-// A view of a scan ---------------------------------------------------------------------------------
-
-class Viewer {
-  constructor(svg, onNode) {
-    this.svg = svg; this.onNode = onNode; this.pointers = new Map(); this.view = null;
-    svg.addEventListener("wheel", (event) => {
-      event.preventDefault();
-      this.zoom(Math.exp(Math.sign(event.deltaY) * Math.min(Math.abs(event.deltaY), 60) * 0.004), this.point(event));
-    }, { passive: false });
-    svg.addEventListener("pointerdown", (event) => this.down(event));
-    svg.addEventListener("pointermove", (event) => this.move(event));
-    for (const name of ["pointerup", "pointercancel"]) svg.addEventListener(name, (event) => this.up(event));
-    new ResizeObserver(() => { if (this.view) { this.fit(this.view); this.refine(); } }).observe(svg);
-  }
-
-  show(look) {
-    this.look = look; this.drag = null; this.pointers.clear();
-    delete this.svg.dataset.loaded;
-    this.svg.replaceChildren();
-    this.base = this.image(); this.fine = this.image();
-    this.marks = document.createElementNS(SVG, "g");
-    this.marks.setAttribute("class", "marks");
-    this.marks.innerHTML = look.marks || "";
-    this.nodes = document.createElementNS(SVG, "g");
-    this.nodes.setAttribute("class", "nodes");
-    this.svg.append(this.base, this.fine, this.marks, this.nodes);
-    for (const node of look.nodes || []) this.addNode(node);
-    const [x, y, w, h] = look.box;
-    this.fit({ x, y, w, h });
-    this.place(this.base, this.visible(1.0));
-  }
-
-  image() {
-    const image = document.createElementNS(SVG, "image");
-    image.setAttribute("preserveAspectRatio", "none");
-    return image;
-  }
-
-  addNode(node) {
-    const circle = document.createElementNS(SVG, "circle"), title = document.createElementNS(SVG, "title");
-    circle.setAttribute("class", "node"); circle.setAttribute("tabindex", "0"); circle.setAttribute("role", "button");
-    circle.setAttribute("aria-label", `${texts.node} ${node.name}`);
-    circle.setAttribute("cx", node.x); circle.setAttribute("cy", node.y);
-    circle.dataset.node = `${node.figure}:${node.name}`;
-    title.textContent = node.name;
-    circle.append(title);
-    circle.addEventListener("keydown", (event) => this.nudge(event, circle));
-    this.nodes.append(circle);
-  }
-
-  nudge(event, circle) {
-    const step = event.shiftKey ? 1.0 : 0.2, by = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
-    if (by) {
-      circle.setAttribute("cx", Number(circle.getAttribute("cx")) + step * by[0]);
-      circle.setAttribute("cy", Number(circle.getAttribute("cy")) + step * by[1]);
-    } else if (event.key === "Enter") {
-      this.onNode(circle.dataset.node, Number(circle.getAttribute("cx")), Number(circle.getAttribute("cy")));
-    } else return;
-    event.preventDefault(); event.stopPropagation();
-  }
-
-  fit(view) {
-    const { width, height } = this.svg.getBoundingClientRect();
-    if (!width || !height) { this.view = view; return; }
-    const w = Math.max(view.w, (view.h * width) / height), h = (w * height) / width;
-    this.view = { x: view.x + view.w / 2 - w / 2, y: view.y + view.h / 2 - h / 2, w, h };
-    this.svg.setAttribute("viewBox", [this.view.x, this.view.y, w, h].join(" "));
-    const mm = w / width;
-    for (const circle of this.nodes ? this.nodes.children : []) {
-      circle.setAttribute("r", 11 * mm); circle.setAttribute("stroke-width", 1.6 * mm);
-    }
-  }
-
-  visible(margin) {
-    const [wide, high] = this.look.page_mm, { x, y, w, h } = this.view;
-    const left = Math.max(0, x - (margin - 1) * w / 2), top = Math.max(0, y - (margin - 1) * h / 2);
-    const right = Math.min(wide, x + (w * (1 + margin)) / 2), bottom = Math.min(high, y + (h * (1 + margin)) / 2);
-    return { x: left, y: top, w: Math.max(1, right - left), h: Math.max(1, bottom - top) };
-  }
-
-  place(image, part) {
-    const { width } = this.svg.getBoundingClientRect();
-    if (!this.look.scan || !width) return;
-    const scale = (width * (window.devicePixelRatio || 1)) / this.view.w;
-    const query = new URLSearchParams({
-      x: part.x.toFixed(2), y: part.y.toFixed(2), w: part.w.toFixed(2), h: part.h.toFixed(2), scale: Math.min(scale, 60).toFixed(2),
-    });
-    const loader = new Image();
-    loader.onload = () => {
-      for (const [name, value] of [["x", part.x], ["y", part.y], ["width", part.w], ["height", part.h]]) image.setAttribute(name, Number(value.toFixed(2)));
-      image.setAttribute("href", loader.src);
-      this.loaded();
-    };
-    loader.onerror = () => { if (this.svg.id === "view") tell(texts.no_picture, [[texts.close, () => tell("")]]); this.loaded(); };
-    loader.src = `${this.look.scan}&${query}`;
-  }
-
-  loaded() {
-    this.svg.dataset.loaded = this.look.scan;
-    if (this.onLoad) this.onLoad();
-  }
-
-  refine() {
-    clearTimeout(this.timer);
-    this.timer = setTimeout(() => { if (this.look) this.place(this.fine, this.visible(1.3)); }, SETTLE_MS);
-  }
-
-  point(event) {
-    const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(this.svg.getScreenCTM().inverse());
-    return { x: at.x, y: at.y };
-  }
-
-  zoom(factor, about = null) {
-    if (!this.look) return;
-    const { x, y, w, h } = this.view, centre = about || { x: x + w / 2, y: y + h / 2 };
-    const most = 1.3 * Math.max(...this.look.page_mm), wide = Math.min(Math.max(w * factor, 4), most), f = wide / w;
-    this.fit({ x: centre.x - (centre.x - x) * f, y: centre.y - (centre.y - y) * f, w: wide, h: h * f });
-    this.refine();
-  }
-
-  whole() {
-    if (!this.look) return;
-    const isWhole = this.view.w >= 0.98 * this.look.page_mm[0], [x, y, w, h] = this.look.box;
-    this.fit(isWhole ? { x, y, w, h } : { x: 0, y: 0, w: this.look.page_mm[0], h: this.look.page_mm[1] });
-    this.refine();
-  }
-
-  down(event) {
-    if (!this.look) return;
-    this.svg.setPointerCapture(event.pointerId);
-    this.pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
-    const node = event.target.closest(".node");
-    // A node that cannot be saved now does not move.
-    this.drag = node && this.pointers.size === 1 && !state.busy ? node : null;
-    this.moved = false;
-  }
-
-  move(event) {
-    const last = this.pointers.get(event.pointerId);
-    if (!last || !this.look) return;
-    const mm = this.view.w / this.svg.getBoundingClientRect().width;
-    const by = { x: (event.clientX - last.x) * mm, y: (event.clientY - last.y) * mm };
-    if (this.drag) {
-      const at = this.point(event);
-      this.moved = true;
-      this.drag.setAttribute("cx", at.x); this.drag.setAttribute("cy", at.y);
-    } else if (this.pointers.size === 2) {
-      const other = [...this.pointers].find(([id]) => id !== event.pointerId)[1];
-      const before = Math.hypot(last.x - other.x, last.y - other.y), after = Math.hypot(event.clientX - other.x, event.clientY - other.y);
-      if (before > 5 && after > 5) this.zoom(before / after, this.point({ clientX: (event.clientX + other.x) / 2, clientY: (event.clientY + other.y) / 2 }));
-      this.fit({ ...this.view, x: this.view.x - by.x / 2, y: this.view.y - by.y / 2 });
-    } else this.fit({ ...this.view, x: this.view.x - by.x, y: this.view.y - by.y });
-    this.pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
-  }
-
-  up(event) {
-    if (!this.pointers.delete(event.pointerId)) return;
-    if (this.drag && this.moved) this.onNode(this.drag.dataset.node, Number(this.drag.getAttribute("cx")), Number(this.drag.getAttribute("cy")));
-    else if (!this.drag) this.refine();
-    this.drag = null;
-  }
-}
-
 // One question -------------------------------------------------------------------------------------
 
 const viewer = new Viewer($("view"), (node, x, y) => moveNode(node, x, y));
@@ -312,18 +109,12 @@ async function showQuestion(keepView = false) {
   state.question = question;
   const student = state.students.get(question.student);
   $("who").textContent = nameOf(student);
-  $("place").textContent = [question.position, `${state.at + 1} / ${state.list.length}`].filter(Boolean).join(" · ");
-  $("what").innerHTML = question.title;
+  $("place").textContent = `${state.at + 1} / ${state.list.length}`;
+  showFacts(question);
   $("state").innerHTML = question.state;
-  $("sentence").innerHTML = question.sentence;
   $("sentence").parentElement.hidden = !question.sentence;
   $("why").innerHTML = question.why;
   $("why").hidden = !question.why;
-  $("numbers").replaceChildren(...question.numbers.flatMap(([name, value]) => {
-    const cell = element("dd");
-    cell.innerHTML = value;
-    return [element("dt", {}, name), cell];
-  }));
   const accept = $("accept");
   accept.innerHTML = question.accept;
   accept.disabled = isOpen(row) && !question.choices.some((one) => one.default);
@@ -346,9 +137,6 @@ async function showQuestion(keepView = false) {
     chip.onclick = () => { $("comment").value = text; };
     return chip;
   }));
-  $("view").style.display = question.look ? "" : "none";
-  $("no-scan").hidden = Boolean(question.look);
-  $("no-scan").textContent = texts.no_scan;
   setReady(!question.look);
   if (question.look) {
     const view = viewer.view;
@@ -358,7 +146,7 @@ async function showQuestion(keepView = false) {
   document.body.dataset.shown = `${keyOf(row)} ${state.version}`;
   state.shown = performance.now();
   const next = state.list[state.at + 1];
-  if (next) fetchQuestion(next).then((one) => { if (one.look && one.look.first) new Image().src = one.look.first; }, () => {});
+  if (next) fetchQuestion(next).catch(() => {});
 }
 
 function step(by) {
@@ -387,20 +175,12 @@ function onward() {
   showQuestion().catch(failed);
 }
 
-async function busy(work) {
-  // A key while the last answer is still being written would be an answer to a question not yet seen.
-  if (state.busy) return;
-  state.busy = true;
-  document.body.dataset.busy = "1";
-  try { await work(); } catch (error) { failed(error); } finally { state.busy = false; delete document.body.dataset.busy; }
-}
-
 function failed(error) {
   if (error instanceof Error) throw error;
   if (error.clash) {
     const again = async () => { tell(""); state.fetched.clear(); take(await call("api/class")); await refreshScreen(); };
     tell(error.message, [[texts.look_again, () => busy(again)]]);
-  } else tell(error.message, [[texts.close, () => tell("")]]);
+  } else advise(error.message);
 }
 
 function answerOf(question, verdict) {
@@ -431,7 +211,7 @@ function accept() {
   if (!question || !row) return;
   if (!isOpen(row)) { busy(async () => onward()); return; }
   const index = question.choices.findIndex((one) => one.default);
-  if (index < 0) { tell(texts.choose, [[texts.close, () => tell("")]]); return; }
+  if (index < 0) { advise(texts.choose); return; }
   choose(index);
 }
 
@@ -440,7 +220,7 @@ function saveComment() {
   if (!row || isOpen(row)) { $("comment").blur(); return; }
   busy(async () => {
     take(await call("api/decide", { answers: [answerOf(state.question, row.verdict)] }));
-    tell(texts.saved, [[texts.close, () => tell("")]]);
+    advise(texts.saved);
     $("comment").blur();
     await showQuestion(true);
   });
@@ -449,7 +229,7 @@ function saveComment() {
 function undo() {
   return busy(async () => {
     const data = await call("api/undo", {});
-    if (!data.undone) { tell(texts.nothing_to_undo, [[texts.close, () => tell("")]]); return; }
+    if (!data.undone) { advise(texts.nothing_to_undo); return; }
     take(data); tell("");
     if (state.mode === "eight") { showEight(data.undone); return; }
     const undone = state.rows.get(data.undone);
@@ -490,7 +270,7 @@ function showEight(keep) {
 
 function tileOf(key, index) {
   const row = state.rows.get(key), tile = element("div", { class: "tile", tabindex: "-1", "data-key": key });
-  const svg = document.createElementNS(SVG, "svg"), about = element("p"), buttons = element("div", { class: "row" });
+  const svg = svgElement("svg"), about = element("p"), buttons = element("div", { class: "row" });
   about.append(element("b", {}, nameOf(state.students.get(row.student))));
   const said = element("span", { class: "soft" });
   about.append(" ", said);
@@ -604,34 +384,30 @@ function showPage(page, button) {
 }
 
 function drawPage() {
-  const { width, height, picture } = state.page, svg = $("page-view"), turned = document.createElementNS(SVG, "g");
+  const { width, height, picture } = state.page, svg = $("page-view"), turned = svgElement("g");
   const flips = pageViewer.turn % 180 !== 0, wide = flips ? height : width, high = flips ? width : height;
   svg.replaceChildren(turned);
   if (!width) return;
   svg.setAttribute("viewBox", [-0.03 * wide, -0.03 * high, 1.06 * wide, 1.06 * high].join(" "));
   const shift = { 0: "", 90: `translate(0 ${width})`, 180: `translate(${width} ${height})`, 270: `translate(${height} 0)` }[pageViewer.turn];
   turned.setAttribute("transform", `${shift} rotate(${-pageViewer.turn})`);
-  const image = document.createElementNS(SVG, "image");
-  for (const [name, value] of [["width", width], ["height", height], ["href", picture], ["preserveAspectRatio", "none"]]) image.setAttribute(name, value);
-  turned.append(image);
+  turned.append(svgElement("image", { width, height, href: picture, preserveAspectRatio: "none" }));
   if (!$("corners").checked) return;
   if (!pageViewer.corners) {
     const box = [[0, 0], [width, 0], [width, height], [0, height]].map(([x, y]) => [0.06 * width + 0.88 * x, 0.06 * height + 0.88 * y]);
     pageViewer.corners = [...box, ...box].slice(pageViewer.turn / 90, pageViewer.turn / 90 + 4);
   }
-  const outline = document.createElementNS(SVG, "polygon"), size = Math.max(width, height);
-  outline.setAttribute("class", "outline"); outline.setAttribute("stroke-width", size / 500);
+  const size = Math.max(width, height), outline = svgElement("polygon", { class: "outline", "stroke-width": size / 500 });
   const redraw = () => outline.setAttribute("points", pageViewer.corners.map((at) => at.join(",")).join(" "));
   redraw();
   turned.append(outline);
   pageViewer.corners.forEach((corner, index) => {
-    const handle = document.createElementNS(SVG, "circle");
+    const handle = svgElement("circle", { class: "handle", r: size / 45, "stroke-width": size / 400, tabindex: 0, role: "button", "aria-label": `${texts.corner} ${index + 1}` });
     const set = (x, y) => {
       pageViewer.corners[index] = [Math.min(Math.max(x, 0), width - 1), Math.min(Math.max(y, 0), height - 1)];
       handle.setAttribute("cx", pageViewer.corners[index][0]); handle.setAttribute("cy", pageViewer.corners[index][1]);
       redraw();
     };
-    for (const [name, value] of [["class", "handle"], ["r", size / 45], ["stroke-width", size / 400], ["tabindex", 0], ["role", "button"], ["aria-label", `${texts.corner} ${index + 1}`]]) handle.setAttribute(name, value);
     set(corner[0], corner[1]);
     handle.onpointerdown = (event) => { handle.setPointerCapture(event.pointerId); handle.dataset.held = "1"; };
     handle.onpointerup = () => { delete handle.dataset.held; };
@@ -666,7 +442,7 @@ function savePage() {
       corners: $("corners").checked ? pageViewer.corners : [],
     }));
     await showPages();
-    tell(texts.page_saved, [[texts.close, () => tell("")]]);
+    advise(texts.page_saved);
   });
 }
 
@@ -736,11 +512,6 @@ function showMode(mode) {
   showQuestion().catch(failed);
 }
 
-function hideMarks() {
-  const isBare = $("view").classList.toggle("bare");
-  $("hide").setAttribute("aria-pressed", String(isBare));
-}
-
 function jumps() {
   $("jump").replaceChildren(element("option", { value: "" }, "–"), ...[...state.students.values()].map((student) => element("option", { value: student.key }, `${nameOf(student)} ${student.score}`)));
 }
@@ -803,7 +574,7 @@ $("finish").onclick = finish;
 $("save-whole").onclick = () => busy(async () => {
   const student = state.question.student;
   take(await call("api/whole", { student, comment: $("remark").value.trim(), added: Number($("added").value) || 0, seen: state.students.get(student).seen }));
-  tell(texts.saved, [[texts.close, () => tell("")]]);
+  advise(texts.saved);
   await showQuestion(true);
 });
 $("by").value = $("by").readOnly ? document.body.dataset.by : stored.get("by", document.body.dataset.by);

@@ -57,21 +57,12 @@ function valuesOf(form) {
 for (const form of document.querySelectorAll("form[data-send]")) {
   form.addEventListener("submit", (event) => {
     event.preventDefault();
-    const [method, path] = form.dataset.send.split(" "), place = form.querySelector(".said");
+    const [method, path] = form.dataset.send.split(" "), place = form.querySelector(".said"), values = valuesOf(form);
     doing(event.submitter, place, async () => {
-      const answer = await call(method, path, valuesOf(form));
-      if (form.dataset.shows) tell(place, `${answer.sent.length} ✓ ${Object.entries({ ...answer.refused, ...answer.withheld }).map(([who, why]) => `${who}: ${why}`).join("; ")}`, !Object.keys(answer.refused).length);
+      const answer = await ("query" in form.dataset ? call(method, `${path}?${new URLSearchParams(values)}`) : call(method, path, values));
+      if ("query" in form.dataset) tell(place, answer[form.dataset.shows], true);
+      else if (form.dataset.shows) tell(place, `${answer.sent.length} ✓ ${Object.entries({ ...answer.refused, ...answer.withheld }).map(([who, why]) => `${who}: ${why}`).join("; ")}`, !Object.keys(answer.refused).length);
       else if (form.dataset.told) { form.reset(); tell(place, texts[form.dataset.told], true); } else go(form.dataset.then, answer);
-    });
-  });
-}
-for (const form of document.querySelectorAll("form[data-query]")) {
-  form.addEventListener("submit", (event) => {
-    event.preventDefault();
-    const [method, path] = form.dataset.query.split(" "), place = form.querySelector(".said");
-    doing(event.submitter, place, async () => {
-      const answer = await call(method, `${path}?${new URLSearchParams(valuesOf(form))}`);
-      tell(place, answer[form.dataset.shows], true);
     });
   });
 }

@@ -12,6 +12,7 @@ from grader.outcomes import NamedMistake
 from grader.records import Reason
 from grader.self_check.advice import ADVICE, LAWS, advice_on, checked_lines, law_of
 from grader.texts.reasons import HINTS
+from reference.authored.assignment import load_assignment
 from reference.construction.mistakes import Mistake
 from tests.hands import changed, measured, task_for
 
@@ -21,7 +22,7 @@ EN = tongue("en")
 
 def lines_of(reading, level="hint", **declared):
     judgement = judge(PUMP, Submission(measured=reading, declared=declared))
-    return {line.name: line for line in checked_lines(judgement, level, EN, {}, "A")}
+    return {line.name: line for line in checked_lines(judgement, level, EN, load_assignment("pump"))}
 
 
 @pytest.mark.parametrize("name", ["v_A", "v_D", "v_BA", "a_BA_n", "a_B_t", "a_D"])

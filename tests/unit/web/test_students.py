@@ -103,6 +103,14 @@ def test_requests_do_not_keep_a_connection_while_they_wait_for_each_other(admin,
     assert set(pages) == set(checks) == {200}
 
 
+def test_a_student_who_has_left_the_roster_sees_the_own_page(admin, graded, student):
+    key, _ = graded
+    roster = b"student_id,name,n\ns11,Student 11,5\n"
+    assert admin.act("PUT", f"/publications/{key}/roster/files/roster.csv", content=roster).status_code == 200
+    page = student.get(f"/c/{key}")
+    assert (page.status_code, "s09" in page.text) == (200, True)
+
+
 def test_there_is_no_list_of_publications_for_visitors(visitor, admin):
     admin.publish()
     assert visitor.get("/api/v1/publications/wrong/form").status_code == 404
