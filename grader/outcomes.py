@@ -62,6 +62,10 @@ from grader.documents import Quantity, Tolerance, Verdict
 from grader.records import Reason
 from reference.construction.mistakes import Mistake
 
+CREDITED: frozenset[str] = frozenset({"full", "follow_through"})
+CHARGED: frozenset[str] = frozenset({"none", "partial"})
+"""Verdicts with all points, and those that cost some; the others are open, or not judged."""
+
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
@@ -98,6 +102,11 @@ class Outcome:
     shares: tuple[float, ...] = ()
     probability: float = 1.0
     proposed: float = 0.0
+
+    @property
+    def codes(self) -> frozenset[str]:
+        """The codes of its reasons."""
+        return frozenset(reason.code for reason in self.reasons)
 
     @property
     def proposed_verdict(self) -> Verdict:

@@ -26,8 +26,6 @@ ZONE_SLACK_MM = 2.0
 MECHANISM = "mechanism"
 VELOCITY_PLAN = "velocity_plan"
 ACCELERATION_PLAN = "acceleration_plan"
-
-
 Value = float | str | tuple[str, ...]
 
 
@@ -52,6 +50,11 @@ class Reason:
 def of_error(error: PlanmarkError, file: str | None = None) -> Reason:
     """Convert an error to a problem: its parameters, and its own words as the `detail`."""
     return Reason(error.code, {**error.parameters, "detail": error.message}, file)
+
+
+def on_sheet(at: complex) -> tuple[float, float]:
+    """Return a complex position as x and y in sheet millimetres, y down."""
+    return at.real, -at.imag
 
 
 @dataclass(frozen=True, slots=True)

@@ -64,8 +64,6 @@ def quarters(angle: Number) -> tuple[Number, Number]:
 
 def larger(x: Number, y: Number) -> Number:
     """The larger of two numbers; nan if either is nan."""
-    if isinstance(x, float) and isinstance(y, float):
-        return x if x > y or x != x else y  # noqa: PLR0124 - only nan differs from itself
     if isinstance(x, np.ndarray) or isinstance(y, np.ndarray):
         return np.maximum(x, y)
     return x if x > y or x != x else y  # noqa: PLR0124 - only nan differs from itself

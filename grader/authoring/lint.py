@@ -102,7 +102,7 @@ def lint(assignment: Assignment, rubric: RubricFile) -> Lint:
     broken = broken_variants(assignment, variants)
     findings = [*broken_findings(assignment, broken), *_odd_sizes(assignment)]
     findings += data_findings(assignment, rubric, construction)
-    rows = {each.variant: _row(each.variant, problem=each.error.message) for each in broken}
+    rows = {variant: _row(variant, problem=error.message) for variant, error in broken.items()}
     sound = [variant for variant in variants if variant not in rows]
     if not sound:
         return Lint(assignment, tuple(rows.values()), _sorted(findings))

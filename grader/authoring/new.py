@@ -13,7 +13,7 @@ from pathlib import Path
 from grader.authoring.from_mechanism import texts_for
 from grader.files import create_whole
 from grader.rubric import load_rubric
-from reference.authored.assignment import SUFFIXES, Assignment, library, load_assignment, locate
+from reference.authored.assignment import SUFFIXES, Assignment, library, load_assignment, locate, names_in
 from reference.authored.toml_file import text_of
 from reference.errors import CallError
 
@@ -161,8 +161,7 @@ def starts_folder() -> Path:
 
 def starts() -> list[str]:
     """Return the names of the mechanisms to start from."""
-    suffix = SUFFIXES["assignment"]
-    return sorted(path.name.removesuffix(suffix) for path in starts_folder().glob(f"*{suffix}"))
+    return names_in(starts_folder(), "assignment")
 
 
 def load_start(name: str) -> Assignment:

@@ -19,7 +19,7 @@ from grader.rubric import RubricFile
 from reference.authored.assignment import SCALE_NAMES, Assignment, Scales, Variant
 from reference.geometry import FloatArray
 from reference.plan import ZERO_SHARE, Plan
-from reference.quantities import SCALE_OF
+from reference.quantities import SCALE_OF, unit_of
 
 WELL_READ_MM = 8.0
 """Shorter vectors are read from scans with less certainty."""
@@ -450,11 +450,10 @@ def suggestions(proposed: Sequence[Proposal], plan: Plan, figures: Collection[st
 
 def written(scales: Scales, names: Sequence[str]) -> str:
     """Write scales that are the same for all variants, as people do."""
-    units = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s^2)/mm"}
     texts = []
     for name in names:
         value = float(np.ravel(getattr(scales, name))[0])
-        text = f"{value:g} {units[name]}"
+        text = f"{value:g} {unit_of(name)}"
         texts.append(f"kL = {ratio_text(value)} ({text})" if name == "kL" else f"{name} = {text}")
     return ", ".join(texts)
 

@@ -45,33 +45,29 @@ Pairs = tuple[np.ndarray, np.ndarray]
 # Variants whose mechanism cannot be solved --------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class Broken:
-    """A variant that cannot be solved, and why."""
-
-    variant: Variant
-    error: MechanismError
+Broken = Mapping[Variant, MechanismError]
+"""The variants that cannot be solved, and why."""
 
 
-def broken_variants(assignment: Assignment, variants: list[Variant]) -> list[Broken]:
+def broken_variants(assignment: Assignment, variants: list[Variant]) -> Broken:
     """Return the variants that do not assemble or are singular, with the reason of each."""
     mechanism = assignment.mechanism(variants)
     lost = ~np.isfinite(move_where_possible(mechanism).predicted_error)
-    return [Broken(variants[index], reason_at(mechanism, int(index))) for index in np.flatnonzero(lost)]
+    return {variants[index]: reason_at(mechanism, int(index)) for index in np.flatnonzero(lost)}
 
 
-def broken_findings(assignment: Assignment, broken: Sequence[Broken]) -> Iterator[LintFinding]:
+def broken_findings(assignment: Assignment, broken: Broken) -> Iterator[LintFinding]:
     """Report a fault for each group and reason, with all its variants and the range of the gaps."""
-    by_reason: dict[str, list[Broken]] = defaultdict(list)
-    for variant in broken:
-        by_reason[variant.error.template].append(variant)
+    by_reason: dict[str, list[Variant]] = defaultdict(list)
+    for variant, error in broken.items():
+        by_reason[error.template].append(variant)
     for template, variants in by_reason.items():
-        error = variants[0].error
-        gaps = sorted(variant.error.gap_m for variant in variants if variant.error.gap_m is not None)
+        error = broken[variants[0]]
+        gaps = sorted(gap for variant in variants if (gap := broken[variant].gap_m) is not None)
         same = not gaps or f"{gaps[0]:.6g}" == f"{gaps[-1]:.6g}"
         message = error.message if same else template.replace("{gap}", f"{gaps[0]:.3g} to {gaps[-1]:.3g} m")
         place = group_place(assignment, error.group)
-        yield LintFinding("fault", error.code, *place, message, tuple(one.variant for one in variants))
+        yield LintFinding("fault", error.code, *place, message, tuple(variants))
 
 
 def assembly_findings(assignment: Assignment, variants: Sequence[Variant]) -> Iterator[LintFinding]:
@@ -257,9 +253,9 @@ def groups_of(pairs: Pairs, count: int) -> list[list[int]]:
 
     graph = coo_array((np.ones(len(pairs[0]), dtype=np.int8), pairs), shape=(count, count))
     _, component = connected_components(graph, directed=False)
-    groups: dict[int, list[int]] = {}
+    groups: dict[int, list[int]] = defaultdict(list)
     for index in np.unique(np.concatenate(pairs)).tolist():
-        groups.setdefault(int(component[index]), []).append(index)
+        groups[int(component[index])].append(index)
     return list(groups.values())
 
 

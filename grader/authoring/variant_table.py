@@ -19,6 +19,7 @@ import numpy as np
 from grader.files import guarded
 from grader.language import Tongue
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
+from reference.authored.variant_table import KEYS
 from reference.drawing.canvas import (
     A3_MM,
     Area,
@@ -139,7 +140,7 @@ def _vector(plan: Plan, name: str) -> tuple[Column, ...]:
 
 def identity(variants: Sequence[Variant]) -> list[tuple[str, list[int]]]:
     """Return ``n`` and ``position`` of each variant, as far as the assignment has them."""
-    columns = [(name, [getattr(variant, name) for variant in variants]) for name in ("n", "position")]
+    columns = [(name, [getattr(variant, name) for variant in variants]) for name in KEYS]
     return [(name, numbers) for name, numbers in columns if numbers and numbers[0] is not None]
 
 

@@ -81,14 +81,13 @@ def _sound(assignment: Assignment) -> list[Variant]:
     """The variants that can be solved; the others are printed as left out."""
     variants = assignment.variants()
     broken = broken_variants(assignment, variants)
-    without = {one.variant for one in broken}
-    if len(without) == len(variants):
-        error = broken[0].error
+    if len(broken) == len(variants):
+        error = broken[variants[0]]
         told = f"no variant can be solved; {variants[0]}: {error.template}"
         raise MechanismError(error.code, told, group=error.group, gap_m=error.gap_m)
     for finding in broken_findings(assignment, broken):
         typer.secho(f"left out: {finding}", err=True, fg="red")
-    return [variant for variant in variants if variant not in without]
+    return [variant for variant in variants if variant not in broken]
 
 
 def _print_pages(assignment: Assignment, plan: Plan, pdf: Path, *, drawings: bool, lang: str) -> None:

@@ -18,6 +18,7 @@ from grader.comparison.verdicts import (
     at_worst,
     the_better,
 )
+from grader.outcomes import CHARGED, CREDITED
 from grader.records import Reason
 from reference.construction.steps import Given
 
@@ -84,7 +85,7 @@ def choose(
 
 @dataclass(slots=True)
 class Charges:
-    """What was found of nodes, scales and angular quantities so far, criteria in the order of construction.
+    """The findings on nodes, scales and angular quantities so far, criteria in the order of construction.
 
     A value may follow through only when every mistake that it depends on has cost something.
 
@@ -95,7 +96,7 @@ class Charges:
     by_length : nodes whose direction is not known: they may be laid off the wrong way
     inherited : nodes that are right only as they follow from something charged
     doubtful : what has an open verdict
-    either : what drafting errors may explain, or a mistake: read well, what follows from it is right
+    either : what drafting errors or a mistake may explain, read for certain: what follows from it counts
     """
 
     task: Task
@@ -145,9 +146,9 @@ class Charges:
         node = self.forget(name)
         if verdict == "review":
             self.doubtful.add(node)
-        if verdict in {"none", "partial"}:
+        elif verdict in CHARGED:
             self.charged.add(node)
-        elif verdict in {"full", "follow_through"}:
+        elif verdict in CREDITED:
             self.cleared.add(node)
         if verdict == "follow_through":
             self.inherited.add(node)
@@ -175,7 +176,7 @@ class Charges:
         return frozenset(found - right) | one.causes | (one.relies_on & self.charged)
 
     def is_wrong(self, one: Expectation) -> bool:
-        """Whether anything that an expectation relies on is wrong, or right only as it follows."""
+        """Return whether anything that an expectation relies on is wrong, or right only as it follows."""
         return bool(self.causes(one) or one.relies_on & self.inherited)
 
     def credited(self, one: Expectation, mark: MarkRange) -> tuple[MarkRange, frozenset[str]]:
@@ -197,7 +198,7 @@ class Charges:
         return MarkRange(NONE, NONE, NONE, mark.reasons, mark.sure), shown
 
     def opened(self, segment: TaskSegment, mark: MarkRange) -> MarkRange:
-        """A loss on a sheet is open while what it may follow from was not read for certain."""
+        """Return a mark; a loss on a sheet is open while one of its sources was not read for certain."""
         unknown = () if mark.share == FULL else self._unknown_upstream(segment)
         if not unknown:
             return mark
@@ -207,7 +208,7 @@ class Charges:
         return replace(mark, best=FULL, reasons=(*mark.reasons, unread), sure=min(mark.sure, EVEN))
 
     def _unknown_upstream(self, segment: TaskSegment) -> tuple[str, ...]:
-        """What a vector is made from and is not known: nodes, of figures that were read, and its scale.
+        """Return the unknown sources of a vector: nodes, of figures that were read, and its scale.
 
         Known are nodes that were read, those from which a vector was made that is right, and those at which
         it is nearly certain what was done.

@@ -44,7 +44,7 @@ from grader.comparison.verdicts import (
     widened,
 )
 from grader.documents import Quantity, Tolerance, Verdict
-from grader.outcomes import Outcome, UsedScale
+from grader.outcomes import CHARGED, Outcome, UsedScale
 from grader.records import Reason
 from grader.rubric import CriterionTable
 from reference.authored.assignment import SCALE_NAMES
@@ -93,7 +93,7 @@ def _outcome(charges: Charges, criterion: CriterionTable) -> Outcome:
     """The verdict on one criterion, open where it depends on an entry that cannot be used."""
     outcome, name, evidence = _judged(charges, criterion), criterion.name, charges.evidence
     entry = evidence.refused.get(name)
-    if entry is None and outcome.verdict in {"none", "partial"}:
+    if entry is None and outcome.verdict in CHARGED:
         entry = _refused_below(charges, name)
     if entry is not None:
         charges.decided(name, "review")
@@ -247,7 +247,7 @@ def _segment(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) ->
 # Computed values -----------------------------------------------------------------------------------
 
 LEAST_VALUES = 3
-"""So many values with one common factor were computed with a wrong scale; fewer may agree by chance."""
+"""Number of values with one common factor that show a wrong scale; fewer may agree by chance."""
 SAME_FACTOR = 0.02
 """Relative difference up to which two factors are the same, with rounding on the way."""
 HALF = 0.5
@@ -331,7 +331,7 @@ def _common_factor(charges: Charges, scale: str) -> float | None:
         if vector.scale != scale or name not in evidence.values:
             continue
         drawn = evidence.vector(name)
-        length = abs(task.drawn(name, used)) if drawn is None else drawn.length_mm
+        length = abs(task.segments[name].drawn(used)) if drawn is None else drawn.length_mm
         if length > task.rubric.tolerance_of(name).least_mm:
             factors.append(abs(evidence.values[name]) / (length * used[scale]))
     if len(factors) < LEAST_VALUES:
@@ -345,9 +345,9 @@ def _common_factor(charges: Charges, scale: str) -> float | None:
 # What was not handed in, or not read ---------------------------------------------------------------
 
 PROBABLY_NOT_DRAWN = 0.9
-"""That a vector was not drawn, where no ink lies along it and an end was not read for certain."""
+"""Probability that a vector was not drawn if no ink lies along it and an end was not read for certain."""
 NOT_DRAWN = 0.98
-"""That a vector was not drawn, where both its ends were read for certain and no ink lies between them."""
+"""Probability that it was not drawn if both its ends were read for certain and no ink is between them."""
 NOTHING = DrawnVector(0.0, 0.0, None, 0.0, 1.0)
 """A component left blank, as it is compared: a zero."""
 
@@ -383,7 +383,7 @@ def _absent(charges: Charges, criterion: CriterionTable, expected: Quantity) -> 
 
 
 def _why_absent(charges: Charges, criterion: CriterionTable) -> Reason:
-    """Why a vector or link was not read; of anything that no sheet could show, that it is not measured."""
+    """Return why a vector or link was not read, or that it was not measured if no sheet could show it."""
     segment, evidence = charges.task.segments.get(criterion.name), charges.evidence
     if segment is None or not evidence.has_sheets:
         return Reason("not_measured")
@@ -394,7 +394,7 @@ def _why_absent(charges: Charges, criterion: CriterionTable) -> Reason:
 
 
 def _is_nothing(charges: Charges, criterion: CriterionTable) -> bool:
-    """Whether an earlier mistake leaves a component too short to be drawn."""
+    """Return whether an earlier mistake leaves a component too short to be drawn."""
     task = charges.task
     is_component = isinstance(task.construction.step(task.segments[criterion.name].head), Given)
     if not is_component or not task.rubric.follows_through(criterion):
@@ -412,7 +412,7 @@ def _leave_out(charges: Charges, segment: TaskSegment | None, verdict: Verdict) 
 
 
 def _is_not_drawn(task: Task, evidence: Evidence, name: str, length_mm: float) -> bool:
-    """Whether a vector of this expected length is not on the sheet, though both its ends were read."""
+    """Return whether a vector of this expected length is missing, though both its ends were read."""
     vector = task.construction.vectors.get(name)
     if vector is None or name not in evidence.blank or length_mm < SHORT_MM:
         return False

@@ -43,9 +43,9 @@ class DrawnVector:
     se_deg: float
     confidence: float
     turn_rad: float = 0.0
-    """Of the sketch on its sheet: the sheet's direction is `direction_rad` + this."""
+    """Turn of the sketch on its sheet: the sheet's direction is `direction_rad` + this."""
     others: tuple[OtherReading, ...] = ()
-    """What else it may be, likeliest first, as on the sheet."""
+    """Other readings, the likeliest first, as on the sheet."""
 
     def if_others(self) -> Iterator["DrawnVector"]:
         """The vector as each of the others, with the confidence that it is this one or one before it."""
@@ -167,7 +167,8 @@ class _Sheets:
             self.add_nodes(joints, sketch)
         for figure, read in reading.figures.items():
             if figure != MECHANISM:
-                self.add_vectors(_vectors(self.task, figure, read, turn, se_turn))
+                names = [vector.name for vector in self.task.construction.vectors_of(figure)]
+                self.add_vectors(_vectors(read, names, turn, se_turn))
                 self.add_nodes(_plan_nodes(self.task, figure, read, turn), read)
                 if joints:
                     self.sketches.setdefault(figure, joints)
@@ -218,17 +219,19 @@ def held_against_cells(
 # Vectors and nodes --------------------------------------------------------------------------------
 
 
-def _vectors(task: Task, figure: str, read: Figure, turn: float, se_turn: float) -> dict[str, DrawnVector]:
+def _vectors(
+    read: Figure, names: Iterable[str], turn: float = 0.0, se_turn: float = 0.0
+) -> dict[str, DrawnVector]:
+    """Vectors of a figure whose lengths are known, by name; `turn` is that of its sheet."""
     found = {}
-    for vector in task.construction.vectors_of(figure):
-        one = read.vectors.get(vector.name)
-        if one is None or one.length_mm is None:
-            continue
-        direction = None if one.direction_deg is None else math.radians(one.direction_deg) - turn
-        se_deg = math.hypot(one.se_deg or 0.0, math.degrees(se_turn))
-        found[vector.name] = DrawnVector(
-            one.length_mm, one.se_mm, direction, se_deg, one.confidence, turn, one.others
-        )
+    for name in names:
+        one = read.vectors.get(name)
+        if one is not None and one.length_mm is not None:
+            direction = None if one.direction_deg is None else math.radians(one.direction_deg) - turn
+            se_deg = math.hypot(one.se_deg or 0.0, math.degrees(se_turn))
+            found[name] = DrawnVector(
+                one.length_mm, one.se_mm, direction, se_deg, one.confidence, turn, one.others
+            )
     return found
 
 
@@ -282,15 +285,8 @@ def _yardstick(task: Task, sketch: Figure) -> list[tuple[float, float]]:
 
 
 def _measured(reading: Reading | None) -> dict[str, DrawnVector]:
-    found: dict[str, DrawnVector] = {}
-    for figure in reading.figures.values() if reading else ():
-        for name, one in figure.vectors.items():
-            if one.length_mm is not None:
-                direction = None if one.direction_deg is None else math.radians(one.direction_deg)
-                found[name] = DrawnVector(
-                    one.length_mm, one.se_mm, direction, one.se_deg or 0.0, one.confidence
-                )
-    return found
+    figures = reading.figures.values() if reading else ()
+    return {name: one for read in figures for name, one in _vectors(read, read.vectors).items()}
 
 
 def _refused(reading: Reading | None) -> dict[str, tuple[str, ...]]:
@@ -322,7 +318,7 @@ def _nodes_from(task: Task, measured: Mapping[str, DrawnVector]) -> dict[str, co
 
 
 NOT_TURNED = (0.0, math.radians(1.0))
-"""Where no sketch tells the turn: people draw along the frame, to about a degree."""
+"""The turn without a sketch, and its standard error: people draw along the frame, to about a degree."""
 FAR_TURNED_RAD = math.radians(90.0)
 """Nobody turns a sketch by more than this on its sheet."""
 LEAST_TURNED_MM = 10.0
@@ -334,11 +330,11 @@ LEAST_GROUND_MM = 20.0
 CERTAINLY_UPRIGHT_RAD = 1e-3
 """A smaller turn is far below every tolerance of a direction."""
 LEAST_JOINTS = 3
-"""So many joints that fit together determine the turn of a sketch whose other joints are wrong."""
+"""Number of joints that fit together and so determine the turn of a sketch with other, wrong joints."""
 
 
 def turn_of(task: Task, sketch: Figure) -> tuple[float, float]:
-    """How far the mechanism is turned on its sheet, radians counter-clockwise, and its standard error.
+    """Return the turn of the mechanism on its sheet, radians counter-clockwise, and its standard error.
 
     It is fitted to the whole mechanism where that is right, else to what is right without one joint and
     those drawn from it, else to the pivots alone, which no mistake moves; `NOT_TURNED` without any.
@@ -352,7 +348,7 @@ def turn_of(task: Task, sketch: Figure) -> tuple[float, float]:
     for nodes in _subsets(task, sure):
         fit = _fit(nodes, exact)
         if fit is not None and fit[2] <= FIT_MM:
-            # A turn that drafting errors may have made may as well be one.
+            # A turn that may be a drafting error is none, but counts as the uncertainty.
             is_error = _is_drafting_error(task, nodes, fit[0])
             return (0.0, math.hypot(fit[1], fit[0])) if is_error else (fit[0], fit[1])
     ground = _fit({name: node for name, node in sure.items() if name in task.ground}, exact)
@@ -360,7 +356,7 @@ def turn_of(task: Task, sketch: Figure) -> tuple[float, float]:
 
 
 def _agrees_with_plans(task: Task, reading: Reading, turn: float) -> bool:
-    """Whether as many vectors of the sheet's plans fit a sketch's turn as fit none.
+    """Return whether as many vectors of the sheet's plans fit a sketch's turn as fit none.
 
     People draw plans beside the sketch as it lies. One that looks upside down among plans that are not
     has been misread.
@@ -380,7 +376,7 @@ def _turn_of_sketches(task: Task, readings: Sequence[Reading]) -> tuple[float, f
 
 
 def _turns(task: Task, reading: Reading) -> list[float]:
-    """How far each vector of a sheet's plans is turned from the exact one, radians, -pi to pi."""
+    """Return the turn of each vector of a sheet's plans from the exact one, radians, -pi to pi."""
     return [
         math.remainder(math.radians(drawn.direction_deg) - cmath.phase(task.real[name]), math.tau)
         for figure in reading.figures.values()
@@ -392,7 +388,7 @@ def _turns(task: Task, reading: Reading) -> list[float]:
 
 
 def _is_drafting_error(task: Task, nodes: Iterable[str], turn: float) -> bool:
-    """Whether a turn is no more than careful drafting errors make of an upright sketch."""
+    """Return whether careful drafting errors may turn an upright sketch as much."""
     if abs(turn) <= CERTAINLY_UPRIGHT_RAD:
         return True
     drawn = task.traced(task.rule_scales).nodes

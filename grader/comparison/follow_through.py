@@ -65,7 +65,7 @@ def nothing_explained(_task: Task, _evidence: Evidence, _settled: Mapping[str, S
 
 @dataclass(slots=True)
 class FollowThrough:
-    """What follows from one submission's own values, at the scales used and at those it follows.
+    """Expectations that follow from one submission's own values, at the scales used and those it follows.
 
     Attributes
     ----------
@@ -107,9 +107,9 @@ class FollowThrough:
     def expectations(
         self, segment: TaskSegment, wrong: Collection[str] = (), *, follows_through: bool
     ) -> Iterator[Expectation]:
-        """What may be expected of a vector or link, each made when it is asked for.
+        """Yield the expectations of a vector or link, each made when it is asked for.
 
-        As given; as it follows from the student's own earlier values; as each explanation predicts.
+        The given one, those from the student's own earlier values, and each explanation's prediction.
 
         Arguments: `wrong` are nodes whose wrong line has been charged to another vector, or is in doubt.
         """
@@ -240,7 +240,7 @@ class FollowThrough:
         return {name: node.at for name, node in self.traced(self.followed, basis).made.items()}
 
     def is_trivial(self, segment: TaskSegment, expected: complex) -> bool:
-        """Whether an expectation is near zero, has no solution, or is far shorter than the right vector."""
+        """Return whether an expectation is near zero, unsolvable, or far shorter than the right vector."""
         if not cmath.isfinite(expected):
             return True
         rubric = self.task.rubric
@@ -283,7 +283,7 @@ class FollowThrough:
         return basis if self._explains_more(figure, basis) else None
 
     def _explains_more(self, figure: str, basis: PlanBasis) -> bool:
-        """Whether a basis makes every node of the plan that the right construction makes, and more."""
+        """Return whether a basis makes every node of the plan that the right construction makes, and more."""
         own = self.own(self.followed).get(figure, {})
         turned, right = self.traced(self.followed, basis), self.traced(self.followed)
         made = {node for node in own if self._makes(node, turned)}
@@ -359,14 +359,14 @@ class FollowThrough:
                 yield self.causes_of(node, basis) | wrong, self.followed, basis, False
 
     def _lays_off(self, node: str, traced: TracedDrawing) -> bool:
-        """Whether a drawing lays a node off to the side where the student has it; a short one to either."""
+        """Return whether a drawing lays a node off to the student's side; a short one may lie on either."""
         step = self.task.construction.step(node)
         start = traced.nodes[step.start].at if isinstance(step, Given) else 0j
         own, made = traced.nodes[node].at - start, traced.made[node].at - start
         return abs(own) < self.task.tolerance_at(node).least_mm or dot(own, made) > 0.0
 
     def _makes(self, node: str, traced: TracedDrawing) -> bool:
-        """Whether a drawing puts a node where the student has it, within tolerance or drafting errors."""
+        """Return whether a drawing puts a node where the student has it, by tolerance or drafting errors."""
         made, own = traced.made[node], traced.nodes[node]
         residual = own.at - made.at
         if not cmath.isfinite(residual):

@@ -7,7 +7,7 @@ from dataclasses import replace
 from grader.comparison.task import Task
 from grader.comparison.verdicts import EVEN, FULL, NONE, MarkRange, degrees
 from grader.documents import Quantity, Tolerance, Verdict
-from grader.outcomes import Outcome
+from grader.outcomes import CREDITED, Outcome
 from grader.records import Reason
 from grader.rubric import CriterionTable
 from reference.construction.elements import Line
@@ -15,7 +15,6 @@ from reference.construction.graph import Construction
 from reference.construction.steps import Divide, Given, Similar, TwoLines
 from reference.quantities import unit_of
 
-CREDITED = frozenset({"full", "follow_through"})
 RANKS: dict[Verdict, int] = {"none": 0, "partial": 1, "follow_through": 2, "full": 2}
 
 
@@ -216,7 +215,7 @@ def _replaced(construction: Construction, node: str) -> Iterator[str]:
 
 
 def _earned(outcome: Outcome, of: str) -> Outcome:
-    if outcome.verdict == "not_judged" or not LEFT_OUT & {reason.code for reason in outcome.reasons}:
+    if outcome.verdict == "not_judged" or not LEFT_OUT & outcome.codes:
         return outcome
     earned = settled_as(outcome, "full", FULL, (Reason("by_similarity", {"of": of}),))
     return replace(earned, confidence=1.0)

@@ -39,7 +39,7 @@ class PlanBasis:
     quarters: int = 0
 
     def blames(self, vector: str, head: str) -> bool:
-        """Whether the mistake was made in this vector, which ends at the node `head`."""
+        """Return whether the mistake was made in this vector, which ends at the node `head`."""
         if head not in self.wrong:
             return False
         on_lines = {name for name in self.lines if self.construction.vectors[name].head == head}
@@ -82,17 +82,15 @@ def _by_figure(task: Task, positions: Mapping[str, OwnNode]) -> dict[str, dict[s
 
 def known(nodes: Nodes) -> frozenset[str]:
     """The names of all own nodes."""
-    return frozenset(
-        name for figure, positions in nodes.items() for name in positions if figure != MECHANISM
-    ) | frozenset(nodes.get(MECHANISM, ()))
+    return frozenset(name for positions in nodes.values() for name in positions)
 
 
 # From measured lengths -----------------------------------------------------------------------------
 
 LEAST_SINE = 0.2
-"""Of the angle at which two lengths meet: in a flatter triangle the corner is taken to lie on the base."""
+"""Least sine of the angle at which two lengths meet; in a flatter triangle the corner lies on the base."""
 GAP_MM = 3.0
-"""So much two lengths may be too short to meet, by errors of drawing and of measuring."""
+"""Largest gap between two lengths that should meet, from errors of drawing and measuring."""
 BRANCHES = 32
 """Explanations that are continued."""
 COST_WINDOW = 26.0
@@ -273,7 +271,7 @@ class _LengthBranches:
         columns: Mapping[str, int],
         shifts: Mapping[str, ComplexArray],
     ) -> ComplexArray:
-        """How one standard deviation of each measurement moves a node, complex mm."""
+        """Return the shift of a node by one standard deviation of each measurement, complex mm."""
         hand = self.task.rubric.hand
         rows = []
         for one in sources:
@@ -310,7 +308,7 @@ def _nearest(made: Sequence[ComplexArray], place: ComplexArray) -> FloatArray:
 
 
 def _is_component(step: Step) -> TypeGuard[Given]:
-    """Whether a step lays off a normal or Coriolis component: it may be missing, or reversed."""
+    """Return whether a step lays off a normal or Coriolis component: it may be missing, or reversed."""
     return isinstance(step, Given) and isinstance(step.length, Normal | Coriolis)
 
 
@@ -385,9 +383,9 @@ def own_rate(
 # Another mechanism that the vectors fit ------------------------------------------------------------
 
 BETTER_BY = 3
-"""So many more vectors a wrong mechanism must explain."""
+"""Number of vectors that a wrong mechanism must explain beyond those of the right one."""
 LEAST_SHARE = 0.6
-"""Of the measured vectors that it explains."""
+"""Least share of the measured vectors that it explains."""
 
 
 def other_mechanism(
@@ -402,55 +400,44 @@ def other_mechanism(
         return None
     each = [scales[0]] if scales[0] == scales[1] else list(scales)
     tried = [one for scale in each for one in _tried(task, scale)]
-    counts = [_fitting(task, one, known) for one in tried]
-    right = max(count for one, count in zip(tried, counts, strict=True) if one.is_right)
+    counted = [(basis, _fitting(task, vectors, known)) for basis, vectors in tried]
+    right = max(count for basis, count in counted if basis.construction is task.construction)
     least, best = max(right + BETTER_BY, math.ceil(LEAST_SHARE * len(known))), None
-    for one, count in zip(tried, counts, strict=True):
-        if not one.is_right and count >= least:
-            best, least = PlanBasis("other", one.construction, one.parameters), count + 1
+    for basis, count in counted:
+        if basis.construction is not task.construction and count >= least:
+            best, least = basis, count + 1
     return best
 
 
-@dataclass(frozen=True, slots=True)
-class _Plans:
-    """What one construction makes of the data: complex millimetres by vector."""
-
-    is_right: bool
-    construction: Construction
-    parameters: Parameters
-    vectors: Mapping[str, complex]
-
-
-def _tried(task: Task, scales: Mapping[str, float]) -> list[_Plans]:
-    """The plans for the right mechanism and for every wrong assembly."""
+def _tried(task: Task, scales: Mapping[str, float]) -> list[tuple[PlanBasis, Mapping[str, complex]]]:
+    """The right mechanism and every wrong assembly, each with its vectors, complex millimetres by name."""
     key = ("plans", *(scales[name] for name in SCALE_NAMES))
 
-    def tried() -> list[_Plans]:
+    def tried() -> list[tuple[PlanBasis, Mapping[str, complex]]]:
         known = task.at(scales)
         others = [
             task.construction.with_step(replace(step, side=-step.side))
             for step in task.construction.figures[MECHANISM]
             if isinstance(step, TwoArcs | ArcAndLine)
         ]
-        return [_plans(one, known, is_right=one is task.construction) for one in (task.construction, *others)]
+        return [
+            (PlanBasis("other", one, known), _vectors(one, known)) for one in (task.construction, *others)
+        ]
 
     return task.cached(key, tried)
 
 
-def _plans(construction: Construction, parameters: Parameters, *, is_right: bool) -> _Plans:
+def _vectors(construction: Construction, parameters: Parameters) -> dict[str, complex]:
     nodes = evaluate(construction, parameters)
-    vectors = {
+    return {
         one.name: complex(np.ravel(nodes[one.head] - nodes[one.tail])[0])
         for one in construction.vectors.values()
     }
-    return _Plans(is_right, construction, parameters, vectors)
 
 
-def _fitting(task: Task, plans: _Plans, known: Mapping[str, DrawnVector]) -> int:
-    """How many of the vectors lie within twice their tolerance."""
-    return sum(
-        _fits(drawn, plans.vectors[name], task.rubric.tolerance_of(name)) for name, drawn in known.items()
-    )
+def _fitting(task: Task, vectors: Mapping[str, complex], known: Mapping[str, DrawnVector]) -> int:
+    """Count the vectors that lie within twice their tolerance."""
+    return sum(_fits(drawn, vectors[name], task.rubric.tolerance_of(name)) for name, drawn in known.items())
 
 
 def _fits(drawn: DrawnVector, exact: complex, table: ToleranceTable) -> bool:

@@ -26,7 +26,7 @@ from reference.construction.uncertainty import spread
 from reference.quantities import unit_of
 
 TELLING = 2
-"""So many vectors of the right length confirm a scale as well as the crank's vector does."""
+"""Number of vectors of the right length that confirm a scale as well as the crank's vector."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,8 @@ def _settled_scale(
     rule = _by_rule(task, evidence, name, before)
     if parsed is None:
         used = UsedScale(None, None, rule, assumed=True)
-        return Scale(used, _contradiction(task, evidence, name, rule), None, (_assumed(name, rule),))
+        assumed = Reason("scale_assumed", {"used": rule, "unit": unit_of(name)})
+        return Scale(used, _contradiction(task, evidence, name, rule), None, (assumed,))
     if isinstance(parsed, Refused):
         used = UsedScale(text, None, rule, assumed=True, refused=parsed.why)
         why = parsed.why
@@ -102,16 +103,6 @@ def _parsed(task: Task, name: str, text: str | None) -> ParsedScale | None:
     return parsed
 
 
-@lru_cache(maxsize=4096)
-def _understood(name: str, text: str, bare_unit: str | None) -> ParsedScale:
-    """The scale that a text declares; cached, since a class declares the same few scales."""
-    return parse_scale(name, text, bare_unit=bare_unit)
-
-
-def _assumed(name: str, rule: float) -> Reason:
-    return Reason("scale_assumed", {"used": rule, "unit": unit_of(name)})
-
-
 def _by_rule(task: Task, evidence: Evidence, name: str, before: Mapping[str, Scale]) -> float:
     """The scale by the assignment's rule; a length scale by the drawn yardstick where that was read."""
     known = {each: scale.followed for each, scale in before.items()}
@@ -132,7 +123,7 @@ def _by_rule(task: Task, evidence: Evidence, name: str, before: Mapping[str, Sca
 def _evidence_of(
     task: Task, evidence: Evidence, name: str, *, however_doubtful: bool = False
 ) -> tuple[float, float, float] | None:
-    """What shows a scale on the drawing: real value, drawn millimetres, standard error; None without it.
+    """Return the evidence of a scale: real value, drawn millimetres, standard error; None without any.
 
     Arguments: `however_doubtful` takes a vector whatever its confidence.
     """
@@ -164,7 +155,7 @@ def _contradiction(task: Task, evidence: Evidence, name: str, used: float) -> fl
 
 
 def _fitting(task: Task, evidence: Evidence, name: str, scale: float, least: float = 0.0) -> int:
-    """How many drawn vectors of such a confidence, beside the crank's, have the right length at a scale."""
+    """Count the drawn vectors of such a confidence, without the crank's, with the right length at a scale."""
     vectors = [v for v in task.construction.vectors.values() if v.scale == name]
     known = [(v.name, evidence.vector(v.name)) for v in vectors if v.name != task.driven_vector(name)]
     return sum(
@@ -175,7 +166,7 @@ def _fitting(task: Task, evidence: Evidence, name: str, scale: float, least: flo
 
 
 def _links_at(task: Task, evidence: Evidence, scale: float) -> int:
-    """How many links beside the yardstick have the right length at a scale of lengths."""
+    """Count the links without the yardstick that have the right length at a scale of lengths."""
     yardstick = None if task.yardstick is None else {task.yardstick.tail, task.yardstick.head}
     return sum(
         _fits(evidence.drawn[name], abs(task.segments[name].real) / scale, task.rubric.tolerance_of(name))
@@ -228,7 +219,7 @@ def _hold_declared(task: Task, evidence: Evidence, name: str, scale: UsedScale, 
 def _unseen(
     task: Task, evidence: Evidence, name: str, scale: UsedScale, doubtful: tuple[float, float, float] | None
 ) -> Scale:
-    """A declared scale that waits: what shows it was not read for certain.
+    """Return a declared scale that waits for a person: its evidence was not read for certain.
 
     Arguments: `doubtful` is what shows it as read, where that contradicts it.
     """
@@ -259,7 +250,7 @@ def _is_off(task: Task, evidence: Evidence, name: str, declared: float, other: f
 
 
 def _is_unseen(task: Task, evidence: Evidence, name: str, scale: float) -> bool:
-    """Whether a plan was read without its crank's vector, and nothing else confirms its scale."""
+    """Return whether a plan was read without its crank's vector, and nothing else confirms its scale."""
     plan = [v.name for v in task.construction.vectors.values() if v.scale == name]
     return any(one in evidence.drawn for one in plan) and _fitting(task, evidence, name, scale) < TELLING
 
@@ -286,7 +277,7 @@ def _followed_instead(
 def _is_confirmed(
     task: Task, evidence: Evidence, name: str, scale: float, shown: tuple[float, float, float]
 ) -> bool:
-    """Whether a scale agrees with the drawn length within its tolerance and uncertainty.
+    """Return whether a scale agrees with the drawn length within its tolerance and uncertainty.
 
     Arguments: `shown` is what `_evidence_of` the scale gives.
     """
@@ -322,9 +313,9 @@ LIKELY, BEYOND_DOUBT = 0.2, 0.985
 """Confidence at which a box is believed where the drawing or the rule has the very scale (a misreading
 would hit it once in hundreds), and where they have another; `SURE` where they have nearly that scale."""
 SAME = 0.005
-"""Relative: two scales that differ less are one, rounded."""
+"""Relative difference up to which two scales are the same one, rounded."""
 BORNE_OUT = 0.02
-"""Relative: as near as that the drawing or the rule bears a scale out."""
+"""Relative difference up to which the drawing or the rule confirms a scale."""
 Source = Literal["roster", "measurements", "box"]
 
 
@@ -380,7 +371,8 @@ def declarations(
             if box is not None:
                 texts[name], sources[name] = box.text, "box"
         elif box is not None and not _is_same(task, name, box.text, texts[name], known):
-            problems.append(_contradicts(name, box, texts[name], sources[name]))
+            seen: dict[str, Value] = {"scale": name, "read": box.text, "confidence": box.confidence}
+            problems.append(Reason("scale_box_disagrees", {**seen, sources[name]: texts[name]}))
         if name in texts:
             known.update(_value(task, name, texts[name], known))
     return Declarations(texts, sources, tuple(problems), tuple(unread))
@@ -416,11 +408,6 @@ def _believed(
     return best, []
 
 
-def _contradicts(name: str, box: Written, text: str, source: Source) -> Reason:
-    seen: dict[str, Value] = {"scale": name, "read": box.text, "confidence": box.confidence}
-    return Reason("scale_box_disagrees", {**seen, source: text})
-
-
 def _differ(name: str, given: Sequence[tuple[str, Source]]) -> Reason:
     said: dict[str, tuple[str, ...]] = {}
     for text, source in given:
@@ -428,9 +415,13 @@ def _differ(name: str, given: Sequence[tuple[str, Source]]) -> Reason:
     return Reason("scale_disagrees", {"scale": name, **said})
 
 
+_understood = lru_cache(maxsize=4096)(parse_scale)
+"""The scale that a text declares; cached, since a class declares the same few scales."""
+
+
 def _parsed_text(task: Task, name: str, text: str) -> ParsedScale:
-    units = task.assignment.file.scales.bare_units
-    return _understood(name, text, next((unit for scale, unit in units.items() if scale == name), None))
+    units = task.assignment.file.scales.bare_units.items()
+    return _understood(name, text, bare_unit=next((unit for scale, unit in units if scale == name), None))
 
 
 def _value(task: Task, name: str, text: str, known: Mapping[str, float]) -> dict[str, float]:
@@ -446,18 +437,18 @@ def _value(task: Task, name: str, text: str, known: Mapping[str, float]) -> dict
 
 
 def _is_same(task: Task, name: str, one: str, other: str, known: Mapping[str, float]) -> bool:
-    """Whether two texts mean the same scale, as far as both can be understood."""
+    """Return whether two texts mean the same scale, as far as both can be understood."""
     first, second = (_value(task, name, text, known).get(name) for text in (one, other))
     return first is None or second is None or abs(first / second - 1.0) <= SAME
 
 
 def _is_certainly_same(task: Task, name: str, text: str, other: str, known: Mapping[str, float]) -> bool:
-    """Whether two texts surely mean the same scale; a rule takes undeclared scales from the assignment."""
+    """Return whether two texts surely mean one scale; a rule takes undeclared scales from the assignment."""
     if text == other or _parsed_text(task, name, text) == _parsed_text(task, name, other):
         return True
     known = {**task.rule_scales, **known}
-    first, second = (_value(task, name, each, known).get(name) for each in (text, other))
-    return first is not None and second is not None and abs(first / second - 1.0) <= SAME
+    are_known = all(_value(task, name, each, known) for each in (text, other))
+    return are_known and _is_same(task, name, text, other, known)
 
 
 def _is_borne_out(
@@ -468,7 +459,7 @@ def _is_borne_out(
     known: Mapping[str, float],
     within: float = BORNE_OUT,
 ) -> bool:
-    """Whether the drawn crank, v_A or a_A, or the assignment's rule, has nearly this scale.
+    """Return whether the drawn crank, v_A or a_A, or the assignment's rule, has nearly this scale.
 
     A rule of the student's own, such as omega kL, needs nothing else to bear it out.
     """

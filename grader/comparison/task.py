@@ -117,14 +117,6 @@ class Task:
         """The scales that the assignment's rule gives."""
         return {name: float(self.parameters[name]) for name in SCALE_NAMES}
 
-    def scale_of(self, vector: str) -> str:
-        """``kv`` or ``ka``."""
-        return self.construction.vectors[vector].scale
-
-    def drawn(self, vector: str, scales: Mapping[str, float]) -> complex:
-        """The exact vector on paper, millimetres, at these scales."""
-        return self.real[vector] / scales[self.scale_of(vector)]
-
     def at(self, scales: Mapping[str, float]) -> dict[str, np.ndarray[tuple[int, ...], np.dtype[np.float64]]]:
         """The parameters with other scales."""
         return {**self.parameters, **{name: np.asarray(scales[name]) for name in SCALE_NAMES}}

@@ -4,7 +4,7 @@ import cmath
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol, cast
+from typing import cast
 
 from grader.comparison.evidence import DrawnVector
 from grader.documents import Tolerance
@@ -118,16 +118,16 @@ class MarkRange:
 
     @property
     def is_certain(self) -> bool:
-        """Whether the standard errors leave only one verdict."""
+        """True if the standard errors leave only one verdict."""
         return self.worst == self.best
 
     @property
     def is_full(self) -> bool:
-        """Whether it is full marks for certain."""
+        """True if it is full marks for certain."""
         return self.worst == FULL
 
     def is_better(self, other: "MarkRange") -> bool:
-        """Whether it leaves more than another, first for certain, then at best."""
+        """Return whether it leaves more than another, first for certain, then at best."""
         return (self.worst, self.best) > (other.worst, other.best)
 
 
@@ -135,7 +135,7 @@ ALL_RIGHT = MarkRange(FULL, FULL, FULL)
 
 
 def mark(limits: Sequence[Limit], remarks: tuple[Reason, ...] = ()) -> MarkRange:
-    """The mark that limits give, at least one."""
+    """Return the mark that one or several limits give together."""
     by_loss = sorted(limits, key=lambda limit: limit.share)
     losses = tuple(limit.reason for limit in by_loss if limit.share != FULL)
     near = tuple(
@@ -173,7 +173,7 @@ def at_worst(mark: MarkRange) -> MarkRange:
 
 
 EVEN = 0.5
-"""The probability of a mark that is open for a reason which no probability is known of."""
+"""Probability of a mark that is open for a reason without a known probability."""
 
 
 def open_between(
@@ -184,7 +184,7 @@ def open_between(
 
 
 COUNTED: Mapping[str, str] = {"student": "counted_for_you", "strict": "not_certainly_within"}
-"""The reason that tells of a decision rule, by its name."""
+"""The code of the reason for each decision rule."""
 
 
 def by_rule(first: MarkRange, rule: str) -> MarkRange:
@@ -240,26 +240,26 @@ def the_worse(first: MarkRange, other: MarkRange) -> MarkRange:
 
 
 WRONG_CREDIT, WRONG_COUNTED, WRONG_CHARGE = 0.05, 0.15, 1.0
-"""How often a reading without any confidence makes the verdict wrong. What is taken for a vector lies seldom
-within the tolerance of the right one unless that is there: of simulated vectors credited with a confidence
-below 0.2 one in 20 was wrong, of 900 from 0.2 to 0.9 none (other students than those of the docs). What is
-within the tolerance by the reading's error alone is less surely so. A misreading makes a right vector wrong
-much more often."""
+"""Probabilities that a reading without any confidence makes the verdict wrong. Another stroke seldom lies
+within the tolerance of the right vector: of simulated vectors credited with a confidence below 0.2 one in 20
+was wrong, of 900 from 0.2 to 0.9 none (other students than those of the docs). A vector that is within the
+tolerance by the reading's error alone is less certain. A misreading makes a right vector wrong much more
+often."""
 
 
 MOSTLY_MISREAD = 0.7
-"""Of vectors that are off as read and were read without any confidence, this share was misread. On simulated
+"""Share of misread vectors among those that are off and were read without any confidence. On simulated
 flatbed sheets 31 of 39 read with 0.3 to 0.9 were read rightly, and all of 59 from 0.9 on."""
 
 
 SHORT_MM, WRONG_SHORT = 5.0, 0.03
-"""What is expected shorter than this may be hidden by the marks of its ends; there is little to misread."""
+"""A vector expected to be shorter may be hidden by the marks of its ends; there is little to misread."""
 
 
 def with_confidence(
     mark: MarkRange, confidence: float, settle: float, expected_mm: float = math.inf
 ) -> MarkRange:
-    """A mark, wholly open where a misreading is too likely to have made it.
+    """Return a mark, open between nothing and full marks if the vector may have been misread.
 
     Arguments: `confidence` is the probability that the vector is read rightly, `settle` the least
     probability of a verdict that stands.
@@ -285,13 +285,6 @@ REVERSED_WITHIN_DEG = 20.0
 """A direction this near the opposite one is called reversed, not turned by so much."""
 
 
-class Held(Protocol):
-    """Something drawn or computed that can be held against expectations."""
-
-    def against(self, one: Expectation) -> MarkRange:
-        """The mark against one expectation."""
-
-
 BOUNDLESS_MM, BOUNDLESS_SHARE = 20.0, 0.5
 """Propagated uncertainty larger than this, and than this share of the vector: the linear propagation no
 longer holds, and the error may be anything."""
@@ -299,7 +292,7 @@ longer holds, and the error may be anything."""
 
 @dataclass(frozen=True, slots=True)
 class HeldVector:
-    """A drawn vector, held by the rubric; `remarks` are told wherever it is not right."""
+    """A drawn vector judged by the rubric; `remarks` are added to its reasons unless it is right."""
 
     rubric: RubricFile
     criterion: CriterionTable
@@ -307,7 +300,7 @@ class HeldVector:
     remarks: tuple[Reason, ...] = ()
 
     def allowed(self, one: Expectation, at_most: float | None = None) -> Tolerance:
-        """What full marks allow on paper.
+        """Return the tolerance of full marks on paper.
 
         Arguments: `at_most` bounds it to a multiple of the plain tolerance, by default the rubric's.
         """
@@ -345,7 +338,7 @@ class HeldVector:
 
 @dataclass(frozen=True, slots=True)
 class HeldValue:
-    """A computed value, SI, held by the rubric; `per_mm` is worth a millimetre of its vector.
+    """A computed value, SI, judged by the rubric; `per_mm` is the value of a millimetre of its vector.
 
     A vector's value has no sign, an angular quantity's has: the real part of an expectation is its value.
     """
@@ -356,7 +349,7 @@ class HeldValue:
     per_mm: float
 
     def allowed(self, one: Expectation) -> Tolerance:
-        """What full marks allow: the tolerance of the length that the value stands for."""
+        """Return the tolerance of full marks: that of the length that the value stands for."""
         table, most = self.rubric.tolerance_of(self.criterion), self.rubric.hand.at_most
         on_paper = widened(table, most, one, with_direction=False)
         return Tolerance(value=(on_paper.length_mm or 0.0) * self.per_mm, widened=on_paper.widened)
@@ -379,6 +372,10 @@ class HeldValue:
             reason = Reason("value_too_large" if large else "value_too_small", params)
         plain = table.length_at(abs(one.vector)) * self.per_mm
         return mark([Limit("value", residual, allowed, plain, 0.0, table, reason)])
+
+
+Held = HeldVector | HeldValue
+"""Something drawn or computed that can be held against expectations."""
 
 
 def widened(

@@ -114,8 +114,7 @@ class Setting:
     @property
     def title(self) -> str:
         """The assignment's title and id, the variant's number and position."""
-        numbers = (("n", self.variant.n), (self.words.gettext("position"), self.variant.position))
-        parts = [f"{name} = {value}" for name, value in numbers if value is not None]
+        parts = [f"{self.words.gettext(name)} = {value}" for name, value in self.variant.numbers.items()]
         title = self.assignment.file.title.in_language(self.words.lang)
         return ", ".join([f"{title} ({self.assignment.id})", *parts])
 

@@ -43,10 +43,10 @@ from grader.files import result_folders, write_whole
 from grader.language import N_, Tongue, tongue
 from grader.marking.trust import CONFIDENCE
 from grader.overlay.scene import MARKS
+from grader.texts.spoken import NO_NAMES
 
 # The page -----------------------------------------------------------------------------------------
 
-_NO_NAMES: Mapping[str, str] = {}
 SHOWN = 12
 """Number of students named at once; the others unfold."""
 FEW = 3
@@ -108,7 +108,7 @@ def write_index(
     lang: str,
     *,
     title: str = "",
-    student_names: Mapping[str, str] = _NO_NAMES,
+    student_names: Mapping[str, str] = NO_NAMES,
 ) -> None:
     """Write `index.html`, the class at a glance, into a folder; `student_names` by student_id."""
     page = index_page(results, lang, title=title, student_names=student_names, out=str(out_dir))
@@ -120,7 +120,7 @@ def index_page(
     lang: str,
     *,
     title: str = "",
-    student_names: Mapping[str, str] = _NO_NAMES,
+    student_names: Mapping[str, str] = NO_NAMES,
     out: str = "OUT",
 ) -> str:
     """Return the class's page; `out` is the folder of the results, as commands name it."""

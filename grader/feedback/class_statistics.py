@@ -7,13 +7,13 @@ from math import floor
 from statistics import mean, median
 
 from grader.documents import CriterionDocument, CriterionMovedDocument, ReportDocument, ResultsDocument
+from grader.outcomes import CHARGED, CREDITED
 
 BINS = 10
 HARDEST = 8
 COMMONEST = 8
 
-_JUDGED = {"full", "partial", "none", "follow_through"}
-_LOST = {"none", "partial"}
+_JUDGED = CREDITED | CHARGED
 
 
 def states(results: ResultsDocument) -> Counter[str]:
@@ -144,7 +144,7 @@ def wrong_scales(results: ResultsDocument) -> list[tuple[ReportDocument, list[Cr
         # A criterion asks for a scale where it expects something per millimetre on paper.
         asked = [each for each in report.criteria if each.vector is None]
         asked = [each for each in asked if (each.expected.unit or "").endswith("/mm")]
-        lost = [criterion for criterion in asked if criterion.verdict in _LOST]
+        lost = [criterion for criterion in asked if criterion.verdict in CHARGED]
         refused = [
             f"{name} = {scale.text}" for name, scale in report.scales.items() if scale.refused and scale.text
         ]

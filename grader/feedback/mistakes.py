@@ -280,11 +280,11 @@ def precise(code: str, at: str, line: str, known: Collection[str]) -> str | None
     """Return the text that says what was done, with all known details; None if too little is known."""
     if at.startswith(CORIOLIS_END):
         return None
+    texts = PRECISE.get(code, ())
     if code == "units":
         texts = _PRECISE_UNITS.get(line, ())
-        return next((text for text in texts if set(_NAMED.findall(text)) <= set(known)), None)
-    by_guide = line == ALONG_GUIDE and code in PRECISE_ALONG_GUIDE
-    texts = PRECISE_ALONG_GUIDE[code] if by_guide else PRECISE.get(code, ())
+    elif line == ALONG_GUIDE:
+        texts = PRECISE_ALONG_GUIDE.get(code, texts)
     return next((text for text in texts if set(_NAMED.findall(text)) <= set(known)), None)
 
 

@@ -13,12 +13,10 @@ from grader.documents import CriterionDocument, Parameters, Quantity
 from grader.feedback.mistakes import GIVING_AWAY, MISTAKES, NORMAL_END, precise, question_of, words_of
 from grader.language import N_, Tongue, tongue
 from grader.options import Level
-from grader.outcomes import NamedMistake, Outcome
+from grader.outcomes import CHARGED, CREDITED, NamedMistake, Outcome
 from grader.records import Reason, Value
 from grader.texts.reasons import MISREAD, UNCHECKED, UNDECIDED, UNSURE, reason_sentence
-from grader.texts.spoken import place
-
-_NO_NAMES: Mapping[str, str] = {}
+from grader.texts.spoken import NO_NAMES, place
 
 # Criteria -----------------------------------------------------------------------------------------
 
@@ -49,7 +47,7 @@ MOST_REASONS = 3
 
 
 def criterion_feedback(
-    outcome: Outcome, lang: str, level: Level = "full", names: Mapping[str, str] = _NO_NAMES
+    outcome: Outcome, lang: str, level: Level = "full", names: Mapping[str, str] = NO_NAMES
 ) -> str:
     """Return the sentences on one criterion; empty at level `symbol`.
 
@@ -67,7 +65,7 @@ def criterion_feedback(
         for reason in _worth_telling(outcome, level)
     )
     parts = list(dict.fromkeys(told))[:MOST_REASONS]
-    if outcome.mistake and outcome.verdict in {"none", "partial"} and outcome.mistake in MISTAKES:
+    if outcome.mistake and outcome.verdict in CHARGED and outcome.mistake in MISTAKES:
         cause = outcome.cause
         words = words_of(cause.code, cause.at, line_of(cause)) if cause else MISTAKES[outcome.mistake]
         title = speaker.gettext(words.title)
@@ -76,7 +74,7 @@ def criterion_feedback(
 
 
 def feedback_again(
-    criterion: CriterionDocument, lang: str, level: Level = "full", names: Mapping[str, str] = _NO_NAMES
+    criterion: CriterionDocument, lang: str, level: Level = "full", names: Mapping[str, str] = NO_NAMES
 ) -> str:
     """Return the sentences on a report's open criterion in another language than the report's."""
     outcome = Outcome(
@@ -84,7 +82,7 @@ def feedback_again(
         criterion.tolerance, criterion.confidence,
         reasons=tuple(Reason(one.code, _as_before(one.parameters)) for one in criterion.why),
         possible=(criterion.verdict, criterion.verdict),
-        proposed=1.0 if criterion.proposed in {"full", "follow_through"} else 0.0,
+        proposed=1.0 if criterion.proposed in CREDITED else 0.0,
     )  # fmt: skip
     return criterion_feedback(outcome, lang, level, names)
 
@@ -97,7 +95,7 @@ def _worth_telling(outcome: Outcome, level: Level = "full") -> list[Reason]:
     """Return the reasons without those that add nothing to the others, or say too much."""
     if outcome.verdict == "not_judged" and not outcome.reasons:
         return [Reason(UNCHECKED)]
-    codes = {reason.code for reason in outcome.reasons}
+    codes = outcome.codes
     by_scale = any(one.code == "follows" and one.parameters.get("what") == "scale" for one in outcome.reasons)
     if outcome.verdict == "review" and "scale_assumed" in codes and by_scale:
         return [Reason(UNDECIDED)]
@@ -142,7 +140,7 @@ BETWEEN_RIVALS = N_("or:")
 
 
 def mistake_feedback(
-    mistake: NamedMistake, lang: str, level: Level = "full", names: Mapping[str, str] = _NO_NAMES
+    mistake: NamedMistake, lang: str, level: Level = "full", names: Mapping[str, str] = NO_NAMES
 ) -> str:
     """Describe the likeliest mistake and what to redo; empty at level `symbol` and for an unknown code.
 
@@ -163,7 +161,7 @@ ODDS = N_("How likely that is: %(share)s.")
 
 
 def mistake_sentences(
-    mistake: NamedMistake, speaker: Tongue, level: Level, names: Mapping[str, str] = _NO_NAMES
+    mistake: NamedMistake, speaker: Tongue, level: Level, names: Mapping[str, str] = NO_NAMES
 ) -> list[str]:
     """Return what was done and what to redo, then the same for each rival, with its odds.
 
@@ -190,7 +188,7 @@ def _odds(share: float, speaker: Tongue) -> str:
     return speaker.gettext(ODDS) % {"share": percent}
 
 
-def question(mistake: NamedMistake, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES) -> str:
+def question(mistake: NamedMistake, speaker: Tongue, names: Mapping[str, str] = NO_NAMES) -> str:
     """Return the question that distinguishes a mistake from its rivals."""
     where = {"at": place(mistake.at, speaker, names)}
     known = {**where, **_known(mistake, speaker, "hint", names)}
@@ -198,7 +196,7 @@ def question(mistake: NamedMistake, speaker: Tongue, names: Mapping[str, str] = 
 
 
 def mistake_sentence(
-    mistake: NamedMistake, speaker: Tongue, level: Level, names: Mapping[str, str] = _NO_NAMES
+    mistake: NamedMistake, speaker: Tongue, level: Level, names: Mapping[str, str] = NO_NAMES
 ) -> str:
     """Return what was done and what to redo, regardless of rivals."""
     words = words_of(mistake.code, mistake.at, line_of(mistake))

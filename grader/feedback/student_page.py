@@ -31,6 +31,7 @@ from grader.feedback.words import ProblemText, environment, problem_sentence
 from grader.files import write_whole
 from grader.language import N_, Tongue, tongue
 from grader.options import Level
+from grader.outcomes import CHARGED
 from grader.overlay.closeup import PageView, detail, page_views, scan_element, svg
 from grader.overlay.scene import Picture
 from grader.texts.spoken import PLACES, place
@@ -375,7 +376,7 @@ class StudentPage:
         criteria = {criterion.id: criterion for criterion in self.report.criteria}
         explained = [criteria[name] for name in mistake.explains if name in criteria]
         verdicts = {one.verdict for one in explained}
-        off = {one.drawn for one in explained if one.verdict in {"none", "partial", "review"}}
+        off = {one.drawn for one in explained if one.verdict in CHARGED | {"review"}}
         causes: list[MistakeDocument | RivalDocument] = [mistake, *mistake.rivals]
         titles = dict.fromkeys(_title(cause, self.speaker) for cause in causes)
         joined = f" {self.speaker.gettext(OR)} ".join(list(titles)[:MOST_TITLES])
@@ -387,7 +388,7 @@ class StudentPage:
             redo=tuple(mistake.redo),
             explains=tuple(self.shown(one.drawn or one.id) for one in explained),
             view=detail(self.pictures, off, self.about.names),
-            is_open="review" in verdicts and not verdicts & {"none", "partial"},
+            is_open="review" in verdicts and not verdicts & CHARGED,
         )
 
     @property

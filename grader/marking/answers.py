@@ -9,11 +9,10 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from grader.comparison.outcomes import CREDITED
 from grader.comparison.task import Task
 from grader.documents import Quantity
-from grader.outcomes import Judgement, Outcome
-from grader.records import Figure, ReadNode, ScannedPage
+from grader.outcomes import CREDITED, Judgement, Outcome
+from grader.records import Figure, ReadNode, ScannedPage, on_sheet
 from grader.tables.decisions import Decision
 
 Places = dict[tuple[str, str], tuple[float, float]]
@@ -30,7 +29,7 @@ NONE_DECIDED: Mapping[str, str] = {}
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """What is known by verdicts; false where that is nothing.
+    """Facts known from verdicts; false if there are none.
 
     Attributes
     ----------
@@ -46,7 +45,7 @@ class Answers:
 
 
 def answers_of(task: Task, own: Judgement, pages: Sequence[ScannedPage], rows: Sequence[Decision]) -> Answers:
-    """What the verdicts in some rows say of reading and scales.
+    """Return what the verdicts in some rows say of reading and scales.
 
     Arguments: `own` is the program's judgement without them, on `pages`.
     """
@@ -63,7 +62,7 @@ def answers_of(task: Task, own: Judgement, pages: Sequence[ScannedPage], rows: S
 
 
 def _has_waited(own: Judgement, outcome: Outcome) -> bool:
-    """Whether a verdict was open, or is on a scale that nobody declared."""
+    """Return whether a verdict was open, or is on a scale that nobody declared."""
     scale = own.scales.get(outcome.name)
     return outcome.verdict == "review" or (scale is not None and scale.assumed)
 
@@ -74,9 +73,9 @@ def _has_waited(own: Judgement, outcome: Outcome) -> bool:
 def _places(
     task: Task, outcome: Outcome, verdict: str, pages: Sequence[ScannedPage]
 ) -> Iterator[tuple[tuple[str, str], tuple[float, float]]]:
-    """Where the ends of a vector lie by the verdict on it."""
+    """Yield the places of a vector's ends that the verdict on it implies."""
     vector = task.construction.vectors.get(outcome.name)
-    codes = {reason.code for reason in outcome.reasons}
+    codes = outcome.codes
     if vector is None or outcome.verdict != "review" or not codes & OF_READING or "counted_for_you" in codes:
         return
     name = task.construction.figure_of(vector.head)
@@ -117,8 +116,3 @@ def along_of(quantity: Quantity) -> complex | None:
     if length is None or direction is None:
         return 0j if length is not None and length < 1e-6 else None
     return cmath.rect(length, math.radians(direction))
-
-
-def on_sheet(at: complex) -> tuple[float, float]:
-    """A complex place as x and y in mm of the sheet, y down."""
-    return at.real, -at.imag

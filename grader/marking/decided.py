@@ -6,19 +6,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import cast
 
-from grader.comparison.verdicts import EVEN, OPENING
+from grader.comparison.outcomes import unjudged
+from grader.comparison.verdicts import OPENING
 from grader.documents import (
     AppliedDecisionDocument,
     CriterionDocument,
     DecidedDocument,
-    Quantity,
     ReportDocument,
-    Tolerance,
     Verdict,
 )
-from grader.marking.mark import CHARGED, DECIMALS, score, with_mistake
+from grader.marking.mark import DECIMALS, score, with_mistake
 from grader.marking.settling import at_stake
-from grader.outcomes import Judgement, NamedMistake, Outcome
+from grader.outcomes import CHARGED, Judgement, NamedMistake, Outcome
 from grader.reading.corrected import corrected
 from grader.records import Reason, ScannedPage, Value
 from grader.rubric import CriterionTable, RubricFile
@@ -34,7 +33,7 @@ NOT_APPLIED = "decision_not_applied"
 
 
 def why_not(row: Decision, criterion: CriterionTable, rubric: RubricFile) -> Reason | None:
-    """Why the points of a decision contradict its verdict or the rubric; None where they do not."""
+    """Return why the points of a decision contradict its verdict or the rubric; None if they do not."""
     maximum, points = rubric.points[criterion.id], row.points
     if points is None:
         return None
@@ -97,9 +96,9 @@ FOLLOWED = "follows"
 
 
 def _reasons(reasons: Sequence[Reason], verdict: Verdict) -> Sequence[Reason]:
-    """What was read, as far as it says why a person's verdict is what it is; else that a person decided.
+    """Return the reasons that support a person's verdict; without any, that a person decided.
 
-    What would contradict the verdict, and why the program was in doubt, is not told.
+    Reasons that contradict the verdict, and those of the program's doubt, are left out.
     """
     said = [one for one in reasons if one.code not in OPENING | FOR_THE_STUDENT | {FOLLOWED}]
     losses = [one for one in said if one.code not in REMARKS]
@@ -121,30 +120,14 @@ def _left(mistakes: Sequence[NamedMistake], acquitted: set[str]) -> Iterator[Nam
             yield replace(mistake, explains=explains)
 
 
-NOTHING_READ = Outcome(
-    "",
-    "",
-    "review",
-    Quantity(),
-    Quantity(),
-    Tolerance(),
-    0.0,
-    (),
-    ("none", "full"),
-    shares=(0.0, 1.0),
-    probability=EVEN,
-)
-"""What nothing at all is known of."""
-
-
 def open_again(judgement: Judgement, rubric: RubricFile, submission: StudentSubmission) -> Judgement:
     """The judgement of a submission of which nothing could be read: what is asked for waits for a person."""
     why = Reason("unread" if submission.pages or submission.has_unusable else "not_measured")
-    waiting = replace(NOTHING_READ, reasons=(why,))
+    criteria = {one.id: one for one in rubric.criterion}
     outcomes = tuple(
         one
         if one.verdict == "not_judged"
-        else replace(waiting, criterion=one.criterion, name=one.name, expected=one.expected)
+        else unjudged(criteria[one.criterion], "review", (why,), expected=one.expected)
         for one in judgement.outcomes
     )
     return replace(judgement, outcomes=outcomes, mistakes=(), score=score(rubric, outcomes))
@@ -178,7 +161,7 @@ def with_decisions(
     before: Judgement | None = None,
     construction: Construction | None = None,
 ) -> ReportDocument:
-    """The report, in which it stands who decided what, what it was before, points added and a comment.
+    """Return the report with people's decisions: who decided what, the verdicts before, points, a comment.
 
     Arguments: `before`, the program's own judgement; the construction; neither for what was not judged.
     """
@@ -236,7 +219,7 @@ def _with_node(
 
 
 def _with_points(report: ReportDocument, row: Decision) -> ReportDocument:
-    """The report with points added to the score, or taken away, as far as they fit: so many are `added`."""
+    """Return the report with points added or subtracted within its limits; `added` is their number."""
     if report.score_range is None:
         return report
 

@@ -30,20 +30,20 @@ Key = tuple[str, str]
 
 
 def key_of(mistake: Mistake) -> Key:
-    """What tells a mistake from others: its code and its place."""
+    """Return a mistake's code and place, which distinguish it from others."""
     return mistake.code, mistake.at
 
 
 # The explanations of a drawing ---------------------------------------------------------------------
 
 FURTHER_SCALE = 4.0
-"""What it costs to suppose a further wrong scale: it often comes from the first."""
+"""Cost of a further wrong scale: it often comes from the first."""
 BEYOND_DOUBT = 8.0
 """A mistake is named only where the drawing made rightly by any hand costs this much more: 50 to 1."""
 BEYOND_DOUBT_BY_LENGTHS = 14.0
 """The same where no direction is known: a thousand to one."""
 LEAST_WRONG = 0.06
-"""Of a scale's logarithm: a smaller error is no mistake to be named, drafting errors reach it."""
+"""Least error of a scale's logarithm that is named a mistake: drafting errors reach smaller ones."""
 USUAL = 1.0
 CARES = (0.6, USUAL, 1.6, 2.5, 4.0)
 """The sizes of drafting errors that are tried, as multiples of the usual ones."""
@@ -135,7 +135,7 @@ def _by_cost(*found: Sequence[Replay]) -> list[Replay]:
 
 
 ONE_FACTOR = 0.08
-"""Of a logarithm: slips by factors as near as this to each other are one wrong scale."""
+"""Largest difference of the logarithms of slips that are one wrong scale."""
 
 
 def _scale_of_slips(case: Case, best: Replay) -> Root | None:
@@ -201,7 +201,7 @@ def _both(one: Root, other: Root) -> Root:
 
 
 def _is_explained(explanation: Replay) -> bool:
-    """Whether usual drafting errors and one mistake at most explain everything."""
+    """Return whether usual drafting errors and one mistake at most explain everything."""
     return not explanation.unexplained and len(explanation.made) <= 1 and explanation.care <= USUAL
 
 
@@ -213,7 +213,7 @@ def _cost_if_right(explanations: Sequence[Replay]) -> float:
 
 
 def _is_clear(explanations: Sequence[Replay], case: Case) -> bool:
-    """Whether the best explanation needs no further search.
+    """Return whether the best explanation needs no further search.
 
     It has no mistake, or one at a step whose node and sources were observed: a mistake in a mechanism
     that was not handed in shows in more than one step.
@@ -232,7 +232,7 @@ def _is_clear(explanations: Sequence[Replay], case: Case) -> bool:
 
 
 def _may_be_assembled_otherwise(explanations: Sequence[Replay], case: Case) -> bool:
-    """Whether a reversed component may be right for another assembly of a mechanism not handed in."""
+    """Return whether a reversed component may fit another assembly of a mechanism not handed in."""
     made = explanations[0].made if explanations else ()
     return any(one.code == "normal_reversed" for one in made) and not case.observations.sketches
 
@@ -327,7 +327,7 @@ def _swaps(case: Case, explanation: Replay) -> Iterator[Mistake]:
 
 
 def _lie_nearer_swapped(case: Case, pole: str, pair: tuple[str, str], nodes: Nodes) -> bool:
-    """Whether two nodes, as drawn, lie nearer to each other's right place than to their own."""
+    """Return whether two nodes, as drawn, lie nearer to each other's right place than to their own."""
     drawn = {
         one.node: one.value for one in case.observations.entries if one.tail is None and one.has_direction
     }
@@ -344,7 +344,7 @@ LEAST_LENGTHS = 4
 
 
 def _has_lengths_swapped(case: Case, figure: str, pair: tuple[str, str], nodes: Nodes) -> bool:
-    """Whether a right plan with two letters swapped has the lengths observed."""
+    """Return whether a right plan with two letters swapped has the lengths observed."""
     steps = {step.node for step in case.drawing.construction.figures[figure]}
     observed = [one for one in case.observations.entries if one.node in steps and not one.has_direction]
     if len(observed) < LEAST_LENGTHS:

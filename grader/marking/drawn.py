@@ -299,7 +299,7 @@ def _adjusted_plan(task: Task, evidence: Evidence, figure: str) -> list[_Nodes]:
 def _equations(
     task: Task, entries: Mapping[Vector, complex], nodes: Sequence[str]
 ) -> tuple[FloatArray, FloatArray]:
-    """Of each vector two rows, along it and across it, in standard deviations; and what was measured."""
+    """Return two rows for each vector, along and across it, in standard deviations; and the measurements."""
     hand = task.rubric.hand
     rows, drawn = np.zeros((2 * len(entries), 2 * len(nodes))), np.zeros(2 * len(entries))
     for index, (vector, along) in enumerate(entries.items()):

@@ -9,11 +9,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from grader.comparison.evidence import Submission
-from grader.comparison.outcomes import CREDITED, left_open, verdict_of
+from grader.comparison.outcomes import left_open, verdict_of
 from grader.comparison.task import Task
 from grader.comparison.verdicts import FULL, NONE, OPENING
 from grader.marking.settling import settled
-from grader.outcomes import NamedMistake, Outcome
+from grader.outcomes import CREDITED, NamedMistake, Outcome
 from grader.records import Figure, Reading, ReadNode, ReadVector, Reason
 from reference.construction.graph import Vector
 from reference.construction.mistakes import Mistake
@@ -113,7 +113,7 @@ def letters_charged(
     read: Sequence[NamedMistake],
     as_lettered: Callable[[Pair], Sequence[Outcome]],
 ) -> tuple[Outcome, ...]:
-    """The outcomes, one vector charged for each certain exchange of letters, and all that it touches told.
+    """Return the outcomes with one vector charged for each certain exchange of letters, and its reason.
 
     Arguments: `as_lettered` gives the outcomes under the letters as they stand; the charged one is of these.
     `read` are the exchanges of letters that were read beside nodes named by their lines: an uncertain one

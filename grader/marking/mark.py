@@ -10,7 +10,6 @@ import numpy as np
 
 from grader.comparison.criteria import NOT_DRAWN, Comparison, compare
 from grader.comparison.evidence import DrawnVector, Submission, gather
-from grader.comparison.outcomes import CREDITED
 from grader.comparison.scales import Scale
 from grader.comparison.task import Task
 from grader.comparison.verdicts import FULL, NONE
@@ -20,7 +19,7 @@ from grader.marking.lettering import exchanged_pair, letters_charged, with_lette
 from grader.marking.naming import LEAST_CONFIDENCE, Lost, drawn_instead, named, not_explained
 from grader.marking.settling import at_stake, is_of, of_another, of_nothing, settled
 from grader.marking.units import EXCHANGED, Undone, undone, with_scales_exchanged
-from grader.outcomes import Judgement, NamedMistake, Outcome, Score
+from grader.outcomes import CHARGED, CREDITED, Judgement, NamedMistake, Outcome, Score
 from grader.records import Figure, FloatArray, ReadNode, ReadVector
 from grader.rubric import CriterionTable, RubricFile
 from reference.authored.assignment import SCALE_NAMES
@@ -29,7 +28,6 @@ from reference.construction.mistakes import Mistake
 from reference.replay.replay import Replay
 
 Read = TypeVar("Read", ReadNode, ReadVector)
-CHARGED = frozenset({"none", "partial"})
 LOST = CHARGED | {"follow_through", "review"}
 """Verdicts for which the diagnosis seeks a cause, also where a person has still to decide."""
 AGREES, BY_CHANCE = 0.95, 0.03
@@ -74,7 +72,7 @@ def _with_scales_exchanged(
 
 
 def _is_explained_better(task: Task, meant: Comparison, entered: Comparison, slips: Undone) -> bool:
-    """Whether a submission is explained better without its slips of units, these at their price."""
+    """Return whether a submission is explained better without its slips of units, these at their price."""
     if not slips.is_drawing_changed:
         return True
     without = _cost_of(task, meant)
@@ -89,7 +87,7 @@ def _cost_of(task: Task, comparison: Comparison) -> float | None:
 
 
 def _is_off(scale: Scale) -> bool:
-    """Whether a declared scale was not understood, or is not the one that the drawing follows."""
+    """Return whether a declared scale was not understood, or is not the one that the drawing follows."""
     return scale.used.refused is not None or (scale.other is not None and not scale.used.assumed)
 
 
@@ -99,16 +97,14 @@ def _judged(task: Task, submission: Submission, comparison: Comparison, owner: O
     surer = _confirmed(task, submission, comparison)
     if surer is not None:
         submission, comparison = surer, compare(task, surer, search)
-    explanations, lost = _explanations(task, comparison, owner)
-    mistakes = _named(task, comparison, owner, explanations, lost)
+    explanations, mistakes = _diagnosed(task, comparison, owner)
     pair = exchanged_pair(mistakes)
     used = {name: scale.used for name, scale in comparison.scales.items()}
     if pair is not None:
         letters = [one for one in mistakes if one.code == "labels_swapped"]
         submission = with_letters_exchanged(task, submission, pair, used)
         comparison = compare(task, submission, search)
-        explanations, lost = _explanations(task, comparison, owner)
-        others = _named(task, comparison, owner, explanations, lost)
+        explanations, others = _diagnosed(task, comparison, owner)
         mistakes = (*letters, *(one for one in others if one.code != "labels_swapped"))
     read = _swapped_letters(task, submission, mistakes)
     mistakes = (*mistakes, *read)
@@ -130,23 +126,23 @@ def _judged(task: Task, submission: Submission, comparison: Comparison, owner: O
     return Judgement(outcomes, mistakes, comparison.scales, score(task.rubric, outcomes), unfit)
 
 
-def _named(
-    task: Task, comparison: Comparison, owner: Owner | None, explanations: Sequence[Replay], lost: Lost
-) -> tuple[NamedMistake, ...]:
-    """The mistakes named; whose data they are goes first."""
+def _diagnosed(
+    task: Task, comparison: Comparison, owner: Owner | None
+) -> tuple[Sequence[Replay], tuple[NamedMistake, ...]]:
+    """Return the explanations of lost points, and the mistakes named; whose data they are goes first."""
+    explanations, lost = _explanations(task, comparison, owner)
     other = None if owner is None else owner.named
     directed = any(one.direction_rad is not None for one in comparison.evidence.drawn.values())
     mistakes = named(explanations, task.construction, lost, has_directions=directed)
-    if owner is None or other is None:
-        return mistakes
-    losing = [one for one in comparison.outcomes if one.verdict in LOST]
-    explained = tuple(one.criterion for one in losing if is_of(task, one.name, owner.part))
-    other = replace(other, explains=explained)
-    return (other, *mistakes)
+    if owner is not None and other is not None:
+        losing = [one for one in comparison.outcomes if one.verdict in LOST]
+        explained = tuple(one.criterion for one in losing if is_of(task, one.name, owner.part))
+        mistakes = (replace(other, explains=explained), *mistakes)
+    return explanations, mistakes
 
 
 def _explanations(task: Task, comparison: Comparison, owner: Owner | None) -> tuple[Sequence[Replay], Lost]:
-    """What explains lost points, or points that may be lost, and these.
+    """Return the explanations of lost points, or of points that may be lost, and the criteria concerned.
 
     Where one plan follows other data than the rest, nothing explains what is drawn from it, or into it.
     """
@@ -193,19 +189,18 @@ def _not_drawn(task: Task, comparison: Comparison, known: Sequence[NamedMistake]
     evidence, vectors = comparison.evidence, task.construction.vectors
     found = []
     for one in comparison.outcomes:
-        codes = {reason.code for reason in one.reasons}
         is_table = bool(evidence.measured) and not evidence.has_sheets
-        is_left_blank = "not_measured" in codes and is_table and one.verdict == "none"
+        is_left_blank = "not_measured" in one.codes and is_table and one.verdict == "none"
         if one.name not in vectors or vectors[one.name].head in left_out:
             continue
-        if "not_drawn" in codes or is_left_blank:
+        if "not_drawn" in one.codes or is_left_blank:
             sure = NOT_DRAWN if evidence.has_sheets else 1.0
             found.append(NamedMistake(Mistake("vector_missing", one.name), (one.criterion,), sure))
     return found
 
 
 def _left_out(task: Task, outcomes: Sequence[Outcome], known: Sequence[NamedMistake]) -> tuple[Outcome, ...]:
-    """The outcomes; of components that were not read, as likely lost as it is that they were left out."""
+    """Return the outcomes; unread components are lost with the probability that they were left out."""
     sure = {one.at: one.confidence for one in known if one.code == "normal_missing"}
     vectors = task.construction.vectors
 
@@ -239,7 +234,7 @@ def _slips(task: Task, comparison: Comparison, known: Sequence[NamedMistake]) ->
     of_vectors, of_rates = [], []
     for one in comparison.outcomes:
         rate = task.construction.rates.get(one.name)
-        is_value_off = one.verdict in CHARGED and VALUE_OFF & {reason.code for reason in one.reasons}
+        is_value_off = one.verdict in CHARGED and VALUE_OFF & one.codes
         value, right = one.measured.value, one.expected.value
         factor = value / right if value and right else 1.0
         slip = NamedMistake(Mistake("arithmetic", one.name, factor=factor), (one.criterion,), SLIPPED)
@@ -253,10 +248,8 @@ def _slips(task: Task, comparison: Comparison, known: Sequence[NamedMistake]) ->
 
 def with_mistake(outcome: Outcome, mistakes: Sequence[NamedMistake]) -> Outcome:
     """The outcome with the mistake that explains its loss."""
-    if outcome.verdict not in {"none", "partial"}:
-        return outcome
     found = next((one for one in mistakes if outcome.criterion in one.explains), None)
-    if found is None or outcome.mistake is not None:
+    if found is None or outcome.verdict not in CHARGED or outcome.mistake is not None:
         return outcome
     return replace(outcome, mistake=found.code, cause=found)
 
@@ -295,11 +288,10 @@ def with_slips_charged(
 
 
 def _shows(slip: Mistake, entered: Outcome) -> bool:
-    """Whether a criterion as entered loses by a slip of units: values apart from what was drawn."""
+    """Return whether a criterion as entered loses by a slip of units: values apart from what was drawn."""
     if slip.at == "scales":
         return entered.name in SCALE_NAMES and entered.verdict not in CREDITED
-    is_value = {"value_too_large", "value_too_small"} & {one.code for one in entered.reasons}
-    return entered.verdict in CHARGED and (slip.at != "values" or bool(is_value))
+    return entered.verdict in CHARGED and (slip.at != "values" or bool(VALUE_OFF & entered.codes))
 
 
 # Points --------------------------------------------------------------------------------------------
@@ -413,7 +405,7 @@ def _confirmed(task: Task, submission: Submission, comparison: Comparison) -> Su
 
 
 def _lies_there(task: Task, name: str, drawn: DrawnVector, predicted: complex) -> bool:
-    """Whether a vector was read within the tolerance of a length of where its end is predicted."""
+    """Return whether a vector's end was read within twice a length's tolerance of its predicted place."""
     at, tolerance = drawn.as_complex, task.rubric.tolerance_of(name)
     is_long = abs(predicted) >= tolerance.least_mm
     return at is not None and is_long and abs(at - predicted) <= 2.0 * tolerance.length_at(abs(predicted))

@@ -1,4 +1,4 @@
-"""Which mistakes of the explanations are sure enough to be named, and what each of them explains.
+"""Choose the mistakes of the explanations that are sure enough to be named, and what each explains.
 
 The confidence in a mistake is its share of the probability of all explanations; a mistake that the evidence
 does not distinguish from it is its rival.
@@ -54,7 +54,7 @@ ALL_THOUGHT_OF, ALL_THOUGHT_OF_BY_LENGTHS = 0.94, 0.89
 EVEN = 0.5
 """A plan that is likelier than this to follow no construction goes to a person."""
 MOST_SLIPS = 2
-"""Where more computed lengths do not fit, it is no slip in each, but something else."""
+"""Most slips that are named: if more computed lengths do not fit, they have another cause."""
 SUSPICIOUS, GROSS = 2.0, 3.0
 """RMS misfits of a step in standard deviations of this drawing's errors: between the two a mistake is too
 slight to be named. (Below the first the mistake shows elsewhere.)"""
@@ -116,7 +116,7 @@ def not_explained(explanations: Sequence[Replay]) -> frozenset[str]:
 
 
 def _is_slight(mistake: Mistake, explanation: Replay) -> bool:
-    """Whether the residual at the mistake's step is small enough for drafting errors."""
+    """Return whether the residual at the mistake's step is small enough for drafting errors."""
     if mistake.code in OF_THE_WHOLE:
         return False
     return SUSPICIOUS < explanation.right.get(mistake.at, 0.0) < GROSS

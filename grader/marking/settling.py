@@ -12,7 +12,7 @@ from grader.comparison.task import Task
 from grader.comparison.verdicts import FULL, NONE, OPENING
 from grader.given_data.owner import Owner
 from grader.marking.drawn import NEARLY_CERTAIN
-from grader.outcomes import NamedMistake, Outcome, Unfit
+from grader.outcomes import CHARGED, NamedMistake, Outcome, Unfit
 from grader.records import Reason
 from grader.rubric import RubricFile
 from reference.authored.assignment import SCALE_NAMES
@@ -49,7 +49,7 @@ def of_another(task: Task, outcomes: Sequence[Outcome], owner: Owner | None) -> 
 
 
 def is_of(task: Task, name: str, part: str) -> bool:
-    """Whether a criterion is about a part of the drawing: a plan, or all of it."""
+    """Return whether a criterion is about a part of the drawing: a plan, or all of it."""
     if part not in task.construction.poles:
         return True
     return name == task.construction.vectors_of(part)[0].scale or _is_in(task, name, frozenset({part}))
@@ -64,7 +64,7 @@ def _of_another(outcome: Outcome, named: NamedMistake, *, earns_none: bool) -> O
 
 
 def _unclear(outcome: Outcome, owner: Owner) -> Outcome:
-    """An outcome that a person decides, as likely as the data are the own."""
+    """Return an outcome left to a person, with the probability that the data are the student's own."""
     each = "; ".join(_whose(one) for one in (owner.likeliest, *owner.likeliest.rivals))
     why = Reason("data_unclear", {"whose": each, "confidence": owner.not_own})
     sure = outcome.probability * (1.0 - owner.not_own)
@@ -80,7 +80,7 @@ def _whose(mistake: NamedMistake) -> str:
 
 NOT_HANDED_IN = frozenset({"not_measured", "not_drawn"})
 """Reasons of a vector that nobody drew: nothing is there that could belong to the others."""
-UNEXPLAINED = frozenset({"none", "partial", "follow_through"})
+UNEXPLAINED = CHARGED | {"follow_through"}
 
 
 def of_nothing(
@@ -93,9 +93,7 @@ def of_nothing(
     lost = [
         one
         for one in outcomes
-        if one.verdict in UNEXPLAINED
-        and not NOT_HANDED_IN & {reason.code for reason in one.reasons}
-        and _is_in(task, one.name, figures)
+        if one.verdict in UNEXPLAINED and not NOT_HANDED_IN & one.codes and _is_in(task, one.name, figures)
     ]
     vectors = [one for one in outcomes if one.name in task.construction.vectors]
     unfit = Unfit(
@@ -108,7 +106,7 @@ def of_nothing(
 
 
 def _is_in(task: Task, name: str, figures: frozenset[str]) -> bool:
-    """Whether a vector or angular quantity is of these figures; a scale, of all plans."""
+    """Return whether a vector or angular quantity belongs to these figures; a scale, to all plans."""
     construction = task.construction
     if name in SCALE_NAMES:
         return figures >= construction.poles.keys()

@@ -34,7 +34,7 @@ from grader.documents import (
 )
 from grader.marking.decided import FOR_THE_STUDENT
 from grader.marking.mark import score
-from grader.outcomes import Judgement, Outcome
+from grader.outcomes import CHARGED, CREDITED, Judgement, Outcome
 from grader.records import FloatArray, Reason
 from grader.rubric import RubricFile
 from grader.tables.decision_texts import audit_answer
@@ -49,7 +49,6 @@ PRIOR_FEW = 32.0
 that settles from 0.97 promises."""
 LEAST_SURE = 5
 """Verdicts offered because they are least sure; more of them are no sample of anything."""
-CREDIT, CHARGE = frozenset({"full", "follow_through"}), frozenset({"partial", "none"})
 NOT_CHECKED = frozenset({"not_measured", "optional", "at_stake"})
 """Reasons of a verdict that nobody can find wrong: nothing was handed in, or too little is at stake."""
 NO_LONGER_SAID = FOR_THE_STUDENT | {"right"}
@@ -123,7 +122,7 @@ def said_of(report: ReportDocument, criterion: CriterionDocument) -> SaidDocumen
         return report.said.get(criterion.id)
     is_open = criterion.verdict == "review"
     verdict = criterion.proposed if is_open else criterion.verdict
-    if verdict not in CREDIT | CHARGE or criterion.probability is None:
+    if verdict not in CREDITED | CHARGED or criterion.probability is None:
         return None
     return SaidDocument(
         verdict=verdict, settled=not is_open, probability=criterion.probability, mistake=criterion.mistake
@@ -167,10 +166,10 @@ def _source_of(report: ReportDocument) -> Source:
 
 
 def _answer_by(criterion: CriterionDocument, said: SaidDocument) -> Answer:
-    """Whether a person's verdict on a criterion is the program's."""
-    if criterion.verdict not in CREDIT | CHARGE:
+    """Return whether a person's verdict on a criterion is the program's."""
+    if criterion.verdict not in CREDITED | CHARGED:
         return "unclear"
-    same = criterion.verdict == said.verdict or {criterion.verdict, said.verdict} <= CREDIT
+    same = criterion.verdict == said.verdict or {criterion.verdict, said.verdict} <= CREDITED
     return "right" if same else "wrong"
 
 
@@ -259,7 +258,7 @@ def _opened(
 
 
 def is_like(criterion: str, said: SaidDocument, like: LikeDocument) -> bool:
-    """Whether a verdict is one of those that are no longer trusted."""
+    """Return whether a verdict is one of those that are no longer trusted."""
     if said.probability > like.most:
         return False
     return like.criterion is None or (criterion, said.verdict, said.mistake) == (
@@ -319,8 +318,8 @@ def opened_by_audit(judgement: Judgement, rubric: RubricFile, likes: Sequence[Li
 
 def _is_opened(outcome: Outcome, like: LikeDocument) -> bool:
     said = said_by(outcome)
-    checkable_here = not NOT_CHECKED & {reason.code for reason in outcome.reasons}
-    return said is not None and said.settled and checkable_here and is_like(outcome.criterion, said, like)
+    is_checkable = not NOT_CHECKED & outcome.codes
+    return said is not None and said.settled and is_checkable and is_like(outcome.criterion, said, like)
 
 
 def said_by(outcome: Outcome) -> SaidDocument | None:

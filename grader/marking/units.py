@@ -30,13 +30,13 @@ PRICE = 12.0
 STRAY = 0.1
 """Share of the entries that may be anything: slips of units come with other mistakes."""
 CARES = (0.5, 1.0, 2.0, 8.0)
-"""Standard errors that are tried, as multiples of a tolerance's half: a drawing with mistakes in it, too."""
+"""Standard errors to try, as multiples of half a tolerance: large ones fit a drawing with mistakes."""
 FITS = 4.0
 """Standard errors within which an entry fits: twice its tolerance."""
 LEAST_ENTRIES = 2
-"""Of each plan: fewer do not show what all of them have in common."""
+"""Least entries of each plan: fewer do not show what all of them have in common."""
 MOST_FIT = 0.5
-"""Where more of the entries fit as they stand, there is no slip in all of them."""
+"""Largest share of entries that fit as they stand: above it, there is no slip in all of them."""
 SURE = 0.9
 """A slip less probable than this is not undone."""
 DEGREE = math.pi / 180.0
@@ -55,7 +55,7 @@ class Undone:
 
     @property
     def is_drawing_changed(self) -> bool:
-        """Whether a slip is in the drawing's entries."""
+        """True if a slip is in the drawing's entries."""
         return any(one.at in {"directions", "lengths"} for one, _ in self.slips)
 
     @property
@@ -130,7 +130,8 @@ class _Entries:
         for name, one in drawn.items():
             if name not in task.construction.vectors:
                 continue
-            exact, table = task.drawn(name, used), task.rubric.tolerance_of(name)
+            segment, table = task.segments[name], task.rubric.tolerance_of(name)
+            exact = segment.drawn(used)
             length = abs(exact)
             is_directed = one.direction_rad is not None and length >= max(table.least_mm, 1.0)
             turned = one.direction_rad if is_directed and one.direction_rad is not None else math.nan
@@ -143,7 +144,7 @@ class _Entries:
                     turned,
                     table.length_at(length) / 2.0,
                     max(math.radians(table.direction_deg), across) / 2.0,
-                    float(task.scale_of(name) == "ka"),
+                    float(segment.scale == "ka"),
                 )
             )
         return cls(*np.array(rows or np.zeros((0, 7)), np.float64).reshape(-1, 7).T)
@@ -229,7 +230,7 @@ MOST_RADIANS = 2.0 * math.pi + 0.01
 
 @dataclass(frozen=True, slots=True)
 class _Convention:
-    """How directions were entered: in which unit, in which sense, from which axis."""
+    """A way to enter directions: unit, sense, and axis."""
 
     radians: bool
     clockwise: bool
@@ -287,7 +288,7 @@ def _directions(entries: _Entries) -> _Found | None:
 
 LENGTH_UNITS: Mapping[str, float] = {"cm": 10.0, "m": 1000.0}
 PAPER_MM = 420.0
-"""Where declared scales ask for vectors longer than an A3 sheet, these are wrong, not the lengths."""
+"""Longest vector on an A3 sheet: if declared scales ask for longer ones, these are wrong, not the lengths."""
 
 
 def _lengths(entries: _Entries) -> _Found | None:
@@ -323,7 +324,7 @@ VALUE_UNITS: Mapping[str, tuple[str, float]] = {
 RELATIVE_SIGMA = 0.03
 """Standard error of a value's logarithm: of a length measured by hand and a scale."""
 VALUE_RANGE = 10.0
-"""Of a logarithm: a wrong value may be anything between a hundredth and a hundredfold."""
+"""Range of a wrong value's logarithm: anything between a hundredth and a hundredfold."""
 
 
 def _values(
@@ -334,9 +335,10 @@ def _values(
     They are computed at the scales declared, right or wrong. A unit is held against any other common factor.
     """
     followed = {name: one.used.used / (one.other or one.used.used) for name, one in settled.items()}
-    right = {name: abs(real) * followed.get(task.scale_of(name), 1.0) for name, real in task.real.items()}
+    vectors = task.construction.vectors
+    right = {name: abs(real) * followed.get(vectors[name].scale, 1.0) for name, real in task.real.items()}
     for name, rate in task.rates.items():
-        right[name] = rate * followed.get(task.scale_of(task.construction.rates[name].vector), 1.0)
+        right[name] = rate * followed.get(vectors[task.construction.rates[name].vector].scale, 1.0)
     ratios = {name: abs(value / float(right[name])) for name, value in values.items() if right.get(name)}
     known = {name: ratio for name, ratio in ratios.items() if 0.0 < ratio < math.inf}
     for unit, (kinds, factor) in VALUE_UNITS.items():

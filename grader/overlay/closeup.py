@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 
 from markupsafe import Markup
 
+from grader.outcomes import CHARGED
 from grader.overlay.scene import XY, Arrow, Ghost, Layer, Picture, Scene, between, is_in, layers_of
 from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, Box
+from grader.texts.spoken import NO_NAMES
 from reference.drawing.canvas import FONTS, elements
 
 CLOSE_UP_MARGIN_MM = 12.0
@@ -31,9 +33,6 @@ CLOSE_UP_SIZE_PER_MM = 0.0105
 DETAIL_SIZE_PER_MM = 0.0145
 """Size of marks and letters by the width shown: close-ups stand two in a row, details up to three."""
 LEAST_SIZE, LARGEST_SIZE = 0.3, 3.0
-WRONG = frozenset({"none", "partial"})
-
-_NO_NAMES: Mapping[str, str] = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +54,7 @@ class PageView:
     names: tuple[str, ...]
 
 
-def page_views(picture: Picture, index: int, names: Mapping[str, str] = _NO_NAMES) -> list[PageView]:
+def page_views(picture: Picture, index: int, names: Mapping[str, str] = NO_NAMES) -> list[PageView]:
     """Return the whole sheet, then close-ups of plans that are small on it; `names` as students know them."""
     scene = picture.scene
     close_ups = {
@@ -87,7 +86,7 @@ def _plan(scene: Scene, index: int, figure: str, box: Box, names: Mapping[str, s
 
 
 def detail(
-    pictures: Collection[Picture], concerned: AbstractSet[str], names: Mapping[str, str] = _NO_NAMES
+    pictures: Collection[Picture], concerned: AbstractSet[str], names: Mapping[str, str] = NO_NAMES
 ) -> PageView | None:
     """Return a view of some vectors and the expected ones; None if none of them is drawn.
 
@@ -146,7 +145,7 @@ def _part(scene: Scene, figure: str) -> Scene:
     return replace(
         scene,
         arrows=tuple(_arrows_of(scene, figure)),
-        ghosts=tuple(ghost for ghost in scene.ghosts if ghost.figure == figure and ghost.verdict in WRONG),
+        ghosts=tuple(ghost for ghost in scene.ghosts if ghost.figure == figure and ghost.verdict in CHARGED),
         dots=tuple(dot for dot in scene.dots if dot.figure in {"", figure}),
     )
 
@@ -236,7 +235,7 @@ LOOK_SIZE_PER_MM = 0.0095
 
 
 def look(
-    scene: Scene, name: str, ghost: Ghost | None, names: Mapping[str, str] = _NO_NAMES
+    scene: Scene, name: str, ghost: Ghost | None, names: Mapping[str, str] = NO_NAMES
 ) -> tuple[Box, Markup] | None:
     """Return a box around a vector or link and the expected one, and its figure's marks as SVG elements.
 

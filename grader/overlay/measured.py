@@ -20,9 +20,8 @@ from grader.overlay.scene import (
     Scene,
     expected_vector,
     ghosts_of,
-    on_paper,
 )
-from grader.records import Reading
+from grader.records import Reading, on_sheet
 from reference.construction.graph import Construction, Vector
 
 MARGIN_MM = 14.0
@@ -85,7 +84,7 @@ def _plan(
     arrows = tuple(_arrows(figure, vectors, steps, nodes, outcomes))
     ghosts = tuple(ghosts_of(arrows, outcomes)) if show_expected else ()
     dots = tuple(
-        Dot(name, on_paper(place), doubtful=False, lettered=True, figure=figure)
+        Dot(name, on_sheet(place), doubtful=False, lettered=True, figure=figure)
         for name, place in nodes.items()
     )
     return Scene((0.0, 0.0), arrows, ghosts, dots)
@@ -112,8 +111,8 @@ def _arrows(
         if vector.tail in nodes:
             tail, outcome = nodes[vector.tail], outcomes.get(vector.name)
             verdict = "not_judged" if outcome is None else outcome.verdict
-            tip = on_paper(tail + steps[vector.name])
-            yield Arrow(vector.name, figure, on_paper(tail), tip, verdict, doubtful=verdict == "review")
+            tip = on_sheet(tail + steps[vector.name])
+            yield Arrow(vector.name, figure, on_sheet(tail), tip, verdict, doubtful=verdict == "review")
 
 
 def _side_by_side(plans: list[Scene]) -> Scene:

@@ -9,11 +9,13 @@ import cmath
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
-from grader.records import MECHANISM, Box, FloatArray, Reading
+from grader.documents import CriterionDocument
+from grader.outcomes import CHARGED, Outcome
+from grader.records import MECHANISM, Box, FloatArray, Reading, on_sheet
+from grader.texts.spoken import NO_NAMES
 from reference.construction.graph import Vector
 from reference.drawing import symbols
 from reference.drawing.canvas import PAPER, Area, Curve, Label, Ring, Shape, Stroke, Text, pieces_of, width_of
@@ -73,7 +75,7 @@ GHOST_DASH_MM = (0.35, 1.0)
 GHOST_WIDTH_MM = 0.5
 """Expected vectors are dotted."""
 NODE_COLOUR = "#24303c"
-HAS_GHOST = frozenset({"none", "partial", "review"})
+HAS_GHOST = CHARGED | {"review"}
 """Verdicts of vectors that have a ghost."""
 
 
@@ -164,28 +166,8 @@ class Picture:
 _NO_LINKS: Mapping[str, tuple[str, str]] = {}
 
 
-class Drawn(Protocol):
-    """A length and a direction on paper, None if not known."""
-
-    @property
-    def length_mm(self) -> float | None:
-        """Length, mm."""
-
-    @property
-    def direction_deg(self) -> float | None:
-        """Direction, counter-clockwise from the sheet's +x."""
-
-
-class Judged(Protocol):
-    """A verdict and the expected vector: an outcome, or a criterion of a report."""
-
-    @property
-    def verdict(self) -> str:
-        """One of `COLOURS`."""
-
-    @property
-    def expected(self) -> Drawn:
-        """The expected vector."""
+Judged = Outcome | CriterionDocument
+"""A verdict and the expected vector."""
 
 
 def scene_of(
@@ -200,17 +182,12 @@ def scene_of(
     """Return the scene of one sheet's reading; `outcomes` by the vector's or link's name."""
     arrows = [*_arrows(reading, vectors, outcomes), *_links(reading, links, outcomes)]
     dots = tuple(
-        Dot(name, on_paper(node.at), node.confidence < LEAST_SURE, figure=kind)
+        Dot(name, on_sheet(node.at), node.confidence < LEAST_SURE, figure=kind)
         for kind, figure in reading.figures.items()
         for name, node in figure.nodes.items()
     )
     ghosts = tuple(ghosts_of(arrows, outcomes)) if show_expected else ()
     return Scene(page_mm, tuple(arrows), ghosts, dots)
-
-
-def on_paper(at: complex) -> XY:
-    """Convert a point of the plane, y up, to sheet millimetres, y down."""
-    return (at.real, -at.imag)
 
 
 def between(start: XY, end: XY, share: float) -> XY:
@@ -230,7 +207,7 @@ def _arrows(
                 continue
             outcome = outcomes.get(name)
             verdict = "not_judged" if outcome is None else outcome.verdict
-            tail, tip = on_paper(figure.nodes[ends.tail].at), on_paper(figure.nodes[ends.head].at)
+            tail, tip = on_sheet(figure.nodes[ends.tail].at), on_sheet(figure.nodes[ends.head].at)
             doubtful = verdict == "review" or read.confidence < LEAST_SURE
             yield Arrow(name, kind, tail, tip, verdict, doubtful)
 
@@ -245,7 +222,7 @@ def _links(
         if sketch is None or outcome is None or tail not in sketch.nodes or head not in sketch.nodes:
             continue
         if outcome.verdict != "not_judged":
-            ends = (on_paper(sketch.nodes[tail].at), on_paper(sketch.nodes[head].at))
+            ends = (on_sheet(sketch.nodes[tail].at), on_sheet(sketch.nodes[head].at))
             doubtful = outcome.verdict == "review"
             yield Arrow(name, MECHANISM, *ends, outcome.verdict, doubtful, is_link=True)
 
@@ -290,8 +267,6 @@ CROSSING_COST = 2.0
 ARROW_OPACITY, FAINT, GROUND_OPACITY = 0.85, 0.3, 0.82
 """The drawing stays visible under arrows, and faintly under the ground of labels."""
 
-_NO_NAMES: Mapping[str, str] = {}
-
 
 @dataclass(frozen=True, slots=True)
 class ArrowLabel:
@@ -323,7 +298,7 @@ class ArrowLabel:
 
 
 def labels_of(
-    arrows: Sequence[Arrow], within: Box, size: float = 1.0, names: Mapping[str, str] = _NO_NAMES
+    arrows: Sequence[Arrow], within: Box, size: float = 1.0, names: Mapping[str, str] = NO_NAMES
 ) -> list[ArrowLabel]:
     """Return the position of each arrow's mark and name; `size` 1 suits a whole sheet, less a close-up.
 

@@ -121,11 +121,7 @@ def _sheet(
 def _whose(row: RosterRow, variant: Variant, speaker: Tongue) -> str:
     """Return the student and the variant; lines to write on if there is no student."""
     blank = "_" * 14
-    parts = [
-        f"{speaker.gettext(NUMBER[name])} {value}"
-        for name, value in (("n", variant.n), ("position", variant.position))
-        if value is not None
-    ]
+    parts = [f"{speaker.gettext(NUMBER[name])} {value}" for name, value in variant.numbers.items()]
     if row.student_id:
         name = f"{row.name} ({row.student_id})" if row.name else row.student_id
         return " · ".join([name, *parts])
@@ -242,10 +238,10 @@ def _tables(assignment: Assignment, rubric: RubricFile, speaker: Tongue) -> Iter
         _ = speaker.gettext
         if kind == "scales":
             head = [_(SCALE), _(VALUE)]
-            rows = [[_scale_cell(names.get(name, name), name, speaker), ""] for name in asked[kind]]
+            rows = [[_cell(scale_pieces(names.get(name, name)), name, speaker), ""] for name in asked[kind]]
         elif kind == "angular":
             head = [_(QUANTITY), _(VALUE)]
-            rows = [[_rate_cell(names.get(name, name), name, speaker), ""] for name in asked[kind]]
+            rows = [[_cell(pieces_of(names.get(name, name)), name, speaker), ""] for name in asked[kind]]
         else:
             unit = speaker.unit(kind_of(SCALE_OF[kind]).unit)
             head = [_(VECTOR), _(LENGTH), _(DIRECTION), f"{_(VALUE)}, {unit}"]
@@ -267,12 +263,9 @@ def _tables(assignment: Assignment, rubric: RubricFile, speaker: Tongue) -> Iter
     yield _side_by_side(left, right, half)
 
 
-def _scale_cell(shown: str, scale: str, speaker: Tongue) -> Markup:
-    return Markup("{}, {}").format(_letters(scale_pieces(shown)), speaker.unit(unit_of(scale)))
-
-
-def _rate_cell(shown: str, rate: str, speaker: Tongue) -> Markup:
-    return Markup("{}, {}").format(_letters(pieces_of(shown)), speaker.unit(unit_of(rate)))
+def _cell(pieces: Iterable[Piece], name: str, speaker: Tongue) -> Markup:
+    """Return a scale or angular quantity, as students see it, with its unit."""
+    return Markup("{}, {}").format(_letters(pieces), speaker.unit(unit_of(name)))
 
 
 def _empty(head: list[str], rows: Iterable[Sequence[str]], wide_mm: float) -> Table:

@@ -16,8 +16,9 @@ import numpy as np
 from grader.comparison.task import Task
 from grader.comparison.verdicts import EVEN
 from grader.documents import CriterionDocument, ReadingDocument, ReportDocument
-from grader.marking.answers import OFF_AS_READ, along_of, on_sheet
-from grader.records import MECHANISM, Figure, Reading, ReadNode, ReadVector, ScannedPage
+from grader.marking.answers import OFF_AS_READ, along_of
+from grader.outcomes import CREDITED
+from grader.records import MECHANISM, Figure, Reading, ReadNode, ReadVector, ScannedPage, on_sheet
 from grader.tables.decision_texts import place_text
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.graph import Vector
@@ -27,7 +28,6 @@ ORDER: Mapping[Kind, int] = {"owner": 0, "scale": 1, "node": 2, "verdict": 3}
 OPEN = "review"
 OF_OWNER = ("other_variant", "data_misread", "data_unclear", "not_explained")
 """Reasons of a doubt that concerns a whole drawing."""
-CREDITED = frozenset({"full", "follow_through"})
 SURE = 0.8
 """A choice of this probability is the default, which Enter takes; below it a person is not led."""
 APART_MM = 1.0

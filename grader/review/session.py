@@ -25,10 +25,10 @@ from grader.folder.batch import Batch, Graded, Job, graded, pages_read
 from grader.folder.decisions import basis_of, decided, page_basis
 from grader.folder.workers import Pool
 from grader.marking.trust import opened_in, trust_of
-from grader.overlay.scene import Arrow, Ghost, Scene, expected_vector, ghost_of, on_paper, scene_of
+from grader.overlay.scene import Arrow, Ghost, Scene, expected_vector, ghost_of, scene_of
 from grader.pipeline import mark
 from grader.reading.corrected import snapped
-from grader.records import MECHANISM, PageRef, ScannedPage
+from grader.records import MECHANISM, PageRef, ScannedPage, on_sheet
 from grader.review.doubts import Doubt, doubts_of, figures_read, in_order, reading_of
 from grader.review.scans import Scans
 from grader.tables.decisions import ClashError, Decision, DecisionFile, Key
@@ -506,7 +506,7 @@ class Session:
         if not 0 <= sheet < len(pages):
             raise RefusedError(400, "page_missing", "no_page")
         node = snapped(pages[sheet].ink, *at, figure)
-        return node.at.real, -node.at.imag
+        return on_sheet(node.at)
 
     # Pages ----------------------------------------------------------------------------------------
 
@@ -565,7 +565,7 @@ class Session:
         node = read.nodes.get(tail)
         if node is None:
             return None
-        at = on_paper(node.at)
+        at = on_sheet(node.at)
         return ghost_of(Arrow(criterion.drawn, figure, at, at, criterion.verdict, doubtful=False), expected)
 
     def _construction(self, student: Student) -> Construction | None:

@@ -11,7 +11,7 @@ from typing import Literal, get_args
 from grader.documents import Quantity, Tolerance
 from grader.marking.drawn import NEARLY_CERTAIN
 from grader.options import Level
-from grader.outcomes import Judgement, NamedMistake, Outcome
+from grader.outcomes import CHARGED, CREDITED, Judgement, NamedMistake, Outcome
 from grader.records import Reason
 from reference.authored.assignment import SCALE_NAMES
 
@@ -88,11 +88,11 @@ def _checked(outcome: Outcome, level: Level) -> Checked:
 
 
 def _result(outcome: Outcome) -> Result:
-    is_right = {"right", "follows"} & {reason.code for reason in outcome.reasons}
+    is_right = {"right", "follows"} & outcome.codes
     is_right_alone = outcome.reasons[:1] == (Reason("value_alone"),) and bool(is_right)
-    if outcome.verdict in {"full", "follow_through"} or is_right_alone:
+    if outcome.verdict in CREDITED or is_right_alone:
         return "right"
-    return "off" if outcome.verdict in {"partial", "none"} else "open"
+    return "off" if outcome.verdict in CHARGED else "open"
 
 
 def _without_numbers(reason: Reason) -> Reason:

@@ -16,6 +16,7 @@ from itertools import groupby
 from math import exp, log
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from grader.documents import AlikeDocument, Sign
@@ -231,6 +232,8 @@ LEAST_SPREAD = 0.015
 """Least scale of the tail, in inverse hyperbolic tangents: if all pairs are equal there is none."""
 QUANTILES = 0.84, 0.95
 """The upper quantile excludes a copied pair in a class of seven."""
+BLUR = (0.25, 0.5, 0.25)
+"""Shares of a cell and its neighbours after a sheet has shifted a little, as it does with every scan."""
 TAIL_DROP = float(np.log((1.0 - QUANTILES[0]) / (1.0 - QUANTILES[1])))
 """Fall of the logarithm of an exponential tail between the two quantiles."""
 
@@ -329,7 +332,7 @@ def _long_runs(inked: NDArray[np.bool_]) -> NDArray[np.bool_]:
     A run may shift by a cell, because the page is askew, and have gaps, because pencil is faint.
     """
     # A row has fewer than 256 cells: counts fit into bytes.
-    wide = _with_neighbours(inked).astype(np.uint8)
+    wide = _with_neighbours(inked)
     sums = np.pad(wide.cumsum(axis=2, dtype=np.uint8), ((0, 0), (0, 0), (1, 0)))
     begins = sums[..., RUN:] - sums[..., :-RUN] >= RUN_INKED * RUN
     marks = np.pad(begins, ((0, 0), (0, 0), (RUN, RUN))).cumsum(axis=2, dtype=np.uint8)
@@ -339,10 +342,7 @@ def _long_runs(inked: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def _with_neighbours(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return cells and those beside them across the last axis."""
-    wide = cells.copy()
-    wide[:, 1:] |= cells[:, :-1]
-    wide[:, :-1] |= cells[:, 1:]
-    return wide
+    return np.asarray(scipy.ndimage.maximum_filter1d(cells, 3, axis=1, mode="constant"))
 
 
 def _parts(ink: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -356,11 +356,7 @@ def _parts(ink: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _blurred(ink: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Blur each cell with its neighbours: a sheet shifts a little with every scan."""
-    down = 0.5 * ink
-    down[:, 1:] += 0.25 * ink[:, :-1]
-    down[:, :-1] += 0.25 * ink[:, 1:]
-    across = 0.5 * down
-    across[:, :, 1:] += 0.25 * down[:, :, :-1]
-    across[:, :, :-1] += 0.25 * down[:, :, 1:]
-    return across
+    """Blur each cell with its neighbours."""
+    for axis in (1, 2):
+        ink = scipy.ndimage.correlate1d(ink, BLUR, axis, mode="constant")
+    return ink

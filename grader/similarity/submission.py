@@ -1,7 +1,7 @@
 """The data of submissions that are compared between students: nodes, entered values, scales."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from grader.documents import ReportDocument
 from grader.records import FloatArray
 from grader.tables.measurements import Measurements
 from reference.authored.assignment import Assignment, Scales, Variant
+from reference.authored.variant_table import KEYS
 from reference.construction.uncertainty import Skill
 from reference.geometry import ComplexArray
 from reference.plan import exact_plan
@@ -79,12 +80,8 @@ def _fits(variant: Variant, report: ReportDocument) -> tuple[Variant, float] | N
     """Return the other variant that the diagnosis names, and its confidence; None without one."""
     for mistake in report.mistakes:
         if mistake.code == "other_variant":
-            named = dict(part.split(" = ", 1) for part in mistake.detail.split(", ") if " = " in part)
-            n, position = named.get("n"), named.get("position")
-            drawn = Variant(
-                n=variant.n if n is None else int(n),
-                position=variant.position if position is None else int(position),
-            )
+            known = ((name, mistake.parameters.get(name)) for name in KEYS)
+            drawn = replace(variant, **{name: value for name, value in known if isinstance(value, int)})
             return (drawn, mistake.confidence) if drawn != variant else None
     return None
 

@@ -7,7 +7,6 @@ from functools import cache
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
-from reportlab.lib.enums import TA_LEFT
 from reportlab.lib.pagesizes import A4
 from reportlab.lib.styles import ParagraphStyle
 from reportlab.lib.units import mm
@@ -204,8 +203,8 @@ def pdf_pages(subject: Subject, tongue: Tongue) -> bytes:
         buffer, pagesize=A4, title=title, invariant=1,
         leftMargin=12 * mm, rightMargin=12 * mm, topMargin=14 * mm, bottomMargin=14 * mm,
     )  # fmt: skip
-    story: list[Flowable] = [Paragraph(_printed(Markup.escape(title)), _style(14))]
-    story += [Spacer(1, 2 * mm), Paragraph(_printed(Markup.escape(tongue.gettext(LENGTHS_MM))), _style(8.5))]
+    story: list[Flowable] = [_paragraph(title, 14)]
+    story += [Spacer(1, 2 * mm), _paragraph(tongue.gettext(LENGTHS_MM), 8.5)]
     for chapter in chapters(subject, tongue):
         story += _printed_chapter(chapter)
     document.build(story)
@@ -215,8 +214,8 @@ def pdf_pages(subject: Subject, tongue: Tongue) -> bytes:
 def _printed_chapter(chapter: Chapter) -> Iterator[Flowable]:
     yield CondPageBreak(70 * mm)
     yield Spacer(1, 6 * mm)
-    yield Paragraph(_printed(Markup.escape(chapter.section.title)), _style(12))
-    yield Paragraph(_printed(chapter.section.introduction), _style(9))
+    yield _paragraph(chapter.section.title, 12)
+    yield _paragraph(chapter.section.introduction, 9)
     for step in chapter.steps:
         yield Spacer(1, 4 * mm)
         yield KeepTogether([_printed_step(step)])
@@ -225,9 +224,8 @@ def _printed_chapter(chapter: Chapter) -> Iterator[Flowable]:
 def _printed_step(step: Illustrated) -> Table:
     explanation = step.explanation
     head = Markup("{}. {}").format(explanation.number, explanation.sentence)
-    words: list[Flowable] = [Paragraph(_printed(line), _style(8.5, indent=4)) for line in explanation.before]
-    words += [Paragraph(_printed(head), _style(9.5))]
-    words += [Paragraph(_printed(line), _style(8.5, indent=4)) for line in explanation.after]
+    words: list[Flowable] = [_paragraph(line, 8.5, indent=4) for line in explanation.before]
+    words += [_paragraph(head, 9.5), *(_paragraph(line, 8.5, indent=4) for line in explanation.after)]
     if step.model is not None:
         words += [Spacer(1, 2 * mm), _Drawn(step.model, MODEL_SHARE, MODEL_TALLEST_MM)]
     widths = ((COLUMN_MM + GAP_MM) * mm, COLUMN_MM * mm)
@@ -236,23 +234,22 @@ def _printed_step(step: Illustrated) -> Table:
     return Table([[words, picture]], colWidths=widths, style=style)
 
 
-def _style(size: float, indent: float = 0.0) -> ParagraphStyle:
-    return ParagraphStyle(
-        f"s{size}i{indent}", fontName=REGULAR, fontSize=size, leading=1.4 * size, alignment=TA_LEFT,
-        leftIndent=indent * mm,
-    )  # fmt: skip
+PRINTED = {
+    "<i>": "",
+    "</i>": "",
+    "<sub>": '<sub rise="2" size="70%">',
+    "<sup>": '<super rise="3" size="70%">',
+    "</sup>": "</super>",
+}
+"""Marks as reportlab reads them; the embedded font has no slanted letters."""
 
 
-def _printed(text: Markup) -> str:
-    """Return markup as reportlab reads it; the embedded font has no slanted letters."""
-    marks: Sequence[tuple[str, str]] = (
-        ("<i>", ""),
-        ("</i>", ""),
-        ("<sub>", '<sub rise="2" size="70%">'),
-        ("<sup>", '<super rise="3" size="70%">'),
-        ("</sup>", "</super>"),
-    )
-    written = str(text)
-    for mark, printed in marks:
+def _paragraph(text: str, size: float, indent: float = 0.0) -> Paragraph:
+    """Return a text or markup as a printed paragraph; its size in points, its indent in millimetres."""
+    written = str(Markup.escape(text))
+    for mark, printed in PRINTED.items():
         written = written.replace(mark, printed)
-    return written
+    style = ParagraphStyle(
+        f"s{size}i{indent}", fontName=REGULAR, fontSize=size, leading=1.4 * size, leftIndent=indent * mm
+    )
+    return Paragraph(written, style)

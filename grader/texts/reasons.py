@@ -4,9 +4,7 @@ from collections.abc import Mapping
 
 from grader.language import N_, Tongue
 from grader.options import Level
-from grader.texts.spoken import Coded, filled, spoken
-
-_NO_NAMES: Mapping[str, str] = {}
+from grader.texts.spoken import NO_NAMES, Coded, filled, spoken
 
 UNDECIDED = "scale_undecided"
 """Replaces `scale_assumed` and `follows` together under review: neither alone says what is in doubt."""
@@ -138,9 +136,7 @@ FOLLOWS: dict[str, str] = {
 """Sentences for the reason `follows`, by what the result follows from."""
 
 
-def reason_sentence(
-    reason: Coded, speaker: Tongue, level: Level, names: Mapping[str, str] = _NO_NAMES
-) -> str:
+def reason_sentence(reason: Coded, speaker: Tongue, level: Level, names: Mapping[str, str] = NO_NAMES) -> str:
     """Return the sentence of one reason; a code without a sentence is shown by its name."""
     hint = HINTS.get(reason.code, reason.code)
     texts = [FULL[reason.code], hint] if level == "full" and reason.code in FULL else [hint]

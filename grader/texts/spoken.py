@@ -13,7 +13,7 @@ from grader.texts.refusals import REFUSALS
 from reference.errors import PlanmarkError
 
 ENGLISH = tongue(ROOT_LANGUAGE)
-_NO_NAMES: Mapping[str, str] = {}
+NO_NAMES: Mapping[str, str] = {}
 
 
 class Coded(Protocol):
@@ -59,7 +59,7 @@ _NOUNS = {"corners": CORNERS, "areas": AREAS}
 """Words for the codes in lists, by the parameter's name."""
 
 
-def place(at: str, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES) -> str:
+def place(at: str, speaker: Tongue, names: Mapping[str, str] = NO_NAMES) -> str:
     """Return a node, vector, scale or figure as a sentence names it."""
     return speaker.gettext(PLACES[at]) if at in PLACES else names.get(at, at)
 
@@ -70,7 +70,7 @@ def place(at: str, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES) -> str
 def spoken(
     parameters: Mapping[str, float | str | Sequence[str]],
     speaker: Tongue,
-    names: Mapping[str, str] = _NO_NAMES,
+    names: Mapping[str, str] = NO_NAMES,
 ) -> dict[str, str]:
     """Return parameters in words: `off_mm` becomes `off`, with its unit."""
     # `near_limit` names its quantity instead of a unit.
@@ -183,7 +183,7 @@ AT_PAGE, AT_LINE = N_("Page %(page)s: %(text)s"), N_("Line %(line)s: %(text)s")
 
 
 def sentence(
-    reason: Coded, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES, *, brief: bool = False
+    reason: Coded, speaker: Tongue, names: Mapping[str, str] = NO_NAMES, *, brief: bool = False
 ) -> str:
     """Return the sentence of a problem (`brief`: the one without numbers); empty if its code has none.
 
@@ -201,7 +201,7 @@ def sentence(
     return text
 
 
-def clause(reason: Coded, speaker: Tongue, names: Mapping[str, str] = _NO_NAMES) -> str:
+def clause(reason: Coded, speaker: Tongue, names: Mapping[str, str] = NO_NAMES) -> str:
     """Return why something is not read or understood, as part of a sentence; the code if it has no words."""
     return filled(clauses(reason.code), spoken(reason.parameters, speaker, names), speaker) or reason.code
 

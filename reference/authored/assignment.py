@@ -146,13 +146,13 @@ class Variant:
     n: int | None = None
     position: int | None = None
 
+    @property
+    def numbers(self) -> dict[str, int]:
+        """The number and the position by name, as far as the assignment has them."""
+        return {name: value for name in KEYS if (value := getattr(self, name)) is not None}
+
     def __str__(self) -> str:
-        parts = [
-            f"{name} = {value}"
-            for name, value in (("n", self.n), ("position", self.position))
-            if value is not None
-        ]
-        return ", ".join(parts) or "the only variant"
+        return ", ".join(f"{name} = {value}" for name, value in self.numbers.items()) or "the only variant"
 
 
 SCALE_NAMES = tuple(SCALE_UNITS)
@@ -229,7 +229,7 @@ class Assignment:
     def values(self, variants: list[Variant]) -> dict[str, Value]:
         """Return the variants' data by name, arrays of shape (N,)."""
         known: dict[str, Value] = {}
-        for name in ("n", "position"):
+        for name in KEYS:
             numbers = [getattr(variant, name) for variant in variants]
             if numbers and numbers[0] is not None:
                 known[name] = np.array(numbers, dtype=np.float64)
@@ -307,10 +307,15 @@ def library() -> Path:
     return installed if installed.is_dir() else Path(__file__).resolve().parents[2] / "rubrics"
 
 
+def names_in(folder: Path, kind: str) -> list[str]:
+    """Return the names of the authored files of one kind in a folder."""
+    suffix = SUFFIXES[kind]
+    return sorted(path.name.removesuffix(suffix) for path in folder.glob(f"*{suffix}"))
+
+
 def built_in() -> list[str]:
     """The names of the built-in assignments."""
-    suffix = SUFFIXES["assignment"]
-    return sorted(path.name.removesuffix(suffix) for path in library().glob(f"*{suffix}"))
+    return names_in(library(), "assignment")
 
 
 def locate(kind: str, name: str, beside: Path | None = None) -> Path:
@@ -373,10 +378,7 @@ def _load(path: Path, _changed_ns: int) -> Assignment:
 def _load_mechanism(name: str, source: Path, beside: Path) -> MechanismFile:
     """Load the mechanism that an assignment names; AuthoredFileError of the assignment if there is none."""
     if not toml_file.is_file(source):
-        suffix = SUFFIXES["mechanism"]
-        known = [
-            one.name.removesuffix(suffix) for one in (*beside.parent.glob(f"*{suffix}"), *_built_in(suffix))
-        ]
+        known = (*names_in(beside.parent, "mechanism"), *names_in(library(), "mechanism"))
         near = near_names(name, known, most=1)
         meant = f" (did you mean {near[0]}?)" if near else ""
         missing = f"there is no mechanism '{name}'{meant}: {source.name} was looked for beside this file"
@@ -384,10 +386,6 @@ def _load_mechanism(name: str, source: Path, beside: Path) -> MechanismFile:
             str(beside), (Finding("$.mechanism", f"{missing} and among the built-in ones"),)
         )
     return toml_file.load(MechanismFile, source)
-
-
-def _built_in(suffix: str) -> Iterator[Path]:
-    return library().glob(f"*{suffix}")
 
 
 def _check_values(file: AssignmentFile) -> Iterator[Finding]:

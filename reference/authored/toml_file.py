@@ -183,18 +183,17 @@ def text_of(path: Path) -> str:
 def _content_of(path: Path) -> bytes:
     """Return a file's bytes, up to the largest authored size; raises OSError or AuthoredFileError."""
     if path.exists() and not path.is_file():
-        raise AuthoredFileError(
-            str(path), (Finding("$", "cannot be read: it is a folder or a device, not a file"),)
-        )
-    with path.open("rb") as stream:
-        content = stream.read(MAX_BYTES + 1)
-    if len(content) > MAX_BYTES:
-        finding = Finding("$", f"is larger than {MAX_BYTES // 1000} kB: nothing that is written by hand is")
-        raise AuthoredFileError(str(path), (finding,))
-    if _ENDLESS_KEY.search(content):
-        finding = Finding("$", f"has a key of more than {MAX_DEPTH} parts: nothing that is authored nests so")
-        raise AuthoredFileError(str(path), (finding,))
-    return content
+        why = "cannot be read: it is a folder or a device, not a file"
+    else:
+        with path.open("rb") as stream:
+            content = stream.read(MAX_BYTES + 1)
+        if len(content) > MAX_BYTES:
+            why = f"is larger than {MAX_BYTES // 1000} kB: nothing that is written by hand is"
+        elif _ENDLESS_KEY.search(content):
+            why = f"has a key of more than {MAX_DEPTH} parts: nothing that is authored nests so"
+        else:
+            return content
+    raise AuthoredFileError(str(path), (Finding("$", why),))
 
 
 def is_file(path: Path) -> bool:

@@ -49,8 +49,7 @@ class Wording:
 
     def variant_text(self, variant: Variant) -> str:
         """Return the student's number and position."""
-        values = (("n", variant.n), ("position", variant.position))
-        return ", ".join(f"{self.variant[name]} = {value}" for name, value in values if value is not None)
+        return ", ".join(f"{self.variant[name]} = {value}" for name, value in variant.numbers.items())
 
 
 @dataclass(frozen=True, slots=True)

@@ -126,7 +126,7 @@ def entered(case_task, printed: dict[str, float], *, as_segments: bool) -> Submi
         if name in case_task.rates:
             values[name] = math.copysign(value, case_task.rates[name])
         elif as_segments:
-            lengths[name] = value / scales[case_task.scale_of(name)]
+            lengths[name] = value / scales[case_task.segments[name].scale]
         else:
             values[name] = value
     plans = {"v": "velocity_plan", "a": "acceleration_plan"}
@@ -198,7 +198,7 @@ def test_a_coriolis_component_follows_from_a_books_own_sliding_velocity():
 def test_a_textbooks_computed_vectors_score_full_marks():
     case_task = task(COMPUTED["mechanism"])
     vectors = {
-        name: complex(*value) / float(case_task.parameters[case_task.scale_of(name)])
+        name: complex(*value) / float(case_task.parameters[case_task.segments[name].scale])
         for name, value in COMPUTED["published"].items()
         if name in case_task.construction.vectors
     }

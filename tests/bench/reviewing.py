@@ -116,7 +116,7 @@ def _left_out(work: StudentWork, task: Task) -> frozenset[str]:
         own = work.own(work.construction.figure_of(vector.head))
         return (
             name not in work.task.missing
-            and abs(task.drawn(name, scales)) < least
+            and abs(task.segments[name].drawn(scales)) < least
             and abs(own[vector.head] - own[vector.tail]) < least
         )
 

@@ -8,7 +8,8 @@ import pytest
 
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
-from grader.marking.mark import CHARGED, judge
+from grader.marking.mark import judge
+from grader.outcomes import CHARGED
 from grader.rubric import HandTable, rubric_of
 from reference.authored.assignment import built_in, load_assignment
 from reference.construction.mistakes import Drawing, single_mistakes

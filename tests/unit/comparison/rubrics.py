@@ -1,4 +1,4 @@
-"""Tasks with something of their rubric changed."""
+"""Tasks with something of their rubric changed, and what is looked up in a comparison."""
 
 from dataclasses import replace
 
@@ -19,3 +19,11 @@ def with_criterion(task, name, **change):
 def without_hand(task):
     """The same rubric with its tolerances as they stand, widened for nobody's hand."""
     return with_rubric(task, hand=HandTable(sigmas=0.0))
+
+
+def outcome_of(comparison, criterion):
+    return next(one for one in comparison.outcomes if one.criterion == criterion)
+
+
+def codes(outcome):
+    return [reason.code for reason in outcome.reasons]

@@ -19,7 +19,7 @@ from grader.self_check.results import checked_values
 from reference.authored.assignment import load_assignment
 from reference.construction.mistakes import Mistake
 from tests.hands import changed, drawn_nodes, measured, rule_scales, sheet, task_for, without
-from tests.unit.comparison.rubrics import with_criterion, with_rubric, without_hand
+from tests.unit.comparison.rubrics import codes, outcome_of, with_criterion, with_rubric, without_hand
 
 PUMP = task_for("pump", 7)
 PRESS = task_for("press", position=1)
@@ -29,14 +29,6 @@ ROUNDING = 1e-9
 
 def verdicts(comparison):
     return {one.criterion: one.verdict for one in comparison.outcomes}
-
-
-def outcome_of(comparison, criterion):
-    return next(one for one in comparison.outcomes if one.criterion == criterion)
-
-
-def codes(outcome):
-    return [reason.code for reason in outcome.reasons]
 
 
 def lost(comparison):
@@ -328,7 +320,7 @@ def test_what_follows_from_a_vector_that_was_refused_is_open():
 
 
 def test_what_is_lost_at_a_disputed_scale_waits_and_what_is_right_does_not():
-    long = changed(measured(PUMP), "v_D", length_mm=1.2 * abs(PUMP.drawn("v_D", rule_scales(PUMP))))
+    long = changed(measured(PUMP), "v_D", length_mm=1.2 * abs(PUMP.segments["v_D"].drawn(rule_scales(PUMP))))
     comparison = compare(PUMP, entered(PUMP, "kv", long))
     assert lost(comparison) == ["kv", "v_D"]
     assert {outcome_of(comparison, name).verdict for name in ("kv", "v_D")} == {"review"}

@@ -8,19 +8,11 @@ from grader.comparison.task import task_of
 from grader.rubric import load_rubric
 from reference.authored.assignment import library, load_assignment
 from tests.hands import changed, drawn_nodes, measured, rule_scales, sheet, task_for, without
-from tests.unit.comparison.rubrics import with_rubric
+from tests.unit.comparison.rubrics import codes, outcome_of, with_rubric
 
 TASK = task_for("pump", 7)
 RULE = rule_scales(TASK)
 ROUNDING = 1e-9
-
-
-def outcome_of(comparison, criterion):
-    return next(one for one in comparison.outcomes if one.criterion == criterion)
-
-
-def codes(outcome):
-    return [reason.code for reason in outcome.reasons]
 
 
 def declared(kv_factor=1.0, ka_factor=1.0):

@@ -34,7 +34,7 @@ def handed_in():
     for figure in task.construction.poles:
         vectors = {}
         for vector in task.construction.vectors_of(figure):
-            drawn = task.drawn(vector.name, scales)
+            drawn = task.segments[vector.name].drawn(scales)
             direction = float(np.degrees(np.angle(drawn))) + TURNED_DEG
             vectors[vector.name] = ReadVector(OFF * abs(drawn), 0.0, direction % 360.0, 0.0, 1.0)
         figures[figure] = Figure({}, vectors)

@@ -19,7 +19,6 @@ from tests.hands import (
     drawn_nodes,
     handed_in,
     measured,
-    rule_scales,
     sheet,
     task_for,
     without,
@@ -77,7 +76,7 @@ def test_two_mistakes_are_told_apart_from_the_own_nodes():
     [((1, 2), "rpm_not_converted"), ((0, 1), "scale_wrong"), ((1, 0), "rpm_not_converted")],
 )
 def test_a_wrong_declared_scale_is_told_as_what_it_is(powers, code):
-    scales = rule_scales(PUMP)
+    scales = PUMP.rule_scales
     factor = 9.5493 if code == "rpm_not_converted" else 0.1
     declared = {
         "kv": f"{scales['kv'] * factor ** powers[0]!r} (m/s)/mm",
@@ -94,7 +93,7 @@ def test_another_students_data_are_recognised():
     other = task_for("pump", 20)
     reading = measured(other)
     declared = {name: f"{scale!r} {unit}" for (name, scale), unit in zip(
-        rule_scales(other).items(), ("m/mm", "(m/s)/mm", "(m/s2)/mm"), strict=True)}  # fmt: skip
+        other.rule_scales.items(), ("m/mm", "(m/s)/mm", "(m/s2)/mm"), strict=True)}  # fmt: skip
     judgement = judge(PUMP, Submission(measured=reading, declared=declared))
     assert codes(judgement)[0] == "other_variant"
     assert judgement.mistakes[0].detail["n"] == 20
@@ -124,7 +123,7 @@ def test_what_no_mistake_explains_is_left_unexplained():
 
 
 def test_a_drawing_at_a_scale_that_nobody_declared_is_not_called_a_mistake():
-    other = {**rule_scales(PUMP), "kv": 2.0 * rule_scales(PUMP)["kv"]}
+    other = {**PUMP.rule_scales, "kv": 2.0 * PUMP.rule_scales["kv"]}
     assert judge(PUMP, Submission(measured=measured(PUMP, other))).mistakes == ()
 
 
@@ -195,7 +194,7 @@ def test_a_longer_crank_vector_and_a_reversed_component_are_both_named(source):
 @pytest.mark.parametrize("source", SOURCES)
 def test_another_students_data_at_the_own_scales_are_recognised(source):
     other = task_for("pump", 20)
-    nodes = drawn_nodes(other, rule_scales(PUMP))
+    nodes = drawn_nodes(other, PUMP.rule_scales)
     submission = replace(handed_in(PUMP, nodes, source), declared={})
     assert [(one.code, one.detail) for one in judge(PUMP, submission).mistakes] == [
         ("other_variant", {"n": 20})
@@ -248,7 +247,7 @@ def test_what_the_evidence_does_not_tell_apart_is_told_with_its_odds():
 
 
 def test_a_wrong_scale_is_named_beside_a_reversed_vector():
-    scales = rule_scales(PRESS)
+    scales = PRESS.rule_scales
     declared = declared_texts({**scales, "ka": 1.25 * scales["ka"]})
     reading = measured(PRESS, mistakes=(Mistake("sense_reversed", "a'"),))
     judgement = judge(PRESS, Submission(measured=reading, declared=declared))

@@ -4,7 +4,8 @@ import pytest
 
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
-from grader.marking.mark import CHARGED, judge
+from grader.marking.mark import judge
+from grader.outcomes import CHARGED
 from grader.records import VELOCITY_PLAN, Reading, Swapped
 from grader.rubric import rubric_of
 from reference.authored.assignment import load_assignment

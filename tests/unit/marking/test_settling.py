@@ -41,7 +41,7 @@ def test_another_students_drawing_is_marked_as_any_mistake_where_the_rubric_says
 def one_open(stake):
     """A drawing of which the last vector is 1.5 times too long and was read without confidence."""
     task = with_doubt(stake=stake)
-    expected = abs(task.drawn("a_D", task.rule_scales))
+    expected = abs(task.segments["a_D"].drawn(task.rule_scales))
     reading = changed(sheet(task), "a_D", length_mm=1.5 * expected, confidence=0.5)
     return task, judge(task, Submission(readings=(reading,)))
 

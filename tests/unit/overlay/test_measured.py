@@ -26,7 +26,7 @@ def measured(name="pump", n=7, position=None, *, directions=True, left_out=(), l
     for figure in task.construction.poles:
         vectors = {}
         for vector in task.construction.vectors_of(figure):
-            exact = task.drawn(vector.name, scales)
+            exact = task.segments[vector.name].drawn(scales)
             direction = math.degrees(np.angle(exact)) % 360.0 if directions and abs(exact) > 1e-9 else None
             length = abs(exact) * (longer or {}).get(vector.name, 1.0)
             if vector.name not in left_out:

@@ -6,12 +6,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from grader.documents import MistakeDocument
 from grader.similarity import groups
 from grader.similarity.drawings import compare_drawings, log_chance
 from grader.similarity.groups import CELLS, compared_together, find_similar, ink_map
+from grader.similarity.submission import compared_submission
 from reference.authored.assignment import Variant, built_in, load_assignment
 from samples.simulation import PERFECT
 from tests.examples import slow
+from tests.unit.feedback.works import report
 from tests.unit.similarity import classes
 from tests.unit.similarity.classes import any_drawing, changed, drawing, measured, scanned, scanned_class
 
@@ -353,3 +356,9 @@ def test_crosses_for_poles_that_are_each_variants_own_make_nobody_alike(printed)
             placed[figure] = {node: at + shift for node, at in nodes.items()}
         made.append(replace(one, sheets=(placed,), printed=printed))
     assert found("pump", made) == {}
+
+
+def test_the_variant_that_the_diagnosis_names_is_known_by_its_number():
+    known = {"at": "mechanism", "explains": [], "confidence": 0.9, "parameters": {"n": 9}}
+    named = report(mistakes=[MistakeDocument(code="other_variant", **known)])
+    assert compared_submission(named, Variant(n=7), None).fits == (Variant(n=9), 0.9)
