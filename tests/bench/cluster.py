@@ -2,9 +2,8 @@
 
 ``python -m tests.bench.cluster [--sheets 60] [--seconds 0.5] [--workers 1 2 4]`` starts a scheduler and
 workers as the page on clusters says. A call sleeps for a sheet's time and writes as much as a sheet leaves
-behind, so that not the processors of this machine are measured but the way there and back. With
-``--folder F`` a class of `pump` is graded instead. From processor times per sheet follow the rates at which
-client, scheduler and network are full.
+behind, so that not the processors of this machine are measured but the way there and back. From processor
+times per sheet follow the rates at which client, scheduler and network are full.
 """
 
 import argparse
@@ -22,11 +21,8 @@ import distributed
 import psutil
 
 from grader.files import write_whole
-from grader.folder.batch import Batch, grade
 from grader.folder.cluster import Cluster
 from grader.folder.workers import Limits
-from grader.rubric import rubric_of
-from reference.authored.assignment import load_assignment
 
 ROOT = Path(__file__).resolve().parents[2]
 SHEET_BYTES = 1_200_000
@@ -65,7 +61,7 @@ def _dask(*arguments: str) -> subprocess.Popen[bytes]:
     )
 
 
-def _measured(workers: int, sheets: int, seconds: float, folder: Path | None, port: int) -> Run:
+def _measured(workers: int, sheets: int, seconds: float, port: int) -> Run:
     from tests.bench.cluster import sheet  # noqa: PLC0415 - by a name that workers know, not __main__
 
     address = f"tcp://127.0.0.1:{port}"
@@ -77,21 +73,14 @@ def _measured(workers: int, sheets: int, seconds: float, folder: Path | None, po
         with tempfile.TemporaryDirectory() as name:
             out = Path(name, "out")
             out.mkdir()
-            with Cluster(address, folder or Path(name), out, Limits(seconds=300.0)) as pool:
+            with Cluster(address, Path(name), out, Limits(seconds=300.0)) as pool:
                 # The workers' own processes start before the clock does.
                 list(pool.run(sheet, [(out, -1 - number, 0.0, 1) for number in range(4 * workers)]))
                 known = psutil.Process(scheduler.pid)
                 before = sum(known.cpu_times()[:2])
                 start, own = time.monotonic(), time.process_time()
-                if folder is None:
-                    calls = [(out, number, seconds, SHEET_BYTES) for number in range(sheets)]
-                    assert len([one for one in pool.run(sheet, calls) if one[0] == one[1]]) == sheets
-                else:
-                    assignment = load_assignment("pump")
-                    batch = Batch(assignment, rubric_of(assignment), folder, out)
-                    reports = grade(batch, lambda *_: None, pool).reports
-                    read = [report.reading.sheets for report in reports if report.reading]
-                    sheets = len([one for several in read for one in several])
+                calls = [(out, number, seconds, SHEET_BYTES) for number in range(sheets)]
+                assert len([one for one in pool.run(sheet, calls) if one[0] == one[1]]) == sheets
                 return Run(
                     workers,
                     sheets,
@@ -138,11 +127,10 @@ def main() -> None:
     parser.add_argument("--sheets", type=int, default=60)
     parser.add_argument("--seconds", type=float, default=0.5)
     parser.add_argument("--workers", type=int, nargs="+", default=[1, 2, 4])
-    parser.add_argument("--folder", type=Path)
     parser.add_argument("--port", type=int, default=18790)
     given = parser.parse_args()
     runs = [
-        _measured(workers, given.sheets, given.seconds, given.folder, given.port + number)
+        _measured(workers, given.sheets, given.seconds, given.port + number)
         for number, workers in enumerate(given.workers)
     ]
     print(report(runs, given.seconds))

@@ -13,10 +13,9 @@ were used to set the constants of `grader.given_data`; the rest measure.
 """
 
 import argparse
-import pickle
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -24,18 +23,14 @@ from grader.comparison.evidence import Submission
 from grader.comparison.task import Task, task_of
 from grader.marking.mark import judge
 from grader.outcomes import Judgement
-from grader.pipeline import read_submission, scan
-from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, PageRef, Reading
-from grader.rubric import asked_of
-from grader.tables.measurements import StudentSubmission
+from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, Reading
 from reference.authored.assignment import Assignment, Variant
-from samples.simulation import SimulatedSheet
 from samples.simulation.hand import draw
 from samples.simulation.hand import task_of as drawing_task
 from samples.simulation.settings import Student
 from samples.simulation.wording import declared_texts
 from tests.bench.judging_handed_in import submission
-from tests.bench.judging_scans import SCANNED, SHEET_KINDS, SheetKind, drawn_on
+from tests.bench.judging_scans import SCANNED, SHEET_KINDS, SheetKind, drawn_on, read_under, stored
 from tests.bench.judging_students import (
     ASSIGNMENTS,
     HANDS,
@@ -205,9 +200,10 @@ class ReadCopy:
 def read_copy(kind: str, seed: int, kept: Path | None, *, honest: bool) -> ReadCopy | None:
     """A sheet read, from the folder `kept` where it has it; None where no such drawing comes about."""
     path = None if kept is None else kept / f"{kind}-{seed}-{'honest' if honest else 'copied'}.pkl"
-    if path is not None and path.exists():
-        found: ReadCopy = pickle.loads(path.read_bytes())  # noqa: S301 - written by the lines below
-        return found
+    return stored(path, partial(_read_copy, kind, seed, honest=honest))
+
+
+def _read_copy(kind: str, seed: int, *, honest: bool) -> ReadCopy | None:
     hand = list(HANDS)[seed % 2]
     key = StudentKey(
         SCANNED[seed % len(SCANNED)], hand, "single" if honest and seed % 4 > 1 else "right", seed
@@ -224,24 +220,7 @@ def read_copy(kind: str, seed: int, kept: Path | None, *, honest: bool) -> ReadC
         own = others[int(key.lot("own").integers(len(others)))]
     scales = task_of(work.assignment, work.rubric, own).rule_scales
     declared = declared_texts(work.task.declared if honest else scales)
-    read = ReadCopy(key, own, work.variant, declared, _read_under(work, own, declared, pages))
-    if path is not None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(pickle.dumps(read))
-    return read
-
-
-def _read_under(
-    work: StudentWork, own: Variant, declared: Mapping[str, str], pages: Sequence[SimulatedSheet]
-) -> tuple[Reading, ...]:
-    """The pages as read for a variant."""
-    asked = asked_of(work.assignment, work.rubric)
-    with tempfile.TemporaryDirectory() as folder:
-        paths = [page.save(Path(folder) / str(number)) for number, page in enumerate(pages)]
-        refs = tuple(PageRef(path.name, path=path) for path in paths)
-        submission = StudentSubmission("s", own, refs, declared)
-        read = read_submission(submission, [scan(ref, asked) for ref in refs], work.assignment, asked)
-    return tuple(page.reading for page in read)
+    return ReadCopy(key, own, work.variant, declared, read_under(work, own, declared, pages))
 
 
 def judged_scan(kind: str, read: ReadCopy) -> Copied:
@@ -258,51 +237,31 @@ def judged_scan(kind: str, read: ReadCopy) -> Copied:
     return Copied(read.key, "scans", how, _apart(read.own, read.drawn), _said(judgement, read.drawn))
 
 
-@dataclass(slots=True)
-class CopyingFigures:
-    """All submissions, and their tables."""
+def tables(submissions: Sequence[Copied]) -> Iterator[Table]:
+    """Copies told, by how and by source; honest submissions accused, by hand."""
+    copies = [one for one in submissions if one.how != "honest"]
+    groups = {f"{source}, {how}": [one for one in copies if (one.source, one.how) == (source, how)]
+              for source in SOURCES for how in HOWS}  # fmt: skip
+    groups |= {f"scans, {kind}": [one for one in copies if one.how == f"{kind}, copied"] for kind in SCANS}
+    groups["all"] = copies
+    groups["all but neighbours"] = [one for one in copies if one.apart >= LEAST_APART]
+    heads = [
+        "copies", "submissions", "named", "told with the number", "settled without a person",
+        "of it neighbours", "of it right by the own data",
+    ]  # fmt: skip
+    yield "Copies", heads, [_row(name, ones) for name, ones in groups.items() if ones]
+    own = [one for one in submissions if one.how == "honest"]
+    groups = {f"{hand}, {kind}, {source}": [
+        one for one in own if (one.key.hand, one.key.kind, one.source) == (hand, kind, source)]
+        for hand in HANDS for kind in KINDS for source in (*SOURCES, "scans")}  # fmt: skip
+    groups["all"] = own
+    heads = ["own data", "submissions", "accused", "a person asked"]
+    yield "Honest submissions", heads, [_honest_row(name, ones) for name, ones in groups.items() if ones]
 
-    submissions: list[Copied] = field(default_factory=list)
 
-    def tables(self) -> Iterator[Table]:
-        """Copies told, by how and by source; honest submissions accused, by hand."""
-        heads = [
-            "copies",
-            "submissions",
-            "named",
-            "told with the number",
-            "settled without a person",
-            "of it neighbours",
-            "of it right by the own data",
-        ]
-        copies = [one for one in self.submissions if one.how != "honest"]
-        groups = {f"{source}, {how}": [one for one in copies if (one.source, one.how) == (source, how)]
-                  for source in SOURCES for how in HOWS}  # fmt: skip
-        groups |= {
-            f"scans, {kind}": [one for one in copies if one.how == f"{kind}, copied"] for kind in SCANS
-        }
-        groups["all"] = copies
-        groups["all but neighbours"] = [one for one in copies if one.apart >= LEAST_APART]
-        yield "Copies", heads, [_row(name, ones) for name, ones in groups.items() if ones]
-        own = [one for one in self.submissions if one.how == "honest"]
-        groups = {f"{hand}, {kind}, {source}": [
-            one for one in own if (one.key.hand, one.key.kind, one.source) == (hand, kind, source)]
-            for hand in HANDS for kind in KINDS for source in (*SOURCES, "scans")}  # fmt: skip
-        groups["all"] = own
-        yield (
-            "Honest submissions",
-            ["own data", "submissions", "accused", "a person asked"],
-            [
-                [
-                    name,
-                    str(len(ones)),
-                    str(sum(one.said.is_named for one in ones)),
-                    str(sum(one.said.is_asked for one in ones)),
-                ]
-                for name, ones in groups.items()
-                if ones
-            ],
-        )
+def _honest_row(name: str, ones: Sequence[Copied]) -> list[str]:
+    counts = len(ones), sum(one.said.is_named for one in ones), sum(one.said.is_asked for one in ones)
+    return [name, *map(str, counts)]
 
 
 RIGHT = 0.95
@@ -329,21 +288,19 @@ def _percent(part: int, whole: int) -> str:
 KINDS: tuple[Kind, ...] = ("right", "single", "pair")
 
 
-def measure(students: int, first: int = FIRST_SEED) -> CopyingFigures:
+def measure(students: int, first: int = FIRST_SEED) -> Iterator[Copied]:
     """So many copies, and as many honest submissions."""
-    found = CopyingFigures()
     for seed in range(first, first + students):
         name = ASSIGNMENTS[seed % len(ASSIGNMENTS)]
         hand = list(HANDS)[seed // len(ASSIGNMENTS) % len(HANDS)]
         source = SOURCES[seed % len(SOURCES)]
         how = HOWS[seed // len(SOURCES) % len(HOWS)]
         if hand != "sloppy" or seed % 2:
-            found.submissions.append(judged_copy(StudentKey(name, hand, "right", seed), source, how))
+            yield judged_copy(StudentKey(name, hand, "right", seed), source, how)
         kind = KINDS[seed % len(KINDS)]
         one = honest(StudentKey(name, hand, kind, seed), SOURCES[seed // 2 % len(SOURCES)])
         if one is not None:
-            found.submissions.append(one)
-    return found
+            yield one
 
 
 def measure_scans(students: int, first: int, kept: Path | None) -> Iterator[Copied]:
@@ -364,9 +321,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--kept", type=Path, help="folder in which readings are kept")
     parser.add_argument("--first", type=int, default=FIRST_SEED)
     chosen = parser.parse_args(arguments)
-    figures = measure(chosen.students, chosen.first)
-    figures.submissions += measure_scans(chosen.scans, chosen.first, chosen.kept)
-    print(as_text(figures.tables()))
+    submissions = [*measure(chosen.students, chosen.first)]
+    submissions += measure_scans(chosen.scans, chosen.first, chosen.kept)
+    print(as_text(tables(submissions)))
 
 
 if __name__ == "__main__":

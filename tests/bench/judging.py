@@ -10,27 +10,19 @@ import csv
 import math
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from itertools import product
 from pathlib import Path
-
-import cv2
-import numpy as np
 
 from grader.comparison.evidence import Submission
 from grader.comparison.task import Task, task_of
 from grader.documents import Quantity
 from grader.folder.batch import Batch, grade
 from grader.marking.mark import judge
-from grader.pipeline import read_pages
-from grader.records import PageRef, Reading
 from grader.rubric import RubricFile
-from grader.scan.page import open_page
 from grader.tables.measurements import names_of, read_measurements
 from reference.authored.assignment import Assignment
-from samples.simulation import Settings, SimulatedSheet, any_settings, simulate
-from samples.simulation.student import drawn_by
-from samples.simulation.wording import declared_texts
 from tests.bench.judging_handed_in import measured_line, submission
 from tests.bench.judging_students import (
     ASSIGNMENTS,
@@ -42,8 +34,6 @@ from tests.bench.judging_students import (
     StudentKey,
     StudentWork,
     assignment_named,
-    codes_of,
-    is_hidden,
     student,
 )
 from tests.bench.judging_tally import ClassTime, JudgingFigures, Result, Times, judging_tables, result_of
@@ -94,85 +84,10 @@ def _write(path: Path, assignment: str, rows: int) -> None:
         writer.writerows({"student_id": f"s{row:04d}", **lines[row % len(lines)]} for row in range(rows))
 
 
-_TRIES = 40
-
-
-def judged_scan(key: StudentKey, times: Times) -> list[Result]:
-    """One student's scans (flatbed, 300 dpi), read and judged, against what was due.
-
-    Raises ValueError where no drawing of this kind comes about.
-    """
-    work, pages = _drawn(key)
-    threads = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
-        readings = _read(work, pages)
-    finally:
-        cv2.setNumThreads(threads)
-    handed_in = Submission(
-        readings=tuple(one for one in readings if one.figures), declared=declared_texts(work.task.declared)
-    )
-    task = task_of(work.assignment, work.rubric, work.variant)
-    start = time.process_time()
-    judgement = judge(task, handed_in)
-    times.scans.append(1000.0 * (time.process_time() - start))
-    return [result_of(work, "scans", handed_in, judgement)]
-
-
-def _drawn(key: StudentKey) -> tuple[StudentWork, list[SimulatedSheet]]:
-    assignment, rubric = assignment_named(key.assignment)
-    variants = assignment.variants()
-    lot = key.lot("scan")
-    variant = variants[int(lot.integers(len(variants)))]
-    for _ in range(_TRIES):
-        seed = int(lot.integers(1_000_000))
-        settings = _settings(key, seed, lot)
-        try:
-            desk, drawn = drawn_by(assignment, variant, seed, settings)
-        except ValueError:  # a mistake that cannot be made here
-            continue
-        if is_hidden(desk.task):
-            continue
-        pages = simulate(assignment, variant, seed, settings)
-        left_out = {
-            name
-            for page in pages
-            for figure in page.truth["figures"].values()
-            for name in figure.get("missing", {})
-        }
-        left = frozenset(left_out) | desk.task.missing
-        work = StudentWork(
-            key, assignment, rubric, desk.task, drawn, declares=True, letters=True, left_out=left
-        )
-        return work, pages
-    raise ValueError(f"{key}: no such drawing in {_TRIES} tries")
-
-
-def _settings(key: StudentKey, seed: int, lot: np.random.Generator) -> Settings:
-    """Habits, pen, page and scan by lot; the hand and the mistakes by the key."""
-    settings = any_settings(seed, device="flatbed", dpi=300.0, mistakes=0.0)
-    habits = replace(settings.student, mistakes=codes_of(key, lot))
-    return replace(settings, hand=HANDS[key.hand], student=habits)
-
-
-def _read(work: StudentWork, pages: Sequence[SimulatedSheet]) -> list[Reading]:
-    with tempfile.TemporaryDirectory() as folder:
-        paths = [page.save(Path(folder) / str(number)) for number, page in enumerate(pages)]
-        scanned = [open_page(PageRef(path.name, path=path)) for path in paths]
-        declared = declared_texts(work.task.declared)
-        pages_read = read_pages(scanned, work.assignment, work.variant, declared, work.rubric.vectors)
-        return [page.reading for page in pages_read]
-
-
 STUDENTS: Mapping[Kind, int] = {"right": 96, "single": 48, "pair": 48, "slip": 12}
 """Of each kind for an assignment and a hand: 2,016 right drawings in all."""
 QUICK = 4
 """In a quick run so many of each kind."""
-ROWS, ROWS_QUICK = 1000, 50
-"""Of a class's measurements."""
-SCANNED = ("pump", "press", "engine", "shaper")
-SCANS: Mapping[Kind, int] = {"right": 1, "single": 4}
-"""Students of each kind, for a mechanism of these and a hand, whose scans are read."""
 
 
 def judged(key: StudentKey, times: Times | None = None, sources: Sequence[Source] = SOURCES) -> list[Result]:
@@ -194,53 +109,25 @@ def _judged_from(work: StudentWork, task: Task, source: Source, noted: Times) ->
     return result_of(work, source, handed_in, judgement)
 
 
-class JudgingBench:
-    """The whole benchmark of judging; `run` tells what was measured, step by step.
+def measure_judging(
+    students: int | None = None,
+    *,
+    quick: bool = False,
+    assignments: Sequence[str] = ASSIGNMENTS,
+) -> JudgingFigures:
+    """Students of each assignment, hand and kind, judged.
 
-    Arguments: `students` of each kind for an assignment and a hand; `whole` for simulated scans (careful and
-    typical hands, fewer of each kind) and a class's file of measurements through the whole program as well.
+    Arguments: `students` of each kind for an assignment and a hand, by default `STUDENTS`.
     """
-
-    def __init__(
-        self,
-        *,
-        quick: bool = False,
-        students: int | None = None,
-        assignments: Sequence[str] = ASSIGNMENTS,
-        whole: bool = False,
-    ) -> None:
-        few = students or (QUICK if quick else None)
-        self._counts = dict.fromkeys(KINDS, few) if few else STUDENTS
-        self._classes = [(name, hand) for name in assignments for hand in HANDS]
-        scanned = [one for one in self._classes if one[0] in SCANNED and one[1] != "sloppy"]
-        self._scanned = scanned if whole and not quick else []
-        self._rows = (ROWS_QUICK if quick else ROWS) if whole else 0
-        self.figures = JudgingFigures()
-        self.steps = len(self._classes) + len(self._scanned) + (self._rows > 0)
-
-    def run(self) -> Iterator[str]:
-        """Measure, naming what was measured."""
-        for name, hand in self._classes:
-            for kind, count in self._counts.items():
-                for seed in range(1, count + 1):
-                    self._measure(StudentKey(name, hand, kind, seed), judged)
-            yield f"judging: {name}, {hand} hands"
-        for name, hand in self._scanned:
-            for kind, count in SCANS.items():
-                for seed in range(1, count + 1):
-                    self._measure(StudentKey(name, hand, kind, seed), judged_scan)
-            yield f"judging: {name}, {hand} hands, scans"
-        if self._rows:
-            self.figures.classes.append(measure_class(self._rows))
-            yield "judging: a class's measurements"
-
-    def _measure(self, key: StudentKey, how: Callable[[StudentKey, Times], list[Result]]) -> None:
-        try:
-            results = how(key, self.figures.times)
-        except ValueError as error:
-            self.figures.refused.append(str(error))
-        else:
-            self.figures.results.extend(results)
+    few = students or (QUICK if quick else None)
+    figures = JudgingFigures()
+    for name, hand in product(assignments, HANDS):
+        for kind, count in (dict.fromkeys(KINDS, few) if few else STUDENTS).items():
+            for seed in range(1, count + 1):
+                # Of some students no drawing comes about.
+                with suppress(ValueError):
+                    figures.results += judged(StudentKey(name, hand, kind, seed), figures.times)
+    return figures
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -256,11 +143,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         name, hand, kind, seed = chosen.case
         print(*_in_full(StudentKey(name, hand, kind, int(seed))), sep="\n")
         return
-    bench = JudgingBench(quick=chosen.quick, students=chosen.students, assignments=chosen.assignments)
-    for _ in bench.run():
-        pass
-    print(as_text(judging_tables(bench.figures)))
-    print(*bench.figures.failures[: chosen.failures], sep="\n")
+    figures = measure_judging(chosen.students, quick=chosen.quick, assignments=chosen.assignments)
+    print(as_text(judging_tables(figures)))
+    print(*figures.failures[: chosen.failures], sep="\n")
 
 
 def _in_full(key: StudentKey) -> Iterator[str]:

@@ -6,11 +6,11 @@ photos; sloppy hands apart. Half of the drawings are right, a third have one mis
 
 import pickle
 import tempfile
-import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from grader.pipeline import read_submission, scan
 from grader.records import PageRef, Reading
 from grader.rubric import asked_of
 from grader.tables.measurements import StudentSubmission
+from reference.authored.assignment import Variant
 from reference.construction.graph import Vector
 from samples.simulation import SimulatedSheet, any_settings, simulate
 from samples.simulation.mixture import Device
@@ -61,19 +62,12 @@ SHEET_KINDS: Mapping[str, SheetKind] = {
 
 @dataclass(frozen=True, slots=True)
 class ReadWork:
-    """A student's sheets as they were read.
-
-    Attributes
-    ----------
-    declared : scales, as the student declares them
-    seconds : processor time of scanning and reading
-    """
+    """A student's sheets as they were read, and the scales as the student declares them."""
 
     kind: str
     work: StudentWork
     readings: tuple[Reading, ...]
     declared: Mapping[str, str]
-    seconds: float
 
 
 def read_works(kind: str, seeds: Sequence[int], kept: Path | None = None) -> Iterator[ReadWork]:
@@ -83,17 +77,32 @@ def read_works(kind: str, seeds: Sequence[int], kept: Path | None = None) -> Ite
     """
     for seed in seeds:
         path = None if kept is None else kept / f"{kind}-{seed}.pkl"
-        if path is not None and path.exists():
-            yield pickle.loads(path.read_bytes())  # noqa: S301 - written by the lines below
-            continue
-        made = drawn_on(SHEET_KINDS[kind], *_student(kind, seed))
-        if made is None:
-            continue
-        read = _read(kind, *made)
-        if path is not None:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(pickle.dumps(read))
-        yield read
+        read = stored(path, partial(_read, kind, seed))
+        if read is not None:
+            yield read
+
+
+Read = TypeVar("Read")
+
+
+def stored(path: Path | None, read: Callable[[], Read | None]) -> Read | None:
+    """What a file has; what `read` gives, written there, where it is not there; None where that is none."""
+    if path is not None and path.exists():
+        return pickle.loads(path.read_bytes())  # type: ignore[no-any-return]  # noqa: S301 - written below
+    found = read()
+    if found is not None and path is not None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(pickle.dumps(found))
+    return found
+
+
+def _read(kind: str, seed: int) -> ReadWork | None:
+    made = drawn_on(SHEET_KINDS[kind], *_student(kind, seed))
+    if made is None:
+        return None
+    work, pages = made
+    declared = declared_texts(work.task.declared)
+    return ReadWork(kind, work, read_under(work, work.variant, declared, pages), declared)
 
 
 def _student(kind: str, seed: int) -> tuple[StudentKey, np.random.Generator]:
@@ -164,13 +173,14 @@ def _lies_under_lines(figure: Mapping[str, Any], vector: Vector) -> bool:
     return not is_point and bool((apart.min(axis=1, initial=np.inf) <= ON_LINE_MM).all())
 
 
-def _read(kind: str, work: StudentWork, pages: Sequence[SimulatedSheet]) -> ReadWork:
-    declared, asked = declared_texts(work.task.declared), asked_of(work.assignment, work.rubric)
+def read_under(
+    work: StudentWork, variant: Variant, declared: Mapping[str, str], pages: Sequence[SimulatedSheet]
+) -> tuple[Reading, ...]:
+    """The pages as read for a variant and these scales."""
+    asked = asked_of(work.assignment, work.rubric)
     with tempfile.TemporaryDirectory() as folder:
         paths = [page.save(Path(folder) / str(number)) for number, page in enumerate(pages)]
         refs = tuple(PageRef(path.name, path=path) for path in paths)
-        start = time.process_time()
-        submission = StudentSubmission("s", work.variant, refs, declared)
+        submission = StudentSubmission("s", variant, refs, declared)
         read = read_submission(submission, [scan(ref, asked) for ref in refs], work.assignment, asked)
-        spent = time.process_time() - start
-    return ReadWork(kind, work, tuple(page.reading for page in read), declared, spent)
+    return tuple(page.reading for page in read)

@@ -3,8 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -155,7 +154,6 @@ class Times:
     right: list[float] = field(default_factory=list)
     wrong: list[float] = field(default_factory=list)
     task: list[float] = field(default_factory=list)
-    scans: list[float] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
@@ -259,10 +257,6 @@ class JudgingTally:
         if one.due == "follows":
             self.followed.add(one.verdict in CREDITED)
 
-    def as_json(self) -> dict[str, Any]:
-        """One JSON object."""
-        return {**asdict(self), "instead": [[*key, count] for key, count in self.instead.most_common()]}
-
 
 def summed(results: Iterable[Result], by: Sequence[str]) -> dict[tuple[str, ...], JudgingTally]:
     """Tallies by assignment, hand, kind or source."""
@@ -279,51 +273,27 @@ def where(result: Result, by: Sequence[str]) -> tuple[str, ...]:
 
 @dataclass(slots=True)
 class JudgingFigures:
-    """All that was measured; `refused` are students of whom no drawing came about."""
+    """All that was measured."""
 
     results: list[Result] = field(default_factory=list)
     times: Times = field(default_factory=Times)
     classes: list[ClassTime] = field(default_factory=list)
-    refused: list[str] = field(default_factory=list)
 
     @property
     def failures(self) -> list[Result]:
         """All that went wrong, to be looked into one by one."""
         return [result for result in self.results if not result.is_clean]
 
-    def as_json(self) -> dict[str, Any]:
-        """One JSON object: sums by assignment, hand, kind and source, and every failure in one line."""
-        by = ("assignment", "hand", "kind", "source")
-        rows = [
-            {**dict(zip(by, place, strict=True)), **tally.as_json()}
-            for place, tally in summed(self.results, by).items()
-        ]
-        return {
-            "rows": rows,
-            "milliseconds": {
-                name: _spread(getattr(self.times, name)) for name in ("right", "wrong", "task", "scans")
-            },
-            "classes": [asdict(one) for one in self.classes],
-            "failures": [str(result) for result in self.failures],
-            "refused": self.refused,
-        }
 
-
-def _spread(spent: Sequence[float]) -> dict[str, float] | None:
-    """Median and what 95 % keep within."""
-    if not spent:
-        return None
-    middle, most = np.percentile(spent, (50.0, 95.0))
-    return {"median": float(middle), "p95": float(most), "count": len(spent)}
+PLACE = ("source", "hand")
+"""What the rows of the tables are told apart by."""
 
 
 def judging_tables(figures: JudgingFigures) -> Iterator[Table]:
     """Verdicts, mistakes named, codes, times."""
     results = figures.results
-    yield _verdicts(results, ("source", "hand"), "Judging: verdicts")
-    yield _verdicts(results, ("source", "assignment"), "Judging: verdicts by mechanism")
-    yield _names(results, ("source", "hand"), "Judging: the first mistake named")
-    yield _names(results, ("source", "assignment"), "Judging: the first mistake named, by mechanism")
+    yield _verdicts(results)
+    yield _names(results)
     yield _codes(results)
     yield _instead(results)
     yield _times(figures.times)
@@ -339,9 +309,9 @@ def _percent(count: Count) -> str:
     return NOTHING if count.share is None else f"{100.0 * count.share:.1f} %"
 
 
-def _verdicts(results: Sequence[Result], by: Sequence[str], title: str) -> Table:
+def _verdicts(results: Sequence[Result]) -> Table:
     heads = [
-        *by, "students", "charged wrongly", "credited wrongly", "review", "follow-through credited",
+        *PLACE, "students", "charged wrongly", "credited wrongly", "review", "follow-through credited",
         "hand's own miss charged", "unpunished", "nothing to judge by: review",
     ]  # fmt: skip
     rows = [
@@ -350,20 +320,20 @@ def _verdicts(results: Sequence[Result], by: Sequence[str], title: str) -> Table
             f"{_percent(one.followed)} of {one.followed.of}", _of(one.missed), _of(one.unpunished),
             _of(one.blank),
         ]
-        for place, one in summed(results, by).items()
+        for place, one in summed(results, PLACE).items()
     ]  # fmt: skip
-    return title, heads, rows
+    return "Judging: verdicts", heads, rows
 
 
-def _names(results: Sequence[Result], by: Sequence[str], title: str) -> Table:
+def _names(results: Sequence[Result]) -> Table:
     """Singles, pairs and slips beside each other; in brackets what is named only as a rival of another."""
     heads = [
-        *by, "one mistake", "the first of two", "as the surest of two", "a slip in computing",
+        *PLACE, "one mistake", "the first of two", "as the surest of two", "a slip in computing",
         "wrong names: one mistake", "two", "right drawings accused",
     ]  # fmt: skip
     rows = []
-    for place in dict.fromkeys(where(one, by) for one in results):
-        here = [one for one in results if where(one, by) == place]
+    for place in dict.fromkeys(where(one, PLACE) for one in results):
+        here = [one for one in results if where(one, PLACE) == place]
         kinds = {kind: tally for (kind,), tally in summed(here, ("kind",)).items()}
         right, single, pair, slip = (
             kinds.get(kind, JudgingTally()) for kind in ("right", "single", "pair", "slip")
@@ -374,7 +344,7 @@ def _names(results: Sequence[Result], by: Sequence[str], title: str) -> Table:
                 _of(single.misnamed), _of(pair.misnamed), _of(right.accused),
             ]
         )  # fmt: skip
-    return title, heads, rows
+    return "Judging: the first mistake named", heads, rows
 
 
 def _named_share(tally: JudgingTally) -> str:
@@ -414,7 +384,6 @@ def _times(times: Times) -> Table:
         for name, spent in (
             ("right drawings", times.right),
             ("wrong drawings", times.wrong),
-            ("read from scans", times.scans),
             ("making the task", times.task),
         )
         if spent

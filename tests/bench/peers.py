@@ -216,7 +216,7 @@ class Fsolve:
         values = x.tolist()
         return {name: complex(values[2 * k], values[2 * k + 1]) for k, name in enumerate(self.names)}
 
-    def solve(self, index: int, start: Places, *, accelerations: bool = True) -> Callable[[], Answer]:
+    def solve(self, index: int, start: Places) -> Callable[[], Answer]:
         """The place from the sketch on; velocities and accelerations from the differentiated equations."""
         plain, pin = self.plain, self.plain.pin
         arm, omega, epsilon = plain.arm(index), plain.omega[index], plain.epsilon[index]
@@ -230,8 +230,7 @@ class Fsolve:
         pushed = self.still | {pin: (1j * epsilon - omega**2) * arm}
         try:
             moved |= self._pairs(np.linalg.solve(matrix, self._pull(at, moved)))
-            if accelerations:
-                pushed |= self._pairs(np.linalg.solve(matrix, self._pull(at, pushed, moved)))
+            pushed |= self._pairs(np.linalg.solve(matrix, self._pull(at, pushed, moved)))
         except np.linalg.LinAlgError as error:
             raise NoAnswerError(str(error)) from error
         return lambda: Answer(at, moved, pushed)

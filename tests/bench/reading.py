@@ -1,7 +1,6 @@
 """Reading measured on simulated sheets whose truth is known, scene by scene.
 
 What counts as right, and what as a silent misread, stands in `tests.bench.reading_truth`.
-`ReadingBench` adds pages without the drawing asked for, and strokes by themselves.
 """
 
 import tempfile
@@ -12,7 +11,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from unittest.mock import patch
 
-import cv2
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
@@ -26,69 +24,29 @@ from grader.rubric import asked_of
 from grader.scan.page import open_page
 from grader.tables.measurements import StudentSubmission
 from reference.construction.derive import construction_of
-from tests.bench.lines import LinesFigures, measure_lines
 from tests.bench.plain_text import Table
 from tests.bench.reading_memory import peak_mb
 from tests.bench.reading_scenes import (
     BREAKDOWNS,
     SCENES,
-    ForeignRow,
     ReadingScene,
     SceneWork,
-    measure_foreign,
     scene_named,
     works,
 )
-from tests.bench.reading_tally import STAGES, ReadingTally, SceneRow, pair, percent, row_of
+from tests.bench.reading_tally import ReadingTally, SceneRow, pair, percent, row_of
 from tests.bench.reading_truth import figures_of
 
-__all__ = ["SCENES", "STAGES", "STUDENTS", "ReadingBench", "SceneRow", "measure_reading"]
-
-STUDENTS, STUDENTS_QUICK = 6, 1
 SCENES_QUICK = ("plain", "printed")
 
 
-class ReadingBench:
-    """The whole benchmark of reading; `run` tells what was measured, step by step.
-
-    Arguments: `students` per scene, by default 6, in a quick run 1 of two scenes only.
-    """
-
-    def __init__(self, *, quick: bool = False, students: int | None = None) -> None:
-        self.quick = quick
-        self.students = students or (STUDENTS_QUICK if quick else STUDENTS)
-        self.scenes = tuple(scene for scene in SCENES if not quick or scene.name in SCENES_QUICK)
-        self.rows: list[SceneRow] = []
-        self.foreign: list[ForeignRow] = []
-        self.curve: list[CurveRow] = []
-        self.lines: LinesFigures | None = None
-        self.steps = len(self.scenes) + 3
-
-    def run(self) -> Iterator[str]:
-        """Measure, naming what was measured."""
-        # One core: what a class needs is sheets per core.
-        threads = cv2.getNumThreads()
-        cv2.setNumThreads(1)
-        try:
-            for scene in self.scenes:
-                self.rows.append(measure_scene(scene, self.students, memory=not self.quick))
-                yield f"reading: {scene.title}"
-            self.foreign.extend(measure_foreign(quick=self.quick))
-            yield "reading: foreign pages"
-            self.curve.extend(measure_curve(1 if self.quick else self.students, quick=self.quick))
-            yield "reading: time against error"
-            self.lines = measure_lines(quick=self.quick)
-            yield "lines"
-        finally:
-            cv2.setNumThreads(threads)
-
-
 def measure_reading(
-    *, students: int = STUDENTS, first_seed: int = 1, scenes: Sequence[ReadingScene] = SCENES
+    students: int, scenes: Sequence[ReadingScene] = SCENES, *, quick: bool = False
 ) -> Iterator[SceneRow]:
-    """A row per scene; the same students in each run."""
+    """A row per scene, the same students in each run; a quick one has few scenes and no memory."""
     for scene in scenes:
-        yield measure_scene(scene, students, first_seed)
+        if not quick or scene.name in SCENES_QUICK:
+            yield measure_scene(scene, students, memory=not quick)
 
 
 def measure_scene(

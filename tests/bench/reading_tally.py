@@ -75,10 +75,9 @@ def whitened(error: complex, cov: FloatArray) -> list[float]:
 
 @dataclass(frozen=True, slots=True)
 class Honesty:
-    """Spreads of confidently read lengths (to nodes, to the nearer of nodes and stroke) and of nodes."""
+    """Spreads of confidently read lengths (node to node) and of nodes."""
 
-    length_to_nodes: ErrorSpread
-    length_to_nearer: ErrorSpread
+    lengths: ErrorSpread
     nodes: ErrorSpread
     confidence: Sequence[Bin]
 
@@ -96,8 +95,7 @@ class ReadingTally:
     Attributes
     ----------
     judged : of every sheet, its asked vectors
-    node_errors_mm, near_errors_mm : of confidently read nodes of the plans: to the node, and to the
-        nearest of the node and the ends of the strokes that join there
+    node_errors_mm : of confidently read nodes of the plans
     joint_errors_mm : the same for the sketch's joints
     node_ratios : errors of nodes along principal axes, in standard errors
     """
@@ -109,7 +107,6 @@ class ReadingTally:
     students: int = 0
     judged: list[list[Judged]] = field(default_factory=list)
     node_errors_mm: list[float] = field(default_factory=list)
-    near_errors_mm: list[float] = field(default_factory=list)
     joint_errors_mm: list[float] = field(default_factory=list)
     node_ratios: list[float] = field(default_factory=list)
     times_ms: dict[str, list[float]] = field(default_factory=lambda: {stage: [] for stage in STAGES})
@@ -137,10 +134,10 @@ class ReadingTally:
         for name, drawn in truth["figures"].items():
             found = reading.figures.get(name)
             if found is not None:
-                self._add_nodes(drawn, found, figures.get(name), on_paper)
+                self._add_nodes(drawn, found, on_paper, is_plan=name in figures)
 
     def _add_nodes(
-        self, drawn: Mapping[str, Any], found: Figure, figure: TrueFigure | None, on_paper: OnPaper
+        self, drawn: Mapping[str, Any], found: Figure, on_paper: OnPaper, *, is_plan: bool
     ) -> None:
         """The confidently read nodes of a plan, or joints of the sketch, by their places on the paper."""
         nodes = {name: complex(x, -y) for name, (x, y) in drawn["nodes"].items()}
@@ -150,22 +147,11 @@ class ReadingTally:
         read = on_paper(np.array([found.nodes[name].at for name in sure]))
         for name, at in zip(sure, read.tolist(), strict=True):
             error = at - nodes[name]
-            if figure is None:
+            if not is_plan:
                 self.joint_errors_mm.append(abs(error))
                 continue
             self.node_errors_mm.append(abs(error))
-            places = [nodes[name], *_stroke_ends(figure, name)]
-            self.near_errors_mm.append(min(abs(at - place) for place in places))
             self.node_ratios.extend(whitened(error, found.nodes[name].cov))
-
-
-def _stroke_ends(figure: TrueFigure, node: str) -> Iterable[complex]:
-    """Where the strokes of a node's vectors really begin or end."""
-    for vector in figure.vectors.values():
-        if vector.stroke is not None and vector.ends is not None:
-            for place, end in zip(vector.ends, vector.stroke, strict=True):
-                if place == figure.nodes[node]:
-                    yield end
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,7 +167,7 @@ class SceneRow:
     right_and_confident : what needs no person and is right
     short, short_right : the shorter ones
     misreads, confidently : silent misreads, out of how many reported with confidence
-    node_mm, near_mm, joint_mm : median and p95 of confidently read nodes, see `ReadingTally`
+    node_mm, joint_mm : median and p95 of confidently read nodes, see `ReadingTally`
     times_ms, processor_ms : medians per page of processor time, by stage and in all
     peak_mb : of a process of its own that reads one student's sheets
     """
@@ -206,7 +192,6 @@ class SceneRow:
     misreads: int
     confidently: int
     node_mm: tuple[float | None, float | None]
-    near_mm: tuple[float | None, float | None]
     joint_mm: tuple[float | None, float | None]
     honesty: Honesty
     times_ms: Mapping[str, float]
@@ -241,7 +226,6 @@ def row_of(scene: str, title: str, tally: ReadingTally, peak_mb: float | None) -
         misreads=sum(one.misread for one in everything),
         confidently=len(counting),
         node_mm=_quantiles(tally.node_errors_mm),
-        near_mm=_quantiles(tally.near_errors_mm),
         joint_mm=_quantiles(tally.joint_errors_mm),
         honesty=honesty_of(tally),
         times_ms={stage: _median(spent) for stage, spent in tally.times_ms.items()},
@@ -256,7 +240,6 @@ def honesty_of(tally: ReadingTally) -> Honesty:
     sure = [one for one in everything if one.sure and not one.true.missing and one.se_mm > 0.0]
     return Honesty(
         ErrorSpread.of([one.node_error_mm / one.se_mm for one in sure if one.node_error_mm is not None]),
-        ErrorSpread.of([one.near_error_mm / one.se_mm for one in sure if one.near_error_mm is not None]),
         ErrorSpread.of(tally.node_ratios),
         calibration([(one.confidence, one.error_mm) for one in everything]),
     )
@@ -347,16 +330,14 @@ _PAPER: Sequence[Column] = (
 )
 _NODES: Sequence[Column] = (
     _SCENE,
-    ("from the node", lambda row: pair(row.node_mm)),
-    ("from the node or its strokes' ends", lambda row: pair(row.near_mm)),
+    ("nodes of the plans", lambda row: pair(row.node_mm)),
     ("joints of the sketch", lambda row: pair(row.joint_mm)),
 )
 _SPREADS: Sequence[Column] = (
     _SCENE,
-    ("lengths, node to node", lambda row: _spread(row.honesty.length_to_nodes)),
-    ("lengths, nearer of nodes and stroke", lambda row: _spread(row.honesty.length_to_nearer)),
+    ("lengths", lambda row: _spread(row.honesty.lengths)),
     ("nodes", lambda row: _spread(row.honesty.nodes)),
-    ("lengths, nodes counted", lambda row: f"{row.honesty.length_to_nodes.count}, {row.honesty.nodes.count}"),
+    ("lengths, nodes counted", lambda row: f"{row.honesty.lengths.count}, {row.honesty.nodes.count}"),
 )
 
 

@@ -152,8 +152,7 @@ class Judged:
     ----------
     counts : False for one that is neither drawn nor reported, and where real geometry stands in
     error_mm : distance of its end from the true end, starts laid on one another; infinite if unread
-    node_error_mm, near_error_mm : of its length, against the nodes and against the nearer of nodes and
-        stroke; None if unread
+    node_error_mm : of its length, against the nodes; None if unread
     confidence : 0 where it is unread
     """
 
@@ -163,7 +162,6 @@ class Judged:
     right: bool = False
     error_mm: float = float("inf")
     node_error_mm: float | None = None
-    near_error_mm: float | None = None
     se_mm: float = 0.0
     confidence: float = 0.0
 
@@ -251,15 +249,13 @@ def judged(true: TrueVector, found: ReadVector | None) -> Judged:
         return Judged(true, reported=True, error_mm=abs(read), se_mm=found.se_mm, confidence=found.confidence)
     error = min(abs(read - way) for way in true.ways)
     stands_in = true.covered and error <= MISREAD_MM
-    off = [found.length_mm - abs(way) for way in true.ways]
     return Judged(
         true,
         counts=not (true.missing and stands_in),
         reported=True,
         right=not true.missing and any(_is_right(read, way) for way in true.ways),
         error_mm=error if not true.missing or stands_in else max(error, abs(read)),
-        node_error_mm=off[0],
-        near_error_mm=min(off, key=abs),
+        node_error_mm=found.length_mm - abs(true.ways[0]),
         se_mm=found.se_mm,
         confidence=found.confidence,
     )

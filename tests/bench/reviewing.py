@@ -2,13 +2,12 @@
 
 ::
 
-    python -m tests.bench.reviewing --seeds 1001 1100 --kept FOLDER [--one-by-one]
+    python -m tests.bench.reviewing --seeds 1001 1100 --kept FOLDER
 
 Sheets of simulated students, read once (`judging_scans`), are reviewed twice. *Enter* takes each default, and
 the first choice where there is none. *Truth* answers by what was drawn: of places the one where the node
 lies, else it is dragged there; of verdicts the one that a perfect reading of the same drawing gives. The
-total of that perfect reading is what is due, of both reviews. ``--one-by-one`` asks each open criterion in
-the rubric's order and accepts what is proposed, whatever its probability: the review as it was.
+total of that perfect reading is what is due, of both reviews.
 
 A perfect reader is sure of what it sees, and measures as well as the program does: a rubric's rule for what
 the error of reading leaves open decides alike. It sees two nodes in one point as a vector of length zero,
@@ -30,6 +29,7 @@ from grader.comparison.task import Task, task_of
 from grader.documents import ReportDocument
 from grader.pipeline import mark
 from grader.records import Figure, PageRef, ReadNode, ReadVector, ScannedPage
+from grader.review.doubts import doubts_of, figures_read
 from grader.tables.decisions import Decision
 from grader.tables.measurements import StudentSubmission
 from tests.bench.judging_handed_in import submission
@@ -51,7 +51,6 @@ class Answered:
     kind: str
     probability: float
     is_right: bool
-    about: str = ""
 
 
 @dataclass(slots=True)
@@ -173,18 +172,7 @@ def _laid_onto(own: Sequence[complex], read: Sequence[ReadNode]) -> tuple[comple
 # The two reviews ------------------------------------------------------------------------------------
 
 
-def questions_of(review: Review, report: ReportDocument, *, one_by_one: bool) -> list:  # type: ignore[type-arg]
-    """The open questions, the first one first."""
-    from grader.review.doubts import doubts_of, figures_read, of_verdict  # noqa: PLC0415 - not there before
-
-    if one_by_one:
-        return [of_verdict(one) for one in report.criteria if one.verdict == "review"]
-    return doubts_of(review.task, report, figures_read(report, review.pages))
-
-
-def walked(
-    review: Review, truth: Truth | None, *, one_by_one: bool = False
-) -> tuple[int, list[Answered], float]:
+def walked(review: Review, truth: Truth | None) -> tuple[int, list[Answered], float]:
     """Questions asked, what was offered, and the total that the review comes to.
 
     Arguments: `truth` answers where it is given; else Enter does.
@@ -192,25 +180,16 @@ def walked(
     asked, offered = 0, list[Answered]()
     report = review.report()
     while asked < MOST_QUESTIONS:
-        questions = questions_of(review, report, one_by_one=one_by_one)
+        questions = doubts_of(review.task, report, figures_read(report, review.pages))
         if not questions:
             break
         first, asked = questions[0], asked + 1
         if truth is None:
-            chosen = first.likeliest if one_by_one else first.default or first.choices[0]
-            review.answer(chosen.rows)
+            review.answer((first.default or first.choices[0]).rows)
         else:
-            right = _right(first, truth)
-            best = first.likeliest
+            right, best = _right(first, truth), first.likeliest
             if best is not None and best.probability is not None and first.kind != "owner":
-                offered.append(
-                    Answered(
-                        first.kind,
-                        best.probability,
-                        _is_same(best, right, truth),
-                        f"{first.id} {best.key} {right}",
-                    )
-                )
+                offered.append(Answered(first.kind, best.probability, _is_same(best, right, truth)))
             review.answer(right)
         report = review.report()
     return asked, offered, _total(review, report)
@@ -269,7 +248,7 @@ class Walked:
     offered: tuple[Answered, ...]
 
 
-def reviewed(read: ReadWork, *, one_by_one: bool) -> Walked | None:
+def reviewed(read: ReadWork) -> Walked | None:
     """One student's sheets reviewed; None where nothing was read, or the data are another student's."""
     drawn = [one for one in read.readings if one.figures]
     if not drawn or any(one.code == "other_variant" for one in read.work.task.mistakes):
@@ -279,8 +258,8 @@ def reviewed(read: ReadWork, *, one_by_one: bool) -> Walked | None:
     student = StudentSubmission("s", work.variant, (), read.declared)
     pages = [ScannedPage(PageRef(f"{number}.jpg"), reading=one) for number, one in enumerate(drawn)]
     truth = truth_of(read, task, student)
-    asked, _, total = walked(Review(task, student, pages), None, one_by_one=one_by_one)
-    honest, offered, known = walked(Review(task, student, pages), truth, one_by_one=one_by_one)
+    asked, _, total = walked(Review(task, student, pages), None)
+    honest, offered, known = walked(Review(task, student, pages), truth)
     return Walked(asked, honest, total - truth.total, known - truth.total, tuple(offered))
 
 
@@ -288,24 +267,18 @@ def tables(students: Sequence[Walked]) -> Iterator[Table]:
     """How much was asked, how far the totals are off, and how often what was offered was right."""
     due, honest = [one.off for one in students], [one.honest_off for one in students]
     apart = [one.off - one.honest_off for one in students]
-    yield (
-        "Review: questions and totals",
-        [
-            "answers",
-            "sheets",
-            "questions a sheet",
-            "within 1 point of due",
-            "of the honest review",
-            "mean |off|",
-        ],
-        [
-            [name, str(len(students)), f"{np.mean(counts):.2f}", _near(offs), beside, f"{_mean(offs):.2f}"]
-            for name, counts, offs, beside in (
-                ("Enter", [one.asked for one in students], due, _near(apart)),
-                ("truth", [one.honest for one in students], honest, "-"),
-            )
-        ],
-    )
+    heads = [
+        "answers", "sheets", "questions a sheet", "within 1 point of due", "of the honest review",
+        "mean |off|",
+    ]  # fmt: skip
+    rows = [
+        [name, str(len(students)), f"{np.mean(counts):.2f}", _near(offs), beside, f"{_mean(offs):.2f}"]
+        for name, counts, offs, beside in (
+            ("Enter", [one.asked for one in students], due, _near(apart)),
+            ("truth", [one.honest for one in students], honest, "-"),
+        )
+    ]
+    yield "Review: questions and totals", heads, rows
     offered = [answer for one in students for answer in one.offered]
     kinds = sorted({one.kind for one in offered})
     heads = ["offered with", *kinds, "all"]
@@ -343,29 +316,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--seeds", type=int, nargs=2, default=(1001, 1020), help="first and last")
     parser.add_argument("--kinds", nargs="+", default=["flatbed"], choices=list(SHEET_KINDS))
     parser.add_argument("--kept", type=Path, help="folder in which readings are kept")
-    parser.add_argument("--one-by-one", action="store_true")
-    parser.add_argument("--verbose", action="store_true")
     chosen = parser.parse_args(arguments)
-    students = []
-    for kind in chosen.kinds:
-        for seed in range(chosen.seeds[0], chosen.seeds[1] + 1):
-            for read in read_works(kind, [seed], chosen.kept):
-                one = reviewed(read, one_by_one=chosen.one_by_one)
-                if one is not None:
-                    students.append(one)
-                    if chosen.verbose and (one.asked or abs(one.off) > 1.0):
-                        mistakes = [each.code for each in read.work.task.mistakes]
-                        for each in one.offered:
-                            print("    ", each)
-                        print(
-                            kind,
-                            seed,
-                            one.asked,
-                            one.honest,
-                            f"{one.off:+.2f} {one.honest_off:+.2f}",
-                            mistakes,
-                        )
-    print(as_text(tables(students)))
+    seeds = range(chosen.seeds[0], chosen.seeds[1] + 1)
+    works = (read for kind in chosen.kinds for read in read_works(kind, seeds, chosen.kept))
+    print(as_text(tables([one for read in works if (one := reviewed(read)) is not None])))
 
 
 if __name__ == "__main__":

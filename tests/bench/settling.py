@@ -14,7 +14,7 @@ import itertools
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -114,54 +114,32 @@ def _verdict(outcome: Outcome, due: Due) -> Verdict:
 
 # Tables --------------------------------------------------------------------------------------------
 
+HEADS = (
+    "sheets", "students", "finished", "right drawings finished", "criteria waiting",
+    "charged wrongly", "credited wrongly", "right drawings that lose", "not read",
+)  # fmt: skip
 
-@dataclass(slots=True)
-class SettlingFigures:
-    """All students judged, and their tables."""
 
-    students: list[Marked] = field(default_factory=list)
-
-    def tables(self) -> Iterator[Table]:
-        """Finished sheets and wrong verdicts; then the probabilities against what was right."""
-        kinds = [kind for kind in SHEET_KINDS if any(one.kind == kind for one in self.students)]
-        heads = [
-            "sheets", "students", "finished", "right drawings finished", "criteria waiting",
-            "charged wrongly", "credited wrongly", "right drawings that lose", "not read",
-        ]  # fmt: skip
-        yield (
-            "Settling: a class of scans",
-            heads,
-            [
-                _row(SHEET_KINDS[kind].title, [one for one in self.students if one.kind == kind])
-                for kind in kinds
-            ],
-        )
-        groups = {
-            SHEET_KINDS[kind].title: [one for one in self.students if one.kind == kind] for kind in kinds
-        }
-        groups |= {f"{hand} hands": [one for one in self.students if one.hand == hand]
-                   for hand in dict.fromkeys(one.hand for one in self.students)}  # fmt: skip
-        found = {name: _fair(students) for name, students in groups.items()}
-        everything = _fair(self.students)
-        for low, high in itertools.pairwise(LENGTHS_MM):
-            name = f"vectors from {low:g} mm" if high > 1e3 else f"vectors of {low:g} to {high:g} mm"
-            found[name] = [one for one in everything if low <= one.length_mm < high]
-        bins = [*itertools.pairwise(BINS), (BINS[-1], 1.1)]
-        heads = ["verdicts", *(f"{low:g}-{min(high, 1.0):g}" for low, high in bins)]
-        yield (
-            "Settling: right verdicts, by their probability",
-            heads,
-            [
-                [
-                    name,
-                    *(
-                        _share([one for one in verdicts if low <= one.probability < high])
-                        for low, high in bins
-                    ),
-                ]
-                for name, verdicts in found.items()
-            ],
-        )
+def tables(students: Sequence[Marked]) -> Iterator[Table]:
+    """Finished sheets and wrong verdicts; then the probabilities against what was right."""
+    groups = {
+        sheets.title: [one for one in students if one.kind == kind] for kind, sheets in SHEET_KINDS.items()
+    }
+    groups = {title: own for title, own in groups.items() if own}
+    yield "Settling: a class of scans", HEADS, [_row(title, own) for title, own in groups.items()]
+    for hand in dict.fromkeys(one.hand for one in students):
+        groups[f"{hand} hands"] = [one for one in students if one.hand == hand]
+    found = {name: _fair(own) for name, own in groups.items()}
+    for low, high in itertools.pairwise(LENGTHS_MM):
+        name = f"vectors from {low:g} mm" if high > 1e3 else f"vectors of {low:g} to {high:g} mm"
+        found[name] = [one for one in _fair(students) if low <= one.length_mm < high]
+    bins = [*itertools.pairwise(BINS), (BINS[-1], 1.1)]
+    heads = ["verdicts", *(f"{low:g}-{min(high, 1.0):g}" for low, high in bins)]
+    rows = [
+        [name, *(_share([one for one in verdicts if low <= one.probability < high]) for low, high in bins)]
+        for name, verdicts in found.items()
+    ]
+    yield "Settling: right verdicts, by their probability", heads, rows
 
 
 def _row(title: str, students: Sequence[Marked]) -> list[str]:
@@ -202,12 +180,12 @@ def _marked_seed(kept: Path | None, task: tuple[str, int]) -> list[Marked]:
     return [marked(read) for read in read_works(kind, [seed], kept)]
 
 
-def measure(students: int, kinds: Sequence[str], kept: Path | None, jobs: int) -> SettlingFigures:
+def measure(students: int, kinds: Sequence[str], kept: Path | None, jobs: int) -> list[Marked]:
     """So many students of each kind, read and judged in some processes."""
     tasks = [(kind, seed) for seed in range(FIRST_SEED, FIRST_SEED + students) for kind in kinds]
     with ProcessPoolExecutor(jobs) as pool:
         found = pool.map(partial(_marked_seed, kept), tasks, chunksize=4)
-        return SettlingFigures([one for some in found for one in some])
+        return [one for some in found for one in some]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -218,7 +196,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--kept", type=Path, help="folder in which readings are kept")
     parser.add_argument("--jobs", type=int, default=1)
     chosen = parser.parse_args(arguments)
-    print(as_text(measure(chosen.students, chosen.kinds, chosen.kept, chosen.jobs).tables()))
+    print(as_text(tables(measure(chosen.students, chosen.kinds, chosen.kept, chosen.jobs))))
 
 
 if __name__ == "__main__":

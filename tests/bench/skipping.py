@@ -3,8 +3,8 @@
     python -m tests.bench.skipping [--students N] [--seed S]
 
 A class on printed sheets of `pump`, a page for the velocities and one for the accelerations, is
-graded; then again after each kind of change, and by a rubric that asks for velocities alone; last a node
-is moved in the review, and the marks that follow are waited for. Processor seconds of the whole run; every
+graded; then again after each kind of change; last a node is moved in the review, and the marks that follow
+are waited for. Processor seconds of the whole run; every
 row says whether its reports are those of a run that skips nothing.
 """
 
@@ -16,11 +16,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from grader.folder import batch
 from grader.folder.batch import Batch, grade
 from grader.printed.answer_sheet import make_sheets
 from grader.review.session import Answer, Session, mark_of
-from grader.rubric import Asked, load_rubric
+from grader.rubric import load_rubric
 from grader.tables.decision_texts import place_text
 from grader.tables.roster import RosterRow
 from reference.authored.assignment import load_assignment
@@ -97,16 +96,6 @@ def moved_node(batch: Batch) -> tuple[list, float]:
     return [_verdicts(one.report) for one in session.students], float(np.median(spent))
 
 
-def without_narrowing(run):
-    """Run with every zone looked at and everything read, whatever the rubric asks for."""
-    usual = batch.asked_of
-    batch.asked_of = lambda *_: Asked()
-    try:
-        return run()
-    finally:
-        batch.asked_of = usual
-
-
 def main() -> None:
     """Measure and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -115,7 +104,7 @@ def main() -> None:
     told = parser.parse_args()
     cv2.setNumThreads(1)
     rubric = load_rubric("pump")
-    wider, velocities = with_wider_tolerance(rubric), load_rubric("pump-velocity")
+    wider = with_wider_tolerance(rubric)
     with tempfile.TemporaryDirectory() as place:
         top = Path(place)
         folder = top / "in"
@@ -138,12 +127,6 @@ def main() -> None:
         row("another tolerance in the rubric", again, whole)
         changed = [lines[0].replace("s0,s0", "s0,Ana"), *lines[1:]]
         row("a name in the roster corrected", fresh("out", wider, changed), whole)
-        part = fresh("velocity", velocities, lines)
-        all_of_it = without_narrowing(lambda: fresh("everything", velocities, lines))
-        row("a rubric of velocities alone", part, all_of_it)
-        lines.append(draw(folder, "s9", 20, told.seed + 90))
-        added = fresh("out", wider, lines)
-        row("one student's scans added", (added[0][:-1], added[1]), whole)
         moved = moved_node(Batch(PUMP, wider, folder, top / "out"))
         row("a node moved in the review", moved, fresh("moved", wider, lines))
 

@@ -1,7 +1,7 @@
 """All that is measured of the solver, and its tables: speed, errors, stability near singular positions."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
@@ -14,16 +14,8 @@ from reference.plan import Plan, exact_plan
 from tests.bench.branches import BranchRow, count_branches
 from tests.bench.oracle import ExactMotion
 from tests.bench.plain_text import NOTHING, Table
-from tests.bench.singular import KINDS
-from tests.bench.speed import PLANS, SpeedRow, measure_speed, speed_rows
-from tests.bench.stability import (
-    DISTANCES,
-    DISTANCES_QUICK,
-    OURS,
-    Cell,
-    StabilityRow,
-    measure_stability,
-)
+from tests.bench.speed import SpeedRow, measure_speed
+from tests.bench.stability import OURS, Outcomes, StabilityRow, measure_stability
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,56 +46,15 @@ class SolverFigures:
     stability: tuple[StabilityRow, ...] = ()
     branches: tuple[BranchRow, ...] = ()
 
-    def as_json(self) -> dict[str, Any]:
-        """For the report's JSON."""
-        return asdict(self)
-
-
-@dataclass(slots=True)
-class SolverBench:
-    """All that is measured of the solver, a row after another, so that progress can be shown."""
-
-    quick: bool = False
-    speed: list[SpeedRow] = field(default_factory=list)
-    errors: list[ErrorRow] = field(default_factory=list)
-    stability: list[StabilityRow] = field(default_factory=list)
-    branches: list[BranchRow] = field(default_factory=list)
-
-    @property
-    def steps(self) -> int:
-        """How many rows there will be."""
-        distances = DISTANCES_QUICK if self.quick else DISTANCES
-        return speed_rows() + len(built_in()) + len(KINDS) * len(distances) + 2
-
-    def run(self) -> Iterator[str]:
-        """Measure; each item says what was measured."""
-        for speed in measure_speed(quick=self.quick):
-            self.speed.append(speed)
-            yield f"speed of {speed.solver}"
-        for error in measure_errors():
-            self.errors.append(error)
-            yield f"errors of {error.assignment}"
-        for stability in measure_stability(quick=self.quick):
-            self.stability.append(stability)
-            yield f"stability: {stability.kind}"
-        for row in count_branches(quick=self.quick):
-            self.branches.append(row)
-            yield f"branches of {row.solver}"
-
-    @property
-    def figures(self) -> SolverFigures:
-        """What was measured so far."""
-        return SolverFigures(
-            tuple(self.speed), tuple(self.errors), tuple(self.stability), tuple(self.branches)
-        )
-
 
 def measure_solver(*, quick: bool = False) -> SolverFigures:
     """All of it."""
-    bench = SolverBench(quick)
-    for _ in bench.run():
-        pass
-    return bench.figures
+    return SolverFigures(
+        tuple(measure_speed(quick=quick)),
+        tuple(measure_errors()),
+        tuple(measure_stability(quick=quick)),
+        tuple(count_branches(quick=quick)),
+    )
 
 
 def measure_errors() -> Iterator[ErrorRow]:
@@ -144,24 +95,19 @@ def _largest(ours: Sequence[NDArray[Any]], exact: NDArray[Any]) -> float:
 
 
 OUTCOMES = {"wrong": "wrong", "refused": "refused", "silent": "nan", "beyond": "beyond"}
-"""What is counted of each cell, and the word for it in the tables."""
+"""What is counted of each solver's outcomes, and the word for it in the tables."""
 
 
 def solver_tables(solver: SolverFigures) -> Iterator[Table]:
     """All tables of the solver."""
-    timed = [row for row in solver.speed if row.solver != PLANS]
-    for accelerations, told in ((True, "positions, velocities, accelerations"), (False, "velocities only")):
-        rows = [row for row in timed if row.accelerations == accelerations]
-        yield _speed(f"Solver: median microseconds per variant (pump; {told}; in brackets over ours)", rows)
-    yield _plans([row for row in solver.speed if row.solver == PLANS])
+    yield _speed(solver.speed)
     yield _error_table(solver.errors)
     yield _summary(solver.stability)
     yield _branches(solver.branches)
-    for _, rows_of_kind in groupby(solver.stability, key=lambda row: row.kind):
-        yield _stability(list(rows_of_kind))
 
 
-def _speed(title: str, rows: Sequence[SpeedRow]) -> Table:
+def _speed(rows: Sequence[SpeedRow]) -> Table:
+    what = "pump; positions, velocities, accelerations; in brackets over ours"
     counts = list(rows[0].us) if rows else []
     heads = ["solver", *(f"{count} at once" for count in counts), "error of v", "error of a"]
     lines = []
@@ -170,7 +116,7 @@ def _speed(title: str, rows: Sequence[SpeedRow]) -> Table:
         times = [_time(row, rows[0], count) for count in counts]
         errors = [_figure(row.velocity_error, ".1e"), _figure(row.acceleration_error, ".1e")]
         lines.append([name, *times, *errors])
-    return title, heads, lines
+    return f"Solver: median microseconds per variant ({what})", heads, lines
 
 
 def _time(row: SpeedRow, ours: SpeedRow, count: int) -> str:
@@ -183,11 +129,6 @@ def _time(row: SpeedRow, ours: SpeedRow, count: int) -> str:
 def _digits(number: float, digits: int) -> str:
     """So many digits at least, never as a power of ten."""
     return f"{number:.0f}" if number >= 10.0 ** (digits - 1) else f"{number:.{digits}g}"
-
-
-def _plans(rows: Sequence[SpeedRow]) -> Table:
-    lines = [[str(count), f"{us * count / 1e3:.2f}"] for row in rows for count, us in row.us.items()]
-    return "Solver: a class with both plans (pump)", ["variants", "ms in all"], lines
 
 
 def _error_table(rows: Iterable[ErrorRow]) -> Table:
@@ -208,9 +149,7 @@ def _summary(rows: Iterable[StabilityRow]) -> Table:
     lines, solvers = [], [OURS]
     for _, group in groupby(rows, key=lambda row: row.kind):
         told = list(group)
-        cells = {
-            name: [cell for row in told for cell in row.cells if cell.solver == name] for name in _names(told)
-        }
+        cells = {name: [row.outcomes[name] for row in told] for name in told[0].outcomes}
         solvers = max(solvers, list(cells), key=len)
         unit = "eps" if told[0].smooth else "eps/delta"
         lines.append([told[0].title, unit, *(_overall(cells[name]) for name in cells)])
@@ -218,14 +157,11 @@ def _summary(rows: Iterable[StabilityRow]) -> Table:
     return "Stability: largest error over all distances", ["position", "unit", *solvers], padded
 
 
-def _names(rows: Sequence[StabilityRow]) -> list[str]:
-    return [cell.solver for cell in rows[0].cells]
-
-
-def _overall(cells: Sequence[Cell]) -> str:
-    counts = (sum(getattr(cell, what) for cell in cells) for what in OUTCOMES)
-    answered = any(cell.velocity for cell in cells)
-    return _outcome(_units(max(cell.worst for cell in cells)) if answered else NOTHING, *counts)
+def _overall(cells: Sequence[Outcomes]) -> str:
+    counts = ((sum(getattr(cell, what) for cell in cells), told) for what, told in OUTCOMES.items())
+    errors = [cell.worst for cell in cells if cell.worst is not None]
+    worst = _units(max(errors)) if errors else NOTHING
+    return "; ".join([worst, *(f"{count} {told}" for count, told in counts if count)])
 
 
 def _branches(rows: Iterable[BranchRow]) -> Table:
@@ -234,30 +170,9 @@ def _branches(rows: Iterable[BranchRow]) -> Table:
     return "Stability: branches in random mechanisms", heads, lines
 
 
-def _stability(rows: Sequence[StabilityRow]) -> Table:
-    unit = "eps" if rows[0].smooth else "eps/delta"
-    title = f"Stability: {rows[0].title} (error over {unit}, median / largest)"
-    lines = [[f"{row.delta:.0e}", *(_cell(cell) for cell in row.cells)] for row in rows]
-    return title, ["delta", *_names(rows)], lines
-
-
-def _cell(cell: Cell) -> str:
-    """The larger of the errors of velocities and accelerations, and what failed."""
-    pairs = [pair for pair in (cell.velocity, cell.acceleration) if pair is not None]
-    error = NOTHING
-    if pairs:
-        error = f"{_units(max(pair[0] for pair in pairs))} / {_units(max(pair[1] for pair in pairs))}"
-    return _outcome(error, *(getattr(cell, what) for what in OUTCOMES))
-
-
 def _units(error: float) -> str:
     """An error in its unit; a thousandth of a rounding is none."""
     return "0" if error < 1e-3 else f"{error:.2g}"
-
-
-def _outcome(error: str, *counts: int) -> str:
-    told = zip(counts, OUTCOMES.values(), strict=True)
-    return "; ".join([error, *(f"{count} {what}" for count, what in told if count)])
 
 
 def _figure(value: float | None, form: str) -> str:

@@ -21,7 +21,6 @@ from reference.construction.graph import evaluate, parameters_of
 from reference.geometry import FloatArray
 from reference.kinematics.motion import Motion, move
 from reference.mechanism import Mechanism
-from reference.plan import exact_plan
 from tests.bench.oracle import ExactMotion
 from tests.bench.peers import FSOLVE, Answer, Fsolve, Places, answer_of, error_of, sketch
 
@@ -67,7 +66,6 @@ ROUNDS, ROUNDS_QUICK = 21, 5
 PEER_VARIANTS = 300
 """fsolve takes as long for each of many variants: so many are timed for a larger batch."""
 ASSIGNMENT = "pump"
-PLANS = "a class with both plans"
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,14 +74,12 @@ class SpeedRow:
 
     Attributes
     ----------
-    accelerations : positions, velocities and accelerations; False: velocities only
     us : by the number of variants at once
     velocity_error, acceleration_error : of the joints, relative to the largest of each plan
     """
 
     solver: str
     version: str | None
-    accelerations: bool
     us: Mapping[int, float]
     velocity_error: float | None = None
     acceleration_error: float | None = None
@@ -95,13 +91,12 @@ class _Entry:
 
     solver: str
     version: str | None
-    accelerations: bool
     runs: Mapping[int, tuple[Callable[[], object], int]] = field(default_factory=dict)
     answers: Sequence[Answer] = ()
 
 
 def measure_speed(*, quick: bool = False, batches: Sequence[int] = BATCHES) -> Iterator[SpeedRow]:
-    """Ours by each road, then scipy; the same for velocities alone; then a class's plans."""
+    """Ours by each road, then scipy: positions, velocities and accelerations."""
     bench = _Bench(load_assignment(ASSIGNMENT), batches)
     entries = list(bench.entries())
     runs = {(row, count): run for row, one in enumerate(entries) for count, (run, _) in one.runs.items()}
@@ -109,11 +104,6 @@ def measure_speed(*, quick: bool = False, batches: Sequence[int] = BATCHES) -> I
     for row, entry in enumerate(entries):
         us = {count: medians[row, count] / solved for count, (_, solved) in entry.runs.items()}
         yield bench.row(entry, us)
-
-
-def speed_rows() -> int:
-    """How many rows `measure_speed` gives."""
-    return 7
 
 
 class _Bench:
@@ -127,31 +117,24 @@ class _Bench:
 
     def entries(self) -> Iterator[_Entry]:
         """All rows in their order."""
-        for accelerations in (True, False):
-            yield self._closed_form(accelerations=accelerations)
-            yield self._construction(accelerations=accelerations)
-            yield self._fsolve(accelerations=accelerations)
-        variants = self.assignment.variants()[:CLASS]
-        run = partial(exact_plan, self.assignment, variants)
-        yield _Entry(PLANS, None, accelerations=True, runs={len(variants): (run, len(variants))})
+        yield self._closed_form()
+        yield self._construction()
+        yield self._fsolve()
 
-    def _closed_form(self, *, accelerations: bool) -> _Entry:
+    def _closed_form(self) -> _Entry:
         """All variants of a batch by one call."""
-        runs = {
-            count: (partial(move, one, accelerations=accelerations), count)
-            for count, one in self.mechanisms.items()
-        }
-        return _Entry("closed form", None, accelerations, runs, _answers(move(self.reference)))
+        runs = {count: (partial(move, one), count) for count, one in self.mechanisms.items()}
+        return _Entry("closed form", None, runs, _answers(move(self.reference)))
 
-    def _construction(self, *, accelerations: bool) -> _Entry:
+    def _construction(self) -> _Entry:
         """The steps of mechanism and plans, evaluated."""
         runs, scale = {}, np.asarray(0.01)
         for count, one in self.mechanisms.items():
-            steps = construction_of(one, accelerations=accelerations)
-            runs[count] = partial(evaluate, steps, parameters_of(one, scale, scale, scale)), count
-        return _Entry("construction", None, accelerations, runs)
+            run = partial(evaluate, construction_of(one), parameters_of(one, scale, scale, scale))
+            runs[count] = run, count
+        return _Entry("construction", None, runs)
 
-    def _fsolve(self, *, accelerations: bool) -> _Entry:
+    def _fsolve(self) -> _Entry:
         """One variant after another."""
         solver, starts = Fsolve(self.reference), _starts(self.reference)
         answers = [solver.solve(index, start)() for index, start in enumerate(starts)]
@@ -159,9 +142,8 @@ class _Bench:
         for count in self.mechanisms:
             timed = spread(self.assignment, min(count, PEER_VARIANTS))
             starts = _starts(timed)
-            run = _one_after_another(Fsolve(timed), starts, accelerations=accelerations)
-            runs[count] = run, len(starts)
-        return _Entry(FSOLVE, version("scipy"), accelerations, runs, answers)
+            runs[count] = _one_after_another(Fsolve(timed), starts), len(starts)
+        return _Entry(FSOLVE, version("scipy"), runs, answers)
 
     def row(self, entry: _Entry, us: Mapping[int, float]) -> SpeedRow:
         """What was measured of an entry."""
@@ -169,9 +151,8 @@ class _Bench:
         if entry.answers:
             pairs = list(zip(entry.answers, self.truth, strict=True))
             velocity = max(error_of(found.velocity, exact.velocity) for found, exact in pairs)
-            if entry.accelerations:
-                acceleration = max(error_of(found.acceleration, exact.acceleration) for found, exact in pairs)
-        return SpeedRow(entry.solver, entry.version, entry.accelerations, us, velocity, acceleration)
+            acceleration = max(error_of(found.acceleration, exact.acceleration) for found, exact in pairs)
+        return SpeedRow(entry.solver, entry.version, us, velocity, acceleration)
 
 
 def spread(assignment: Assignment, count: int) -> Mechanism:
@@ -200,12 +181,10 @@ def _starts(mechanism: Mechanism) -> list[Places]:
     return [{joint: complex(at[index]) for joint, at in drawn.items()} for index in range(count)]
 
 
-def _one_after_another(
-    solver: Fsolve, starts: Sequence[Places], *, accelerations: bool
-) -> Callable[[], None]:
+def _one_after_another(solver: Fsolve, starts: Sequence[Places]) -> Callable[[], None]:
     def run() -> None:
         for index, start in enumerate(starts):
-            solver.solve(index, start, accelerations=accelerations)
+            solver.solve(index, start)
 
     return run
 

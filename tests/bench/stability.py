@@ -8,9 +8,8 @@ motion is smooth through the position nothing need be lost, and errors are told 
 """
 
 import math
-import statistics
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -41,8 +40,16 @@ class Truth:
 
 
 @dataclass(slots=True)
-class _Outcomes:
-    """What one solver made of the cases at one distance; errors in the kind's unit."""
+class Outcomes:
+    """What one solver made of the cases at one distance from one kind of singular position.
+
+    Attributes
+    ----------
+    velocity, acceleration : errors of the answers on the right branch, in units of eps/delta (eps for a
+        smooth kind)
+    wrong, refused, silent : answers on the mirrored branch; no answer, and said so; nan
+    beyond : answers whose error is larger than the solver predicts, and than one rounding
+    """
 
     velocity: list[float] = field(default_factory=list)
     acceleration: list[float] = field(default_factory=list)
@@ -51,49 +58,21 @@ class _Outcomes:
     silent: int = 0
     beyond: int = 0
 
-
-@dataclass(frozen=True, slots=True)
-class Cell:
-    """One solver at one distance from one kind of singular position.
-
-    Attributes
-    ----------
-    velocity, acceleration : median and largest error of the answers on the right branch, in units
-        of eps/delta (eps for a smooth kind); None where there is no such answer
-    wrong, refused, silent : answers on the mirrored branch; no answer, and said so; nan
-    beyond : answers whose error is larger than the solver predicts, and than one rounding
-    """
-
-    solver: str
-    cases: int
-    velocity: tuple[float, float] | None
-    acceleration: tuple[float, float] | None
-    wrong: int
-    refused: int
-    silent: int
-    beyond: int
-
     @property
-    def worst(self) -> float:
-        """The largest error told; 0 where there is no answer to tell one of."""
-        return max(
-            self.velocity[1] if self.velocity else 0.0, self.acceleration[1] if self.acceleration else 0.0
-        )
+    def worst(self) -> float | None:
+        """The largest error; None where there is no such answer."""
+        return max([*self.velocity, *self.acceleration], default=None)
 
 
 @dataclass(frozen=True, slots=True)
 class StabilityRow:
-    """All solvers at one distance from one kind of singular position."""
+    """Each solver, by its name, at one distance from one kind of singular position."""
 
     kind: str
     title: str
     smooth: bool
     delta: float
-    cells: tuple[Cell, ...]
-
-    def as_json(self) -> dict[str, Any]:
-        """For the report's JSON."""
-        return asdict(self)
+    outcomes: Mapping[str, Outcomes]
 
 
 def measure_stability(*, quick: bool = False, kinds: Sequence[Kind] = KINDS) -> Iterator[StabilityRow]:
@@ -114,13 +93,11 @@ def _row(kind: Kind, delta: float, cases: Sequence[Case]) -> StabilityRow:
     }
     if kind.plain:
         answers[FSOLVE] = [_by_fsolve(*pair) for pair in zip(mechanisms, truths, strict=True)]
-    cells = []
+    outcomes = {name: Outcomes() for name in answers}
     for name, told in answers.items():
-        outcomes = _Outcomes()
         for answer, case, truth in zip(told, cases, truths, strict=True):
-            _count(outcomes, answer, truth, EPSILON if kind.smooth else EPSILON / case.delta)
-        cells.append(_cell(name, outcomes, len(cases)))
-    return StabilityRow(kind.id, kind.title, kind.smooth, delta, tuple(cells))
+            _count(outcomes[name], answer, truth, EPSILON if kind.smooth else EPSILON / case.delta)
+    return StabilityRow(kind.id, kind.title, kind.smooth, delta, outcomes)
 
 
 def truth_of(mechanism: Mechanism) -> Truth:
@@ -169,7 +146,7 @@ def _by_fsolve(mechanism: Mechanism, truth: Truth) -> Answer | None:
         return None
 
 
-def _count(outcomes: _Outcomes, answer: Answer | None, truth: Truth, unit: float) -> None:
+def _count(outcomes: Outcomes, answer: Answer | None, truth: Truth, unit: float) -> None:
     if answer is None:
         outcomes.refused += 1
         return
@@ -196,19 +173,3 @@ def is_mirrored(found: Mapping[str, complex], truth: Truth) -> bool:
         if way and joint in found and ((found[joint] - right) / way).real > 0.75:
             return True
     return False
-
-
-def _cell(solver: str, outcomes: _Outcomes, cases: int) -> Cell:
-    def both(errors: list[float]) -> tuple[float, float] | None:
-        return (statistics.median(errors), max(errors)) if errors else None
-
-    return Cell(
-        solver=solver,
-        cases=cases,
-        velocity=both(outcomes.velocity),
-        acceleration=both(outcomes.acceleration),
-        wrong=outcomes.wrong,
-        refused=outcomes.refused,
-        silent=outcomes.silent,
-        beyond=outcomes.beyond,
-    )

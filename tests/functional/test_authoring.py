@@ -25,15 +25,6 @@ def test_what_a_new_assignment_says_to_do_next_can_be_done(planmark, tmp_path, o
     assert ET.parse(tmp_path / "plan.svg").getroot().tag.endswith("svg")
 
 
-def test_a_new_assignment_is_never_written_over_another(planmark, tmp_path):
-    assert planmark("new", "mine").returncode == 0
-    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    again = planmark("new", "mine", "--mechanism", "shaper")
-    assert again.returncode == 2
-    assert "is there already" in again.stderr
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
-
-
 def test_lint_draws_the_variant_that_is_hardest_to_draw(planmark, tmp_path):
     ran = planmark("lint", "pump", "--svg", "worst.svg")
     assert ran.returncode == 1

@@ -5,7 +5,6 @@ import json
 
 import jsonschema
 import pypdfium2
-import pytest
 
 from grader.cli.exporting import schema
 from reference.authored.assignment import library
@@ -62,23 +61,3 @@ def test_where_no_variant_can_be_solved_nothing_is_written(planmark, tmp_path):
     assert ran.returncode == 3
     assert "no variant can be solved" in ran.stderr
     assert not (tmp_path / "own.csv").exists()
-
-
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        ("pump --all --n 3", "--n one of them"),
-        ("press --all --position 3", "--position one of them"),
-        ("pump --all --svg x.svg", "--pdf"),
-        ("pump --all --pdf x.pdf --altitude", "--altitude one of them"),
-        ("pump --all --steps x.html", "--steps one of them"),
-        ("pump --n 3 --csv x.csv", "add --all"),
-        ("pump --all --csv x.csv --lang de", "known are en, ro, ru"),
-        ("pump --all --crank-mm -3", "above 0"),
-    ],
-)
-def test_a_call_for_all_and_for_one_is_refused(planmark, tmp_path, call, words):
-    ran = planmark("plan", *call.split())
-    assert ran.returncode == 2
-    assert words in ran.stderr
-    assert not list(tmp_path.iterdir())

@@ -132,27 +132,6 @@ def test_the_diagram_is_drawn_on_a_page_of_its_size(planmark, tmp_path, call, pa
     assert (tmp_path / "c.pdf").read_bytes().startswith(b"%PDF")
 
 
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        ("cycle press --position 1 --of v_Q", "nothing on this cycle is called 'v_Q' (did you mean"),
-        ("cycle press --position 1 --of v_B,V_d", "did you mean v_D?"),
-        ("cycle press --position 1 --of omega_9", "did you mean omega_"),
-        ("cycle press --position 1 --samples 2", "a whole number from 3 to 100001"),
-        ("cycle press --position 1 --samples -5", "a whole number from 3 to 100001"),
-        ("cycle press --position 1 --samples many", "'--samples'"),
-        ("cycle press --position 1 --lang de", "en, ro, ru"),
-        ("cycle press", "needs --position"),
-    ],
-)
-def test_a_wrong_call_says_what_is_right_and_writes_nothing(planmark, tmp_path, call, words):
-    ran = planmark(*call.split(), "--csv", "c.csv")
-    assert ran.returncode == 2
-    assert words in " ".join(ran.stderr.replace("│", " ").split())
-    assert "Traceback" not in ran.stderr
-    assert not list(tmp_path.iterdir())
-
-
 @pytest.fixture
 def kite(tmp_path):
     """An assignment of one's own: crank = ground, coupler = rocker."""

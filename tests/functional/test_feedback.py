@@ -67,12 +67,6 @@ def test_a_student_gets_a_page_of_values_measured_at_home(planmark, folder, tmp_
     assert "План скоростей" in page
 
 
-@pytest.mark.parametrize("name", ["mine.pdf", "mine"])
-def test_a_page_of_another_kind_is_refused(folder, name):
-    with pytest.raises(CallError, match=r"must end in \.html"):
-        check_measured("pump", CheckOptions(measured=folder / "s08.json", page=Path(name)))
-
-
 def test_one_page_is_of_one_student(tmp_path):
     page = tmp_path / "mine.html"
     with pytest.raises(CallError, match="holds 2"):

@@ -131,14 +131,15 @@ def test_a_line_under_a_name_that_no_folder_can_have_is_nobodys(results):
     assert not (results[1] / "CON").exists()
 
 
-@pytest.mark.parametrize("student", ["results.json", "index.html", "summary.csv", "aux"])
+@pytest.mark.parametrize("student", ["results.json", "index.html", "summary.csv", "aux", "no/slash"])
 def test_a_roster_with_such_a_name_is_refused_before_anything_is_written(tmp_path, student):
     folder = tmp_path / "in"
     folder.mkdir()
     (folder / "roster.csv").write_text(f"student_id,name,n\n{student},A,7\n", encoding="utf-8")
-    run = graded(folder, tmp_path / "out")
+    run = graded(folder, tmp_path / "out", "--roster", folder / "roster.csv")
     assert run.returncode == 2
     assert "line 2, student_id" in run.stderr
+    assert student in run.stderr
     assert not (tmp_path / "out").exists()
 
 

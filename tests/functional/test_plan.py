@@ -59,31 +59,6 @@ def test_the_plan_is_drawn_into_a_file(planmark, tmp_path):
     assert [path.name for path in (tmp_path / "new").iterdir()] == ["plan.svg"]
 
 
-@pytest.mark.parametrize(
-    ("call", "status", "words"),
-    [
-        ("plan pmup", 2, "built in are engine, piston, press"),
-        ("plan pump", 2, "needs --n (n from 1 to 30)"),
-        ("plan pump --n 31", 2, "has n from 1 to 30"),
-        ("plan press --position 8", 2, "has position from 0 to 7"),
-        ("plan nowhere.toml --n 1", 2, "no such file"),
-        ("plan pump --n 1 --crank-mm 0", 2, "above 0"),
-        ("plan pump --n 1 --crank-mm nan", 2, "above 0"),
-        ("plan pump --n one", 2, "'--n'"),
-        ("plan pump --m 1", 2, "No such option"),
-        ("schema rapport", 2, "known are"),
-        ("plan pump --n 1 --svg /proc/plan.svg", 5, "cannot be written"),
-    ],
-)
-def test_a_wrong_call_ends_with_its_status_and_one_message(planmark, tmp_path, call, status, words):
-    ran = planmark(*call.split())
-    assert ran.returncode == status
-    assert words in " ".join(ran.stderr.replace("│", " ").split())
-    assert "Traceback" not in ran.stderr
-    assert ran.stdout == ""
-    assert not list(tmp_path.iterdir())
-
-
 def test_all_faults_of_an_authored_file_are_told_at_once(planmark, tmp_path):
     (tmp_path / "my.assignment.toml").write_text('schema_version = 2\nid = "my"\ncolour = "red"\n')
     ran = planmark("plan", "my.assignment.toml")

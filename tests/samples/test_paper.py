@@ -1,7 +1,7 @@
 """Paper, habits and copies, each scene with its floor of vectors read right and its ceiling of misreads.
 
 A scene is one simulated student on one or two sheets (`tests.bench.reading_scenes`); larger numbers
-come from `python -m docs.make_benchmarks paper 3`. Real pages have their own:
+come from `python -m tests.bench --paper --students 3`. Real pages have their own:
 tests/samples/test_real_drawings.py.
 """
 

@@ -6,28 +6,55 @@ import numpy as np
 import pytest
 
 from reference.authored.assignment import load_assignment
-from samples.simulation import HABITS, PERFECT, PageStyle, Scan, Settings, Student, simulate
+from samples.simulation import (
+    HABITS,
+    HARDSHIPS,
+    PERFECT,
+    PageStyle,
+    Scan,
+    Settings,
+    Student,
+    simulate,
+    with_hardships,
+)
 from samples.simulation.student import encoded
 
 pytestmark = pytest.mark.slow
 SMALL = Scan(dpi=45.0, noise=0.0, tint_grain=0.0, dust=0)
 
 
-def drawn(seed=3, scan=SMALL, page=None, **student):
-    assignment = load_assignment("pump")
+class Only:
+    """A lot that gives one hardship and no other."""
+
+    def __init__(self, name):
+        self.drawn = iter([0.0 if one == name else 1.0 for one in HARDSHIPS])
+
+    def random(self):
+        return next(self.drawn)
+
+    def uniform(self, _low, _high, count):
+        return np.full(count, 0.7)
+
+
+def drawn(scan=SMALL, page=None, hardship=None, **student):
     settings = Settings(PERFECT, Student(**student), page=page or PageStyle(), scan=scan)
-    return simulate(assignment, assignment.variant(9), seed, settings)[0]
+    assignment = load_assignment("pump")
+    return simulate(assignment, assignment.variant(9), 3, with_hardships(settings, Only(hardship)))[0]
 
 
-@pytest.mark.parametrize("habit", HABITS)
-def test_a_habit_is_seen_and_leaves_the_true_vectors(habit):
-    one, plain = drawn(habits=(habit,)), drawn()
+@pytest.mark.parametrize(
+    "changes", [*({"habits": (habit,)} for habit in HABITS), *({"hardship": name} for name in HARDSHIPS)]
+)
+def test_a_habit_and_a_hardship_are_seen_and_leave_the_true_vectors(changes):
+    one, plain = drawn(**changes), drawn()
     assert one.image.shape == plain.image.shape
     assert np.any(one.image != plain.image)
     for figure in ("velocity_plan", "acceleration_plan"):
         vectors, usual = (sheet.truth["figures"][figure]["vectors"] for sheet in (one, plain))
-        for vector in usual:
-            assert vectors[vector]["length_mm"] == pytest.approx(usual[vector]["length_mm"], abs=1e-3)
+        if "hardship" in changes:
+            assert vectors == usual
+        for name, vector in usual.items():
+            assert vectors[name]["length_mm"] == pytest.approx(vector["length_mm"], abs=1e-3)
 
 
 def test_overlapping_figures_lie_on_each_other():

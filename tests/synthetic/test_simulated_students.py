@@ -52,6 +52,9 @@ def test_a_perfect_hand_draws_the_exact_plan(name):
         ratio = float(getattr(plan.scales, scale)[0]) / shrunk[scale]
         for node, at in plan.nodes_mm[figure].items():
             assert abs(nodes[node] - pole - ratio * complex(at[0])) < 10 * ROUNDING_MM
+    for vector in vectors_of(sheets).values():
+        assert vector["length_mm"] == pytest.approx(vector["intended"]["length_mm"], abs=ROUNDING_MM)
+        assert vector["direction_deg"] == pytest.approx(vector["intended"]["direction_deg"], abs=2e-3)
 
 
 @pytest.mark.parametrize("code", CODES)

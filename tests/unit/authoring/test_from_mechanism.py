@@ -11,37 +11,14 @@ from grader.rubric import load_rubric, rubric_of
 from reference.authored.assignment import load_assignment
 from reference.errors import AuthoredFileError, CallError
 from reference.plan import construction_for
+from tests.conveyor import MECHANISM
 
-SIX_BAR = """
-schema_version = 1
-id = "other"
-length_unit = "mm"
-title = { en = "Six-bar", ro = "Mecanism cu șase elemente" }
-[ground]
-O1 = [0, 0]
-O2 = ["d", 0]
-[crank]
-pivot = "O1"
-pin = "A"
-length = "a"
-angle_deg = "phi"
-rpm = "n1"
-[[group]]
-type = "RRR"
-node = "B"
-pins = ["A", "O2"]
-links = ["2", "3"]
-lengths = [210, 165]
-side = "side_B"
-[[group]]
-type = "RRP"
-node = "C"
-pin = "B"
-link = "4"
-length = 320
-guide = { through = [0, 150], angle_deg = 0 }
-side = "ahead"
-"""
+SIX_BAR = MECHANISM.replace("rpm = 120", 'rpm = "n1"').replace('side = "left"', 'side = "side_B"')
+SIX_BAR = (
+    SIX_BAR.replace('ru = "Конвейер"\n', "")
+    .replace("Conveyor", "Six-bar")
+    .replace("Transportor", "Mecanism cu șase elemente")
+)
 TABLE = "n,a [mm],d [mm],phi [deg],n1 [rpm],side_B\n1,85,260,290,120,left\n4,90,240,165,150,left\n"
 
 

@@ -1,7 +1,6 @@
 """The benchmark of judging: who drew what, what is due to it, and how it is counted."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +9,6 @@ from grader.authoring.lint import lint
 from grader.comparison.task import task_of
 from grader.marking.mark import judge
 from grader.outcomes import NamedMistake as Named
-from grader.records import Reading
 from reference.construction.mistakes import Mistake as Operator
 from samples.simulation.hand import draw
 from samples.simulation.hand import task_of as drawing_task
@@ -18,7 +16,7 @@ from samples.simulation.mistakes import Occasion, possible, with_mistake
 from samples.simulation.mistakes import StudentMistake as Mistake
 from samples.simulation.settings import PERFECT, Student
 from tests.bench import judging
-from tests.bench.judging import JudgingBench, judged, main, measure_class
+from tests.bench.judging import judged, main, measure_class, measure_judging
 from tests.bench.judging_handed_in import Visible, computed, exact_rates, off, submission
 from tests.bench.judging_naming import is_named, mistakes_due
 from tests.bench.judging_students import (
@@ -32,10 +30,8 @@ from tests.bench.judging_students import (
 )
 from tests.bench.judging_tally import (
     ClassTime,
-    JudgingFigures,
     JudgingTally,
     MarkedCriterion,
-    Times,
     judging_tables,
     result_of,
     summed,
@@ -313,21 +309,16 @@ def test_credit_given_for_what_follows_is_counted_of_all_that_follows():
     assert (tally.false_charges.hits, tally.false_charges.of) == (1, 4)
 
 
-def test_the_benchmark_measures_as_many_steps_as_it_says_and_tells_all_of_it(monkeypatch):
+def test_students_of_each_kind_are_judged_from_each_source_and_shown(monkeypatch):
     monkeypatch.setattr(judging, "HANDS", ("careful",))
-    monkeypatch.setattr(judging, "SCANNED", ())
-    monkeypatch.setattr(judging, "measure_class", lambda rows: ClassTime("pump", rows, 50, 0.5, 1.0, 1.1))
-    bench = JudgingBench(students=1, assignments=("engine",), whole=True)
-    told = list(bench.run())
-    assert len(told) == bench.steps
-    figures = bench.figures
+    figures = measure_judging(1, assignments=("engine",))
     assert len(figures.results) == 4 * len(SOURCES)
     assert {where for (where,) in summed(figures.results, ("kind",))} == {"right", "single", "pair", "slip"}
+    figures.classes.append(ClassTime("engine", 1000, 50, 0.5, 1.0, 1.1))
     text = as_text(judging_tables(figures))
     assert "engine" in text
+    assert "1000" in text
     assert "making the task" in text
-    assert figures.as_json()["classes"][0]["rows"] == 1000
-    assert JudgingFigures().as_json()["milliseconds"]["right"] is None
 
 
 def test_one_case_is_told_in_full(capsys):
@@ -338,7 +329,7 @@ def test_one_case_is_told_in_full(capsys):
     assert judged(StudentKey("engine", "careful", "single", 4))
 
 
-# Values computed, scans, whole classes --------------------------------------------------------------
+# Values computed, whole classes --------------------------------------------------------------
 
 
 def test_a_slip_in_one_value_is_wrong_there_and_nowhere_else():
@@ -374,20 +365,6 @@ def test_the_sense_of_a_value_is_due_only_where_it_can_be_told():
     by_length, _, _ = due(with_values, "lengths")
     assert found["omega_2"] == "follows"
     assert by_length["omega_2"] == "either"
-
-
-def test_scans_are_judged_as_read_against_what_was_drawn(monkeypatch):
-    """With a perfect reader in place of pictures: what is due does not hang on the reader."""
-    page = SimpleNamespace(truth={"figures": {"velocity_plan": {"missing": {"v_D": "not drawn out"}}}})
-    monkeypatch.setattr(judging, "simulate", lambda *_: [page])
-    monkeypatch.setattr(judging, "_read", lambda work, _: [*submission(work, "nodes").readings, Reading({})])
-    times = Times()
-    (one,) = judging.judged_scan(StudentKey("engine", "careful", "single", 5), times)
-    assert one.source == "scans"
-    assert len(one.made) == len(times.scans) == 1
-    by_name = {marked.criterion: marked for marked in one.criteria}
-    assert by_name["v_D"].due == "absent"
-    assert by_name["v_A"].due != "absent"
 
 
 @pytest.mark.slow

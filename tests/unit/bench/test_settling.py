@@ -1,6 +1,6 @@
 """How the benchmark of settling counts."""
 
-from tests.bench.settling import Marked, SettlingFigures, Verdict
+from tests.bench.settling import Marked, Verdict, tables
 
 RIGHT = Verdict(is_settled=True, is_right=True, is_charge=False, probability=0.99, length_mm=40.0)
 WRONG = Verdict(is_settled=True, is_right=False, is_charge=True, probability=0.98, length_mm=4.0)
@@ -20,7 +20,7 @@ def test_sheets_are_counted_as_they_are():
         student(OPEN, of_another=True),
     ]  # fmt: skip
     assert [one.is_finished for one in students] == [True, False, True, False, False]
-    (_, heads, rows), (_, _, shares) = SettlingFigures(students).tables()
+    (_, heads, rows), (_, _, shares) = tables(students)
     row = dict(zip(heads, rows[0], strict=True))
     assert row["students"] == "5"
     assert row["finished"] == "50.0 %"

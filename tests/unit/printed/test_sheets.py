@@ -32,8 +32,8 @@ from grader.scan.strokes.ink import find_ink
 from grader.tables.roster import RosterRow
 from grader.texts.spoken import message
 from reference.authored.assignment import built_in, load_assignment
-from reference.drawing.canvas import pieces_of
 from reference.errors import AuthoredFileError
+from tests.rendered import rendered
 
 A3_POINTS = (420.0 / 25.4 * 72.0, 297.0 / 25.4 * 72.0)
 QUIET_MM = 2.0
@@ -42,6 +42,8 @@ FAINT = 200
 """The darkest grey (0..255) printed where students draw: the crosses for the poles."""
 LEAST_CELL_MM = 3.5
 ANA = RosterRow("s07", "Ana Țîrlea", 7, line=2)
+TEN_A_MM = 254.0
+"""Dots per inch."""
 
 
 def page_layouts(assignment, asked=None):
@@ -112,10 +114,9 @@ def test_the_layout_is_told_as_the_contract_says():
 
 def test_what_is_printed_is_where_the_layout_says():
     sheets = make_sheets(load_assignment("pump"), [ANA])
-    image = pypdfium2.PdfDocument(sheets.pdf)[0].render(scale=10 / (72 / 25.4), grayscale=True).to_numpy()
-    grey = image.reshape(image.shape[:2])
+    grey = rendered(sheets.pdf, TEN_A_MM)
     detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_250))
-    corners, ids, _ = detector.detectMarkers(np.ascontiguousarray(grey))
+    corners, ids, _ = detector.detectMarkers(grey)
     found = {
         int(number): quad.reshape(4, 2) / 10.0 for number, quad in zip(ids.ravel(), corners, strict=True)
     }
@@ -129,8 +130,7 @@ def test_what_is_printed_is_where_the_layout_says():
 
 def test_boxes_and_cells_to_write_in_are_drawn_where_the_layout_says():
     sheets = make_sheets(load_assignment("pump"), [ANA])
-    image = pypdfium2.PdfDocument(sheets.pdf)[0].render(scale=10 / (72 / 25.4), grayscale=True).to_numpy()
-    grey = image.reshape(image.shape[:2])
+    grey = rendered(sheets.pdf, TEN_A_MM)
     page = sheets.layout.pages[0]
     scales = [box for name, box in page.zones["fields"].items() if name in SCALE_BOXES]
     cells = [cell for cells in page.cells.values() for cell in cells]
@@ -272,12 +272,7 @@ def test_the_calibration_page_has_its_segments_inside_the_page():
 
 
 def test_the_segments_of_the_calibration_page_are_inked_from_end_to_end_and_not_beyond():
-    image = (
-        pypdfium2.PdfDocument(make_calibration().pdf)[0]
-        .render(scale=10 / (72 / 25.4), grayscale=True)
-        .to_numpy()
-    )
-    grey = image.reshape(image.shape[:2])
+    grey = rendered(make_calibration().pdf, TEN_A_MM)
     for start, end in calibration_segments():
         along = (end - start) / np.hypot(*(end - start))
         for place, dark in (
@@ -288,18 +283,6 @@ def test_the_segments_of_the_calibration_page_are_inked_from_end_to_end_and_not_
         ):
             column, row = (place * 10 - 0.5).round().astype(int)
             assert (grey[row, column] < 128) == dark
-
-
-def test_indices_are_set_below_and_above():
-    assert [(p.text, p.height) for p in pieces_of("a_BA_n")] == [("a", 0), ("BA", -1), ("n", 1)]
-    assert [(p.text, p.height) for p in pieces_of("O1A = O2B")] == [
-        ("O", 0),
-        ("1", -1),
-        ("A = O", 0),
-        ("2", -1),
-        ("B", 0),
-    ]
-    assert [(p.text, p.height) for p in pieces_of("φ")] == [("φ", 0)]
 
 
 @pytest.mark.parametrize(
@@ -339,8 +322,7 @@ def test_long_names_and_ids_stay_in_their_column(lang):
     sheets = make_sheets(
         load_assignment("pump"), [RosterRow("W" * 64, "Wolfeschlegelsteinhausen " * 6, 30)], lang
     )
-    image = pypdfium2.PdfDocument(sheets.pdf)[0].render(scale=10 / (72 / 25.4), grayscale=True).to_numpy()
-    grey = image.reshape(image.shape[:2])
+    grey = rendered(sheets.pdf, TEN_A_MM)
     # The quiet zone of the marker beside the column, and the line between data and advice.
     assert grey[110:280, int(142.2 * 10) : int(143.8 * 10)].min() == 255
     assert grey[370:378, 380:1430].min() == 255
@@ -348,8 +330,7 @@ def test_long_names_and_ids_stay_in_their_column(lang):
 
 def test_the_faint_crosses_are_no_strokes_on_a_scan():
     sheets = make_sheets(load_assignment("pump"), [ANA])
-    rendered = pypdfium2.PdfDocument(sheets.pdf)[1].render(scale=300 / 72, grayscale=True).to_numpy()
-    page = Page("blank.png", 1, np.ascontiguousarray(rendered.reshape(rendered.shape[:2])), (300.0, 300.0))
+    page = Page("blank.png", 1, rendered(sheets.pdf, 300, 1), (300.0, 300.0))
     sheet = rectify(page)
     assert isinstance(sheet, Sheet)
     zones = [box for box in sheets.layout.pages[1].zones.values() if isinstance(box, tuple)]

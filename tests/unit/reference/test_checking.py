@@ -79,14 +79,26 @@ def test_a_slider_may_drive_in_place_of_the_crank():
 @pytest.mark.parametrize(
     ("changes", "path", "words"),
     [
-        ([(3, "pins", ["A", "O4"])], "[3].pins[1]", "O4 is not placed above (did you mean O3?)"),
+        (
+            [(3, "pins", ["A", "O4"])],
+            "[3].pins[1]",
+            "O4 is not placed above (did you mean O3?): known so far are A, A3, D, E, O1, O2, O3",
+        ),
+        ([(3, "pins", ["A", "A"])], "[3].pins", "two pins must be different"),
+        ([(3, "links", ["6", "6"])], "[3].links[1]", "each link needs a name of its own"),
+        ([(3, "links", ["6", "1"])], "[3].links[1]", "each link needs a name of its own"),
         ([(0, "pin", "C")], "[0].pin", "C is placed further down: groups stand in the order"),
-        ([(8, "node", "B")], "[8].node", "B has a place already: over-constrained"),
+        (
+            [(8, "node", "B")],
+            "[8].node",
+            "B has a place already: over-constrained; a group places a new joint",
+        ),
         ([(6, "guide", "coincident", "O1")], "[6].guide.coincident", "O1 has a place already"),
-        ([(2, "link", "3")], "[2].link", "there is a link 3 already"),
+        ([(2, "link", "3")], "[2].link", "there is a link 3 already: each link needs a name of its own"),
         ([(2, "link", "1")], "[2].link", "there is a link 1 already"),
         ([(0, "pivot", "A")], "[0].pivot", "pin and pivot must be different joints"),
         ([(4, "link", "66")], "[4].base", "must be two joints of link 66 (no joints yet)"),
+        ([(4, "base", ["A", "O2"])], "[4].base", "must be two joints of link 6 (A, B)"),
         ([(1, "base", ["A3", "O2"])], "[1].base", "the pivot comes first"),
         ([(1, "base", ["O2", "A"])], "[1].base", 'by type = "point" from O2, A3'),
         (
@@ -110,6 +122,21 @@ def test_a_slider_may_drive_in_place_of_the_crank():
 def test_what_does_not_fit_together_is_told_at_its_place(changes, path, words):
     found = told(edited(*(("group", *change) for change in changes)))
     assert words in found[f"$.group{path}"]
+
+
+@pytest.mark.parametrize("name", ["BA", "O2B"])
+def test_a_joint_whose_name_reads_like_two_joints_is_refused(name):
+    assert (
+        f"{name} would mean both {name} and {name[:-1]} about {name[-1]}"
+        in told(edited(("group", 8, "node", name)))["$"]
+    )
+
+
+def test_the_crank_needs_a_ground_pivot_and_a_new_pin_and_letters_differ_by_more_than_case():
+    found = told(edited(("crank", "pivot", "O9"), ("crank", "pin", "O2")))
+    assert {"$.crank.pivot", "$.crank.pin"} <= set(found)
+    found = told(edited(("ground", "Ab", [0, 0]), ("group", 8, "node", "AB")))
+    assert any("another case" in message for message in found.values())
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import pytest
 from reference.authored.assignment import load_assignment
 from reference.construction import derive
 from reference.construction.derive import construction_of
-from reference.construction.graph import ancestors, bars, evaluate, parameters_of
+from reference.construction.graph import ancestors, bars, coincident, evaluate, parameters_of
 from reference.construction.steps import Similar
 from reference.plan import exact_plan
 from tests import every_group
@@ -23,10 +23,15 @@ def plan_of(name, *, accelerations=True):
     return exact_plan(assignment, assignment.variants(), accelerations=accelerations)
 
 
+def drawn_plan(name):
+    """A plan by the closed form, and its nodes as the construction draws them."""
+    plan = plan_of(name)
+    return plan, evaluate(plan.construction, plan.drawing.parameters)
+
+
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_the_construction_and_the_closed_form_give_the_same_plans(name):
-    plan = plan_of(name)
-    drawn = evaluate(plan.construction, plan.drawing.parameters)
+    plan, drawn = drawn_plan(name)
     for figure, nodes in plan.nodes_mm.items():
         size = plan.size_mm(figure)
         assert set(nodes) == {step.node for step in plan.construction.figures[figure]}
@@ -45,8 +50,7 @@ def test_without_accelerations_the_velocity_plan_is_the_same_and_nothing_else_is
 
 
 def test_what_follows_from_a_wrong_node_follows_the_wrong_node_and_the_rest_stays():
-    plan = plan_of("pump")
-    drawn = evaluate(plan.construction, plan.drawing.parameters)
+    plan, drawn = drawn_plan("pump")
     moved = evaluate(plan.construction, plan.drawing.parameters, given={"b": drawn["b"] + (3 - 2j)})
     downstream = {node for node in drawn if "b" in ancestors(plan.construction, [node])}
     assert {"b", "c", "d", "n_BA", "n_B", "b'", "c'", "d'"} <= downstream
@@ -59,8 +63,7 @@ def test_what_follows_from_a_wrong_node_follows_the_wrong_node_and_the_rest_stay
 
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_giving_the_right_nodes_changes_nothing(name):
-    plan = plan_of(name)
-    drawn = evaluate(plan.construction, plan.drawing.parameters)
+    plan, drawn = drawn_plan(name)
     given = {node: drawn[node] for node in list(drawn)[::2]}
     again = evaluate(plan.construction, plan.drawing.parameters, given=given)
     for node in drawn:
@@ -68,15 +71,13 @@ def test_giving_the_right_nodes_changes_nothing(name):
 
 
 def test_a_given_node_hides_its_own_makers():
-    plan = plan_of("pump")
-    drawn = evaluate(plan.construction, plan.drawing.parameters)
+    plan, drawn = drawn_plan("pump")
     both = evaluate(plan.construction, plan.drawing.parameters, given={"b": drawn["b"] + 5, "c": drawn["c"]})
     np.testing.assert_allclose(both["d"], drawn["d"], atol=1e-10)
 
 
 def test_what_a_given_node_is_made_from_is_not_drawn():
-    plan = plan_of("pump")
-    drawn = evaluate(plan.construction, plan.drawing.parameters)
+    plan, drawn = drawn_plan("pump")
     joints = {step.node: drawn[step.node] for step in plan.construction.figures["mechanism"]}
     given = {**joints, "b": drawn["b"]}
     part = evaluate(plan.construction, plan.drawing.parameters, given=given, wanted=["b"])
@@ -100,8 +101,7 @@ def test_only_what_is_asked_for_and_its_ancestors_are_drawn(wanted):
 
 @pytest.mark.parametrize("name", ["pump", "press", "engine", "pump-collinear", "shaper", "piston"])
 def test_small_errors_of_the_hand_move_the_nodes_in_proportion(name):
-    plan = plan_of(name)
-    drawn = evaluate(plan.construction, plan.drawing.parameters)
+    plan, drawn = drawn_plan(name)
     rng = np.random.default_rng(7)
     size = max(float(np.max(np.abs(place))) for place in drawn.values())
     tried = 0
@@ -123,8 +123,7 @@ def test_small_errors_of_the_hand_move_the_nodes_in_proportion(name):
 
 
 def test_an_error_at_a_node_is_seen_at_that_node():
-    plan = plan_of("pump")
-    drawn = evaluate(plan.construction, plan.drawing.parameters)
+    plan, drawn = drawn_plan("pump")
     for node in ("b", "c'", "n_BA", "B"):
         off = evaluate(
             plan.construction,
@@ -151,8 +150,7 @@ def test_similar_triangles_and_perpendiculars_give_the_same_image_of_a_plate():
 
 
 def test_a_flat_plate_comes_by_similarity_and_divides_the_image_as_it_divides_the_link():
-    plan = plan_of("pump-collinear")
-    drawn = evaluate(plan.construction, plan.drawing.parameters)
+    plan, drawn = drawn_plan("pump-collinear")
     assert isinstance(plan.construction.step("c"), Similar)
     np.testing.assert_allclose(drawn["c"], (drawn["a"] + drawn["b"]) / 2, atol=1e-10)
     np.testing.assert_allclose(drawn["c'"], (drawn["a'"] + drawn["b'"]) / 2, atol=1e-10)
@@ -184,8 +182,7 @@ def test_the_pump_has_the_names_that_students_use():
 
 
 def test_a_turned_sketch_turns_the_plans_with_it():
-    plan = plan_of("pump")
-    drawn = evaluate(plan.construction, plan.drawing.parameters)
+    plan, drawn = drawn_plan("pump")
     turn = np.radians(17.0)
     turned = evaluate(plan.construction, {**plan.drawing.parameters, "turn": np.asarray(turn)})
     for node, place in drawn.items():
@@ -203,10 +200,24 @@ def test_a_flat_plate_on_a_link_with_a_ground_pivot_divides_its_image():
     assert [name for name in construction.vectors if name.startswith("v_M")] == ["v_M", "v_MB"]
 
 
-def test_bars_are_links_and_slots_and_guides_are_none():
-    told = "O1-A O2-A3 O2-D D-E A-B O3-B A-C B-C O3-F C-G B-K O1-P O1-C9 A-L B-L"
-    drawn = bars(construction_of(every_group.mechanism()))
-    assert sorted("-".join(bar) for bar in drawn) == sorted(told.split())
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("pump", "O1-A A-B O2-B A-C B-C C-D"),
+        ("press", "O1-A A-B O2-B O2-C C-D"),
+        ("shaper", "O1-A O2-A3 O2-D D-E"),
+        ("piston", "B-A O1-A B-C"),
+        (None, "O1-A O2-A3 O2-D D-E A-B O3-B A-C B-C O3-F C-G B-K O1-P O1-C9 A-L B-L"),
+    ],
+)
+def test_bars_are_links_and_slots_and_guides_are_none(name, told):
+    construction = plan_of(name).construction if name else construction_of(every_group.mechanism())
+    assert sorted("-".join(bar) for bar in bars(construction)) == sorted(told.split())
+
+
+def test_a_point_under_a_block_lies_where_the_block_does():
+    assert coincident(plan_of("shaper").construction) == {"A3": "A"}
+    assert not coincident(plan_of("pump").construction)
 
 
 def test_no_more_constructions_are_kept_than_are_asked_for(monkeypatch):

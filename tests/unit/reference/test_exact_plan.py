@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from reference.authored.assignment import Assignment, load_assignment
-from reference.plan import Plan, conditioning, exact_plan
+from reference.authored.assignment import load_assignment
+from reference.plan import conditioning, exact_plan
 from tests.bench.oracle import ExactMotion
 
 SHARE_OF_PLAN = 1e-12
@@ -19,16 +19,12 @@ SOURCE_ROUNDING = 0.02
 BUILT_IN = ["pump", "pump-230", "pump-collinear", "engine", "press"]
 
 
-def solved(name: str) -> tuple[Assignment, Plan, list[ExactMotion]]:
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_vectors_places_and_rates_agree_with_fifty_digits_by_differentiating_places(name):
     assignment = load_assignment(name)
     variants = assignment.variants()
     plan = exact_plan(assignment, variants)
-    return assignment, plan, [ExactMotion(plan.mechanism, index) for index in range(len(variants))]
-
-
-@pytest.mark.parametrize("name", BUILT_IN)
-def test_every_vector_agrees_with_fifty_digits_by_differentiating_places(name):
-    _, plan, truth = solved(name)
+    truth = [ExactMotion(plan.mechanism, index) for index in range(len(variants))]
     for figure in plan.construction.poles:
         vectors = plan.construction.vectors_of(figure)
         exact = np.array([[motion.vector(vector) for motion in truth] for vector in vectors])
@@ -36,11 +32,6 @@ def test_every_vector_agrees_with_fifty_digits_by_differentiating_places(name):
         size = np.max(np.abs(exact), axis=0)
         assert len(vectors) > 3
         assert np.max(np.abs(ours - exact) / size) <= SHARE_OF_PLAN
-
-
-@pytest.mark.parametrize("name", BUILT_IN)
-def test_positions_and_angular_rates_agree_with_fifty_digits(name):
-    _, plan, truth = solved(name)
     size = np.max([np.abs(place) for place in plan.motion.position.values()], axis=0)
     for joint, place in plan.motion.position.items():
         exact = np.array([complex(motion.position[joint]) for motion in truth])
@@ -54,31 +45,18 @@ def test_positions_and_angular_rates_agree_with_fifty_digits(name):
         assert np.max(np.abs(values - exact) / np.maximum(reference, np.abs(exact))) <= SHARE_OF_PLAN
 
 
-def test_the_press_gives_the_five_printed_segments_to_their_last_digit():
+def test_the_press_gives_what_the_source_prints():
+    """Segments to their last digit, real values, and normals within the source's own rounding."""
     press = load_assignment("press")
     plan = exact_plan(press, [press.variant(None, 1)])
-    printed = {"v_B": 46.40, "v_BA": 47.17, "v_C": 92.80, "v_D": 89.36, "v_DC": 21.61}
-    for vector, segment_mm in printed.items():
+    segments = {"v_B": 46.40, "v_BA": 47.17, "v_C": 92.80, "v_D": 89.36, "v_DC": 21.61}
+    segments |= {"a_BA_n": 22.25, "a_B_n": 32.29, "a_DC_n": 16.01}
+    for vector, segment_mm in segments.items():
         assert abs(plan.drawn_mm(vector)[0]) == pytest.approx(segment_mm, abs=LAST_DIGIT_MM)
-
-
-def test_the_press_gives_the_real_values_of_the_source():
-    press = load_assignment("press")
-    plan = exact_plan(press, [press.variant(None, 1)])
-    exact = {"v_B": 1.675, "v_BA": 1.703, "v_C": 3.350, "v_D": 3.226, "v_DC": 0.780}
-    for vector, value in exact.items():
+    for vector, value in {"v_B": 1.675, "v_BA": 1.703, "v_C": 3.350, "v_D": 3.226, "v_DC": 0.780}.items():
         assert abs(plan.vectors_si[vector][0]) == pytest.approx(value, abs=REAL_VALUE_MPS)
-
-
-def test_the_press_gives_the_printed_normals_within_the_sources_own_rounding():
-    press = load_assignment("press")
-    plan = exact_plan(press, [press.variant(None, 1)])
-    exact = {"a_BA_n": 22.25, "a_B_n": 32.29, "a_DC_n": 16.01}
-    printed = {"a_BA_n": 22.2, "a_B_n": 32.4, "a_DC_n": 15.7}
-    for vector, segment_mm in exact.items():
-        drawn_mm = abs(plan.drawn_mm(vector)[0])
-        assert drawn_mm == pytest.approx(segment_mm, abs=LAST_DIGIT_MM)
-        assert drawn_mm == pytest.approx(printed[vector], rel=SOURCE_ROUNDING)
+    for vector, printed_mm in {"a_BA_n": 22.2, "a_B_n": 32.4, "a_DC_n": 15.7}.items():
+        assert abs(plan.drawn_mm(vector)[0]) == pytest.approx(printed_mm, rel=SOURCE_ROUNDING)
 
 
 @pytest.mark.parametrize("position", [0, 4])

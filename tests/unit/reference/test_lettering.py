@@ -44,7 +44,10 @@ def test_a_text_is_as_wide_as_the_font_prints_it(text):
         ("a_B3B_c", [("a", 0), ("B3B", -1), ("c", 1)]),
         ("omega_2", [("ω", 0), ("2", -1)]),
         ("epsilon_3", [("ε", 0), ("3", -1)]),
+        ("a_BA_n", [("a", 0), ("BA", -1), ("n", 1)]),
+        ("O1A = O2B", [("O", 0), ("1", -1), ("A = O", 0), ("2", -1), ("B", 0)]),
         ("π", [("π", 0)]),
+        ("φ", [("φ", 0)]),
     ],
 )
 def test_a_name_has_its_indices_below_and_above(name, pieces):

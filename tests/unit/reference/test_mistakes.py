@@ -29,10 +29,14 @@ def a_plan(name="pump", n=7, position=None):
     return exact_plan(assignment, [assignment.variant(n, position)])
 
 
+def drawn(plan, mistake):
+    """The nodes with a mistake, and without it."""
+    drawings = commit(mistake, plan.drawing), plan.drawing
+    return tuple(evaluate(one.construction, one.parameters) for one in drawings)
+
+
 def shifts(plan, mistake):
-    right = evaluate(plan.construction, plan.drawing.parameters)
-    wrong_drawing = commit(mistake, plan.drawing)
-    wrong = evaluate(wrong_drawing.construction, wrong_drawing.parameters)
+    wrong, right = drawn(plan, mistake)
     return {node: float(np.max(np.abs(wrong[node] - right[node]))) for node in right}
 
 
@@ -72,9 +76,7 @@ def test_every_code_of_the_contract_is_offered_or_can_be_committed():
 
 def test_rpm_for_radians_grows_velocities_once_and_accelerations_twice():
     plan = a_plan()
-    drawing = commit(Mistake("rpm_not_converted", "velocity_plan", factor=RPM_FACTOR), plan.drawing)
-    right = evaluate(plan.construction, plan.drawing.parameters)
-    wrong = evaluate(drawing.construction, drawing.parameters)
+    wrong, right = drawn(plan, Mistake("rpm_not_converted", "velocity_plan", factor=RPM_FACTOR))
     for node in ("a", "b", "c", "d"):
         np.testing.assert_allclose(wrong[node], right[node] * RPM_FACTOR, rtol=1e-9)
     for node in ("a'", "b'", "c'", "d'"):
@@ -83,23 +85,19 @@ def test_rpm_for_radians_grows_velocities_once_and_accelerations_twice():
 
 def test_a_missing_normal_component_leaves_its_end_at_its_start():
     plan = a_plan()
-    drawing = commit(Mistake("normal_missing", "n_BA"), plan.drawing)
-    nodes = evaluate(drawing.construction, drawing.parameters)
+    nodes, _ = drawn(plan, Mistake("normal_missing", "n_BA"))
     np.testing.assert_allclose(nodes["n_BA"], nodes["a'"], atol=1e-12)
 
 
 def test_a_reversed_normal_component_points_away_from_the_pin():
     plan = a_plan()
-    drawing = commit(Mistake("normal_reversed", "n_BA"), plan.drawing)
-    nodes = evaluate(drawing.construction, drawing.parameters)
-    right = evaluate(plan.construction, plan.drawing.parameters)
+    nodes, right = drawn(plan, Mistake("normal_reversed", "n_BA"))
     np.testing.assert_allclose(nodes["n_BA"] - nodes["a'"], right["a'"] - right["n_BA"], atol=1e-12)
 
 
 def test_a_normal_from_the_absolute_velocity_has_that_velocitys_square():
     plan = a_plan()
-    drawing = commit(Mistake("normal_from_absolute", "n_BA"), plan.drawing)
-    nodes = evaluate(drawing.construction, drawing.parameters)
+    nodes, _ = drawn(plan, Mistake("normal_from_absolute", "n_BA"))
     length_mm = abs(nodes["n_BA"] - nodes["a'"])[0]
     known = plan.drawing.parameters
     expected = abs(plan.vectors_si["v_B"][0]) ** 2 / (known["AB"][0] * known["ka"][0])
@@ -108,9 +106,7 @@ def test_a_normal_from_the_absolute_velocity_has_that_velocitys_square():
 
 def test_a_mirrored_image_lies_on_the_other_side_of_its_base():
     plan = a_plan()
-    drawing = commit(Mistake("image_mirrored", "c"), plan.drawing)
-    nodes = evaluate(drawing.construction, drawing.parameters)
-    right = evaluate(plan.construction, plan.drawing.parameters)
+    nodes, right = drawn(plan, Mistake("image_mirrored", "c"))
 
     def side(c):
         return ((nodes["b"] - nodes["a"]).conjugate() * (c - nodes["a"])).imag[0]
@@ -140,8 +136,7 @@ def test_another_students_variant_keeps_the_own_scales():
 
 def test_a_turned_plan_is_the_right_one_turned():
     plan = a_plan()
-    drawing = commit(Mistake("figure_rotated", "velocity_plan", quarters=1), plan.drawing)
-    nodes = evaluate(drawing.construction, drawing.parameters)
+    nodes, _ = drawn(plan, Mistake("figure_rotated", "velocity_plan", quarters=1))
     for node, place in plan.nodes_mm["velocity_plan"].items():
         np.testing.assert_allclose(nodes[node], place * 1j, atol=1e-9)
 
@@ -177,9 +172,7 @@ def test_swapped_labels_exchange_the_ends_of_vectors_and_move_nothing():
 
 def test_an_arithmetic_slip_changes_the_length_that_was_computed():
     plan = a_plan()
-    drawing = commit(Mistake("arithmetic", "n_B", factor=1.3), plan.drawing)
-    nodes = evaluate(drawing.construction, drawing.parameters)
-    right = evaluate(plan.construction, plan.drawing.parameters)
+    nodes, right = drawn(plan, Mistake("arithmetic", "n_B", factor=1.3))
     np.testing.assert_allclose(nodes["n_B"] - nodes["o'"], 1.3 * (right["n_B"] - right["o'"]), atol=1e-12)
 
 
@@ -207,16 +200,14 @@ def test_the_driven_links_vector_may_lie_along_the_link():
     plan = a_plan()
     mistake = Mistake("parallel_for_perpendicular", "a", quarters=1)
     assert mistake in rarer(plan)
-    drawing = commit(mistake, plan.drawing)
-    nodes = evaluate(drawing.construction, drawing.parameters)
+    nodes, _ = drawn(plan, mistake)
     crank = nodes["A"] - nodes["O1"]
     assert abs((crank.conjugate() * nodes["a"]).imag[0]) < MOVED_MM
 
 
 def test_a_point_may_be_taken_on_another_vectors_line():
     plan = a_plan()
-    drawing = commit(Mistake("wrong_intersection", "c'", 1, other=("a_B_t",)), plan.drawing)
-    nodes = evaluate(drawing.construction, drawing.parameters)
+    nodes, _ = drawn(plan, Mistake("wrong_intersection", "c'", 1, other=("a_B_t",)))
     along, across = nodes["c'"] - nodes["n_B"], nodes["B"] - nodes["O2"]
     assert abs((along.conjugate() * across).real[0]) < MOVED_MM * abs(across)[0]
     construction = plan.construction

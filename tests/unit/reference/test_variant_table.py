@@ -7,37 +7,17 @@ from reference.authored.assignment import Variant, load_assignment
 from reference.construction.graph import evaluate
 from reference.errors import AuthoredFileError, CallError, ranges_of
 from reference.plan import exact_plan
+from tests import conveyor
 
-MECHANISM = """
-schema_version = 1
-id = "six"
-length_unit = "mm"
-title = { en = "Crank-rocker with a slider" }
-[ground]
-O1 = [0, 0]
-O2 = ["d", 0]
-[crank]
-pivot = "O1"
-pin = "A"
-length = "a"
-angle_deg = "phi"
-rpm = "n1"
-[[group]]
-type = "RRR"
-node = "B"
-pins = ["A", "O2"]
-links = ["2", "3"]
-lengths = ["b", "c"]
-side = "side_B"
-[[group]]
-type = "RRP"
-node = "C"
-pin = "B"
-link = "4"
-length = "e"
-guide = { through = ["d", "h"], angle_deg = 0 }
-side = "side_C"
-"""
+MECHANISM = (
+    conveyor.MECHANISM.replace('"course"', '"six"')
+    .replace("rpm = 120", 'rpm = "n1"')
+    .replace("[210, 165]", '["b", "c"]')
+    .replace("length = 320", 'length = "e"')
+    .replace("[0, 150]", '["d", "h"]')
+    .replace('"left"', '"side_B"')
+    .replace('"ahead"', '"side_C"')
+)
 ASSIGNMENT = """
 schema_version = 1
 id = "six"

@@ -27,6 +27,7 @@ from grader.scan.register.registration import register
 from reference.errors import InputFileError
 from tests import hostile
 from tests.inline import Inline
+from tests.unit.scan.decode.test_intake import refused
 from tests.waiting import PATIENCE_S
 
 PROJECT = Path(__file__).parents[4]
@@ -38,9 +39,7 @@ def handed_in(data, name="scan"):
 
 
 def code_of(data):
-    with pytest.raises(InputFileError) as caught:
-        list(pages_of(handed_in(data)))
-    return caught.value.code
+    return refused(lambda: list(pages_of(handed_in(data)))).code
 
 
 REFUSED = {
@@ -158,9 +157,7 @@ def test_a_list_of_tiff_pages_that_breaks_off_costs_the_pages_behind_and_no_othe
     data[at : at + 4] = (len(data) + 1000).to_bytes(4, "little")
     assert count_pages(handed_in(bytes(data))) == 2
     assert page_of(handed_in(bytes(data)), 1).grey.shape == (300, 420)
-    with pytest.raises(InputFileError) as caught:
-        page_of(handed_in(bytes(data)), 2)
-    assert caught.value.code == "image_truncated"
+    assert refused(lambda: page_of(handed_in(bytes(data)), 2)).code == "image_truncated"
 
 
 def test_pages_that_go_in_a_circle_have_an_end():
@@ -168,24 +165,24 @@ def test_pages_that_go_in_a_circle_have_an_end():
 
 
 @pytest.mark.parametrize(
-    "error", [ZeroDivisionError("odd"), RecursionError(), KeyError("x"), cv2.error("bad")]
+    ("error", "raised"),
+    [
+        (ZeroDivisionError("odd"), InputFileError),
+        (RecursionError(), InputFileError),
+        (KeyError("x"), InputFileError),
+        (cv2.error("bad"), InputFileError),
+        (MemoryError(), MemoryError),
+        (cv2.error("(-4:Insufficient memory) Failed to allocate"), MemoryError),
+    ],
 )
-def test_any_error_of_a_library_is_an_error_of_the_page(monkeypatch, error):
+def test_any_error_of_a_library_is_one_of_the_page_but_for_want_of_memory(monkeypatch, error, raised):
     def failing(*_):
         raise error
 
     monkeypatch.setattr(pictures.cv2, "imdecode", failing)
-    assert code_of(hostile.stored(hostile.paper())) == "image_damaged"
-
-
-@pytest.mark.parametrize("error", [MemoryError(), cv2.error("(-4:Insufficient memory) Failed to allocate")])
-def test_want_of_memory_is_no_fault_of_the_page(monkeypatch, error):
-    def failing(*_):
-        raise error
-
-    monkeypatch.setattr(pictures.cv2, "imdecode", failing)
-    with pytest.raises(MemoryError):
+    with pytest.raises(raised) as caught:
         page_of(handed_in(hostile.stored(hostile.paper())), 1)
+    assert getattr(caught.value, "code", "image_damaged") == "image_damaged"
 
 
 HEALTHY = {
@@ -236,20 +233,12 @@ def test_a_page_of_a_file_that_has_changed_since_it_was_surveyed_is_not_read(tmp
     assert (changed.image, [problem.code for problem in changed.problems]) == (None, ["file_changed"])
 
 
-def test_a_pipe_is_not_waited_for(tmp_path):
+def test_a_pipe_is_not_waited_for_and_a_file_of_more_than_a_class_not_loaded(tmp_path):
     os.mkfifo(tmp_path / "pipe.png")
-    with pytest.raises(InputFileError) as caught:
-        load(tmp_path / "pipe.png")
-    assert caught.value.code == "file_missing"
-
-
-def test_a_file_of_more_than_a_class_is_not_loaded(tmp_path):
-    path = tmp_path / "huge.pdf"
-    with path.open("wb") as file:
+    assert refused(lambda: load(tmp_path / "pipe.png")).code == "file_missing"
+    with (tmp_path / "huge.pdf").open("wb") as file:
         file.truncate(MAX_FILE_BYTES + 1)
-    with pytest.raises(InputFileError) as caught:
-        load(path)
-    assert caught.value.code == "file_too_large"
+    assert refused(lambda: load(tmp_path / "huge.pdf")).code == "file_too_large"
 
 
 def test_a_file_that_grows_while_it_is_read_is_not_taken_for_whole(tmp_path, monkeypatch):
@@ -257,9 +246,7 @@ def test_a_file_that_grows_while_it_is_read_is_not_taken_for_whole(tmp_path, mon
     path.write_bytes(bytes(100))
     shorter = os.stat_result((*path.stat()[:6], 50, *path.stat()[7:]))
     monkeypatch.setattr(limits.os, "fstat", lambda _: shorter)
-    with pytest.raises(InputFileError) as caught:
-        load(path)
-    assert caught.value.code == "file_changed"
+    assert refused(lambda: load(path)).code == "file_changed"
 
 
 # Damaged rows -------------------------------------------------------------------------------------

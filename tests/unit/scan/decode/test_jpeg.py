@@ -8,7 +8,7 @@ from PIL import Image
 
 from grader.scan.decode import jpeg
 from grader.scan.decode.pages import page_of
-from reference.errors import InputFileError
+from tests.unit.scan.decode.test_intake import refused
 
 pytest.importorskip("simplejpeg")
 SHADES = np.add.outer(np.arange(300), np.arange(420)) % 256
@@ -57,6 +57,4 @@ def test_a_file_that_is_cut_off_is_told(tmp_path, without):
     large = Image.fromarray(np.repeat(np.repeat(COLOURS, 5, axis=0), 5, axis=1))
     large.save(path, "JPEG")
     path.write_bytes(path.read_bytes()[:-20_000])
-    with pytest.raises(InputFileError) as refused:
-        page_of(path, 1)
-    assert refused.value.code == "image_truncated"
+    assert refused(lambda: page_of(path, 1)).code == "image_truncated"

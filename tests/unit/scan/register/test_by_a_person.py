@@ -6,7 +6,8 @@ import pytest
 
 from grader.records import Page
 from grader.scan.register.registration import register
-from tests.unit.scan.register.test_plain import GRID_MM, apply, off_mm, painted, scale_off, scanner
+from tests.unit.scan.register.places import apply
+from tests.unit.scan.register.test_plain import GRID_MM, off_mm, painted, scale_off, scanner
 
 CORNERS_MM = np.array([(0, 0), (420, 0), (420, 297), (0, 297)], dtype=float)
 POINTED_MM = 2.5

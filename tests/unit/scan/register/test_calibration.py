@@ -5,7 +5,6 @@ from functools import cache
 
 import cv2
 import numpy as np
-import pypdfium2
 import pytest
 from PIL import Image
 
@@ -13,6 +12,7 @@ from grader.printed.answer_sheet import make_calibration
 from grader.records import Unread
 from grader.scan.register.calibration import calibrate, residual_map
 from tests.inline import planmark
+from tests.rendered import rendered
 
 DPI = 200
 SCALE = 0.0002
@@ -23,8 +23,7 @@ LENGTH_MM, PLACE_MM = 0.15, 0.02
 
 @cache
 def printed():
-    image = pypdfium2.PdfDocument(make_calibration().pdf)[0].render(scale=DPI / 72, grayscale=True).to_numpy()
-    return np.ascontiguousarray(image.reshape(image.shape[:2]))
+    return rendered(make_calibration().pdf, DPI)
 
 
 def saved(path, grey, dpi=DPI):

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pypdfium2
 import pytest
 
 from grader.printed.answer_sheet import make_sheets
@@ -13,6 +12,7 @@ from grader.scan.register.registration import rectify
 from grader.tables.roster import RosterRow
 from reference.authored.assignment import load_assignment
 from samples.simulation import any_settings, simulate
+from tests.rendered import rendered
 
 PUMP = load_assignment("pump")
 
@@ -32,8 +32,7 @@ def refused_as_half(page):
 @pytest.mark.parametrize("dpi", [(150.0, 150.0), None])
 def test_half_a_printed_sheet_is_refused_though_its_markers_are_seen(dpi):
     pdf = make_sheets(PUMP, [RosterRow("s07", "Ana", 7)]).pdf
-    image = pypdfium2.PdfDocument(pdf)[0].render(scale=150 / 72, grayscale=True).to_numpy()
-    page = Page("s.png", 1, np.ascontiguousarray(image.reshape(image.shape[:2])), dpi)
+    page = Page("s.png", 1, rendered(pdf, 150), dpi)
     assert isinstance(rectify(page), Sheet)
     assert all(refused_as_half(half) for half in halves(page))
 

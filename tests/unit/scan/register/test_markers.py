@@ -5,7 +5,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import pypdfium2
 import pytest
 
 from grader.printed.answer_sheet import make_calibration, make_sheets
@@ -17,6 +16,9 @@ from grader.scan.register.markers import register
 from grader.scan.register.registration import register as register_page
 from grader.tables.roster import RosterRow
 from reference.authored.assignment import load_assignment
+from tests.rendered import rendered
+from tests.unit.scan.register import places
+from tests.unit.scan.register.places import apply
 
 REAL = Path(__file__).resolve().parents[5] / "shared" / "real"
 CLEAN_MM, HARD_MM = 0.02, 0.08
@@ -33,20 +35,14 @@ def printed(dpi, page=0):
 
 
 def rasterised(pdf, dpi, page=0):
-    image = pypdfium2.PdfDocument(pdf)[page].render(scale=dpi / 72, grayscale=True).to_numpy()
-    grey = np.ascontiguousarray(image.reshape(image.shape[:2]))
+    grey = rendered(pdf, dpi, page)
     high, wide = grey.shape
     return grey, np.array([[wide / 420.0, 0.0, -0.5], [0.0, high / 297.0, -0.5], [0.0, 0.0, 1.0]])
 
 
-def apply(matrix, points):
-    mapped = np.c_[points, np.ones(len(points))] @ matrix.T
-    return mapped[:, :2] / mapped[:, 2:]
-
-
 def off_mm(sheet, truth):
     """Largest distance on paper between where points are and where the sheet says."""
-    return np.hypot(*(apply(np.linalg.inv(truth), apply(sheet.mm_to_px, GRID_MM)) - GRID_MM).T).max()
+    return places.off_mm(sheet.mm_to_px, truth, GRID_MM)
 
 
 def scanned(grey, *, blur=0.7, noise=5.0, quality=80):

@@ -12,6 +12,8 @@ from grader.scan.decode.pages import page_of
 from grader.scan.register.distortion import straight, straighten, straightened
 from grader.scan.register.registration import rectify
 from grader.texts.spoken import message
+from tests.unit.scan.register import places
+from tests.unit.scan.register.places import apply
 
 SHARED = Path(__file__).resolve().parents[5] / "shared"
 RULED_MM = 0.06
@@ -22,12 +24,6 @@ ISO, GOST = (20, 10, 410, 287), (20, 5, 415, 292)
 PX_PER_MM = 150 / 25.4
 SUBPIXEL = 6
 GRID_MM = np.stack(np.meshgrid(np.linspace(10, 410, 6), np.linspace(10, 287, 5)), axis=-1).reshape(-1, 2)
-
-
-def apply(matrix, points):
-    points = np.asarray(points, dtype=float)
-    mapped = np.c_[points, np.ones(len(points))] @ np.asarray(matrix).T
-    return mapped[:, :2] / mapped[:, 2:]
 
 
 def scanner(*, turns=0, skew_deg=0.0, scale=(1.0, 1.0), bed_mm=0.0):
@@ -57,19 +53,16 @@ def painted(matrix, shape, *, frame=ISO, block=True, bed=250, errors=None, noise
         right, bottom = (410, 287) if frame is None else frame[2:]
         lines += [((right - 150, bottom - h), (right, bottom - h)) for h in (0, 9, 18, 27)]
         lines += [((right - x, bottom - 27), (right - x, bottom)) for x in (150, 0)]
-    for start, end in lines:
-        cv2.polylines(
-            grey,
-            [fixed(apply(matrix, [start, end]))],
-            isClosed=False,
-            color=60,
-            thickness=3,
-            lineType=cv2.LINE_AA,
-            shift=SUBPIXEL,
-        )
+    for ends in lines:
+        stroke(grey, apply(matrix, ends))
     soft = cv2.GaussianBlur(grey, (0, 0), 0.6)
     noisy = soft + np.random.default_rng(0).normal(0, noise, shape)
     return np.clip(noisy, 0, 255).astype(np.uint8)
+
+
+def stroke(grey, points, *, dark=60, thick=3, closed=False):
+    pen = {"color": dark, "thickness": thick, "lineType": cv2.LINE_AA, "shift": SUBPIXEL}
+    cv2.polylines(grey, [fixed(points)], isClosed=closed, **pen)
 
 
 def fixed(points):
@@ -78,7 +71,7 @@ def fixed(points):
 
 def off_mm(sheet, matrix):
     """Largest distance on the sheet between where points are and where the registration says."""
-    return np.hypot(*(apply(np.linalg.inv(matrix), apply(sheet.mm_to_px, GRID_MM)) - GRID_MM).T).max()
+    return places.off_mm(sheet.mm_to_px, matrix, GRID_MM)
 
 
 def scale_off(sheet, matrix):
@@ -136,9 +129,7 @@ def test_a_shadow_along_the_edge_lies_outside_the_paper():
     matrix, shape = scanner(bed_mm=6)
     grey = painted(matrix, shape, frame=None, bed=249)
     outer = apply(matrix, [(-0.3, -0.3), (420.3, -0.3), (420.3, 297.3), (-0.3, 297.3)])
-    cv2.polylines(
-        grey, [fixed(outer)], isClosed=True, color=120, thickness=4, lineType=cv2.LINE_AA, shift=SUBPIXEL
-    )
+    stroke(grey, outer, dark=120, thick=4, closed=True)
     sheet = rectify(Page("a.png", 1, grey, (150.0, 150.0)))
     assert off_mm(sheet, matrix) < 4 * RULED_MM
     assert scale_off(sheet, matrix) < SCALE_SES
@@ -221,26 +212,10 @@ def unknown_because(sheet) -> str:
 def test_squared_paper_has_no_title_block():
     matrix, shape = scanner()
     grey = painted(matrix, shape, frame=None, block=False, bed=248)
-    for x in range(0, 420, 10):
-        cv2.polylines(
-            grey,
-            [fixed(apply(matrix, [(x, 0), (x, 297)]))],
-            isClosed=False,
-            color=150,
-            thickness=2,
-            lineType=cv2.LINE_AA,
-            shift=SUBPIXEL,
-        )
-    for y in range(0, 297, 10):
-        cv2.polylines(
-            grey,
-            [fixed(apply(matrix, [(0, y), (420, y)]))],
-            isClosed=False,
-            color=150,
-            thickness=2,
-            lineType=cv2.LINE_AA,
-            shift=SUBPIXEL,
-        )
+    squares = [[(x, 0), (x, 297)] for x in range(0, 420, 10)]
+    squares += [[(0, y), (420, y)] for y in range(0, 297, 10)]
+    for ends in squares:
+        stroke(grey, apply(matrix, ends), dark=150, thick=2)
     assert unknown_because(rectify(Page("a.png", 1, grey, None)))
 
 

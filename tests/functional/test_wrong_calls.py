@@ -1,0 +1,52 @@
+"""Calls that cannot be carried out end with their status, one message, and nothing written."""
+
+import pytest
+
+
+@pytest.mark.parametrize(
+    ("call", "status", "words"),
+    [
+        ("plan pmup", 2, "built in are engine, piston, press"),
+        ("plan pump", 2, "needs --n (n from 1 to 30)"),
+        ("plan pump --n 31", 2, "has n from 1 to 30"),
+        ("plan press --position 8", 2, "has position from 0 to 7"),
+        ("plan nowhere.toml --n 1", 2, "no such file"),
+        ("plan pump --n 1 --crank-mm 0", 2, "above 0"),
+        ("plan pump --n 1 --crank-mm nan", 2, "above 0"),
+        ("plan pump --n one", 2, "'--n'"),
+        ("plan pump --m 1", 2, "No such option"),
+        ("schema rapport", 2, "known are"),
+        ("plan pump --n 1 --svg /proc/plan.svg", 5, "cannot be written"),
+        ("plan press --position 1 --altitude --svg plan.svg", 2, "kL ka / kv^2 = 0.555556"),
+        ("plan pump --n 7 --altitude", 2, "name a file by --svg or --pdf"),
+        ("plan pump --n 7 --steps steps.docx", 2, "must end in .html or .pdf"),
+        ("plan pump --n 7 --steps steps.html --lang de", 2, "choose one of en, ro, ru"),
+        ("plan pump --all --n 3", 2, "--n one of them"),
+        ("plan press --all --position 3", 2, "--position one of them"),
+        ("plan pump --all --svg x.svg", 2, "--pdf"),
+        ("plan pump --all --pdf x.pdf --altitude", 2, "--altitude one of them"),
+        ("plan pump --all --steps x.html", 2, "--all is every variant"),
+        ("plan pump --n 3 --csv x.csv", 2, "add --all"),
+        ("plan pump --all --csv x.csv --lang de", 2, "known are en, ro, ru"),
+        ("plan pump --all --crank-mm -3", 2, "above 0"),
+        (
+            "cycle press --position 1 --of v_Q --csv c.csv",
+            2,
+            "nothing on this cycle is called 'v_Q' (did you mean",
+        ),
+        ("cycle press --position 1 --of v_B,V_d --csv c.csv", 2, "did you mean v_D?"),
+        ("cycle press --position 1 --of omega_9 --csv c.csv", 2, "did you mean omega_"),
+        ("cycle press --position 1 --samples 2 --csv c.csv", 2, "a whole number from 3 to 100001"),
+        ("cycle press --position 1 --samples -5 --csv c.csv", 2, "a whole number from 3 to 100001"),
+        ("cycle press --position 1 --samples many --csv c.csv", 2, "'--samples'"),
+        ("cycle press --position 1 --lang de --csv c.csv", 2, "en, ro, ru"),
+        ("cycle press --csv c.csv", 2, "needs --position"),
+    ],
+)
+def test_a_wrong_call_ends_with_its_status_and_one_message(planmark, tmp_path, call, status, words):
+    ran = planmark(*call.split())
+    assert ran.returncode == status
+    assert words in " ".join(ran.stderr.replace("│", " ").split())
+    assert "Traceback" not in ran.stderr
+    assert ran.stdout == ""
+    assert not list(tmp_path.iterdir())
