@@ -86,7 +86,11 @@ EXAMPLES: Mapping[str, str] = {
     "readings": "1:5, 1:4", "rival": "2\u00a0%", "roster": "1:5", "rows": "30", "said": "0.036",
     "scan": "class.pdf#3", "scans": "400", "sign": "$", "size": "97\u00a0%", "strokes": "9000",
     "suffix": ".png", "unpacked": "1600", "values": "60 (a.csv), 65 (b.csv)", "wanted": "9",
-    "row": "2", "lines": "3", "source": "class.pdf",
+    "row": "2", "lines": "3", "source": "class.pdf", "asked": "core_grading_get_definitions",
+    "began": "2026-05-04T10:00", "byte": "17", "choices": "'Plan 1 (7)', 'Plan 2 (8)'", "combine": "best",
+    "faults": "row 3: ...", "folder": "marks", "here": "10", "host": "desk", "item": "Plan",
+    "option": "--item", "pid": "4711", "platform": "Canvas", "score": "7.5", "sheets": "class",
+    "there": "20", "to": "moodle", "version": "3", "was": "class",
     "wide": "@90 mm", "zone_high": "@120 mm", "zone_wide": "@180 mm",
 }  # fmt: skip
 """Parameters by name: after ``@`` a number with its unit; other texts of the catalogues are translated."""

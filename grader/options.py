@@ -111,6 +111,17 @@ def _port(default: int) -> Any:  # noqa: ANN401 - as above
     return option("Port; 0 takes any free one.", default=default, least=0, most=65535)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommonOptions:
+    """The options of every command."""
+
+    quiet: bool = option(
+        "Print only results and what needs a person, no progress.", "--quiet", "-q", default=False
+    )
+    verbose: bool = option("Also print the log.", "--verbose", "-v", default=False)
+    log: Path | None = option("Append to this file: times, versions, each submission's outcome, tracebacks.")
+
+
 # A variant ----------------------------------------------------------------------------------------
 
 

@@ -21,8 +21,9 @@ from typer.core import TyperCommand, TyperGroup
 
 from grader import __version__
 from grader.cli import class_folder, terminal
-from grader.options import is_record, offered
-from reference.errors import CallError, PlanmarkError
+from grader.language import LANGUAGES, tongue
+from grader.options import CommonOptions, is_record, offered
+from reference.errors import PlanmarkError
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -130,23 +131,6 @@ class Commands(_Help, TyperGroup):
         ctx.exit(status)
 
 
-QuietOption = Annotated[
-    bool, typer.Option("--quiet", "-q", help="Print only results and what needs a person, no progress.")
-]
-VerboseOption = Annotated[bool, typer.Option("--verbose", "-v", help="Also print the log.")]
-LogOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--log", help="Append to this file: times, versions, each submission's outcome, tracebacks."
-    ),
-]
-
-
-def _common(*, quiet: QuietOption = False, verbose: VerboseOption = False, log: LogOption = None) -> None:
-    """The options of every command."""
-    terminal.set_up(quiet=quiet, verbose=verbose, log=log)
-
-
 def _assignments() -> list[str]:
     """The built-in names, for a shell that completes them."""
     from reference.authored.assignment import built_in
@@ -156,13 +140,11 @@ def _assignments() -> list[str]:
 
 def _languages() -> list[str]:
     """The languages, for a shell that completes them."""
-    from grader.language import LANGUAGES
-
     return list(LANGUAGES)
 
 
 def _platforms() -> list[str]:
-    """What there are exports for, for a shell that completes it."""
+    """The platforms of exports, for a shell that completes them."""
     from grader.lms.export import TARGETS
 
     return list(TARGETS)
@@ -197,15 +179,17 @@ class _Application(typer.Typer):
         register = super().command(name, cls=Command)
 
         def add(function: Callable[..., None]) -> Callable[..., None]:
-            own, common = (inspect.signature(one, eval_str=True).parameters for one in (function, _common))
+            own, common = inspect.signature(function, eval_str=True).parameters, _parameters(CommonOptions)
             annotations = {whole: one.annotation for whole, one in own.items()}
             records = {whole: one for whole, one in annotations.items() if is_record(one)}
 
             @wraps(function)
             def run(context: typer.Context, **values: Any) -> None:  # noqa: ANN401 - the commands' options
-                _common(**{option: values.pop(option) for option in common})
+                terminal.set_up(**{one.name: values.pop(one.name) for one in common})
                 terminal.note_call()
                 class_folder.tell_used(context)
+                if values.get("lang") is not None:
+                    values["lang"] = tongue(values["lang"]).lang
                 for whole, record in records.items():
                     values[whole] = record(**{one.name: values.pop(one.name) for one, _ in offered(record)})
                 start = time.monotonic()
@@ -220,7 +204,7 @@ class _Application(typer.Typer):
                     terminal.LOG.debug("ended after %.1f s", time.monotonic() - start)
 
             every = [_parameters(one.annotation) if name in records else [one] for name, one in own.items()]
-            parameters = [*chain.from_iterable(every), *common.values()]
+            parameters = [*chain.from_iterable(every), *common]
             first = inspect.signature(run, follow_wrapped=False).parameters["context"]
             first = first.replace(kind=_KEYWORD, annotation=typer.Context)
             parameters = [one.replace(kind=_KEYWORD) for one in parameters]
@@ -271,12 +255,6 @@ AssignmentArgument = Annotated[
         autocompletion=_assignments,
     ),
 ]
-NumberOption = Annotated[
-    int | None, typer.Option("--n", help="The student's number, if the data depend on it.")
-]
-PositionOption = Annotated[
-    int | None, typer.Option("--position", help="The position, if the assignment has any.")
-]
 AssignmentOption = Annotated[
     str,
     typer.Option("--assignment", help="A built-in name or a .toml file.", autocompletion=_assignments),
@@ -312,11 +290,3 @@ JobsOption = Annotated[
 LanguageOption = Annotated[
     str, typer.Option("--lang", help="Language of feedback: en, ro or ru.", autocompletion=_languages)
 ]
-
-
-def check_language(lang: str) -> None:
-    """Refuse a language that there is no feedback in."""
-    from grader.language import LANGUAGES
-
-    if lang not in LANGUAGES:
-        raise CallError("unknown_language", f"--lang {lang}: known are {', '.join(LANGUAGES)}")

@@ -9,7 +9,7 @@ import json
 import platform
 import statistics
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -109,37 +109,16 @@ def _document(solver: Sequence[SolverRow], reading: Sequence[ReadingRow]) -> dic
 
 
 def _print_tables(solver: Sequence[SolverRow], reading: Sequence[ReadingRow]) -> None:
-    _print_table(
-        ("assignment", "variants", "closed form, us", "construction, us", "error"),
-        [
-            (
-                row.assignment,
-                str(row.variants),
-                *(f"{time_us:.2f}" for time_us in (row.closed_form_us, row.construction_us)),
-                f"{row.error:.1e}",
-            )
-            for row in solver
-        ],
-    )
-    _print_table(
-        ("samples", "pages", "ms a page", "vectors", "right", "believed", "misread"),
-        [
-            (
-                row.samples,
-                str(row.pages),
-                f"{row.ms_per_page:.0f}",
-                *map(str, (row.vectors, row.right, row.believed, row.misread)),
-            )
-            for row in reading
-        ],
-    )
-
-
-def _print_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    table = new_table(*heads)
-    for row in rows:
-        table.add_row(*row)
-    Console().print(table)
+    solved = new_table("assignment", "variants", "closed form, us", "construction, us", "error")
+    for one in solver:
+        times = (f"{time_us:.2f}" for time_us in (one.closed_form_us, one.construction_us))
+        solved.add_row(one.assignment, str(one.variants), *times, f"{one.error:.1e}")
+    read = new_table("samples", "pages", "ms a page", "vectors", "right", "believed", "misread")
+    for row in reading:
+        counts = map(str, (row.vectors, row.right, row.believed, row.misread))
+        read.add_row(row.samples, str(row.pages), f"{row.ms_per_page:.0f}", *counts)
+    for table in (solved, read):
+        Console().print(table)
 
 
 # The solver ------------------------------------------------------------------------------------------

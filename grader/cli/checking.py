@@ -11,7 +11,6 @@ from typing import cast
 import typer
 
 from grader.cli import terminal
-from grader.cli.app import check_language
 from grader.documents import Quantity
 from grader.feedback.sentences import mistake_feedback
 from grader.files import shown_text, write_whole
@@ -24,27 +23,13 @@ from grader.self_check.results import LEVELS, likely_mistakes
 from grader.self_check.values import check_values
 from grader.tables.measurements import Measurements, columns_of, names_of, read_measurements
 from grader.tables.reader import TableError
-from grader.texts.spoken import message, problem_documents, sentence
+from grader.texts.spoken import ENGLISH, failure, message, problem_documents, sentence
 from reference.authored.assignment import Assignment, Variant, built_in, load_assignment
 from reference.errors import CallError, MechanismError
 
 STYLES = {"right": "green", "off": "red", "open": "magenta"}
 NOTHING = N_("nothing that this assignment asks for was measured")
-NO_MEASUREMENTS = N_("--measured FILE is needed: your measurements; --template FILE writes a file to fill in")
-PAGE_NAME = N_("--page %(file)s: the name must end in .html; print the page for paper")
-PAGE_STUDENTS = N_("--page is one student's: %(file)s holds %(count)s")
-TEMPLATE_NAME = N_("--template %(file)s: the name must end in .csv")
-TEMPLATE_EXISTS = N_(
-    "--template %(file)s: there is such a file already, perhaps filled in: choose another name"
-)
 WRITTEN = N_("%(file)s: fill in its last line, then check it by --measured %(file)s")
-LEVEL = N_("--level %(level)s: known are %(names)s")
-NO_ASSIGNMENT = N_(
-    "there is no assignment '%(name)s'; built in are %(names)s; or give the path of a .toml file"
-)
-NEEDED = N_("--%(what)s is needed: this assignment has %(what)s from %(first)s to %(last)s")
-RANGE = N_("%(what)s = %(value)s: this assignment has %(what)s from %(first)s to %(last)s")
-DISAGREES = N_("--%(what)s %(called)s, but %(file)s says %(what)s %(filed)s: which is right?")
 HOW_TO_FILL_IN = N_(
     "# Drawn lengths in mm; _deg: directions counter-clockwise from the horizontal to the right; _value:"
     " computed values, counter-clockwise positive; scales with their units. Blank cells are not checked;"
@@ -59,10 +44,9 @@ def check_measured(name: str, options: CheckOptions) -> bool:
     to fill in is written.
     """
     lang, file, page = options.lang, options.measured, options.page
-    check_language(lang)
     speaker = tongue(lang)
     if page is not None and page.suffix.lower() != ".html":
-        raise _refused(speaker, "page_file", PAGE_NAME, file=page)
+        raise failure(CallError, "page_file", "", speaker, file=page)
     wanted = checked_level(options.level, speaker)
     assignment = _assignment(name, speaker)
     rubric = rubric_of(assignment)
@@ -70,7 +54,7 @@ def check_measured(name: str, options: CheckOptions) -> bool:
         _write_template(options.template, rubric, _variant(assignment, None, options, speaker), speaker)
     if file is None:
         if options.template is None:
-            raise _refused(speaker, "measured_needed", NO_MEASUREMENTS)
+            raise failure(CallError, "measured_needed", "", speaker)
         return False
     all_right = True
     try:
@@ -78,7 +62,7 @@ def check_measured(name: str, options: CheckOptions) -> bool:
     except TableError as error:
         raise error.told(speaker) from error
     if page is not None and len(students) != 1:
-        raise _refused(speaker, "page_students", PAGE_STUDENTS, file=file, count=len(students))
+        raise failure(CallError, "page_students", "", speaker, file=file, count=len(students))
     if not students:
         typer.secho(speaker.gettext(NOTHING), fg="yellow")
     for entered in students:
@@ -108,7 +92,6 @@ def check_photo(name: str, options: CheckOptions) -> bool:
     lang, file = options.lang, cast("Path", options.photo)
     if any((options.measured, options.page, options.template)):
         raise CallError("photo_alone", "--photo goes without --measured, --page and --template")
-    check_language(lang)
     speaker = tongue(lang)
     wanted = checked_level(options.level, speaker)
     assignment = _assignment(name, speaker)
@@ -126,30 +109,24 @@ def check_photo(name: str, options: CheckOptions) -> bool:
 def _assignment(name: str, speaker: Tongue) -> Assignment:
     """An assignment by its name or file; raises CallError for an unknown name."""
     if name not in built_in() and not name.endswith(".toml"):
-        raise _refused(speaker, "unknown_assignment", NO_ASSIGNMENT, name=name, names=", ".join(built_in()))
+        raise failure(CallError, "unknown_assignment", "", speaker, name=name, names=tuple(built_in()))
     return load_assignment(name)
 
 
-def _refused(speaker: Tongue, code: str, text: str, **known: object) -> CallError:
-    """The error of a call, in the student's language."""
-    return CallError(code, speaker.gettext(text) % known if known else speaker.gettext(text))
-
-
-def checked_level(level: str, speaker: Tongue | None = None) -> Level:
+def checked_level(level: str, speaker: Tongue = ENGLISH) -> Level:
     """A level of feedback; raises CallError for another word."""
     wanted = next((known for known in LEVELS if known == level), None)
     if wanted is None:
-        known = {"level": level, "names": ", ".join(LEVELS)}
-        raise _refused(speaker or tongue("en"), "unknown_level", LEVEL, **known)
+        raise failure(CallError, "unknown_level", "", speaker, level=level, names=tuple(LEVELS))
     return wanted
 
 
 def _write_template(file: Path, rubric: RubricFile, variant: Variant, speaker: Tongue) -> None:
     """Write the file that a student fills in: columns, a comment with units, a line for the values."""
     if file.suffix.lower() != ".csv":
-        raise _refused(speaker, "template_file", TEMPLATE_NAME, file=file)
+        raise failure(CallError, "template_file", "", speaker, file=file)
     if file.exists():
-        raise _refused(speaker, "template_exists", TEMPLATE_EXISTS, file=file)
+        raise failure(CallError, "template_exists", "", speaker, file=file)
     known = {"n": variant.n, "position": variant.position}
     columns = {name: "" for name, value in known.items() if value is not None} | columns_of(rubric)
     units = [speaker.unit(unit) for unit in columns.values()]
@@ -199,13 +176,13 @@ def _variant(
         filed = None if entered is None else getattr(entered, what)
         if entered is not None and called is not None and filed is not None and called != filed:
             known = {"what": what, "called": called, "filed": filed, "file": entered.source}
-            raise _refused(speaker, f"{what}_disagrees", DISAGREES, **known)
+            raise failure(CallError, f"{what}_disagrees", "number_disagrees", speaker, **known)
         value = chosen[what] = filed if called is None else called
         if allowed is not None and (value is None or value not in allowed.values):
             limits = {"what": what, "first": allowed.first, "last": allowed.last}
             if value is None:
-                raise _refused(speaker, f"{what}_needed", NEEDED, **limits)
-            raise _refused(speaker, f"{what}_range", RANGE, value=value, **limits)
+                raise failure(CallError, f"{what}_needed", "number_needed", speaker, **limits)
+            raise failure(CallError, f"{what}_range", "number_range", speaker, value=value, **limits)
     return assignment.variant(chosen["n"], chosen["position"])
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from grader.tables.class_file import ClassSettings
 
 SETTINGS = "planmark.class_settings"
-"""Where a command's context holds the settings that it found."""
+"""The key of a command's context for the settings that it found."""
 
 
 def class_folder(context: typer.Context, folder: Path | None) -> Path | None:

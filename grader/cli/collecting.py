@@ -10,6 +10,7 @@ from grader.cli.terminal import note
 from grader.folder.batch import graded, noted_batch
 from grader.folder.collect import LOOK, PAGES, check_scans, check_target, collect
 from grader.lms.export import read_results
+from grader.lms.grades import in_a_row
 
 NAMED = 6
 """Pages named of those that wait."""
@@ -27,8 +28,7 @@ def collect_class(folder: Path, file: Path, jobs: int | None) -> bool:
         return False
     if done.left_out:
         note(f"{done.left_out} page(s) left out: no figure was read, or one lies where the title block is")
-    more = f" and {len(done.waiting) - NAMED} more" if len(done.waiting) > NAMED else ""
-    terminal.say(f"Nothing is written yet. Check {', '.join(done.waiting[:NAMED])}{more}:")
+    terminal.say(f"Nothing is written yet. Check {in_a_row(done.waiting, NAMED)}:")
     terminal.say(f"open {done.preview / LOOK}, answer for each page in {done.preview / PAGES},")
     terminal.say("then run the same command again.")
     return True

@@ -13,9 +13,7 @@ from grader.cli.app import (
     FolderArgument,
     JobsOption,
     LanguageOption,
-    NumberOption,
     OutOption,
-    PositionOption,
     ResultsArgument,
     RosterOption,
     app,
@@ -29,6 +27,7 @@ from grader.options import (
     PlanOptions,
     ReviewOptions,
     ServeOptions,
+    VariantOptions,
 )
 
 
@@ -190,14 +189,13 @@ def demo(
 def read(
     scans: Annotated[list[Path], typer.Argument(help="Scans of one student's sheets.")],
     assignment: AssignmentOption,
-    n: NumberOption = None,
-    position: PositionOption = None,
+    variant: VariantOptions,
     as_json: Annotated[bool, typer.Option("--json", help="Print the readings as JSON.")] = False,
 ) -> None:
     """Read scans and print the values with their standard errors, without grading."""
     from grader.cli.grading import read_scans
 
-    raise typer.Exit(1 if read_scans(scans, assignment, n, position, as_json=as_json) else 0)
+    raise typer.Exit(1 if read_scans(scans, assignment, variant, as_json=as_json) else 0)
 
 
 @app.command()
@@ -228,15 +226,14 @@ def sheet(
 def handout(
     assignment: AssignmentArgument,
     out: Annotated[Path, typer.Option("--out", "-o", help="The PDF file to write.")],
+    variant: VariantOptions,
     roster: RosterOption = None,
-    n: NumberOption = None,
-    position: PositionOption = None,
     lang: LanguageOption = "en",
 ) -> None:
     """Make A4 task sheets for a class or for one --n: scheme, data, empty tables, no solution."""
     from grader.cli.sheets import print_handout
 
-    print_handout(assignment, roster, n, position, out, lang)
+    print_handout(assignment, roster, variant, out, lang)
 
 
 @app.command()

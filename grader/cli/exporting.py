@@ -9,7 +9,6 @@ from pydantic import BaseModel
 
 from grader import lms
 from grader.cli import terminal
-from grader.cli.app import check_language
 from grader.documents import (
     SCHEMA_VERSION,
     CalibrationDocument,
@@ -26,6 +25,7 @@ from grader.lms.table import with_ids
 from grader.options import ExportCall, ExportOptions, taken
 from grader.rubric import RubricFile
 from grader.solution.document import PlanDocument
+from grader.texts.spoken import failure
 from reference.authored.assignment import AssignmentFile
 from reference.authored.mechanism import MechanismFile
 from reference.errors import CallError
@@ -64,17 +64,16 @@ def schema(name: str) -> dict[str, Any]:
 
 def export_results(folder: Path, call: ExportCall) -> tuple[bool, Path]:
     """Write the export file and report who is not in it; whether anybody is missing, and the file."""
-    check_language(call.lang)
     if call.worksheet is not None and (call.gradebook is not None or call.to != "moodle"):
-        raise CallError("option_unused", "--worksheet is Moodle's: give it with --to moodle alone")
+        raise failure(CallError, "option_unused", "worksheet_of_moodle")
     if call.gradebook is not None and call.to in {"moodle", "canvas-api"}:
-        raise CallError("option_unused", f"--gradebook has no meaning for {call.to}: leave it out")
+        raise failure(CallError, "option_unused", option="--gradebook", what=call.to)
     options = Options(form=call.worksheet or call.gradebook, out=folder, **taken(ExportOptions, call))
     path = call.file or folder / usual_name(options)
     sources = (options.form, options.criteria, options.submissions, call.roster, call.ids)
     for source in (folder / "results.json", *sources):
         if source is not None and path.resolve() == source.resolve():
-            raise CallError("file_exists", f"{path}: is read for this export; name another file (--file)")
+            raise failure(CallError, "file_exists", "read_for_export", file=path)
     results = read_results(folder)
     people = {} if call.roster is None else people_of(call.roster)
     if call.ids is not None:

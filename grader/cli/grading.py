@@ -15,7 +15,7 @@ from pathlib import Path
 from types import ModuleType
 
 from grader.cli import terminal
-from grader.cli.app import check_language, new_table, progress
+from grader.cli.app import new_table, progress
 from grader.cli.checking import checked_level
 from grader.cli.terminal import note, tell_next
 from grader.documents import AlikeDocument, MovedDocument, ReadingDocument, ResultsDocument
@@ -27,13 +27,15 @@ from grader.folder.changes import standing_text
 from grader.folder.watch import arrivals
 from grader.folder.workers import Limits, Workers, result_of
 from grader.language import ROOT_LANGUAGE, tongue
+from grader.lms.grades import in_a_row
 from grader.marking.report import reading_document
-from grader.options import ClassOptions, GradeOptions, taken
+from grader.options import ClassOptions, GradeOptions, VariantOptions, taken
 from grader.pipeline import read_pages
 from grader.records import PageRef, ScannedPage
 from grader.rubric import Asked, rubric_of
 from grader.scan.decode.pages import count_pages
 from grader.scan.page import open_page
+from grader.texts.spoken import failure
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, InputFileError
 
@@ -43,10 +45,9 @@ def grade_folder(folder: Path, name: str, out: Path, options: GradeOptions) -> R
 
     What comes into a folder that is watched counts too, until Ctrl+C; a cluster's workers do its work.
     """
-    check_language(options.lang)
     wanted, cluster, decisions = checked_level(options.level), options.cluster, options.decisions
     if decisions is not None and not decisions.is_file():
-        raise CallError("file_missing", f"{decisions}: there is no such file of decisions")
+        raise failure(CallError, "file_missing", "decisions_missing", file=decisions)
     assignment = load_assignment(name)
     rubric = rubric_of(assignment)
     address = address_of(folder)
@@ -58,7 +59,7 @@ def grade_folder(folder: Path, name: str, out: Path, options: GradeOptions) -> R
         if address is not None:
             folder, decisions = on_cluster.image_of(address, out), decisions or out / "decisions.csv"
         elif not folder.is_dir():
-            raise CallError("folder_missing", f"{folder}: there is no such folder")
+            raise failure(CallError, "folder_missing", folder=folder)
     limits = Limits(options.time_limit, options.memory_limit)
     given = {**taken(ClassOptions, options), "level": wanted, "decisions": decisions}
     batch = Batch(
@@ -96,16 +97,15 @@ def _watch(batch: Batch, seconds: float) -> ResultsDocument:
                     raise
                 note(f"{time.strftime('%H:%M:%S')} {error.message}")
                 continue
-            more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-            note(f"{time.strftime('%H:%M:%S')} {', '.join(names[:NAMED])}{more}; {_states(results)}")
+            note(f"{time.strftime('%H:%M:%S')} {in_a_row(names, NAMED)}; {_states(results)}")
     if results is None:
-        raise CallError("nothing_to_grade", f"{batch.folder}: nothing came that could be graded")
+        raise failure(CallError, "nothing_to_grade", "nothing_came", folder=batch.folder)
     tell_class(results, batch.out)
     return results
 
 
 def _until_interrupted(arrived: Iterator[tuple[Batch, list[str]]]) -> Iterator[tuple[Batch, list[str]]]:
-    """What comes while nobody ends the waiting for it."""
+    """Yield what comes, until somebody ends the waiting."""
     while True:
         try:
             batch = next(arrived)
@@ -157,12 +157,10 @@ def demo(out: Path, lang: str, jobs: int | None) -> None:
     tell_next("review", out / "pump", before="settle or change marks with ")
 
 
-def read_scans(
-    scans: Sequence[Path], name: str, n: int | None, position: int | None, *, as_json: bool
-) -> bool:
+def read_scans(scans: Sequence[Path], name: str, options: VariantOptions, *, as_json: bool) -> bool:
     """Read pages without grading; whether anything is doubtful or unread."""
     assignment = load_assignment(name)
-    variant = _variant(assignment, n, position)
+    variant = _variant(assignment, options.n, options.position)
     with Workers(1, Limits(), __name__) as workers:
         refs = [ref for path in scans for ref in result_of(workers, _refs, path)]
         documents = result_of(workers, _read, refs, assignment, variant, sheets=len(refs))
@@ -185,7 +183,7 @@ def _read(refs: Sequence[PageRef], assignment: Assignment, variant: Variant | No
 
 
 def _student_of(page: ScannedPage) -> str | None:
-    """Whose printed sheet it is."""
+    """Return the student of a printed sheet."""
     identity = None if page.sheet is None else page.sheet.identity
     return None if identity is None else identity.student_id
 
@@ -278,13 +276,13 @@ def tell_next_of_class(results: ResultsDocument, out: Path, platform: str | None
 
 
 SECONDS_A_LOOK = 6.0
-"""Of a person at the review's screen, for a criterion."""
+"""Time that a person needs for a criterion at the review's screen."""
 LOOKS_A_PAGE = 3
 """A page that is nobody's, or that was not read at all, takes as long as so many criteria."""
 
 
 def _left(results: ResultsDocument) -> str:
-    """What is finished, what waits, and how long a person will look at it."""
+    """Return what is finished, what waits, and how long a person will need for it."""
     finished = sum(report.status == "graded" for report in results.reports)
     waits = waiting(results)
     looks = sum(len(wait.criteria) or LOOKS_A_PAGE for wait in waits) + LOOKS_A_PAGE * len(results.unmatched)

@@ -1,5 +1,6 @@
 """``planmark lint``."""
 
+from collections import Counter
 from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
@@ -19,11 +20,12 @@ from reference.authored.assignment import Variant
 from reference.drawing.canvas import Label
 from reference.drawing.canvas import svg as as_svg
 from reference.drawing.sheets import FRAME, reference_drawing
+from reference.errors import counted
 
 SHOWN_ROWS = 40
 """More variants than that stand in ranges."""
 REASON_MM, REASON_COLOUR = 4.0, "#a03014"
-"""Of the line under the drawing's frame that says why this variant."""
+"""Height and colour of the line under the drawing's frame that says why this variant is drawn."""
 COLOURS = {"fault": "bold red", "warning": "yellow", "hint": "cyan"}
 
 
@@ -57,14 +59,10 @@ def lint_assignment(name: str, *, as_json: bool, svg: Path | None) -> bool:
 
 
 def _variants_table(rows: Sequence[LintVariant]) -> Table:
-    heads = (
-        "transmis-\nsion sine",
-        "crossing\ndegrees",
-        "shortest\nasked mm",
-        "under\n8 mm",
-        "fits\ntimes",
-    )
-    table = new_table("variant", "assembles", *heads, left=("assembles",))
+    table = new_table(
+        "variant", "assembles", "transmis-\nsion sine", "crossing\ndegrees", "shortest\nasked mm",
+        "under\n8 mm", "fits\ntimes", left=("assembles",),
+    )  # fmt: skip
     table.columns[0].no_wrap = True
     for group in _ranges(rows):
         broken = [row for row in group if row.problem]
@@ -86,11 +84,7 @@ def _ranges(rows: Sequence[LintVariant]) -> list[list[LintVariant]]:
     if len(rows) <= SHOWN_ROWS:
         return [[row] for row in rows]
     has_both = rows[0].n is not None and rows[0].position is not None
-    units = (
-        [list(unit) for _, unit in groupby(rows, key=lambda row: row.n)]
-        if has_both
-        else [[row] for row in rows]
-    )
+    units = [list(unit) for _, unit in groupby(rows, key=lambda row: row.n if has_both else id(row))]
     long = -(-len(units) // 30)
     return [
         [row for unit in units[start : start + long] for row in unit] for start in range(0, len(units), long)
@@ -102,20 +96,20 @@ def _variant_of(row: LintVariant | LintWorst) -> Variant:
 
 
 def _worst_of(figures: Sequence[LintLeast | None], form: str) -> str:
-    known = [figure for figure in figures if figure is not None]
-    if not known:
-        return "-"
-    least = min(known, key=lambda figure: figure.value)
-    return f"{form.format(least.value)} {least.at}"
+    least = _least(figures)
+    return "-" if least is None else f"{form.format(least.value)} {least.at}"
 
 
 def _room_of(figures: Sequence[LintLeast | None]) -> str:
-    """How the tightest figure fits; on which page, where it does not."""
+    """Return how the tightest figure fits, and its page if it does not."""
+    least = _least(figures)
+    page = f" page {least.page}" if least is not None and least.value < 1.0 else ""
+    return "-" if least is None else f"{least.value:.2f}{page}"
+
+
+def _least(figures: Sequence[LintLeast | None]) -> LintLeast | None:
     known = [figure for figure in figures if figure is not None]
-    if not known:
-        return "-"
-    least = min(known, key=lambda figure: figure.value)
-    return f"{least.value:.2f} page {least.page}" if least.value < 1.0 else f"{least.value:.2f}"
+    return min(known, key=lambda figure: figure.value, default=None)
 
 
 def _scales_table(scales: Sequence[LintScales]) -> Table:
@@ -129,12 +123,7 @@ def _scales_table(scales: Sequence[LintScales]) -> Table:
         "kv, (m/s)/mm": [_span(proposal.kv) for proposal in scales],
         "ka, (m/s^2)/mm": [_span(proposal.ka) for proposal in scales],
         "fits, times": [f"{proposal.room:.2f}" for proposal in scales],
-        "shortest asked, mm": [
-            "-"
-            if proposal.shortest_mm is None
-            else f"{proposal.shortest_mm.value:.2f} {proposal.shortest_mm.at}"
-            for proposal in scales
-        ],
+        "shortest asked, mm": [_worst_of([proposal.shortest_mm], "{:.2f}") for proposal in scales],
         f"asked under {WELL_READ_MM:g} mm": [
             f"{proposal.under_8_mm} of {proposal.asked}" for proposal in scales
         ],
@@ -157,12 +146,7 @@ def _tell_end(result: Lint, svg: Path | None) -> None:
             terminal.say(f"drawn in {svg}")
     elif svg is not None:
         terminal.say("nothing drawn: no variant can be solved")
-    counts = {
-        severity: sum(finding.severity == severity for finding in result.findings)
-        for severity in ("fault", "warning", "hint")
-    }
-    told = ", ".join(
-        f"{count} {severity}{'' if count == 1 else 's'}" for severity, count in counts.items() if count
-    )
-    many = "1 variant" if len(result.rows) == 1 else f"{len(result.rows)} variants"
+    counts = Counter[str](finding.severity for finding in result.findings)
+    told = ", ".join(counted(counts[severity], severity) for severity in COLOURS if counts[severity])
+    many = counted(len(result.rows), "variant")
     terminal.say(f"{result.assignment.id}: {many}, {told or 'no findings'}")

@@ -24,7 +24,6 @@ def show_plan(name: str, options: PlanOptions) -> None:
     What cannot be drawn is refused before anything is computed.
     """
     check_crank(options.crank_mm)
-    tongue(options.lang)
     steps = options.steps
     if steps is not None and steps.suffix.lower() not in STEP_FILES:
         raise CallError("steps_file", f"--steps {steps}: the name must end in {' or '.join(STEP_FILES)}")

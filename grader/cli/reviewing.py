@@ -5,11 +5,12 @@ import os
 import socket
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import uvicorn
 
 from grader.cli import terminal
-from grader.cli.app import check_language, progress
+from grader.cli.app import progress
 from grader.cli.grading import fill_image, tell_class, tell_next_of_class
 from grader.folder.batch import noted_batch
 from grader.options import ReviewOptions
@@ -26,9 +27,7 @@ def review_class(folder: Path, options: ReviewOptions) -> None:
 
     Raises CallError for a folder of which nothing is known, a host without a token, a port that is taken.
     """
-    host, token, lang = options.host, options.token, options.lang
-    if lang is not None:
-        check_language(lang)
+    host, token = options.host, options.token
     if host not in LOOPBACK and not token:
         raise CallError(
             "token_needed", f"--host {host} opens the class to other machines: give a --token, too"
@@ -45,7 +44,8 @@ def review_class(folder: Path, options: ReviewOptions) -> None:
     address = f"http://{shown}:{listener.getsockname()[1]}/"
     terminal.say(f"Review: {address}{f'?token={token}' if token else ''}")
     terminal.say(f"Decisions go to {batch.decisions_path}; Ctrl+C ends the review.")
-    _serve(listener, session, lang or batch.lang, token)
+    app = application(session, options.lang or batch.lang, token)
+    answer(app, listener, "The review has ended.", lifespan="off")
     if session.made:
         with progress() as tell:
             results = session.bring_up_to_date(tell).results
@@ -66,14 +66,14 @@ def listener_on(host: str, port: int) -> socket.socket:
     return listener
 
 
-def _serve(listener: socket.socket, session: Session, lang: str, token: str) -> None:
-    """Answer until the process is interrupted."""
+def answer(app: Any, listener: socket.socket, farewell: str, **settings: Any) -> None:  # noqa: ANN401 - uvicorn's
+    """Answer requests until the process is interrupted; then print the farewell."""
     logging.getLogger("uvicorn").setLevel(logging.WARNING)
     config = uvicorn.Config(
-        application(session, lang, token), log_level="warning", access_log=False, lifespan="off", ws="none",
-        timeout_graceful_shutdown=2, server_header=False,
+        app, log_level="warning", access_log=False, ws="none", timeout_graceful_shutdown=2,
+        server_header=False, **settings,
     )  # fmt: skip
     try:
         uvicorn.Server(config).run(sockets=[listener])
     except KeyboardInterrupt:
-        terminal.say("The review has ended.")
+        terminal.say(farewell)

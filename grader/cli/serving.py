@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import logging
 import os
 import socket
 from collections import Counter
@@ -12,11 +11,10 @@ from urllib.parse import urlsplit
 
 import h11
 import typer
-import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from grader.cli import terminal
-from grader.cli.reviewing import listener_on
+from grader.cli.reviewing import answer, listener_on
 from grader.options import ServeOptions
 from grader.review.server import LOOPBACK
 from reference.errors import CallError
@@ -119,18 +117,12 @@ def serve(data: Path, options: ServeOptions) -> None:
 
 
 def _run(app: object, listener: socket.socket) -> None:
-    logging.getLogger("uvicorn").setLevel(logging.WARNING)
-    config = uvicorn.Config(
-        app, log_level="warning", access_log=False, ws="none", timeout_graceful_shutdown=2,  # type: ignore[arg-type]
-        server_header=False, limit_concurrency=MOST_CONNECTIONS, timeout_keep_alive=20, http=Bounded,
-    )  # fmt: skip
     with contextlib.suppress(ImportError, OSError, ValueError):
         import resource  # not on Windows
 
         soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
         wanted = MOST_FILES if hard == resource.RLIM_INFINITY else min(MOST_FILES, hard)
         resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, wanted), hard))
-    try:
-        uvicorn.Server(config).run(sockets=[listener])
-    except KeyboardInterrupt:
-        terminal.say("The server has ended; what was queued goes on with the next start.")
+    farewell = "The server has ended; what was queued goes on with the next start."
+    bounds = {"limit_concurrency": MOST_CONNECTIONS, "timeout_keep_alive": 20, "http": Bounded}
+    answer(app, listener, farewell, **bounds)

@@ -9,13 +9,14 @@ from pathlib import Path
 from grader.authoring.lint import lint
 from grader.authoring.round_scales import suggestions
 from grader.cli import terminal
-from grader.cli.app import check_language, progress
+from grader.cli.app import progress
 from grader.cli.terminal import note
 from grader.documents import CalibrationDocument
 from grader.files import write_whole
 from grader.folder.cache import PageCache
 from grader.folder.inventory import submissions, take_inventory
 from grader.folder.workers import Limits, Workers, result_of
+from grader.options import VariantOptions
 from grader.owners.draft_roster import SURE, contact_sheet, draft_csv, suggest, thumbnail
 from grader.printed.answer_sheet import make_calibration, make_sheets
 from grader.printed.handout import make_handout
@@ -25,7 +26,7 @@ from grader.scan.decode.pages import count_pages
 from grader.scan.register.calibration import ALL_IS_WELL, calibrate, residual_map
 from grader.tables.measurements import names_of
 from grader.tables.roster import RosterRow, read_roster
-from grader.texts.spoken import message
+from grader.texts.spoken import failure, message
 from reference.authored.assignment import Variant, load_assignment
 from reference.errors import CallError, InputFileError, counted
 
@@ -88,11 +89,10 @@ def print_sheets(
     name: str, roster: Path | None, out: Path, layout: Path | None, lang: str, *, calibration: bool
 ) -> None:
     """Write the PDF of a class's answer sheets, and where everything is on them."""
-    check_language(lang)
     if calibration:
         sheets = make_calibration(lang)
     elif roster is None:
-        raise CallError("roster_needed", "answer sheets need --roster: a sheet carries its student's code")
+        raise failure(CallError, "roster_needed")
     else:
         students = read_roster(roster)
         assignment = load_assignment(name)
@@ -139,19 +139,16 @@ def _suggest_scales(name: str, roster: Path) -> None:
 # handout ------------------------------------------------------------------------------------------
 
 
-def print_handout(
-    name: str, roster: Path | None, n: int | None, position: int | None, out: Path, lang: str
-) -> None:
+def print_handout(name: str, roster: Path | None, variant: VariantOptions, out: Path, lang: str) -> None:
     """Write the PDF of task sheets, of a class or of one variant."""
-    check_language(lang)
     if out.suffix.lower() != ".pdf":
         raise CallError("handout_file", f"--out {out}: the name must end in .pdf")
-    if roster is not None and (n is not None or position is not None):
+    if roster is not None and variant != VariantOptions():
         raise CallError("option_unused", "--roster says each student's n and position: leave --n out")
     assignment = load_assignment(name)
     if roster is None:
-        rows: tuple[RosterRow, ...] = (RosterRow("", n=n, position=position),)
-        assignment.variant(n, position)
+        rows: tuple[RosterRow, ...] = (RosterRow("", n=variant.n, position=variant.position),)
+        assignment.variant(variant.n, variant.position)
     else:
         rows = read_roster(roster).rows
     file = "" if roster is None else roster.name
@@ -166,9 +163,8 @@ def draft_matches(
     folder: Path, name: str, roster_file: Path, out: Path, pages_per_student: int | None, lang: str
 ) -> bool:
     """Write the draft of the roster and its contact sheet; whether anything needs to be checked."""
-    check_language(lang)
     if not folder.is_dir():
-        raise CallError("folder_missing", f"{folder}: there is no such folder")
+        raise failure(CallError, "folder_missing", folder=folder)
     assignment, roster = load_assignment(name), read_roster(roster_file)
     paths = submissions(folder, roster_file, (out, *assignment.own_files))
     with (

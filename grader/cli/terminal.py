@@ -46,7 +46,7 @@ def set_up(*, quiet: bool, verbose: bool, log: Path | None) -> None:
 
 
 def is_quiet() -> bool:
-    """Whether notes and progress are not wanted."""
+    """Return whether notes and progress are not wanted."""
     return _SCREEN.level > logging.INFO
 
 
@@ -101,7 +101,7 @@ def set_encoding() -> None:
 
 
 class Pace:
-    """How fast each kind of work goes on, and how long it will take; what a run finds done does not count."""
+    """The pace of each kind of work, and the time left; work that a run finds done does not count."""
 
     def __init__(self) -> None:
         self._first: dict[str, tuple[float, int]] = {}
@@ -120,7 +120,7 @@ class Pace:
 
 
 _LEAST_S = 1.0
-"""Of a shorter time no pace is told: the first results come together."""
+"""Shortest time from which a pace is stated: the first results come together."""
 
 
 class StepLines:

@@ -3,7 +3,8 @@
 import json
 import math
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,7 @@ import typer
 from grader.authoring.variant_checks import broken_findings, broken_variants
 from grader.authoring.variant_table import class_csv
 from grader.cli import terminal
-from grader.cli.app import check_language, new_table, progress
+from grader.cli.app import new_table, progress
 from grader.cli.plans import check_crank
 from grader.cycle.quantities import CycleSubject, Extreme, Selection, cycle_csv, extremes, strokes_of
 from grader.files import write_whole
@@ -27,8 +28,6 @@ from reference.plan import Plan, exact_plan
 
 if TYPE_CHECKING:
     from rich.table import Table
-
-    from grader.authoring.variant_table import Tell
 
 
 # All variants -------------------------------------------------------------------------------------
@@ -56,7 +55,6 @@ def show_class(name: str, options: PlanOptions) -> bool:
     _refuse_single(options)
     crank_mm, csv, pdf, lang = options.crank_mm, options.csv, options.pdf, options.lang
     check_crank(crank_mm)
-    check_language(lang)
     assignment = load_assignment(name)
     variants = _sound(assignment)
     plan = exact_plan(assignment, variants, assignment.scales(variants, crank_mm=crank_mm))
@@ -98,18 +96,10 @@ def _print_pages(assignment: Assignment, plan: Plan, pdf: Path, *, drawings: boo
     words = tongue(lang)
     pages = table_pages(assignment, plan, words)
     if drawings:
-        with _drawing_progress(len(plan.variants) >= LONG) as tell:
+        with progress() if len(plan.variants) >= LONG else nullcontext() as bar:
+            tell = None if bar is None else partial(bar, "drawings")
             pages = class_pages(pages, assignment, plan, wording_of(words), tell)
     write_whole(pdf, as_pdf(numbered(pages), f"{assignment.file.title.in_language(lang)} ({assignment.id})"))
-
-
-@contextmanager
-def _drawing_progress(is_long: bool) -> "Iterator[Tell | None]":
-    if not is_long:
-        yield None
-        return
-    with progress() as tell:
-        yield lambda done, total: tell("drawings", done, total)
 
 
 def _show_table(assignment: Assignment, plan: Plan) -> None:
@@ -132,7 +122,7 @@ def _show_table(assignment: Assignment, plan: Plan) -> None:
 # A cycle ------------------------------------------------------------------------------------------
 
 CONSTANT = 1e-9
-"""What changes by less over a cycle, against the largest of its kind, is constant but for rounding."""
+"""A quantity that changes by less over a cycle, against the largest of its kind, is constant."""
 ZERO = 1e-8
 """Against the largest of its kind: a least value below it is zero but for rounding."""
 
@@ -191,18 +181,13 @@ def _print(assignment: Assignment, variant: Variant, subject: CycleSubject, sele
     for quantity in selection.quantities:
         least, largest = extremes(subject, quantity)
         here = float(subject.values_at(quantity, np.array([subject.cycle.start]))[0])
-        unit = quantity.unit
-        size = subject.size(quantity)
+        unit, size = quantity.unit, subject.size(quantity)
         if largest.value - least.value <= CONSTANT * size:
             told = here if abs(here) > ZERO * size else 0.0
             table.add_row(quantity.name, unit, "constant", "", "", "", f"{told:.6g}")
             continue
-        cells = (
-            *_extreme_cells(subject, least, size),
-            *_extreme_cells(subject, largest, size),
-            f"{here + 0.0:.6g}",
-        )
-        table.add_row(quantity.name, unit, *cells)
+        ends = [cell for end in (least, largest) for cell in _extreme_cells(subject, end, size)]
+        table.add_row(quantity.name, unit, *ends, f"{here + 0.0:.6g}")
     for point in selection.points:
         _path_rows(subject, point, table)
     console.print(table)
@@ -210,7 +195,7 @@ def _print(assignment: Assignment, variant: Variant, subject: CycleSubject, sele
 
 
 def _path_rows(subject: CycleSubject, point: str, table: "Table") -> None:
-    """How far a point's path reaches each way, by its samples."""
+    """Add rows on the extent of a point's path, by its samples."""
     place = np.broadcast_to(subject.cycle.motion.position[point], subject.cycle.driven.shape)
     here = complex(subject.motion_at(np.array([subject.cycle.start])).position[point][0])
     for axis, values, own in (("x", place.real, here.real), ("y", place.imag, here.imag)):
@@ -245,7 +230,7 @@ def _number(subject: CycleSubject, driven: float) -> str:
 
 
 def _range(subject: CycleSubject) -> Iterator[str]:
-    """How far the driving link goes, what stops it, and what it passes."""
+    """Yield lines on the range of the driving link, what stops it, and what it passes."""
     cycle = subject.cycle
     what = "crank" if cycle.is_turned else "driven slider"
     here = f"this variant: {_at(subject, cycle.start)}"
@@ -255,10 +240,8 @@ def _range(subject: CycleSubject) -> Iterator[str]:
         ends = [_at(subject, float(end)) for end in (cycle.driven[0], cycle.driven[-1])]
         yield f"the {what} moves from {ends[0]} to {ends[1]}; {here}"
         for stop in cycle.following.stops:
-            if stop is None:
-                yield "  nothing stops it on one side"
-            else:
-                yield f"  {_at(subject, stop.at)}: {stop.node}, {stop.why}"
+            where = "" if stop is None else f"{_at(subject, stop.at)}: {stop.node}, {stop.why}"
+            yield f"  {where or 'nothing stops it on one side'}"
     if cycle.turns > 1:
         yield "after a turn it is in its other assembly: the cycle is two turns"
     for low, high in cycle.elsewhere:
@@ -271,16 +254,13 @@ def _range(subject: CycleSubject) -> Iterator[str]:
 
 
 def _strokes(subject: CycleSubject) -> Iterator[str]:
-    """What goes to and fro."""
+    """Yield a line on each point or link that goes to and fro."""
     for stroke in strokes_of(subject):
         whose = f"link {stroke.name}" if stroke.is_angle else stroke.name
         places = " and ".join(_at(subject, at) for at in stroke.dead_points)
         text = f"{whose}: dead point{'s' if len(stroke.dead_points) > 1 else ''} at {places}"
         if stroke.travel is not None and stroke.time_ratio is not None:
-            far = (
-                f"{math.degrees(stroke.travel):.3f} deg"
-                if stroke.is_angle
-                else f"{1e3 * stroke.travel:.3f} mm"
-            )
-            text += f", travel {far}, time ratio of the strokes {stroke.time_ratio:.4f}"
+            factor, unit = (math.degrees(1.0), "deg") if stroke.is_angle else (1e3, "mm")
+            text += f", travel {factor * stroke.travel:.3f} {unit}"
+            text += f", time ratio of the strokes {stroke.time_ratio:.4f}"
         yield text

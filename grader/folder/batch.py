@@ -49,10 +49,11 @@ from grader.folder.inventory import FileContent, Progress, natural_key, submissi
 from grader.folder.lock import only_run
 from grader.folder.submissions import Unusable, submissions_of
 from grader.folder.workers import ENDED, Limits, Pool, Whole, Workers
-from grader.lms.table import write_summary
+from grader.lms.table import summary_text
 from grader.marking.report import unjudged_report
 from grader.marking.trust import opened_in, trust_of
 from grader.options import ClassOptions, taken
+from grader.overlay.scene import Picture
 from grader.owners.pages import Unmatched, assign_pages
 from grader.owners.title_block import with_written_numbers, written_owners
 from grader.pipeline import mark, missing_scales, read_submission
@@ -62,7 +63,7 @@ from grader.similarity.groups import by_chance, compared_together, find_similar
 from grader.similarity.submission import compared_submission
 from grader.tables.measurements import StudentSubmission, names_of
 from grader.tables.roster import Roster, read_roster
-from grader.texts.spoken import unmatched_document
+from grader.texts.spoken import failure, unmatched_document
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, PlanmarkError
 
@@ -83,7 +84,7 @@ class InterruptedRunError(PlanmarkError):
 
 @dataclass(frozen=True, slots=True)
 class Batch(ClassOptions):
-    """What to grade, and how: beside the class's options, where, and by what means.
+    """A class to grade: its options, its folders, and the means.
 
     Attributes
     ----------
@@ -105,12 +106,12 @@ class Batch(ClassOptions):
 
     @property
     def roster_path(self) -> Path:
-        """Where the roster is read, whether there is such a file or not."""
+        """The path of the roster, whether there is such a file or not."""
         return self.roster or self.folder / "roster.csv"
 
     @property
     def decisions_path(self) -> Path:
-        """Where decisions are read, whether there is such a file or not."""
+        """The path of the decisions, whether there is such a file or not."""
         return self.decisions or decisions_path(self.folder)
 
 
@@ -149,7 +150,7 @@ def graded(batch: Batch, progress: Progress, workers: Pool | None = None) -> Gra
     decisions = class_decisions(batch.decisions_path)
     files = files_of(batch)
     if not files and roster is None:
-        raise _nothing(batch)
+        raise failure(CallError, "nothing_to_grade", folder=batch.folder)
     with only_run(batch.out, batch.folder, batch.assignment.id):
         note_run(_note_of(batch), batch.out / CACHE_FOLDER)
         return _graded(batch, (roster, decisions), files, progress, workers)
@@ -174,7 +175,7 @@ def _graded(
             )
             students, unmatched = _submissions(batch, listed, contents, cache, pool)
             if not students and not unmatched:
-                raise _nothing(batch)
+                raise failure(CallError, "nothing_to_grade", folder=batch.folder)
             jobs, reports, trust = _audited(batch, cache, students, progress, pool)
     except (KeyboardInterrupt, InterruptedRunError):
         remove_parts(batch.out)
@@ -222,17 +223,13 @@ def noted_batch(folder: Path) -> Batch:
 
 
 def _expected_wrong(reports: Sequence[ReportDocument]) -> float:
-    """How many of all settled verdicts are wrong in the mean, by their probabilities."""
+    """Return the expected number of wrong settled verdicts, by their probabilities."""
     settled = [one for report in reports for one in report.criteria if one.verdict != "review"]
     return round(sum(1.0 - one.probability for one in settled if one.probability is not None), 3)
 
 
-def _nothing(batch: Batch) -> CallError:
-    return CallError("nothing_to_grade", f"{batch.folder}: there is nothing to grade in this folder")
-
-
 def needs_person(results: ResultsDocument) -> bool:
-    """Whether anything is left for a person."""
+    """Return whether anything is left for a person."""
     return bool(results.unmatched or results.stale) or any(
         report.status != "graded" for report in results.reports
     )
@@ -249,7 +246,7 @@ def _roster(batch: Batch) -> Roster | None:
 def files_of(batch: Batch) -> list[Path]:
     """The files handed in. Raises CallError where there is no such folder."""
     if not batch.folder.is_dir():
-        raise CallError("folder_missing", f"{batch.folder}: there is no such folder")
+        raise failure(CallError, "folder_missing", folder=batch.folder)
     others = (batch.out, batch.decisions_path, *batch.growing, *batch.assignment.own_files)
     files = submissions(batch.folder, batch.roster, passed_over=others)
     return (
@@ -327,7 +324,7 @@ class Job:
 
     @property
     def name(self) -> str:
-        """Of its files in the cache."""
+        """The name of its files in the cache."""
         return self.folder.replace("/", "#")
 
 
@@ -398,29 +395,28 @@ def _audited(
     What is opened follows from the reports; that of the last run is noted, so that nothing is marked twice.
     """
     note = batch.out / CACHE_FOLDER / OPENED_NOTE
-    opened, again = _noted_opened(note), False
-    settle, folders = batch.rubric.doubt.settle, result_folders(students)
-    while True:
+    opened, folders = _noted_opened(note), result_folders(students)
+    for is_last in (False, True):
         students = [
             replace(one, opened=opened.get(folder, ())) for one, folder in zip(students, folders, strict=True)
         ]
         jobs = _jobs(batch, cache, students)
         reports = _marked(batch, cache, jobs, progress, workers)
-        trust = trust_of(reports, settle)
+        trust = trust_of(reports, batch.rubric.doubt.settle)
         found = {
             folder: likes
             for folder, report in zip(folders, reports, strict=True)
             if (likes := opened_in(report, trust))
         }
-        is_applied = found == {folder: opened[folder] for folder in folders if folder in opened}
-        if is_applied or again:
-            return jobs, reports, trust
-        opened, again = found, True
+        if is_last or found == {folder: opened[folder] for folder in folders if folder in opened}:
+            break
+        opened = found
         write_whole(note, _OPENED.dump_json(opened))
+    return jobs, reports, trust
 
 
 def _noted_opened(note: Path) -> dict[str, tuple[LikeDocument, ...]]:
-    """What the last run opened, by the submission's folder."""
+    """Return what the last run opened, by the submission's folder."""
     try:
         return _OPENED.validate_json(note.read_bytes())
     except (OSError, ValidationError):
@@ -508,12 +504,9 @@ def _read(batch: Batch, cache: PageCache, submission: StudentSubmission) -> list
 
 def _mark_one(batch: Batch, cache: PageCache, job: Job) -> ReportDocument:
     """Mark one submission and write its files; its key last, so that it stands for all of them."""
-    submission, where = job.submission, batch.out / job.folder
     pages = pages_read(batch, cache, job)
-    report, painted = mark(submission, pages, batch.assignment, batch.rubric, batch.level)
-    pictures = painted(batch.level if batch.with_ghosts else "hint")
-    write_feedback(report, pictures, where, submission.lang, batch.level, _about(batch, submission))
-    write_whole(where / "report.json", report.model_dump_json(indent=2))
+    report, painted = mark(job.submission, pages, batch.assignment, batch.rubric, batch.level)
+    _write_report(batch, job, report, painted(batch.level if batch.with_ghosts else "hint"))
     if not any(problem.code == _PASSING for problem in report.problems):
         write_whole(_key_file(batch, job), job.key)
     return report
@@ -531,25 +524,27 @@ def pages_read(batch: Batch, cache: PageCache, job: Job) -> list[ScannedPage]:
     return pages
 
 
-def _about(batch: Batch, submission: StudentSubmission) -> About:
-    """How the feedback calls the assignment, the student and the names in it."""
-    title = batch.assignment.file.title.in_language(submission.lang)
-    return About(title, submission.name, batch.assignment.file.names)
-
-
 def _failed(batch: Batch, job: Job, problem: Reason) -> ReportDocument:
-    submission, where = job.submission, batch.out / job.folder
+    submission = job.submission
     report = unjudged_report(
         batch.assignment, batch.rubric, submission.variant or Variant(), submission.student_id, "unreadable",
         problems=(*submission.problems, problem),
     )  # fmt: skip
-    write_feedback(report, [], where, submission.lang, batch.level, _about(batch, submission))
-    write_whole(where / "report.json", report.model_dump_json(indent=2))
+    _write_report(batch, job, report, [])
     return report
 
 
+def _write_report(batch: Batch, job: Job, report: ReportDocument, pictures: Sequence[Picture]) -> None:
+    """Write the page and the report of a submission."""
+    submission, where = job.submission, batch.out / job.folder
+    title = batch.assignment.file.title.in_language(submission.lang)
+    about = About(title, submission.name, batch.assignment.file.names)
+    write_feedback(report, pictures, where, submission.lang, batch.level, about)
+    write_whole(where / "report.json", report.model_dump_json(indent=2))
+
+
 def _write_results(batch: Batch, results: ResultsDocument, students: Sequence[StudentSubmission]) -> None:
-    write_summary(results, batch.out / "summary.csv")
+    write_whole(batch.out / "summary.csv", summary_text(results))
     names = {submission.student_id: submission.name for submission in students}
     title = batch.assignment.file.title.in_language(batch.lang)
     write_index(results, batch.out, batch.lang, title=title, student_names=names)

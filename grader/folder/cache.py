@@ -13,6 +13,7 @@ import re
 import zipfile
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -38,14 +39,14 @@ SCAN_STAGE = (
     "grader.scan.decode.pages", "grader.scan.register.registration", "grader.scan.strokes.ink",
     "grader.scan.handwriting.letters", "grader.scan.handwriting.fields", "grader.overlay.backdrop",
 )  # fmt: skip
-"""What `grader.scan.page` and `grader.pipeline.scan` call."""
+"""The modules that `grader.scan.page` and `grader.pipeline.scan` call."""
 READ_STAGE = (
     "grader.reading.read", "grader.tables.scale_text", "grader.scan.handwriting.captions",
     "grader.scan.strokes.nodes",
 )  # fmt: skip
-"""What `grader.pipeline.read_submission` calls beside them."""
+"""The modules that `grader.pipeline.read_submission` calls beside them."""
 MARK_STAGE = ("grader.folder.batch",)
-"""What marks and writes, with all that it rests on."""
+"""The module that marks and writes, with all that it rests on."""
 ORDER = ("grader.pipeline", "grader.scan.page")
 """The order of all stages: each depends on its text, none on all that it imports."""
 _PACKAGES = ("grader", "reference")
@@ -220,7 +221,7 @@ class PageCache:
     printed_key: str = ""
 
     def path_of(self, ref: PageRef) -> Path:
-        """Where a page's scan is."""
+        """Return the path of a page's scan."""
         placed = (ref.turn_deg, ref.corners_px)
         return self.folder / f"{digest_of((self.key, ref.file, ref.page, ref.digest, *placed))}.page"
 
@@ -236,14 +237,10 @@ class PageCache:
         return replace(self._known(ref), ref=ref)
 
     def _known(self, ref: PageRef) -> ScannedPage:
-        try:
+        """The page from its file; if there is none, scanned now, and stored unless it has a problem."""
+        with suppress(OSError, ValueError):
             (page,) = _pages_in(self.path_of(ref), "", self.printed_key)
-        except (OSError, ValueError):
-            page = self._scanned(ref)
-        return page
-
-    def _scanned(self, ref: PageRef) -> ScannedPage:
-        """The page scanned now, and stored unless it has a problem."""
+            return page
         page = scan(ref, self.asked)
         if page.ref.problem is None:
             write_whole(self.path_of(ref), dumped(("", self.printed_key, [page])))

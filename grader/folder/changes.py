@@ -25,6 +25,7 @@ from grader.documents import (
 from grader.files import Stamp, stamp_of, write_whole
 from grader.options import ClassOptions
 from grader.tables.measurements import StudentSubmission
+from grader.texts.spoken import failure
 from reference.errors import CallError
 
 Key = tuple[str, int | None]
@@ -32,8 +33,6 @@ Key = tuple[str, int | None]
 CACHE_FOLDER = ".planmark"
 NOTE = "inputs.json"
 STANDINGS = "standings.json"
-COMMON = ("assignment", "rubric", "program")
-OWN = ("submission", "roster", "decision")
 
 
 class EarlierCriterion(BaseModel):
@@ -46,7 +45,7 @@ class EarlierCriterion(BaseModel):
 
 
 class EarlierReport(BaseModel):
-    """What matters of a report of the run before, which may be another version's."""
+    """A report of the run before, perhaps of another version: the fields that are compared."""
 
     student_id: str
     position: int | None
@@ -66,14 +65,14 @@ class EarlierReport(BaseModel):
 
 
 class EarlierResults(BaseModel):
-    """What matters of the results of the run before."""
+    """The results of the run before: the fields that are compared."""
 
     assignment: str
     reports: list[EarlierReport]
 
 
 class StandingsNote(BaseModel):
-    """What matters of the results that have this stamp."""
+    """The same of the results that have this stamp."""
 
     stamp: Stamp | None
     results: EarlierResults | None = None
@@ -98,7 +97,7 @@ def inputs_of(
     digests: Mapping[str, str],
     decided: Container[tuple[str, int]],
 ) -> Inputs:
-    """What a run's marks come from, for the next run to tell what has changed.
+    """Return digests of what a run's marks come from, for the next run to tell what has changed.
 
     Arguments
     ---------
@@ -162,7 +161,7 @@ def note_standings(results: Path, document: ResultsDocument) -> None:
 
 
 def noted_inputs(folder: Path) -> Inputs:
-    """What the last run's marks came from; empty where no note can be understood."""
+    """Return what the last run's marks came from; empty where no note can be understood."""
     try:
         return Inputs.model_validate_json((folder / NOTE).read_bytes())
     except (OSError, ValidationError):
@@ -181,7 +180,7 @@ RUN_NOTE = "run.json"
 
 @dataclass(frozen=True, slots=True)
 class RunNote(ClassOptions):
-    """What `planmark grade` was called with last; all paths absolute.
+    """The last call of `planmark grade`; all paths absolute.
 
     Attributes
     ----------
@@ -212,7 +211,7 @@ def noted_run(folder: Path) -> RunNote:
     Raises CallError where none is noted, and where the submissions are no longer there.
     """
     if not folder.is_dir():
-        raise CallError("folder_missing", f"{folder}: there is no such folder")
+        raise failure(CallError, "folder_missing", folder=folder)
     own, here = earlier_run(folder), folder.resolve()
     if own is None:
         places = (here, here.parent, here.parent.parent, Path.cwd())
@@ -221,11 +220,9 @@ def noted_run(folder: Path) -> RunNote:
         last = max(notes, default=None, key=lambda out: (out / CACHE_FOLDER / RUN_NOTE).stat().st_mtime_ns)
         own = None if last is None else notes[last]
     if own is None:
-        why = "nothing says what was graded here; run planmark grade first, then name its --out"
-        raise CallError("run_unknown", f"{folder}: {why}")
+        raise failure(CallError, "run_unknown", folder=folder)
     if not own.folder.is_dir():
-        why = f"the submissions are not in {own.folder} any more; grade them again where they are now"
-        raise CallError("submissions_moved", f"{folder}: {why}")
+        raise failure(CallError, "submissions_moved", folder=folder, was=own.folder)
     return own
 
 
@@ -295,18 +292,13 @@ def _criteria_changed(then: EarlierReport, now: ReportDocument) -> list[Criterio
 def _why(
     then: EarlierReport | None, now: ReportDocument | None, folder: str, inputs: tuple[Inputs, Inputs]
 ) -> list[Cause]:
-    """What differs between the two runs' notes."""
+    """Return the causes of a change: what differs between the two runs' notes."""
     if then is None:
         return ["new"]
     if now is None:
         return ["gone"]
-    last, this = inputs
-    own = last.own.get(folder, {}), this.own.get(folder, {})
-    pairs = [(name, last.common.get(name), this.common.get(name)) for name in COMMON]
-    pairs += [(name, own[0].get(name), own[1].get(name)) for name in OWN]
-    return [
-        cause for cause in get_args(Cause) for name, old, new in pairs if name == cause and old and old != new
-    ]
+    last, this = ({**one.common, **one.own.get(folder, {})} for one in inputs)
+    return [cause for cause in get_args(Cause) if last.get(cause) and last[cause] != this.get(cause)]
 
 
 def standing_text(standing: StandingDocument | None) -> str:

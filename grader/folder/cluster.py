@@ -54,7 +54,7 @@ _Future = Any
 """Dask's, which has no types where it is not installed."""
 
 _LOST = (concurrent.futures.CancelledError, asyncio.CancelledError, distributed.comm.CommClosedError)
-"""What Dask raises, by its version and by what it was doing, when its scheduler is there no more."""
+"""Errors that Dask raises, by its version and by what it was doing, when its scheduler has ended."""
 CONNECT_S = 10.0
 """A scheduler in the same network answers within milliseconds; one behind a slow name service in seconds."""
 WAIT_S = 60.0
@@ -109,7 +109,7 @@ def image_of(address: str, out: Path) -> Path:
 
 
 def _is_web(files: fsspec.AbstractFileSystem) -> bool:
-    """Whether files are named by addresses of the web, which write what is not ASCII with escapes."""
+    """Return whether files are named by web addresses, which have escapes for what is not ASCII."""
     known = files.protocol
     return not {"http", "https"}.isdisjoint([known] if isinstance(known, str) else known)
 
@@ -173,7 +173,7 @@ def fill(folder: Path) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What all tasks of a run share.
+    """The data that all tasks of a run share.
 
     Attributes
     ----------
@@ -223,7 +223,7 @@ class _Pickler(pickle.Pickler):
         self.found: list[PageRef | PageCache | Job] = []
 
     def persistent_id(self, value: object) -> tuple[str, str] | None:
-        """What stands for a path; None for all else."""
+        """Return the folder's name and the rest of a path; None for all else."""
         if isinstance(value, PurePath):
             for name, folder in self._folders:
                 if value.is_relative_to(folder):
@@ -284,7 +284,7 @@ _HANDS = _Hands()
 
 
 class _Store:
-    """What was handed in, as a worker sees it: the folder itself, or copies of the files that it needs."""
+    """The files handed in, as a worker sees them: the folder itself, or copies of those that it needs."""
 
     def __init__(self, address: str, top: str | None) -> None:
         self.files, self._root = fsspec.core.url_to_fs(address)
@@ -371,7 +371,7 @@ def work(run: Run, task: Task, versions: Mapping[str, str]) -> tuple[bytes, dict
 
 
 def _difference(here: Mapping[str, str], there: Mapping[str, str]) -> str:
-    """What differs between the client's versions and a worker's."""
+    """Describe the differences between the client's versions and a worker's."""
     names = sorted(name for name in {*here, *there} if here.get(name) != there.get(name))
     told = [f"{name} {there.get(name, 'none')[:12]}, here {here.get(name, 'none')[:12]}" for name in names]
     return "; ".join(told[:4])
@@ -545,7 +545,7 @@ class Cluster:
                 raise self._lost(f"no worker is left since {self._wait_s:g} s")
 
     def _workers(self) -> int:
-        """How many workers there are now."""
+        """Return the present number of workers."""
         if time.monotonic() - self._asked > _LOOK_S:
             with self._connected(OSError, TimeoutError):
                 self._size = len(self._client.nthreads())

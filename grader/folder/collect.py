@@ -5,9 +5,7 @@ on which to look at them, and `pages.csv` with an empty column. The second gives
 as they were seen. Pages stand in random order, under numbers. No student, date, file name or path is told.
 """
 
-import io
 import json
-import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +20,7 @@ from grader.files import guarded, make_folder, unguarded, write_whole
 from grader.folder.batch import Batch, Graded, files_of, pages_read
 from grader.folder.cache import digest_of
 from grader.folder.inventory import shown_names
+from grader.lms.export import write_archive
 from grader.marking.trust import said_of
 from grader.overlay.covered import Keep, bare_png, covered, painted, reopened, upright_pixels
 from grader.records import MECHANISM, ZONE_SLACK_MM, Box, FloatArray, Reason, ScannedPage, Sheet
@@ -41,13 +40,11 @@ YES, NO = frozenset({"yes", "da", "да"}), frozenset({"no", "nu", "нет"})
 USUAL_BLOCK_MM = (200.0, 70.0)
 """ISO 7200 and GOST 2.104: 180 to 185 by 55 mm at most, 10 mm from the paper's edges."""
 OF_SHEET = ("page_mm", "px_per_mm", "method", "residual_mm", "scale_se", "drawable_mm", "zones")
-"""What is told of a page's registration beside `mm_to_px`."""
-EPOCH = (1980, 1, 1, 0, 0, 0)
-"""The earliest date that a ZIP file can hold: no date is told."""
+"""Fields of a page's registration that are given away, beside `mm_to_px`."""
 SCHEMA_VERSION = 1
 By = Literal["moved", "audited", "decided", "program", "disputed"]
-"""Who vouches for a point: a person put it there, found the verdict that rests on it right, decided as the
-program had proposed; nobody but the program; or a person found the verdict wrong."""
+"""The authority for a point: a person put it there, found the verdict on it right, or decided as the program
+had proposed; the program alone; or the program although a person found the verdict wrong."""
 _RANK: Mapping[By, int] = {"program": 0, "decided": 1, "audited": 2, "disputed": 3, "moved": 4}
 Row = dict[str, Any]
 """An object of JSON."""
@@ -57,7 +54,7 @@ Known = tuple[ScannedPage, Construction, Row]
 
 @dataclass(frozen=True, slots=True)
 class Collected:
-    """What a step did.
+    """The outcome of a step.
 
     Attributes
     ----------
@@ -164,7 +161,7 @@ def _anonymous(page: ScannedPage, construction: Construction, row: Row) -> tuple
 
 
 def keep_of(page: ScannedPage, construction: Construction, row: Row) -> Keep | None:
-    """What stays of a page; None where no figure was read, or one lies where the title block is.
+    """Return the parts of a page that stay; None if no figure was read, or one lies in the title block.
 
     Arguments: `row` is what is known of it; points that a person moved stay where they were and are.
     """
@@ -248,7 +245,7 @@ def _known(batch: Batch, graded: Graded) -> Iterator[Known]:
 
 
 def vouched(report: ReportDocument, construction: Construction) -> dict[tuple[str, str], By]:
-    """Who vouches for each point, by figure and node; points that nobody looked at are absent."""
+    """Return the authority for each point, by figure and node; points that nobody checked are absent."""
     audits = {
         row.criterion[6:]: row.verdict for row in report.decisions if row.criterion.startswith("audit:")
     }
@@ -268,7 +265,7 @@ def vouched(report: ReportDocument, construction: Construction) -> dict[tuple[st
 
 
 def _by(criterion: CriterionDocument, said: SaidDocument | None, audit: str | None) -> By | None:
-    """Whether a person found the verdict that the program gave right; None where nobody looked."""
+    """Return a person's opinion of the verdict that the program gave; None if nobody checked it."""
     if audit is not None and audit_answer(audit).answer != "unclear":
         return "audited" if audit_answer(audit).answer == "right" else "disputed"
     if criterion.decided is None or said is None or criterion.verdict == "not_judged":
@@ -313,7 +310,7 @@ def _give(preview: Path, file: Path, lang: str) -> Collected:
 
 
 def read_answers(preview: Path, pages: Sequence[str]) -> dict[str, tuple[bool | None, list[Box]]]:
-    """What a person said of each page: whether it is given away (None: nothing yet), and boxes to paint.
+    """Return the answer for each page: whether it is given away (None: open), and boxes to paint.
 
     Raises TableError with all that cannot be understood.
     """
@@ -360,14 +357,12 @@ def _uncovered(row: Row, boxes: Sequence[Box]) -> Row:
 
 def _write_zip(preview: Path, file: Path, rows: Sequence[Row]) -> None:
     """Write the file: its pictures with pixels alone, its entries without a date."""
-    buffer = io.BytesIO()
-    given = []
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for number, row in enumerate(rows, 1):
-            grey = reopened((preview / row["page"]).read_bytes())
-            if grey is None:
-                raise CallError("answers_wrong", f"{preview / row['page']}: is no picture any more")
-            given.append({**row, "page": f"{number:04}.png"})
-            archive.writestr(zipfile.ZipInfo(given[-1]["page"], EPOCH), bare_png(grey))
-        archive.writestr(zipfile.ZipInfo(TRUTH, EPOCH), _lines(given))
-    write_whole(file, buffer.getvalue())
+    given, content = list[Row](), dict[str, bytes]()
+    for number, row in enumerate(rows, 1):
+        grey = reopened((preview / row["page"]).read_bytes())
+        if grey is None:
+            raise CallError("answers_wrong", f"{preview / row['page']}: is no picture any more")
+        name = f"{number:04}.png"
+        given.append({**row, "page": name})
+        content[name] = bare_png(grey)
+    write_archive(file, {**content, TRUTH: _lines(given).encode()})

@@ -27,13 +27,13 @@ from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.construction.derive import construction_of
 
 _DIGITS = 8
-"""Of each digest: two of a class are the same by chance once in 10^5 classes."""
+"""Digits of each digest: two of a class are the same by chance once in 10^5 classes."""
 PageKey = tuple[str, int]
 """File and page."""
 
 
 def decisions_path(folder: Path) -> Path:
-    """Where the decisions on what was handed in lie: in its folder, of a single file beside it."""
+    """Return the path of the decisions: in the folder handed in, or beside a single file."""
     return (folder if folder.is_dir() else folder.parent) / FILE_NAME
 
 
@@ -53,7 +53,7 @@ def basis_of(
 
 
 def _handed_in(submission: StudentSubmission, assignment: Assignment) -> list[object]:
-    """What is the same for all decisions on a submission: files, pixels, the task."""
+    """Return what all decisions on a submission are about: files, pixels, the task."""
     entered = submission.measured
     by_hand = None if entered is None else (entered.numbers, entered.scales, entered.further_scales)
     return [
@@ -64,7 +64,7 @@ def _handed_in(submission: StudentSubmission, assignment: Assignment) -> list[ob
 
 
 def _asked(submission: StudentSubmission, rubric: RubricFile, criterion: str) -> object:
-    """What a criterion asks for; of a node, how its page was placed."""
+    """Return what a criterion asks for; for a node, the turn and corners of its page."""
     is_node, asked = criterion.startswith("node:"), criterion.removeprefix("audit:")
     placed = [(page.turn_deg, page.corners_px) for page in submission.pages] if is_node else []
     return [one.name for one in rubric.criterion if one.id == asked], placed
@@ -81,7 +81,7 @@ def _basis(parts: Iterable[object]) -> str:
 
 
 def _task(assignment: Assignment, variant: Variant | None) -> object:
-    """What determines a variant's right answer, without titles."""
+    """Return what determines a variant's right answer, without titles."""
     mechanism = assignment.mechanism_file.model_dump_json(exclude={"title"})
     if variant is None:
         return assignment.id, mechanism
@@ -92,11 +92,11 @@ def _task(assignment: Assignment, variant: Variant | None) -> object:
 
 
 _CHANGED = ("handed_in_changed", "data_changed", "asked_changed")
-"""Why a decision is stale, by the part of its basis that differs."""
+"""Reasons for which a decision is stale, by the part of its basis that differs."""
 
 
 def _why_stale(then: str, now: str) -> str | None:
-    """Why a decision is stale by its basis then and now; None where it is not."""
+    """Return why a decision is stale by its basis then and now; None if it is not."""
     before, after = then.split("."), now.split(".")
     if not then or then == now:
         return None
@@ -127,7 +127,7 @@ class ClassDecisions:
     faults: list[Reason] = field(default_factory=list)
     stale: list[StaleDecisionDocument] = field(default_factory=list)
     pages: dict[PageKey, Decision] = field(default_factory=dict)
-    """What was decided of each page, as far as it applies."""
+    """The decision on each page, as far as it applies."""
 
     def problems(self) -> list[UnmatchedDocument]:
         """The faults, by their lines."""
@@ -154,13 +154,11 @@ class ClassDecisions:
                 self._out_of_date(row, why)
             else:
                 self.pages[key] = row
-        return [self._placed(page) for page in pages]
-
-    def _placed(self, page: PageRef) -> PageRef:
-        row = self.pages.get((page.file, page.page))
-        if row is None:
-            return page
-        return replace(page, turn_deg=row.page.turn, corners_px=row.page.corners)
+        decided = [self.pages.get((page.file, page.page)) for page in pages]
+        return [
+            replace(page, turn_deg=row.page.turn, corners_px=row.page.corners) if row else page
+            for page, row in zip(pages, decided, strict=True)
+        ]
 
     def owners(self, roster: Roster | None) -> dict[PageKey, RosterRow]:
         """The owners that people gave to pages, each on the roster where there is one."""
@@ -292,7 +290,7 @@ def _positions(rows: Sequence[RosterRow | StudentSubmission]) -> dict[str, Value
 
 @dataclass(frozen=True)
 class _Check:
-    """Whether decisions fit an assignment and its rubric."""
+    """A check of decisions against an assignment and its rubric."""
 
     assignment: Assignment
     rubric: RubricFile

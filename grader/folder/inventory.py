@@ -22,22 +22,12 @@ from grader.scan.decode.limits import load
 from grader.scan.decode.pages import count_pages, decode
 from grader.scan.register.registration import register
 from grader.tables.measurements import Measurements, Names, read_measurements, students_in
+from grader.tables.reader import RESULT_FILES
 from reference.errors import InputFileError
 
 # The files handed in ------------------------------------------------------------------------------
 
-_TOOL_NAMES = frozenset(
-    {
-        "thumbs.db",
-        "desktop.ini",
-        "layout.json",
-        "results.json",
-        "summary.csv",
-        "index.html",
-        "truth.jsonl",
-        "decisions.csv",
-    }
-)
+_TOOL_NAMES = RESULT_FILES | {"thumbs.db", "desktop.ini", "layout.json", "truth.jsonl"}
 _TOOL_STARTS = (".", "~$", "__MACOSX")
 _TOOL_ENDS = (".part", ".tmp", ".bak", ".crdownload", ".log", ".toml", "~")
 _FILE_TYPES = frozenset({".jpg", ".jpeg", ".png", ".tif", ".tiff", ".pdf", ".csv", ".json"})
@@ -45,7 +35,7 @@ _DIGITS = re.compile(r"(\d+)")
 
 
 def is_tool_file(name: str) -> bool:
-    """Whether a file's name is one that editors, systems or planmark itself leave behind."""
+    """Return whether a file's name is one that editors, systems or planmark itself leave behind."""
     lower = name.lower()
     return lower in _TOOL_NAMES or name.startswith(_TOOL_STARTS) or lower.endswith(_TOOL_ENDS)
 
@@ -86,7 +76,7 @@ def shown_name(path: Path, folder: Path) -> str:
 
 
 def shown_names(paths: Iterable[Path], folder: Path, called: Mapping[Path, str]) -> list[str]:
-    """What messages and tables name each file: as it is `called`, else its path; each name once.
+    """Return the name of each file in messages and tables: as it is `called`, else its path; each once.
 
     Two names may look the same: their letters are composed or not, or a sign is not shown.
     """
@@ -102,17 +92,17 @@ def shown_names(paths: Iterable[Path], folder: Path, called: Mapping[Path, str])
 
 
 def leads_out(path: Path, folder: Path) -> bool:
-    """Whether a file is a link to one elsewhere, or lies behind such a link."""
+    """Return whether a file is a link to one elsewhere, or lies behind such a link."""
     return not _real(path).is_relative_to(_real(folder))
 
 
 def _real(path: Path) -> Path:
-    """Where a path leads; links that lead in a circle lead nowhere, and the path stays."""
+    """Follow a path's links; links that lead in a circle lead nowhere, and the path stays."""
     return Path(os.path.realpath(path))
 
 
 def _named_as_file(folder: Path) -> bool:
-    """Whether a folder without anything in it is named as scans and measurements are."""
+    """Return whether an empty folder is named as scans and measurements are."""
     try:
         return folder.suffix.lower() in _FILE_TYPES and next(folder.iterdir(), None) is None
     except OSError:
@@ -134,7 +124,7 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, slots=True)
 class FileContent:
-    """What was found in one file.
+    """The content of one file.
 
     Attributes
     ----------
@@ -160,7 +150,7 @@ def take_inventory(  # noqa: PLR0913, PLR0917 - what a folder is read with
     place: Callable[[Sequence[PageRef]], Sequence[PageRef]] = tuple,
     called: Mapping[Path, str] = MappingProxyType({}),
 ) -> list[FileContent]:
-    """What each of a folder's files holds; never raises for a bad file.
+    """Return the content of each of a folder's files; never raises for a bad file.
 
     Arguments
     ---------
@@ -187,26 +177,23 @@ def take_inventory(  # noqa: PLR0913, PLR0917 - what a folder is read with
         index = anew[number]
         contents[index] = _failed(shown[index], result) if isinstance(result, Reason) else result
         progress("opening", done, len(files))
-    waiting = [(index, page) for index in anew for page in contents[index].pages if not page.problem]
-    pages = {index: list(content.pages) for index, content in enumerate(contents)}
-    for index in anew:
-        pages[index] = [page for page in contents[index].pages if page.problem]
-    total = len(waiting) + sum(len(content.pages) for content in contents)
-    total -= sum(len(contents[index].pages) for index in anew)
+    pages = [list(content.pages) for content in contents]
+    waiting = [(index, at) for index in anew for at, page in enumerate(pages[index]) if not page.problem]
+    total = sum(map(len, pages))
     if total:
         progress("looking", total - len(waiting), total)
-    scans = workers.run(identify_page, [(cache, page) for _, page in waiting])
-    for done, (number, page) in enumerate(scans, start=total - len(waiting) + 1):
-        index, ref = waiting[number]
-        pages[index].append(_with_problem(ref, page, workers) if isinstance(page, Reason) else page)
+    scans = workers.run(identify_page, [(cache, pages[index][at]) for index, at in waiting])
+    for done, (number, found) in enumerate(scans, start=total - len(waiting) + 1):
+        index, at = waiting[number]
+        ref = pages[index][at]
+        pages[index][at] = _with_problem(ref, found, workers) if isinstance(found, Reason) else found
         progress("looking", done, total)
-    ordered = [sorted(pages[index], key=lambda page: page.page) for index in range(len(contents))]
-    scanned = [page for several in ordered for page in several]
-    _note(cache, files, dict(zip(shown, map(Noted, stamps, map(tuple, ordered)), strict=True)))
+    scanned = [page for several in pages for page in several]
+    _note(cache, files, dict(zip(shown, map(Noted, stamps, map(tuple, pages)), strict=True)))
     placed = iter(place(scanned))
     contents = [
         replace(content, pages=tuple(next(placed) for _ in several))
-        for content, several in zip(contents, ordered, strict=True)
+        for content, several in zip(contents, pages, strict=True)
     ]
     cache.drop_others([*scanned, *(page for content in contents for page in content.pages)])
     return contents
@@ -228,7 +215,7 @@ class Noted:
 
 
 def _noted(cache: PageCache) -> dict[str, Noted]:
-    """What the last run noted of each file, by the file's name; empty where it was another program's."""
+    """Return the last run's note on each file, by its name; empty if another program wrote it."""
     try:
         key, files = json.loads((cache.folder.parent / FILE_NOTES).read_bytes())
         known = {name: Noted(tuple(stamp), unpacked(pages, ())) for name, (stamp, pages) in files.items()}
@@ -288,7 +275,7 @@ def _with_problem(page: PageRef, problem: Reason, workers: Pool) -> PageRef:
 
 
 def _failed(name: str, problem: Reason) -> FileContent:
-    """What is known of a file that could not be opened: it is there, and why."""
+    """Return the content of a file that could not be opened: its problem."""
     if PurePath(name).suffix.lower() in MEASUREMENT_TYPES:
         return FileContent(refused=replace(problem, file=name))
     return FileContent((PageRef(name, problem=replace(problem, file=name)),))

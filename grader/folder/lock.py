@@ -15,6 +15,7 @@ from pathlib import Path
 
 from grader.files import make_folder, remove_parts, write_whole
 from grader.folder.changes import CACHE_FOLDER, earlier_run
+from grader.texts.spoken import failure
 from reference.errors import CallError
 
 LOG = logging.getLogger("planmark")
@@ -37,7 +38,7 @@ def only_run(out: Path, folder: Path, assignment: str) -> Iterator[None]:
     try:
         lock.acquire()
     except Timeout:
-        raise CallError("results_in_use", f"{out}: {_in_use(notes / _HOLDER)}") from None
+        raise _in_use(out, notes / _HOLDER) from None
     except (OSError, NotImplementedError) as error:
         why = getattr(error, "strerror", None) or error
         LOG.warning("%s: takes no lock (%s): let no other run write into it meanwhile", out, why)
@@ -55,25 +56,25 @@ def only_run(out: Path, folder: Path, assignment: str) -> Iterator[None]:
             lock.release()
 
 
-def _in_use(holder: Path) -> str:
-    """What to tell a second run."""
+def _in_use(out: Path, holder: Path) -> CallError:
+    """Return the error of a second run."""
     try:
         known = json.loads(holder.read_bytes())
-        who = f"process {known['pid']} on {known['host']}, since {known['began']}, over {known['folder']}"
+        who = {name: known[name] for name in ("pid", "host", "began")}
+        return failure(CallError, "results_in_use", folder=out, sheets=known["folder"], **who)
     except (OSError, ValueError, KeyError, TypeError):
-        who = "it does not say which"
-    return f"another run writes its results here ({who}); wait until it ends, or choose another --out"
+        return failure(CallError, "results_in_use", "in_use_unsaid", folder=out)
 
 
 def _check_same_class(out: Path, folder: Path, assignment: str) -> None:
     """Raise CallError for results of another class: this run would take the place of them."""
-    advice = "choose another --out, or remove this folder first"
     before = earlier_run(out)
     if before is None:
         return
     if before.assignment_id not in {"", assignment}:
-        what = f"the results of the assignment {before.assignment_id}, not of {assignment}"
-        raise CallError("results_of_another", f"{out}: holds {what}; {advice}")
+        known = {"folder": out, "there": before.assignment_id, "given": assignment}
+        raise failure(CallError, "results_of_another", "of_another_assignment", **known)
     # A class that was copied with its results is no other class.
     if before.was_at == before.out and before.folder != folder.resolve() and before.folder.is_dir():
-        raise CallError("results_of_another", f"{out}: holds the results of {before.folder}; {advice}")
+        known = {"folder": out, "there": before.folder}
+        raise failure(CallError, "results_of_another", "of_another_folder", **known)

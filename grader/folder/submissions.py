@@ -48,7 +48,7 @@ class Unusable:
 
 @dataclass(slots=True)
 class _Gathered:
-    """What was handed in by one student for one position."""
+    """Everything handed in by one student for one position."""
 
     row: RosterRow | None = None
     owned: list[Owned] = field(default_factory=list)

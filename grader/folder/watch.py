@@ -13,7 +13,7 @@ from grader.folder.inventory import shown_name
 def arrivals(
     batch: Batch, seconds: float, sleep: Callable[[float], None] = time.sleep
 ) -> Iterator[tuple[Batch, list[str]]]:
-    """What to grade whenever files have come, have changed or are gone, and their names; without end.
+    """Yield what to grade whenever files have come, changed or gone, and their names; without end.
 
     A file is whole when two looks, `seconds` apart, find it the same; until then the batch passes it over.
     The roster and the decisions count as well. Raises CallError for a folder that is not there.

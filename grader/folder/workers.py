@@ -57,7 +57,7 @@ _MEGABYTE = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What one file or sheet may take: seconds of processor time, and megabytes of memory.
+    """Limits for one file or sheet: seconds of processor time, and megabytes of memory.
 
     By the clock it may take `_PATIENCE` times as long; so may, where the system measures no other time, all.
     """
@@ -67,7 +67,7 @@ class Limits:
 
 
 class Pool(Protocol):
-    """What runs calls."""
+    """Something that runs calls."""
 
     def run(
         self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]], sheets: Iterable[int] = ()
@@ -77,7 +77,7 @@ class Pool(Protocol):
 
 
 def result_of(pool: Pool, function: Callable[..., Result], *call: object, sheets: int = 1) -> Result:
-    """What one call gives; raises InputFileError for the Reason in its place."""
+    """Return the result of one call; raises InputFileError for the Reason in its place."""
     ((_, result),) = pool.run(function, [call], [sheets])
     if isinstance(result, Reason):
         raise InputFileError(result.code, message(result), **told_parameters(result))

@@ -16,6 +16,7 @@ from grader.lms import gradebooks, moodle, moodle_guide, scores
 from grader.lms.api import canvas, classroom, graph, openedx
 from grader.lms.grades import Content, Delivery, Grade, Options, grades_of, in_a_row, ready
 from grader.lms.table import criteria_text, not_as_meant, parsed, summary_text
+from grader.texts.spoken import failure
 from reference.authored.toml_file import findings_of
 from reference.errors import CallError, InputFileError, lines_of
 
@@ -26,28 +27,23 @@ def read_results(out_dir: Path) -> ResultsDocument:
     try:
         return ResultsDocument.model_validate(_of_a_known_version(parsed(path.read_bytes()), path))
     except FileNotFoundError as error:
-        raise InputFileError(
-            "results_missing", f"{path}: there is no such file; run planmark grade first"
-        ) from error
+        raise failure(InputFileError, "results_missing", file=path) from error
     except OSError as error:
-        raise InputFileError("results_missing", f"{path}: cannot be read ({error.strerror})") from error
+        raise failure(
+            InputFileError, "results_missing", "unreadable", file=path, error=error.strerror
+        ) from error
     except ValidationError as error:
         faults = lines_of(list(findings_of(error, ResultsDocument)))
-        message = f"{path}: is not a planmark results file; grade again\n{faults}"
-        raise InputFileError("results_wrong", message) from error
+        raise failure(InputFileError, "results_wrong", "no_results", file=path, faults=faults) from error
     except ValueError as error:
-        raise InputFileError("results_wrong", f"{path}: is not JSON ({error}); grade again") from error
+        raise failure(InputFileError, "results_wrong", "results_no_json", file=path, error=error) from error
 
 
 def _of_a_known_version(document: Any, path: Path) -> Any:  # noqa: ANN401 - whatever a JSON file holds
     """The document; InputFileError where a later version of the program wrote it."""
     version = document.get("schema_version") if isinstance(document, dict) else None
     if isinstance(version, int) and version > SCHEMA_VERSION:
-        raise InputFileError(
-            "results_newer",
-            f"{path}: a later version of planmark wrote this (schema_version {version}, known"
-            f" is {SCHEMA_VERSION}); update planmark, or grade again with this one",
-        )
+        raise failure(InputFileError, "results_newer", file=path, version=version, known=SCHEMA_VERSION)
     return document
 
 
@@ -105,17 +101,15 @@ _COMMON = frozenset({"to", "what", "out", "people", "titles", "lang", "called", 
 
 
 def what_of(options: Options) -> str:
-    """What is exported; CallError for an unknown target or thing."""
+    """Return the thing that is exported; CallError for an unknown target or thing."""
     known = [what for to, what in KINDS if to == options.to]
     if not known:
-        raise CallError(
-            "unknown_target", f"'{options.to}' is no export target: known are {', '.join(TARGETS)}"
-        )
+        raise failure(CallError, "unknown_target", to=options.to, names=TARGETS)
     if options.what is not None and options.what not in known:
         others = [to for to, what in KINDS if what == options.what and to.startswith(options.to)]
-        hint = f" (or --to {others[0]})" if others else ""
-        message = f"{options.to} is given no '{options.what}': known are {', '.join(known)}{hint}"
-        raise CallError("unknown_target", message)
+        cause, other = ("thing_elsewhere", others[0]) if others else ("unknown_thing", "")
+        told = {"to": options.to, "what": options.what, "names": tuple(known), "other": other}
+        raise failure(CallError, "unknown_target", cause, **told)
     return options.what or known[0]
 
 
@@ -133,17 +127,14 @@ def draft(results: ResultsDocument, options: Options) -> Delivery:
     for each in fields(options):
         is_given = getattr(options, each.name) not in (None, "", False)
         if is_given and each.name not in kind.used | _COMMON:
-            name = "a file to fill in" if each.name == "form" else "--" + each.name.replace("_", "-")
-            raise CallError("option_unused", f"{name} has no meaning for {options.to} {what}: leave it out")
+            cause, option = "form_unused" if each.name == "form" else "", _flag(each.name)
+            raise failure(CallError, "option_unused", cause, option=option, what=f"{options.to} {what}")
     for name in ("course_id", "assignment_id"):
         value = getattr(options, name)
         if value is not None and options.to in _NUMBERED and not re.fullmatch("[1-9][0-9]*", str(value)):
-            option = "--" + name.replace("_", "-")
-            raise CallError(
-                "number", f"{option}: '{value}' is no number, as {options.to} has it in addresses"
-            )
+            raise failure(CallError, "number", option=_flag(name), text=value, to=options.to)
     if options.maximum is not None and not (math.isfinite(options.maximum) and options.maximum > 0.0):
-        raise CallError("maximum", f"a grade's maximum is a positive number, not {options.maximum:g}")
+        raise failure(CallError, "maximum", maximum=options.maximum)
     students = tuple(dict.fromkeys(report.student_id for report in results.reports))
     if kind.of_grades is None:
         return Delivery(kind.of_results(results) if kind.of_results else "", students)
@@ -159,6 +150,10 @@ def draft(results: ResultsDocument, options: Options) -> Delivery:
     return replace(delivery, withheld={**delivery.withheld, **dict.fromkeys(others, why)})
 
 
+def _flag(name: str) -> str:
+    return "--" + name.replace("_", "-")
+
+
 def _check_maxima(grades: Sequence[Grade], options: Options, what: str) -> None:
     """Points out of 10 and out of 20 are no column of one gradebook; CallError unless all are converted."""
     maxima: dict[float, list[str]] = {}
@@ -166,12 +161,8 @@ def _check_maxima(grades: Sequence[Grade], options: Options, what: str) -> None:
         maxima.setdefault(round(grade.max_score, 6), []).append(grade.student_id)
     is_converted = options.rescale and (options.maximum is not None or options.form is not None)
     if len(maxima) > 1 and not is_converted and what != "feedback":
-        lines = lines_of([f"{most:g}: {in_a_row(students)}" for most, students in sorted(maxima.items())])
-        raise CallError(
-            "maximum_differs",
-            "students' maxima differ: choose one position, combine them by mean, or convert all to one"
-            f" maximum (--maximum and --rescale, where the platform is given grades)\n{lines}",
-        )
+        faults = lines_of([f"{most:g}: {in_a_row(students)}" for most, students in sorted(maxima.items())])
+        raise failure(CallError, "maximum_differs", "maxima_differ", faults=faults)
 
 
 _AGAIN = (
@@ -191,9 +182,7 @@ def export(results: ResultsDocument, path: Path, options: Options) -> Delivery:
     is_again = kind == ("moodle", "grades") and options.form is not None and path.exists()
     if isinstance(delivery.content, Mapping):
         if kind[1] == "feedback" and path.suffix.lower() != ".zip":
-            raise CallError(
-                "archive_name", f"{path}: {options.to} takes an archive; let its name end with .zip"
-            )
+            raise failure(CallError, "archive_name", file=path, to=options.to)
         _write_files(path, delivery.content)
     else:
         write_whole(path, delivery.content)
@@ -225,10 +214,10 @@ def _write_files(path: Path, content: Content) -> None:
     OutputError with the system's reason.
     """
     if path.suffix.lower() == ".zip":
-        _write_archive(path, content)
+        write_archive(path, content)
     elif path.suffix.lower() in {".json", ".csv"}:
         if len(content) != 1:
-            raise CallError("archive_name", f"{path}: {len(content)} files; name a .zip, or a folder")
+            raise failure(CallError, "archive_name", "several_files", file=path, count=len(content))
         write_whole(path, *(_bytes(data) for data in content.values()))
     else:
         create_whole({path / name: _bytes(data).decode("utf-8") for name, data in content.items()})
@@ -238,12 +227,15 @@ def _bytes(data: bytes | Path) -> bytes:
     return data if isinstance(data, bytes) else data.read_bytes()
 
 
-def _write_archive(path: Path, content: Content) -> None:
-    """A class's pages may be a gigabyte: one at a time goes through the memory, twice to be compared."""
+def write_archive(path: Path, content: Content) -> None:
+    """Write an archive, one file after another: a class's pages may be a gigabyte.
+
+    Raises OutputError where it cannot be written, or does not read back as it was meant.
+    """
     with replacing(path) as temporary:
         with zipfile.ZipFile(temporary, "x", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
             for name, data in content.items():
-                # Of a fixed date: the same files make the same archive. Unpacked, all may read it.
+                # Without a date the same files make the same archive. Unpacked, all may read it.
                 entry = zipfile.ZipInfo(name)
                 entry.external_attr = 0o644 << 16
                 archive.writestr(entry, _bytes(data), zipfile.ZIP_DEFLATED, 1)

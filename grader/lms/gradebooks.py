@@ -36,10 +36,11 @@ from grader.lms.table import (
     bytes_of,
     csv_text,
     fill_in,
-    match_rows,
+    match_class,
     number,
     parse,
 )
+from grader.texts.spoken import failure
 from reference.errors import CallError, InputFileError, lines_of
 
 HEADER = ("Student", "ID", "SIS User ID", "SIS Login ID", "Section")
@@ -48,7 +49,7 @@ _NUMBERED = re.compile(r"(?P<title>.*\S)\s*\((?P<id>\d+)\)\s*", re.DOTALL)
 _POINTS = "Points Possible"
 _MANUAL = re.compile(r"\s*(Muted|Manual Posting.*)?\s*", re.IGNORECASE)
 _MANGLED = re.compile(r"-?[0-9.,]*[.,][0-9.,]*%?")
-"""What Canvas takes for a number and writes anew, in any column."""
+"""Texts that Canvas takes for numbers and writes anew, in any column."""
 _END = "End-of-Line Indicator"
 _NO_TITLE = re.compile(r'[/"*<>+=|,%]')
 """Characters that the name of a grade item in Brightspace cannot have."""
@@ -60,7 +61,6 @@ class Layout:
 
     Attributes
     ----------
-    key : the platform's name as an option
     required : columns by which the file is known; of alternatives one, after `|`
     who : what each column says of a student: `id`, `student`, `login`, `email`
     kept : columns that are written too
@@ -69,7 +69,6 @@ class Layout:
     has_points : whether the maxima stand in a row below the header
     """
 
-    key: str
     platform: str
     required: tuple[str, ...]
     who: Mapping[str, str]
@@ -79,32 +78,36 @@ class Layout:
     has_points: bool = False
 
 
-LAYOUTS = (
-    Layout(
-        key="canvas", platform="Canvas", required=("ID", "Section", "Student|LastName"), kept=_ABOUT,
+LAYOUTS = {
+    "canvas": Layout(
+        platform="Canvas", required=("ID", "Section", "Student|LastName"), kept=_ABOUT,
         who={"ID": "ID", "SIS User ID": "student_id", "SIS Login ID": "login"},
         item=_NUMBERED, has_points=True,
     ),
-    Layout(
-        key="brightspace", platform="Brightspace", required=("OrgDefinedId|Username", _END), kept=(_END,),
+    "brightspace": Layout(
+        platform="Brightspace", required=("OrgDefinedId|Username", _END), kept=(_END,),
         who={"OrgDefinedId": "student_id", "Username": "login", "Email": "email"},
         item=re.compile(r"(?P<title>.+) Points Grade(?P<id>)(\s*<.*?MaxPoints:(?P<maximum>[\d.,]+).*>)?"),
     ),
-    Layout(
-        key="ilias", platform="ILIAS", is_whole=True,
+    "ilias": Layout(
+        platform="ILIAS", is_whole=True,
         required=("update", "usr_id", "login", "status", "mark", "comment"),
         who={"usr_id": "ID", "login": "login"}, item=re.compile("(?P<title>mark)(?P<id>)(?P<maximum>)"),
     ),
-    Layout(
-        key="blackboard", platform="Blackboard", required=("Username", "Last Name"),
+    "blackboard": Layout(
+        platform="Blackboard", required=("Username", "Last Name"),
         kept=("Last Name", "First Name"), who={"Student ID": "student_id", "Username": "login"},
         # Of text columns, and of those that Blackboard computes from others, the kind is another.
         item=re.compile(r"(?P<title>.*\S)\s*\[[^\]\d]*(?P<maximum>[\d.,]+)(?: Score)?\]\s*\|(?P<id>\d+)"),
     ),
-)  # fmt: skip
-"""By what only its own files have, the plainest last."""
+}  # fmt: skip
+"""By platform, in the order in which a file is tried: the plainest last."""
 
-_LAST_NAMES, _FIRST_NAMES = ("LastName", "Last Name", "lastname"), ("FirstName", "First Name", "firstname")
+_NAMES = {
+    "Student": "name", "LastName": "last", "Last Name": "last", "lastname": "last",
+    "FirstName": "first", "First Name": "first", "firstname": "first",
+}  # fmt: skip
+"""Columns of names, by their headings."""
 
 
 # A new gradebook ----------------------------------------------------------------------------------
@@ -118,15 +121,13 @@ def gradebook(grades: Sequence[Grade], options: Options) -> Delivery:
     if options.to == "brightspace":
         return _new_for_brightspace(ready(grades), options)
     if options.to != "canvas":
-        name = next(layout.platform for layout in LAYOUTS if layout.key == options.to)
-        message = f"{name} takes grades only in its own file: download it there and give it (--gradebook)"
-        raise CallError("gradebook_needed", message)
+        raise failure(CallError, "gradebook_needed", platform=LAYOUTS[options.to].platform)
     item = options.item.strip() or grades[0].assignment
     faults = list(_faults(ready(grades)))
     if is_formula(item) or item in _ABOUT:
         faults.append(f"'{item}' is no title of an assignment")
     if faults:
-        raise CallError("gradebook", f"Canvas would misread this; nothing was written\n{lines_of(faults)}")
+        raise failure(CallError, "gradebook", faults=lines_of(faults))
     table = [["    " + _POINTS, "", "", "", "", number(options.maximum or grades[0].max_score)]]
     for grade in ready(grades):
         person = grade.person
@@ -146,7 +147,7 @@ def _new_for_brightspace(grades: Sequence[Grade], options: Options) -> Delivery:
     """Users by the student_id as OrgDefinedId and by the username, each after a `#` as in a download."""
     item = options.item.strip() or (grades[0].assignment if grades else "planmark")
     if found := _NO_TITLE.search(item):
-        raise CallError("item", f"'{item}': a grade item's name in Brightspace cannot have '{found[0]}'")
+        raise failure(CallError, "item", "item_sign", item=item, sign=found[0])
     maximum = number(options.maximum or (grades[0].max_score if grades else 1.0))
     header = ("OrgDefinedId", "Username", f"{item} Points Grade <Numeric MaxPoints:{maximum}>", _END)
     rows = [
@@ -189,11 +190,7 @@ def _faults(grades: Sequence[Grade]) -> Iterator[str]:
 class Gradebook(Form):
     """A downloaded gradebook."""
 
-    names: tuple[int | None, int | None] = (None, None)
-    """Columns of last and first names."""
-
     name = "the gradebook"
-    keeps_others = False
 
     @classmethod
     def opened(cls, data: bytes, file: str, item: str) -> Self:
@@ -222,17 +219,10 @@ class Gradebook(Form):
             columns |= {"update": header.index("update"), "feedback": header.index("comment")}
         else:
             table.kept = sorted({*about.values(), *others, assignment})
-        last, first_name = (
-            next((header.index(name) for name in known if name in header), None)
-            for known in (_LAST_NAMES, _FIRST_NAMES)
-        )
-        if "Student" in header:
-            columns["name"] = header.index("Student")
-        notes = ["its cells are apart by tabs: let its name end with .xls, or choose Tab at the upload"]
-        notes = notes if table.delimiter == "\t" else []
-        return cls(
-            table, columns, points, possible, notes, platform=layout.platform, names=(last, first_name)
-        )
+        columns |= {kind: header.index(name) for name, kind in _NAMES.items() if name in header}
+        tabs = "its cells are apart by tabs: let its name end with .xls, or choose Tab at the upload"
+        notes = [tabs] if table.delimiter == "\t" else []
+        return cls(table, columns, points, possible, notes, layout.platform)
 
     @staticmethod
     def amount(text: str) -> float | None:
@@ -243,7 +233,7 @@ class Gradebook(Form):
         return float("".join(whole) + "." + last) if whole else float(last)
 
     def why_fixed(self, row: int) -> str:
-        """Whether the platform wants no grade here."""
+        """Return what the platform says where it wants no grade; empty where it wants one."""
         grade = self.value(row, "grade")
         is_out = grade.casefold() in {"ex", "n/a", "exempt"}
         return f"{self.platform} says '{grade}': excused, or not given this assignment" if is_out else ""
@@ -256,8 +246,8 @@ class Gradebook(Form):
         kinds = ("ID", "student_id", "login", "email")
         cells = {kind: self.value(row, kind).removeprefix("#") for kind in kinds if kind in self.columns}
         name = self.value(row, "name")
-        if None not in self.names:
-            name = ", ".join(self.table.value(row, column or 0).strip() for column in self.names)
+        if {"last", "first"} <= self.columns.keys():
+            name = f"{self.value(row, 'last')}, {self.value(row, 'first')}"
         if all(_MANUAL.fullmatch(cell) for cell in (*cells.values(), name.strip(", "))):
             return {}
         return {**cells, "name": name}
@@ -301,13 +291,13 @@ def fill_gradebook(data: bytes, file: str, grades: Sequence[Grade], options: Opt
     if encoding != "utf-8":
         data = data.decode(encoding, errors="replace").encode("utf-8")
     form = Gradebook.opened(data, file, options.item)
-    asked = next(layout.platform for layout in LAYOUTS if layout.key == options.to)
+    asked = LAYOUTS[options.to].platform
     if not form.people:
         raise _refused(file, asked, ["it has no students"])
     if form.platform != asked:
         raise _refused(file, asked, [f"it is one of {form.platform}'s"])
     if form.possible and options.maximum is not None:
-        raise CallError("option_unused", "--maximum has no meaning beside --gradebook: it states its own")
+        raise failure(CallError, "option_unused", "maximum_stated", other="--gradebook")
     comments = {grade.student_id: plain_comment(grade) for grade in ready(grades)}
     delivery = fill_in(form, file, grades, options, comments if "feedback" in form.columns else {})
     if encoding == "utf-8" or not isinstance(delivery.content, bytes):
@@ -317,17 +307,17 @@ def fill_gradebook(data: bytes, file: str, grades: Sequence[Grade], options: Opt
 
 def _layout(header: Sequence[str], file: str) -> Layout:
     """The platform whose columns these are."""
-    for layout in LAYOUTS:
+    for layout in LAYOUTS.values():
         if all(any(name in header for name in each.split("|")) for each in layout.required):
             return layout
-    known = ", ".join(layout.platform for layout in LAYOUTS)
+    known = ", ".join(layout.platform for layout in LAYOUTS.values())
     found = ", ".join(header[:8])
     raise _refused(file, "its platform", [f"row 1: not the columns of {known} (found: {found})"])
 
 
 def _refused(file: str, platform: str, faults: Sequence[str]) -> InputFileError:
-    message = f"{file}: is no gradebook as {platform} exports it; export it again and do not resave it"
-    return InputFileError("gradebook_file", f"{message}\n{lines_of(faults)}")
+    known = {"file": file, "platform": platform, "faults": lines_of(faults)}
+    return failure(InputFileError, "gradebook_file", **known)
 
 
 def _assignment(header: Sequence[str], first: int, layout: Layout, wanted: str, file: str) -> int:
@@ -343,12 +333,8 @@ def _assignment(header: Sequence[str], first: int, layout: Layout, wanted: str, 
     if len(fitting) == 1:
         return fitting[0]
     choices = ", ".join(f"'{header[place]}'" for place in known) or "none"
-    raise CallError(
-        "item",
-        f"{file}: {len(fitting)} assignments fit '{wanted}': name one with --item out of {choices}"
-        if wanted
-        else f"{file}: which assignment? Name it with --item: {choices}",
-    )
+    told = {"file": file, "count": len(fitting), "item": wanted, "choices": choices}
+    raise failure(CallError, "item", "" if wanted else "item_open", **told)
 
 
 # Feedback files of ILIAS --------------------------------------------------------------------------
@@ -363,25 +349,18 @@ def feedback_files(grades: Sequence[Grade], options: Options) -> Delivery:
     Raises CallError where the archive is not given, InputFileError for another one, and for missing pages.
     """
     if options.form is None:
-        message = "ILIAS's archive is needed: Multi-Feedback, Download (--gradebook multi_feedback_....zip)"
-        raise CallError("gradebook_needed", message)
+        raise failure(CallError, "gradebook_needed", "archive_needed")
     try:
         with zipfile.ZipFile(options.form) as archive:
             found = {match[1]: match for name in archive.namelist() if (match := _FOLDER.fullmatch(name))}
     except (OSError, zipfile.BadZipFile) as error:
-        raise InputFileError("gradebook_file", f"{options.form}: is no archive of ILIAS ({error})") from error
+        known = {"file": options.form, "error": error}
+        raise failure(InputFileError, "gradebook_file", "no_archive", **known) from error
     if not found:
-        message = (
-            f"{options.form}: has no folders multi_feedback.../Last_First_login_number; download it again"
-        )
-        raise InputFileError("gradebook_file", message)
+        raise failure(InputFileError, "gradebook_file", "archive_folders", file=options.form)
     folders = list(found)
-    students = {**options.people, **{grade.student_id: grade.person for grade in grades}}
-    matches = match_rows(
-        {row: {"ID": match["id"], "login": match["login"]} for row, match in enumerate(found.values())},
-        {student: Gradebook.evidence(student, person) for student, person in students.items()},
-        options.form_name,
-    )
+    rows = {row: {"ID": match["id"], "login": match["login"]} for row, match in enumerate(found.values())}
+    matches = match_class(rows, grades, options, Gradebook.evidence, options.form_name)
     own = {student: folders[row] for student, row in matches.rows.items()}
     files = pages_in(own, ready(grades), options.out or Path())
     missing = {grade.student_id: matches.missing.get(grade.student_id, "") for grade in ready(grades)}

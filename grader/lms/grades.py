@@ -11,13 +11,12 @@ from grader.files import result_folders
 from grader.options import ExportOptions
 from grader.tables.reader import why_no_id
 from grader.tables.roster import read_roster
+from grader.texts.spoken import failure
 from reference.errors import CallError, InputFileError, lines_of
 
 Content = Mapping[str, bytes | Path]
 """Names, and the content of each: bytes, or a file that is read when it is written."""
 COMBINE = ("sum", "mean")
-_MOST_NAMES = 20
-"""A line of more names is not read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,11 +113,7 @@ class Grade:
         if maximum is None or abs(maximum - self.max_score) <= 1e-6 * max(1.0, maximum):
             return score
         if not rescale:
-            raise CallError(
-                "maximum_differs",
-                f"the grade's maximum there is {maximum:g}, the rubric's is {self.max_score:g}:"
-                " set the same maximum there, or ask for rescaling (--rescale)",
-            )
+            raise failure(CallError, "maximum_differs", there=maximum, here=self.max_score)
         return score * maximum / self.max_score
 
 
@@ -143,7 +138,7 @@ class Delivery:
 
     @property
     def is_complete(self) -> bool:
-        """Whether everybody's grade is in the file."""
+        """Return whether everybody's grade is in the file."""
         return not self.withheld and not self.unplaced
 
     def among(self, grades: Sequence[Grade]) -> "Delivery":
@@ -161,10 +156,10 @@ def ready(grades: Sequence[Grade]) -> list[Grade]:
     return [grade for grade in grades if grade.score is not None]
 
 
-def in_a_row(names: Sequence[str]) -> str:
+def in_a_row(names: Sequence[str], most: int = 20) -> str:
     """Names in one line, of many only the first."""
-    more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
-    return ", ".join(names[:_MOST_NAMES]) + more
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
 
 
 def grades_of(results: ResultsDocument, options: Options) -> list[Grade]:
@@ -178,10 +173,9 @@ def grades_of(results: ResultsDocument, options: Options) -> list[Grade]:
     """
     position, combine = options.position, options.combine
     if combine is not None and combine not in COMBINE:
-        known = " or ".join(COMBINE)
-        raise CallError("combine", f"'{combine}' is no way to combine positions: choose {known}")
+        raise failure(CallError, "combine", combine=combine)
     if position is not None and combine is not None:
-        raise CallError("combine", "either one position or a way to combine them, not both")
+        raise failure(CallError, "combine", "position_or_combine")
     _check(results.reports)
     students: dict[str, list[ReportDocument]] = {}
     for report in results.reports:
@@ -191,15 +185,11 @@ def grades_of(results: ResultsDocument, options: Options) -> list[Grade]:
         folder_of = zip(reports, result_folders(reports), strict=True)
         chosen = [(report, folder) for report, folder in folder_of if position in (None, report.position)]
         if len(chosen) > 1 and combine is None:
-            raise CallError(
-                "several_positions",
-                f"{student_id} has {len(chosen)} positions and the file has room for one grade:"
-                " choose a position, or combine them by sum or mean",
-            )
+            raise failure(CallError, "several_positions", student=student_id, count=len(chosen))
         if chosen:
             grades.append(_grade(student_id, chosen, options))
     if not grades:
-        raise CallError("nothing_to_export", "the results hold no report that could be exported")
+        raise failure(CallError, "nothing_to_export")
     return grades
 
 
@@ -219,8 +209,7 @@ def _check(reports: Sequence[ReportDocument]) -> None:
         if report.max_score <= 0.0:
             faults.append(f"{who}: the maximum is {report.max_score:g}")
     if faults:
-        message = f"results.json contradicts itself; grade again\n{lines_of(faults)}"
-        raise InputFileError("results_wrong", message)
+        raise failure(InputFileError, "results_wrong", "results_contradict", faults=lines_of(faults))
 
 
 _WHY = {
@@ -229,7 +218,7 @@ _WHY = {
     "missing": "nothing handed in",
     "graded": "has no score",
 }
-"""Why a report of each status has no grade yet, for the terminal."""
+"""The reason, by status, for which a report has no grade yet; for the terminal."""
 
 
 def _grade(student_id: str, chosen: Sequence[tuple[ReportDocument, str]], options: Options) -> Grade:

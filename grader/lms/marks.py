@@ -14,10 +14,11 @@ from grader.language import Tongue, tongue
 from grader.lms.grades import Grade, Options, ready
 from grader.lms.table import bytes_of, parsed, read_table
 from grader.overlay.scene import MARKS
+from grader.texts.spoken import failure
 from reference.errors import CallError, InputFileError, lines_of
 
 DECIMALS = 6
-"""Of points: finer than any platform stores, and coarser than rounding errors."""
+"""Decimals of points: more than any platform stores, fewer than rounding errors change."""
 CLOSE = 1e-4
 """Sums of points that are written with five decimals agree to this."""
 
@@ -30,13 +31,17 @@ def json_text(content: Mapping[str, object]) -> str:
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
+def own_document(grades: Sequence[Grade], **content: object) -> str:
+    """A document of planmark's own form as JSON: its version, the assignment, and the content."""
+    return json_text({"schema_version": 1, "assignment": grades[0].assignment, **content})
+
+
 def check_unique(names: Iterable[str], what: str) -> None:
     """Raises InputFileError where a name stands twice; `what` says of what it is."""
     known = set()
     for name in names:
         if name in known:
-            message = "the platform would not take this as it is meant; nothing was written"
-            raise InputFileError("export_refused", f"{message}\n  {what} {name} stands twice")
+            raise failure(InputFileError, "export_refused", "named_twice", what=what, name=name)
         known.add(name)
 
 
@@ -96,7 +101,7 @@ def _comments(grade: Grade) -> Iterator[tuple[str, list[Remark]]]:
 
 
 def _by_person(criterion: CriterionDocument) -> str:
-    """What a person who decided a criterion has to say of it."""
+    """Return the comment of the person who decided a criterion."""
     return "" if criterion.decided is None else criterion.decided.comment
 
 
@@ -131,7 +136,7 @@ class Mark:
 
     @property
     def is_full(self) -> bool:
-        """Whether nothing is lost."""
+        """Return whether no points are lost."""
         return math.isclose(self.points, self.max_points, abs_tol=CLOSE)
 
 
@@ -147,16 +152,13 @@ def marks_of(grade: Grade) -> list[Mark]:
         if not -CLOSE <= mark.points <= mark.max_points + CLOSE or mark.max_points <= 0.0
     ]
     if faults:
-        message = f"{grade.student_id}: points that there are not; grade again"
-        raise InputFileError("results_wrong", f"{message}\n{lines_of(faults)}")
+        told = {"student": grade.student_id, "faults": lines_of(faults)}
+        raise failure(InputFileError, "results_wrong", "points_impossible", **told)
     total = math.fsum(mark.points for mark in marks)
     score = math.fsum(report.score or 0.0 for report in grade.reports)
     if not math.isclose(total, score, abs_tol=CLOSE):
-        raise InputFileError(
-            "results_wrong",
-            f"{grade.student_id}: the criteria give {total:g} points together, the score is {score:g};"
-            " grade again, or export grades without criteria",
-        )
+        known = {"student": grade.student_id, "total": total, "score": score}
+        raise failure(InputFileError, "results_wrong", "points_sum", **known)
     return marks
 
 
@@ -235,7 +237,7 @@ class Criterion:
         return f"{self.id}: {self.titles[0]}"
 
     def is_named(self, name: str) -> bool:
-        """Whether a criterion of a platform is this one, by its name there."""
+        """Return whether a platform's criterion of this name is this one."""
         head = name.partition(":")[0]
         return self.id in (name.strip(), head.strip()) or name.strip() in self.titles
 
@@ -251,7 +253,7 @@ def class_criteria(grades: Sequence[Grade], options: Options) -> list[Criterion]
         if all(report.criteria for report in grade.reports)
     }
     if not students:
-        raise CallError("nothing_to_export", "no report has criteria: nothing was handed in that was read")
+        raise failure(CallError, "nothing_to_export", "no_criteria")
     first = next(iter(students))
     maxima = {mark.criterion: mark.max_points for mark in students[first]}
     faults = []
@@ -263,8 +265,7 @@ def class_criteria(grades: Sequence[Grade], options: Options) -> list[Criterion]
         for mark in marks:
             titles[mark.criterion].append(mark.title)
     if faults:
-        message = "one rubric cannot hold all; grade all with one rubric, or choose a position"
-        raise InputFileError("criteria_differ", f"{message}\n{lines_of(faults)}")
+        raise failure(InputFileError, "criteria_differ", faults=lines_of(faults))
     return [
         Criterion(each, _titles(titles[each], options.titles.get(each)), most)
         for each, most in maxima.items()
@@ -321,7 +322,7 @@ def numbered(criteria: Sequence[Criterion], path: Path) -> list[PlatformCriterio
     if len(numbers) < len(result):
         faults.append("two criteria have one number")
     if faults:
-        raise InputFileError("criteria", f"{path}: these are not the rubric's criteria\n{lines_of(faults)}")
+        raise failure(InputFileError, "criteria", file=path, faults=lines_of(faults))
     return result
 
 
@@ -336,11 +337,7 @@ def _criteria_of(path: Path) -> list[PlatformEntry]:
         return [(row["id"], row["criterion"], None) for row in rows if row["id"]]
     known = list(criteria_in(read_answer(path)))
     if not known:
-        raise InputFileError(
-            "criteria",
-            f"{path}: no criteria are in this answer; ask the platform for its rubric (Moodle:"
-            " core_grading_get_definitions), or write a CSV table with the columns criterion,id",
-        )
+        raise failure(InputFileError, "criteria", "answer_without_criteria", file=path)
     return known
 
 
@@ -349,7 +346,7 @@ def read_answer(path: Path) -> Any:  # noqa: ANN401 - whatever a platform answer
     try:
         return parsed(bytes_of(path, "criteria"))
     except ValueError as error:
-        raise InputFileError("criteria", f"{path}: is not JSON ({error})") from error
+        raise failure(InputFileError, "criteria", "no_json_answer", file=path, error=error) from error
 
 
 _LISTS = ("guide_criteria", "qualities", "criteria", "data", "rubric")

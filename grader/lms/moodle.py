@@ -34,6 +34,7 @@ from grader.lms.table import (
     number,
     parse,
 )
+from grader.texts.spoken import failure
 from reference.errors import CallError, InputFileError, lines_of
 
 # The worksheet ------------------------------------------------------------------------------------
@@ -77,7 +78,7 @@ _NO = {
     "no", "nu", "нет", "nein", "non", "não", "nee", "nej", "nie", "ні", "hayır", "όχι", "ne", "ez", "لا",
     "否",
 }  # fmt: skip
-"""How the pack of each language says that a grade cannot be changed."""
+"""Moodle's "no", in each of its languages, to the question whether a grade can be changed."""
 _PARTICIPANT = re.compile(r"([^\W\d_]\D*?)([0-9]+)")
 """The word for a participant in the site's language, in some with a space, and the number."""
 _AMOUNT = re.compile(r"\d+([.,]\d+)?")
@@ -102,19 +103,15 @@ class Worksheet(Form):
         ": it skips them unless the box for updating records is ticked at the upload, or the worksheet was"
         " downloaded afresh"
     )
-    keeps_others = False
-    # Moodle writes a comment without its links into the worksheet, and would take it for a changed one.
 
     @classmethod
     def opened(cls, data: bytes, file: str, item: str = "") -> Self:  # noqa: ARG003 - a worksheet is of one item
         """A worksheet as downloaded; InputFileError with everything that Moodle would not take."""
         table = parse(data, file)
         if not table.rows:
-            raise InputFileError(
-                "worksheet", f"{file}: the worksheet is empty; download it from Moodle again"
-            )
+            raise failure(InputFileError, "worksheet", "worksheet_empty", file=file)
         columns = _columns(table, file)
-        header = ", ".join(table.value(0, place).strip() for place in range(len(table.rows[0])))
+        header = ", ".join(map(str.strip, table.header()))
         faults = [
             f"row 1: there is no column '{COLUMNS[name][0].capitalize()}' (columns: {header})"
             for name in _REQUIRED
@@ -131,11 +128,7 @@ class Worksheet(Form):
         if not faults:
             faults += _row_faults(sheet)
         if faults:
-            raise InputFileError(
-                "worksheet",
-                f"{file}: Moodle would not take this worksheet; download it again and do not resave it"
-                f"\n{lines_of(faults)}",
-            )
+            raise failure(InputFileError, "worksheet", file=file, faults=lines_of(faults))
         return sheet
 
     @staticmethod
@@ -145,7 +138,7 @@ class Worksheet(Form):
         return float(plain) if re.fullmatch(r"\d+(\.\d+)?", plain) else None
 
     def why_fixed(self, row: int) -> str:
-        """Whether Moodle says that the grade cannot be changed."""
+        """Return a sentence if Moodle says that the grade cannot be changed."""
         return LOCKED if self.value(row, "changeable").casefold() in _NO else ""
 
     def participant(self, row: int) -> int | None:
@@ -243,10 +236,11 @@ def fill_worksheet(
     """
     for name in ("item", "identity"):
         if getattr(options, name):
-            raise CallError("option_unused", f"--{name} has no meaning beside --worksheet: leave it out")
+            known = {"option": f"--{name}", "other": "--worksheet"}
+            raise failure(CallError, "option_unused", "unused_beside", **known)
     sheet = Worksheet.opened(data, file)
     if options.maximum is not None and "maximum" in sheet.columns:
-        raise CallError("option_unused", "--maximum has no meaning here: the worksheet states its own")
+        raise failure(CallError, "option_unused", "maximum_stated", other="--worksheet")
     sheet.date_by(downloaded)
     if "feedback" not in sheet.columns:
         sheet.notes.append("the worksheet has no column for feedback comments: only grades are filled in")
@@ -261,14 +255,13 @@ def _columns(table: RawTable, file: str) -> dict[str, int]:
 
     Raises InputFileError where a heading stands twice.
     """
-    header = [table.value(0, place).strip().casefold() for place in range(len(table.rows[0]))]
+    header = [title.strip().casefold() for title in table.header()]
     columns: dict[str, int] = {}
     for name, known in COLUMNS.items():
         places = [place for place, title in enumerate(header) if title in known]
         if len(places) > 1:
-            raise InputFileError(
-                "worksheet", f"{file}, row 1: there are {len(places)} columns '{table.value(0, places[0])}'"
-            )
+            known_there = {"file": file, "count": len(places), "name": table.value(0, places[0])}
+            raise failure(InputFileError, "worksheet", "worksheet_column", **known_there)
         if places:
             columns[name] = places[0]
     free = [place for place in range(len(header)) if place not in columns.values()]
@@ -288,7 +281,7 @@ def _columns(table: RawTable, file: str) -> dict[str, int]:
             del cells[place]
 
     def all_are(shape: re.Pattern[str], place: int, but: Collection[str] = ()) -> bool:
-        """Whether a column has only such cells, besides those that are also allowed."""
+        """Return whether a column has only such cells, besides those that are also allowed."""
         texts = cells.get(place, set())
         return bool(texts) and all(map(shape.fullmatch, texts - set(but)))
 
@@ -311,7 +304,7 @@ def _columns(table: RawTable, file: str) -> dict[str, int]:
 
 
 def _is_read_by_moodle(moment: str) -> bool:
-    """Whether PHP's strtotime reads a date; a dash is no date."""
+    """Return whether PHP's strtotime reads a date; a dash is no date."""
     words = set(re.findall(r"[^\W\d_]+", moment.casefold()))
     return (
         moment in NO_GRADE
@@ -344,7 +337,7 @@ def _row_faults(sheet: Worksheet) -> Iterator[str]:
 
 
 def _misread(text: str, maximum: float | None, *, comma: bool) -> str:
-    """What Moodle would misread in a grade that is in the worksheet already; empty where nothing."""
+    """Return what Moodle would misread in a grade that is in the worksheet already; empty if nothing."""
     value = Worksheet.amount(text)
     if text in NO_GRADE:
         return ""
@@ -377,10 +370,10 @@ def gradebook(grades: Sequence[Grade], options: Options) -> Delivery:
     """
     identity = options.identity or "idnumber"
     if identity not in IDENTITIES:
-        raise CallError("identity", f"users are found by {', '.join(IDENTITIES)}, not by '{identity}'")
+        raise failure(CallError, "identity", names=IDENTITIES, text=identity)
     item = options.item.strip() or grades[0].assignment
     if is_formula(item):
-        raise CallError("gradebook", f"'{item}' is no name for a grade item: a spreadsheet would run it")
+        raise failure(CallError, "gradebook", "item_formula", item=item)
     graded = ready(grades)
     comments = [comment(grade) for grade in graded]
     faults = list(_faults(graded, identity))
@@ -390,8 +383,7 @@ def gradebook(grades: Sequence[Grade], options: Options) -> Delivery:
         if len(text) > _LONGEST_COMMENT
     ]
     if faults:
-        message = "Moodle would abort this import; nothing was written"
-        raise CallError("gradebook", f"{message}\n{lines_of(faults)}")
+        raise failure(CallError, "gradebook", "import_aborted", faults=lines_of(faults))
     scores = [grade.out_of(options.maximum, rescale=options.rescale) for grade in graded]
     users = [_user(grade, identity) for grade in graded]
     rows = zip(users, [number(score, 2) for score in scores], comments, strict=True)
@@ -450,8 +442,8 @@ def feedback_files(grades: Sequence[Grade], options: Options) -> Delivery:
     folders = {who: f"Participant_{number}_assignfeedback_file" for who, number in numbers.items()}
     files = pages_in(folders, graded, options.out or Path())
     if missing and not files:
-        lines = lines_of([f"{student}: {reason}" for student, reason in missing.items()])
-        raise CallError("nothing_to_export", f"no student has a number in Moodle\n{lines}")
+        faults = lines_of([f"{student}: {reason}" for student, reason in missing.items()])
+        raise failure(CallError, "nothing_to_export", "no_numbers", faults=faults)
     first = "upload grades before feedback files: they make Moodle take a worksheet for outdated"
     return Delivery(files, unplaced=missing, notes=(first, *notes))
 
@@ -475,11 +467,7 @@ def _participants(
     if options.form is None:
         numbers = {student: who.participant for student, who in people.items() if who.participant is not None}
         if all(person.participant is None for person in options.people.values()):
-            raise CallError(
-                "worksheet_needed",
-                "Moodle's numbers of participants are needed: give the downloaded grading worksheet"
-                " (--worksheet), or a table with the columns student_id,participant (--ids)",
-            )
+            raise failure(CallError, "worksheet_needed")
         others = people.keys() - numbers.keys()
         notes = (
             [] if options.groups is False else ["not for groups: there Moodle takes a number for a group's"]
@@ -509,8 +497,7 @@ def pages_in(folders: Mapping[str, str], graded: Sequence[Grade], out: Path) -> 
         if grade.student_id in folders:
             files.update(_pages(grade, out, folders[grade.student_id], faults))
     if faults:
-        message = "not all feedback is there; grade again, nothing was written"
-        raise InputFileError("feedback_missing", f"{message}\n{lines_of(faults)}")
+        raise failure(InputFileError, "feedback_missing", faults=lines_of(faults))
     return files
 
 

@@ -18,10 +18,11 @@ from grader.lms.marks import (
     class_criteria,
     comment,
     criteria_in,
-    json_text,
+    own_document,
     platform_marks,
     read_answer,
 )
+from grader.texts.spoken import failure
 from reference.errors import CallError, InputFileError
 
 _LONGEST_NAME = 255
@@ -31,7 +32,7 @@ _NO_TAGS = str.maketrans("<>", "‹›")
 _PLAIN, _HTML = 2, 1
 """Moodle's FORMAT_PLAIN and FORMAT_HTML."""
 _READY = 20
-"""Of a definition's status: ready for use."""
+"""Status of a definition that is ready for use."""
 _NUMBER = re.compile("[1-9][0-9]*")
 
 
@@ -70,18 +71,16 @@ def guide(grades: Sequence[Grade], options: Options) -> Delivery:
         "cmid": cmid, "contextid": context_id, "component": "mod_assign", "areaname": "submissions",
         "activemethod": "guide", "definitions": [definition],
     }  # fmt: skip
-    content: dict[str, object] = {
-        "schema_version": 1,
-        "assignment": grades[0].assignment,
+    call: dict[str, object] = {
         "wsfunction": "core_grading_save_definitions",
         "arguments": {"areas": [area]},
     }
     notes = []
     if options.replace_guide is not None:
         lost = _fillings(options.replace_guide)
-        content["fillings_lost"] = sum(lost)
+        call["fillings_lost"] = sum(lost)
         notes = [f"saving this guide deletes the one there with {sum(lost)} fillings of {len(lost)} grades"]
-    return Delivery(json_text(content), notes=tuple(notes))
+    return Delivery(own_document(grades, **call), notes=tuple(notes))
 
 
 def _place(options: Options) -> tuple[int, int]:
@@ -114,14 +113,14 @@ def _place(options: Options) -> tuple[int, int]:
 
 
 def _fillings(path: Path) -> list[int]:
-    """How many points each grade by a guide holds, by Moodle's answer; InputFileError for another."""
+    """Count the points of each grade by a guide in Moodle's answer; InputFileError for another answer."""
     answer = read_answer(path)
     try:
         # An instance that nobody filled in has no guide.
         return [len((each.get("guide") or {}).get("criteria", ())) for each in answer["instances"]]
     except (LookupError, TypeError, AttributeError) as error:
-        message = "is not Moodle's answer to core_grading_get_gradingform_instances"
-        raise InputFileError("criteria", f"{path}: {message}") from error
+        known = {"file": path, "asked": "core_grading_get_gradingform_instances"}
+        raise failure(InputFileError, "criteria", "no_answer_to", **known) from error
 
 
 def _area(options: Options) -> Mapping[str, object]:
@@ -131,8 +130,8 @@ def _area(options: Options) -> Mapping[str, object]:
     answer = read_answer(options.criteria)
     areas = answer.get("areas") if isinstance(answer, dict) else None
     if not isinstance(areas, list) or len(areas) != 1 or not isinstance(areas[0], dict):
-        message = "is not Moodle's answer to core_grading_get_definitions for one activity"
-        raise InputFileError("criteria", f"{options.criteria}: {message}")
+        known = {"file": options.criteria, "asked": "core_grading_get_definitions"}
+        raise failure(InputFileError, "criteria", "no_answer_to", **known)
     return areas[0]
 
 
@@ -200,14 +199,9 @@ def fillings(grades: Sequence[Grade], options: Options) -> Delivery:
             "ids_needed", "nobody's number in Moodle is known: give a table student_id,id (--ids)"
         )
     check_unique((grade.person.platform_id for grade, _ in marked if grade.person.platform_id), "user")
-    content = {
-        "schema_version": 1,
-        "assignment": grades[0].assignment,
-        "criteria": [asdict(each) for each in criteria],
-        "calls": calls,
-    }
+    content = own_document(grades, criteria=[asdict(each) for each in criteria], calls=calls)
     note = "each call also replaces the student's feedback comment: without one Moodle stores half of it"
-    return Delivery(json_text(content), unplaced=missing, notes=(note,))
+    return Delivery(content, unplaced=missing, notes=(note,))
 
 
 def _filled(number: int, mark: Mark) -> dict[str, object]:

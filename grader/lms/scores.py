@@ -13,8 +13,9 @@ from collections.abc import Sequence
 from typing import Literal, get_args
 
 from grader.lms.grades import Delivery, Grade, Options, ready
-from grader.lms.marks import Mark, check_unique, json_text, marks_of, plain_comment
+from grader.lms.marks import Mark, check_unique, json_text, marks_of, own_document, plain_comment
 from grader.lms.table import number
+from grader.texts.spoken import failure
 from reference.errors import CallError
 
 # Gradescope ---------------------------------------------------------------------------------------
@@ -27,7 +28,7 @@ def results(grades: Sequence[Grade], options: Options) -> Delivery:
     visibility = options.visibility or "visible"
     known = get_args(Visibility)
     if visibility not in known:
-        raise CallError("visibility", f"'{visibility}' is no visibility: choose {', '.join(known)}")
+        raise failure(CallError, "visibility", text=visibility, names=known)
     return Delivery(
         {
             f"{grade.student_id}/results.json": _results(grade, visibility, options).encode()
@@ -82,7 +83,7 @@ def _name(mark: Mark) -> str:
 # LTI ----------------------------------------------------------------------------------------------
 
 _DECIMALS = 5
-"""Of a score, as in the tables."""
+"""Decimals of a score, as in the tables."""
 
 
 def scores(grades: Sequence[Grade], options: Options) -> Delivery:
@@ -117,8 +118,8 @@ def scores(grades: Sequence[Grade], options: Options) -> Delivery:
         "tag": "grade",
     }
     check_unique((str(score["userId"]) for score in posted), "userId")
-    content = {"schema_version": 1, "assignment": assignment, "lineItem": line_item, "scores": posted}
-    return Delivery(json_text(content), unplaced=missing, notes=tuple(notes))
+    content = own_document(grades, lineItem=line_item, scores=posted)
+    return Delivery(content, unplaced=missing, notes=tuple(notes))
 
 
 def _graded(grade: Grade, options: Options) -> dict[str, object]:

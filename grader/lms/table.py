@@ -8,7 +8,7 @@ import re
 import unicodedata
 from abc import ABC, abstractmethod
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
@@ -18,17 +18,18 @@ from typing import Any, ClassVar, Self
 from pydantic_core import from_json
 
 from grader.documents import CriterionDocument, ReportDocument, ResultsDocument
-from grader.files import OutputError, guarded, write_whole
+from grader.files import OutputError, guarded
 from grader.lms.grades import Delivery, Grade, Options, Person, in_a_row, ready
 from grader.records import Reason
 from grader.tables.reader import Row, TableKind, check_rows, short
+from grader.texts.spoken import failure
 from reference.authored.variant_table import delimiter_of
 from reference.errors import CallError, InputFileError
 
 Cell = str | int | float | None
 
 NO_GRADE = {"", "-"}
-"""How platforms write that there is no grade."""
+"""Cells with which platforms say that there is no grade."""
 
 
 def csv_text(header: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
@@ -77,13 +78,8 @@ _FIXED = ("student_id", "n", "position", "status", "score", "max_score", "score_
 _LAST = ("mistakes", "problems")
 
 
-def write_summary(results: ResultsDocument, path: Path) -> None:
-    """Write a row per student and position, with a column per criterion; raises OutputError."""
-    write_whole(path, summary_text(results))
-
-
 def summary_text(results: ResultsDocument) -> str:
-    """The summary as CSV text; points are blank where a criterion is under review or not judged."""
+    """A CSV row per student and position; a criterion's points are blank under review and if not judged."""
     criteria = list(dict.fromkeys(each.id for report in results.reports for each in report.criteria))
     # A criterion that is named as a fixed column must not hide it.
     names = [f"criterion_{name}" if name in {*_FIXED, *_LAST} else name for name in criteria]
@@ -186,7 +182,7 @@ def bytes_of(path: Path, code: str) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        raise InputFileError(code, f"{path}: cannot be read ({error.strerror})") from error
+        raise failure(InputFileError, code, "unreadable", file=path, error=error.strerror) from error
 
 
 def parsed(data: bytes) -> Any:  # noqa: ANN401 - whatever a JSON file holds
@@ -270,10 +266,7 @@ def parse(data: bytes, file: str, delimiter: str | None = ",") -> RawTable:
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
-        raise InputFileError(
-            "not_utf8",
-            f"{file}: is not UTF-8 text (byte {error.start}); download it again and do not resave it",
-        ) from error
+        raise failure(InputFileError, "not_utf8", file=file, byte=error.start) from error
     delimiter = delimiter or delimiter_of(text)
     pattern = re.compile(rf'({_QUOTED}|[^"{delimiter}\r\n][^{delimiter}\r\n]*+|)({delimiter}|\r\n|\r|\n|\Z)')
     table = RawTable("\ufeff" if text.startswith("\ufeff") else "", delimiter)
@@ -281,10 +274,8 @@ def parse(data: bytes, file: str, delimiter: str | None = ",") -> RawTable:
     while at < len(text) or row:
         cell = pattern.match(text, at)
         if cell is None:
-            where = f"{file}, row {len(table.rows) + 1}"
-            if re.compile(_QUOTED).match(text, at):
-                raise InputFileError("quote_broken", f"{where}: text follows a closing quote")
-            raise InputFileError("quote_open", f"{where}: a quote is opened and never closed")
+            code = "quote_broken" if re.compile(_QUOTED).match(text, at) else "quote_open"
+            raise failure(InputFileError, code, file=file, row=len(table.rows) + 1)
         row.append(cell[1])
         at = cell.end()
         if cell[2] != delimiter:
@@ -311,7 +302,7 @@ class Matches:
     by_name: list[str] = field(default_factory=list)
 
     def notes_on(self, students: Iterable[str]) -> list[str]:
-        """What a person should check among these students."""
+        """Return what a person should check about these students."""
         chosen = set(students)
         doubtful = [student for student in self.by_name if student in chosen]
         return [f"found by name alone, look whether they are these: {in_a_row(doubtful)}"] if doubtful else []
@@ -372,6 +363,18 @@ def match_rows(
     return matches
 
 
+def match_class(
+    rows: Mapping[int, Mapping[str, str]],
+    grades: Sequence[Grade],
+    options: Options,
+    evidence: Callable[[str, Person], Evidence],
+    table: str,
+) -> Matches:
+    """Match everybody of a class as `match_rows` does; `evidence` gives the cells of a student."""
+    students = {**options.people, **{grade.student_id: grade.person for grade in grades}}
+    return match_rows(rows, {student: evidence(student, who) for student, who in students.items()}, table)
+
+
 def _who(cells: Mapping[str, str]) -> str:
     """Name and address, or else all that is known."""
     known = [text for column in (NAME, "email") if (text := cells.get(column))]
@@ -410,7 +413,7 @@ def _rows_in_part(name: set[str], rows_with: Mapping[str, Collection[int]]) -> l
 
 
 def _key(column: str, text: str) -> str:
-    """What is compared of a cell; of a name its parts in the order of the alphabet, without marks."""
+    """Return the part of a cell that is compared; a name's parts in alphabetical order, without marks."""
     if column != NAME:
         return " ".join(unicodedata.normalize("NFKC", text).casefold().split())
     letters = unicodedata.normalize("NFKD", text).casefold()
@@ -446,9 +449,7 @@ class Form(ABC):
 
     name: ClassVar[str]
     replaced: ClassVar[str] = ""
-    """What the platform does where grades that it holds already are changed."""
-    keeps_others: ClassVar[bool] = True
-    """Whether rows stay that are not filled in."""
+    """The end of the note on changed grades that the platform holds already."""
 
     @classmethod
     @abstractmethod
@@ -462,7 +463,7 @@ class Form(ABC):
 
     @abstractmethod
     def why_fixed(self, row: int) -> str:
-        """Why the grade of a row must not be changed; empty where it may."""
+        """Return why the grade of a row must not be changed; empty where it may."""
 
     @abstractmethod
     def identity(self, row: int) -> Mapping[str, str]:
@@ -471,7 +472,7 @@ class Form(ABC):
     @staticmethod
     @abstractmethod
     def evidence(student_id: str, person: Person) -> Evidence:
-        """What would stand in a student's row."""
+        """Return the cells that a student's row would have."""
 
     def value(self, row: int, name: str) -> str:
         """A cell's text; empty where the table has no such column."""
@@ -494,15 +495,11 @@ class Form(ABC):
 
     def match(self, grades: Sequence[Grade], options: Options) -> Matches:
         """The rows of students, among the whole class: a row that fits two of them is given to neither."""
-        students = {**options.people, **{grade.student_id: grade.person for grade in grades}}
-        return match_rows(
-            {row: cells for row in self.people if (cells := self.identity(row))},
-            {student: self.evidence(student, person) for student, person in students.items()},
-            self.name,
-        )
+        rows = {row: cells for row in self.people if (cells := self.identity(row))}
+        return match_class(rows, grades, options, self.evidence, self.name)
 
     def notes_on(self, changed: int, zeros: Sequence[str]) -> Sequence[str]:  # noqa: ARG002 - some platforms
-        """What to look at after the upload of so many changed grades; `zeros` are students who got 0."""
+        """Return what to check after the upload of so many changed grades; `zeros` are students who got 0."""
         return ()
 
     def put_grade(self, row: int, text: str) -> bool:
@@ -523,7 +520,7 @@ class Form(ABC):
 
 
 def _words(comment: str) -> str:
-    """What is compared of a comment: platforms leave out its tags and change its spaces."""
+    """Return the part of a comment that is compared: platforms leave out its tags and change its spaces."""
     return "".join(html.unescape(re.sub(r"<[^>]*>", "", comment)).split())
 
 
@@ -549,21 +546,18 @@ def fill_in(
         filled.append(student)
         maximum = form.maximum(row) or options.maximum
         if maximum is None:
-            raise CallError(
-                "maximum_unknown",
-                f"{file}: states no maximum grade; look it up in {form.platform} and give it (--maximum)",
-            )
+            raise failure(CallError, "maximum_unknown", file=file, platform=form.platform)
         try:
             score = grade.out_of(maximum, rescale=options.rescale)
         except CallError as error:
-            raise CallError(error.code, f"{file}: {error.message}") from error
+            raise CallError(error.code, f"{file}: {error.message}", **error.parameters) from error
         texts[row] = number(score, form.decimals(row))
         zeros += [student] if texts[row] == "0" else []
         changed += [row] if form.put_grade(row, texts[row]) else []
         if student in comments:
             comments_replaced += form.put_comment(row, comments[student])
-    rows = range(len(form.table.rows))
-    staying = [row for row in rows if form.keeps_others or row <= form.above or row in texts]
+    # Moodle would take a comment that it wrote without its links for a changed one: no row of others stays.
+    staying = [row for row in range(len(form.table.rows)) if row <= form.above or row in texts]
     content = form.table.text(staying).encode("utf-8")
     again = form.opened(content, file, options.item)
     for place, row in enumerate(staying):

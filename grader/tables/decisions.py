@@ -342,15 +342,8 @@ class DecisionFile:
         self.path = path
 
     def all(self) -> list[Decision]:
-        """The decisions as they stand in the file now; `table` also tells of lines that cannot be used.
-
-        Raises TableError for a fault of the whole file.
-        """
-        return self.table().rows
-
-    def table(self) -> DecisionTable:
-        """The file's content now. Raises TableError for a fault of the whole file."""
-        return read_table(self.path)
+        """The decisions as they stand in the file now. Raises TableError for a fault of the whole file."""
+        return read_table(self.path).rows
 
     def add(self, *decisions: Decision, expected: Iterable[Decision] | None = None) -> list[Decision]:
         """Write decisions, each in the place of what was decided on the same before; returns those rows.
@@ -409,7 +402,7 @@ class DecisionFile:
                 "cannot_write", f"{self.path}: cannot be written: its folder takes no lock file ({why})"
             ) from error
         try:
-            yield self.table()
+            yield read_table(self.path)
         finally:
             lock.release()
 

@@ -1,12 +1,13 @@
 """Sentences of reasons and problems in a language: numbers with their units, names as students know them."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, Protocol, cast
+from typing import Any, Protocol, TypeVar, cast
 
 from grader.documents import ProblemDocument, UnmatchedDocument, UnreadDocument
 from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
 from grader.records import Reason, Unread, Value, of_error
 from grader.texts.clauses import CLAIMS, CLAUSES
+from grader.texts.failures import FAILURES
 from grader.texts.faults import FAULTS, ON_LINE
 from grader.texts.problems import PROBLEMS
 from grader.texts.refusals import REFUSALS
@@ -223,9 +224,37 @@ def told_parameters(reason: Reason) -> dict[str, Any]:
 
 def refusal(reason: Reason, speaker: Tongue = ENGLISH) -> str:
     """Return a refused request's sentence; of an error its own words, in other languages its sentence."""
+    text = FAILURES.get(str(reason.parameters.get("cause", reason.code)))
+    said = {key: _plain(one, speaker) for key, one in reason.parameters.items()}
+    if text and (told := filled([text], said, speaker)):
+        return told
     if reason.code in REFUSALS:
         return speaker.gettext(REFUSALS[reason.code]) % reason.parameters
     return (speaker is not ENGLISH and sentence(reason, speaker)) or message(reason, speaker)
+
+
+def _plain(value: Value, speaker: Tongue) -> str:
+    if isinstance(value, tuple):
+        return ", ".join(value)
+    return speaker.trimmed(value, 6) if isinstance(value, float) else str(value)
+
+
+Failed = TypeVar("Failed", bound=PlanmarkError)
+
+
+def failure(
+    kind: type[Failed], code: str, cause: str = "", speaker: Tongue = ENGLISH, /, **known: object
+) -> Failed:
+    """Return an error that is told by the sentence of its cause, else of its code: see `FAILURES`.
+
+    Arguments: `known` are what the sentence names; paths and the like become text.
+    """
+    told: dict[str, Value] = {"cause": cause} if cause else {}
+    for name, one in known.items():
+        # A path may hold bytes that are no text: no answer could be written with them.
+        text = str(one).encode("utf-8", "backslashreplace").decode()
+        told[name] = one if isinstance(one, int | float | tuple) else text
+    return kind(code, refusal(Reason(code, told), speaker), **told)
 
 
 class RefusedError(PlanmarkError):

@@ -184,8 +184,12 @@ class Queue:
             except _TurnOverError:
                 self._again(job)
             except PlanmarkError as error:
-                known = {"code": error.code, "parameters": error.parameters}
-                self._end(job, "failed", known, error.message)
+                shown = self.settings.without_folder
+                known = {
+                    name: shown(one) if isinstance(one, str) else one
+                    for name, one in error.parameters.items()
+                }
+                self._end(job, "failed", {"code": error.code, "parameters": known}, error.message)
             except Exception as error:
                 LOG.exception("job %d", job_id)
                 self._end(job, "failed", {"code": "internal_error"}, f"a fault of planmark ({error})")

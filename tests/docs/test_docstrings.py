@@ -8,8 +8,8 @@ from docs import make_architecture as architecture
 QUESTION = re.compile(r'^ *r?"""(What|Where|When|Who|Whose|Of|How|Why|Whether|Which|That)\b', re.MULTILINE)
 
 MOST = {
-    "grader/cli": 15, "grader/folder": 57, "grader/lms": 26, "grader/lms/api": 3, "grader/pipeline": 1,
-    "grader/scan": 9, "grader/scan/decode": 20, "grader/scan/register": 45, "grader/scan/strokes": 24,
+    "grader/pipeline": 1, "grader/scan": 9, "grader/scan/decode": 20, "grader/scan/register": 45,
+    "grader/scan/strokes": 24,
 }  # fmt: skip
 """Most such docstrings by room, none elsewhere. The numbers only fall: rewrite some, then lower them."""
 

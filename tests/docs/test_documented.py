@@ -44,8 +44,9 @@ def codes() -> dict[str, str]:
         for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
             if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and len(node.args) > 1):
                 continue
-            if node.func.id.lower().endswith(("error", "problem")):
-                parts = getattr(node.args[0], "values", [node.args[0]])
+            if node.func.id.lower().endswith(("error", "problem", "failure")):
+                code = node.args[1 if node.func.id == "failure" else 0]
+                parts = getattr(code, "values", [code])
                 texts = [part.value for part in parts if isinstance(part, ast.Constant)]
                 found.update({text: source.name for text in texts if re.fullmatch("[a-z_]+", str(text))})
     return found

@@ -27,7 +27,7 @@ import pytest
         ("plan pump --all --pdf x.pdf --altitude", 2, "--altitude one of them"),
         ("plan pump --all --steps x.html", 2, "--all is every variant"),
         ("plan pump --n 3 --csv x.csv", 2, "add --all"),
-        ("plan pump --all --csv x.csv --lang de", 2, "known are en, ro, ru"),
+        ("plan pump --all --csv x.csv --lang de", 2, "choose one of en, ro, ru"),
         ("plan pump --all --crank-mm -3", 2, "above 0"),
         (
             "cycle press --position 1 --of v_Q --csv c.csv",

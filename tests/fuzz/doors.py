@@ -31,7 +31,7 @@ from grader.rubric import load_rubric
 from grader.scan.decode.pages import count_pages, is_blank, page_of
 from grader.scan.register.registration import register
 from grader.tables.class_file import read_class_file
-from grader.tables.decisions import Decision, DecisionFile
+from grader.tables.decisions import Decision, DecisionFile, read_table
 from grader.tables.measurements import names_of, read_measurements
 from grader.tables.roster import read_roster
 from grader.tables.scale_text import parse_scale
@@ -132,10 +132,10 @@ def _roster(path: Path) -> str:
 
 def _decisions(path: Path) -> str:
     file = DecisionFile(path)
-    table = file.table()
+    table = read_table(file.path)
     added = Decision("s1", None, "v_A", "full", comment="=1+1")
     file.add(added)
-    again = file.table()
+    again = read_table(file.path)
     kept = [row for row in table.rows if row.key != added.key]
     if [row for row in again.rows if row.key != added.key] != kept or added not in again.rows:
         raise AssertionError("a decision was lost or changed when another one was written")
@@ -186,9 +186,9 @@ def _worksheet(path: Path) -> str:
 def _gradebook(path: Path) -> str:
     """For each platform, as an instructor would try it."""
     answers = []
-    for layout in LAYOUTS:
-        item = "Plan 1" if "item" in KINDS[layout.key, "grades"].used else ""
-        options = Options(to=layout.key, form=path, people=_PEOPLE, item=item, rescale=True)
+    for to in LAYOUTS:
+        item = "Plan 1" if "item" in KINDS[to, "grades"].used else ""
+        options = Options(to=to, form=path, people=_PEOPLE, item=item, rescale=True)
         try:
             filled = draft(results(report("s1", 7.5)), options)
         except PlanmarkError as error:

@@ -10,7 +10,7 @@ from grader.lms.table import number
 from reference.errors import CallError
 
 _MOST_CRITERIA = 50
-"""Of a rubric there (developers.google.com/workspace/classroom, Rubrics structure and known limitations)."""
+"""Limit of a rubric (Google's guide, Rubrics structure and known limitations)."""
 
 
 def google_classroom(grades: Sequence[Grade], options: Options) -> Delivery:

@@ -1,17 +1,18 @@
 """Microsoft Teams through Graph: the rubric, its place in an assignment, levels, points and feedback."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 from urllib.parse import quote
 
-from grader.lms.api.requests import Plan, place_of, students_submissions, total_of
+from grader.lms.api.requests import Plan, place_of, students_submissions
 from grader.lms.grades import Delivery, Grade, Options, ready
 from grader.lms.marks import Mark, class_criteria, plain_comment, platform_marks, read_answer
 from grader.lms.table import number
 from reference.errors import CallError
 
 _TYPE = "#microsoft.graph.education"
-"""Of a thing's `@odata.type`, before its own name."""
+"""Start of every `@odata.type`."""
 
 
 def _text(content: str) -> dict[str, str]:
@@ -80,7 +81,7 @@ def ms_education(grades: Sequence[Grade], options: Options) -> Delivery:
 
 def _graph_rubric(grades: Sequence[Grade], options: Options) -> dict[str, Any]:
     criteria = class_criteria(grades, options)
-    total = total_of(criteria)
+    total = math.fsum(each.max_points for each in criteria)
     title = options.item.strip() or grades[0].assignment
     kind = {"@odata.type": f"{_TYPE}AssignmentPointsGradeType"}
     return {

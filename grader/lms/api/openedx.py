@@ -6,13 +6,13 @@ from typing import Any
 from urllib.parse import quote
 from xml.etree import ElementTree as ET
 
-from grader.lms.api.requests import Plan, place_of, ready_marks, students_submissions, total_of
+from grader.lms.api.requests import Plan, place_of, ready_marks, students_submissions
 from grader.lms.grades import Delivery, Grade, Options, in_a_row, ready
 from grader.lms.marks import CLOSE, class_criteria, json_text, plain_comment
 from grader.lms.table import number
 
 _FACTORS = (1, 2, 4, 5, 10, 20, 25, 50, 100)
-"""Of points that are to be whole; finer points than hundredths are rounded, and told."""
+"""Factors that make points whole; finer points than hundredths are rounded, and a note says so."""
 
 
 def openedx(grades: Sequence[Grade], options: Options) -> Delivery:
@@ -76,10 +76,11 @@ def openedx(grades: Sequence[Grade], options: Options) -> Delivery:
         base = "/api/ora_staff_grader/submission"
         plan.add(f"POST {base}/lock?{where}", {}, "lock", student)
         plan.add(f"POST {base}/grade?{where}", body, "grade", student)
+    total = math.fsum(each.max_points for each in criteria)
     notes = [
         (
-            f"Open edX takes whole points: all are times {factor}, {number(total_of(criteria))} become"
-            f" {number(factor * total_of(criteria))}; the grade is their share and stays the same"
+            f"Open edX takes whole points: all are times {factor}, {number(total)} become"
+            f" {number(factor * total)}; the grade is their share and stays the same"
         ),
         "the options are the points that this class has: after a regrade with others put the rubric in again",
     ]

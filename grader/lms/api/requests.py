@@ -1,22 +1,13 @@
 """Requests to a platform: the plan of the calls, their addresses, and the owners of submissions."""
 
-import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import quote
 
-from grader.lms.grades import Delivery, Grade, Options, ready
-from grader.lms.marks import (
-    Criterion,
-    Mark,
-    check_unique,
-    json_text,
-    marks_of,
-    read_answer,
-    together,
-)
-from grader.lms.table import match_rows
+from grader.lms.grades import Delivery, Grade, Options, Person, ready
+from grader.lms.marks import Mark, check_unique, json_text, marks_of, read_answer, together
+from grader.lms.table import Evidence, match_class
 from reference.errors import CallError
 
 # The plan -----------------------------------------------------------------------------------------
@@ -79,9 +70,7 @@ def submissions_in(answer: object) -> Iterator[Submission]:
             yield from submissions_in(each)
     if not isinstance(answer, dict):
         return
-    number_there = next(
-        (answer[key] for key in ("submissionUUID", "submissionUuid", "id") if key in answer), None
-    )
+    names = [answer[key] for key in ("submissionUUID", "submissionUuid", "id") if key in answer]
     recipient = answer.get("recipient")
     of_recipient = recipient if isinstance(recipient, dict) else {}
     cells = {
@@ -90,17 +79,14 @@ def submissions_in(answer: object) -> Iterator[Submission]:
         "email": answer.get("email"),
     }
     user = {kind: cell for kind, cell in cells.items() if isinstance(cell, str) and cell}
-    if isinstance(number_there, str) and user:
+    if user and names and isinstance(names[0], str):
         outcomes = answer.get("outcomes")
-        yield Submission(
-            number_there,
-            user,
-            {
-                str(each.get("@odata.type", "")).rpartition(".")[2]: str(each.get("id", ""))
-                for each in (outcomes if isinstance(outcomes, list) else [])
-                if isinstance(each, dict)
-            },
-        )
+        ids = {
+            str(each.get("@odata.type", "")).rpartition(".")[2]: str(each.get("id", ""))
+            for each in (outcomes if isinstance(outcomes, list) else [])
+            if isinstance(each, dict)
+        }
+        yield Submission(names[0], user, ids)
         return
     for inner in answer.values():
         yield from submissions_in(inner)
@@ -120,32 +106,22 @@ def students_submissions(
     if not known:
         message = f"{options.submissions}: no submissions are in this answer; ask for {ask}"
         raise CallError("submissions", message)
-    students = {**options.people, **{grade.student_id: grade.person for grade in grades}}
-    matches = match_rows(
-        {row: submission.user for row, submission in enumerate(known)},
-        {
-            student: (
-                ("userId", person.platform_id),
-                ("email", person.email),
-                ("username", person.username or student),
-                ("userId", student),
-            )
-            for student, person in students.items()
-        },
-        options.submissions.name,
-    )
-    graded = {grade.student_id for grade in ready(grades)}
+    rows = {row: submission.user for row, submission in enumerate(known)}
+    matches = match_class(rows, grades, options, _evidence, options.submissions.name)
+    graded = [grade.student_id for grade in ready(grades)]
+    found = {student: known[matches.rows[student]] for student in graded if student in matches.rows}
+    return found, {student: matches.missing[student] for student in graded if student not in found}
+
+
+def _evidence(student: str, person: Person) -> Evidence:
     return (
-        {student: known[row] for student, row in matches.rows.items() if student in graded},
-        {student: why for student, why in matches.missing.items() if student in graded},
+        ("userId", person.platform_id),
+        ("email", person.email),
+        ("username", person.username or student),
+        ("userId", student),
     )
 
 
 def ready_marks(grade: Grade, options: Options) -> list[Mark]:
     """The marks of a grade, named as the class's criteria."""
     return together(marks_of(grade), options.combine)
-
-
-def total_of(criteria: Iterable[Criterion]) -> float:
-    """The maxima of all criteria together."""
-    return math.fsum(each.max_points for each in criteria)

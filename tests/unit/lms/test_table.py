@@ -20,7 +20,6 @@ from grader.lms.table import (
     quoted,
     summary_text,
     with_ids,
-    write_summary,
 )
 from reference.errors import InputFileError
 from tests.unit.lms.classroom import a_class, criterion, report, results
@@ -32,9 +31,8 @@ def rows(text):
     return list(csv.DictReader(io.StringIO(text, newline="")))
 
 
-def test_a_row_per_student_with_points_per_criterion(tmp_path):
-    write_summary(a_class(), tmp_path / "summary.csv")
-    table_rows = rows((tmp_path / "summary.csv").read_bytes().decode("utf-8"))
+def test_a_row_per_student_with_points_per_criterion():
+    table_rows = rows(summary_text(a_class()))
     assert [row["student_id"] for row in table_rows] == ["s01", "s02", "s03", "s04"]
     assert (
         table_rows[0] | {"v_A": "5", "v_B": "2.5", "score": "7.5", "mistakes": "sense_reversed@v_B"}

@@ -10,7 +10,7 @@ import pytest
 from grader.folder.batch import Batch, grade
 from grader.rubric import rubric_of
 from grader.tables.class_file import read_class_file
-from grader.tables.decisions import DecisionFile
+from grader.tables.decisions import read_table
 from grader.tables.roster import read_roster
 from reference.authored.assignment import load_assignment
 from reference.errors import PlanmarkError
@@ -19,7 +19,7 @@ from tests.inline import Inline
 READ = {
     "roster.csv": read_roster,
     "planmark.toml": lambda path: read_class_file(path, ()),
-    "decisions.csv": lambda path: DecisionFile(path).table(),
+    "decisions.csv": read_table,
     "mine.assignment.toml": load_assignment,
 }
 

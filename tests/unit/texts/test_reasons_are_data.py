@@ -11,12 +11,22 @@ import pytest
 from grader.language import LANGUAGES, tongue
 from grader.records import Reason, Unread, of_error
 from grader.texts.clauses import CLAIMS, CLAUSES
+from grader.texts.failures import FAILURES
 from grader.texts.faults import FAULTS
 from grader.texts.problems import PROBLEMS
 from grader.texts.reasons import FOLLOWS, FULL, HINTS, reason_sentence
 from grader.texts.refusals import REFUSALS
-from grader.texts.spoken import ENGLISH, clause, fault, message, sentence, unread_document
-from reference.errors import InputFileError
+from grader.texts.spoken import (
+    ENGLISH,
+    clause,
+    failure,
+    fault,
+    message,
+    sentence,
+    told_of,
+    unread_document,
+)
+from reference.errors import CallError, InputFileError
 
 ROOT = Path(__file__).parents[3]
 PROSE = {"message", "reason", "feedback"}
@@ -138,8 +148,28 @@ def test_every_refusal_has_its_sentence() -> None:
 
 
 @pytest.mark.parametrize("lang", [lang for lang in LANGUAGES if lang != "en"])
-def test_every_refusal_is_told_in_every_language(lang: str) -> None:
-    assert [text for text in REFUSALS.values() if tongue(lang).gettext(text) == text] == []
+def test_every_refusal_and_failure_is_told_in_every_language(lang: str) -> None:
+    texts = (*REFUSALS.values(), *FAILURES.values())
+    assert [text for text in texts if tongue(lang).gettext(text) == text] == []
+
+
+def test_every_failure_has_its_sentence_and_every_sentence_its_failure() -> None:
+    said = {one.value for _, tree in trees() for one in ast.walk(tree) if isinstance(one, ast.Constant)}
+    assert FAILURES.keys() <= said
+    for name, tree in trees():
+        for node in ast.walk(tree):
+            match node:
+                case ast.Call(func=ast.Name(id="failure"), args=[_, *args]):
+                    named = [one.value for one in ast.walk(ast.Tuple(args)) if isinstance(one, ast.Constant)]
+                    assert [*filter(None, named), "item"][-1] in FAILURES, f"{name}:{node.lineno}"
+
+
+def test_a_failure_is_told_in_the_readers_language_with_its_numbers() -> None:
+    error = failure(CallError, "maximum_differs", there=10.5, here=20)
+    assert "is 10.5, the rubric's is 20" in error.message
+    assert "acolo este 10,5, al baremului 20" in told_of(error, tongue("ro"))
+    assert "в критериях 20" in told_of(error, tongue("ru"))
+    told_of(failure(CallError, "folder_missing", folder=Path("\udcff")), tongue("ro")).encode()
 
 
 @pytest.mark.parametrize("lang", LANGUAGES)
