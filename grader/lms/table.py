@@ -15,7 +15,7 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
-from pydantic_core import from_json
+from pydantic import TypeAdapter, ValidationError
 
 from grader.documents import CriterionDocument, ReportDocument, ResultsDocument
 from grader.files import OutputError, guarded
@@ -185,9 +185,15 @@ def bytes_of(path: Path, code: str) -> bytes:
         raise failure(InputFileError, code, "unreadable", file=path, error=error.strerror) from error
 
 
+_ANY: TypeAdapter[Any] = TypeAdapter(Any)
+
+
 def parsed(data: bytes) -> Any:  # noqa: ANN401 - whatever a JSON file holds
     """A JSON file's content; ValueError for none, and for half of a surrogate pair in a text."""
-    return from_json(data.decode(json.detect_encoding(data)))
+    try:
+        return _ANY.validate_json(data.decode(json.detect_encoding(data)))
+    except ValidationError as error:
+        raise ValueError(error.errors()[0]["ctx"]["error"]) from error
 
 
 # Files changed in single cells, everything else the same to the byte ------------------------------
