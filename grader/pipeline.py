@@ -235,7 +235,7 @@ def mark(
 
 
 def _is_doubtful(reading: Reading) -> bool:
-    """Whether something that was asked for was not read surely: then what spoils the picture is told."""
+    """Return whether something asked for was not read surely: then what spoils the picture is told."""
     vectors = [vector for figure in reading.figures.values() for vector in figure.vectors.values()]
     return not vectors or bool(reading.unread) or any(one.confidence < _SURELY for one in vectors)
 

@@ -22,14 +22,6 @@ CLEAR_END_MM, HIDDEN_END_MM = 0.2, 1.0
 concerns strokes that extend past nodes, which is modelled separately."""
 HIDDEN = 1.8
 """Ends stated to be this many times worse than the sheet's good ones are hidden."""
-LONG_MM = 12.0
-"""Longer strokes show how much ink the pen leaves: they are not letters."""
-ENOUGH = 6
-"""With fewer long strokes no stroke is called thin."""
-THIN = 0.62
-"""Share of the usual ink per length below which a stroke is a construction line."""
-MOST_PIECES = 5
-"""A chain of more pieces is a dashed line, which is no vector."""
 JOINABLE_MM = 4.0
 """Shorter pieces have no direction that is good enough to extend them."""
 JOIN_OFFSET_MM = 0.45
@@ -62,9 +54,7 @@ class Lines:
     length : mm
     se_offset, se_angle : standard errors across (mm) and of direction (rad)
     se_end : (n, 2) standard errors along, of start and end (mm)
-    darkness, width : means over the stroke
-    thin : much thinner or fainter than the long strokes of its sheet
-    members : (n, k) the strokes it is made of, by their number, repeated to fill the row
+    members : (n, 2) the strokes it is made of, by their number: two different ones if it is joined
     tip_along, tip_kind, tip_sure : (n, t) ends of vectors visible along it, as in `records.Tips`, measured
         from `start`; a probability of 0 fills the row
     """
@@ -76,9 +66,6 @@ class Lines:
     se_offset: FloatArray
     se_angle: FloatArray
     se_end: FloatArray
-    darkness: FloatArray
-    width: FloatArray
-    thin: BoolArray
     members: IntArray
     tip_along: FloatArray
     tip_kind: IntArray
@@ -137,10 +124,7 @@ def lines_of(ink: Ink) -> Lines:
         se_offset=np.maximum(strokes.se_offset[number], SE_OFFSET_MM),
         se_angle=np.maximum(strokes.se_angle[number], SE_OFFSET_MM / length),
         se_end=_end_errors(strokes.se_end)[number],
-        darkness=strokes.darkness[number],
-        width=strokes.width[number],
-        thin=_thin(strokes.width[number] * strokes.darkness[number], length),
-        members=np.repeat(number[:, None], MOST_PIECES, axis=1),
+        members=np.repeat(number[:, None], 2, axis=1),
         tip_along=tip_along,
         tip_kind=tip_kind,
         tip_sure=tip_sure,
@@ -166,24 +150,15 @@ def _end_errors(stated: FloatArray) -> FloatArray:
     return np.where(stated > HIDDEN * good, HIDDEN_END_MM, CLEAR_END_MM)
 
 
-def _thin(ink: FloatArray, length: FloatArray) -> BoolArray:
-    """Return which strokes have much less ink per length than the heavier long ones."""
-    long = length > LONG_MM
-    if np.count_nonzero(long) < ENOUGH:
-        return np.zeros(len(ink), dtype=bool)
-    return np.asarray(ink < THIN * np.quantile(ink[long], 0.7))
-
-
 # Strokes in pieces --------------------------------------------------------------------------------
 
 
 def _with_joined(single: Lines) -> Lines:
-    """Add the strokes that pieces on one line make: every two, and every longest chain of more."""
-    chains = _pairs_in_line(single).tolist()
-    chains.extend(_longest_chains(chains))
-    if not chains:
+    """Add the strokes that two pieces on one line make."""
+    pieces = _pairs_in_line(single)
+    if not len(pieces):
         return single
-    joined = _joined(single, chains)
+    joined = _joined(single, pieces)
     return Lines(*(_stacked(getattr(single, name), getattr(joined, name)) for name in Lines.__slots__))
 
 
@@ -195,23 +170,10 @@ def _stacked(first: NDArray[Any], second: NDArray[Any]) -> NDArray[Any]:
     return np.concatenate([np.pad(rows, ((0, 0), (0, wide - rows.shape[1]))) for rows in (first, second)])
 
 
-def _longest_chains(pairs: list[list[int]]) -> list[list[int]]:
-    """Return pieces that are linked by pairs, if more than two are."""
-    group: dict[int, set[int]] = {}
-    for first, second in pairs:
-        merged = group.get(first, {first}) | group.get(second, {second})
-        for piece in merged:
-            group[piece] = merged
-    longest = {tuple(sorted(pieces)) for pieces in group.values() if 2 < len(pieces) <= MOST_PIECES}
-    return [list(pieces) for pieces in sorted(longest)]
-
-
-def _joined(single: Lines, chains: list[list[int]]) -> Lines:
-    """Return for each chain of pieces one stroke from the one far end to the other."""
-    pieces = np.array([np.resize(chain, MOST_PIECES) for chain in chains])
-    repeated = np.arange(MOST_PIECES) >= np.array([len(chain) for chain in chains])[:, None]
+def _joined(single: Lines, pieces: IntArray) -> Lines:
+    """Return for each two pieces (p, 2) one stroke from the one far end to the other."""
     rows = np.arange(len(pieces))
-    along = single.along[pieces[rows, single.length[pieces].argmax(axis=1)]]
+    along = single.along[pieces[:, 0]]
     ends = np.concatenate([single.start[pieces], single.end[pieces]], axis=1)
     errors = np.concatenate([single.se_end[pieces, 0], single.se_end[pieces, 1]], axis=1)
     place = (ends * np.conj(along)[:, None]).real
@@ -219,7 +181,7 @@ def _joined(single: Lines, chains: list[list[int]]) -> Lines:
     start, end = ends[rows, low], ends[rows, high]
     length = np.abs(end - start)
     offset = single.se_offset[pieces].max(axis=1)
-    tip_along, tip_kind, tip_sure = _joined_tips(single, pieces, repeated, start, along)
+    tip_along, tip_kind, tip_sure = _joined_tips(single, pieces, start, along)
     return Lines(
         start=start,
         end=end,
@@ -228,9 +190,6 @@ def _joined(single: Lines, chains: list[list[int]]) -> Lines:
         se_offset=offset,
         se_angle=(SE_OFFSET_MM + offset) / length,
         se_end=np.column_stack([errors[rows, low], errors[rows, high]]),
-        darkness=single.darkness[pieces].min(axis=1),
-        width=single.width[pieces].min(axis=1),
-        thin=single.thin[pieces].any(axis=1),
         members=single.members[pieces, 0],
         tip_along=tip_along,
         tip_kind=tip_kind,
@@ -239,15 +198,14 @@ def _joined(single: Lines, chains: list[list[int]]) -> Lines:
 
 
 def _joined_tips(
-    single: Lines, pieces: IntArray, repeated: BoolArray, start: ComplexArray, along: ComplexArray
+    single: Lines, pieces: IntArray, start: ComplexArray, along: ComplexArray
 ) -> tuple[FloatArray, IntArray, FloatArray]:
-    """Return `tip_along`, `tip_kind` and `tip_sure` of joined strokes: the tips of all their pieces."""
+    """Return `tip_along`, `tip_kind` and `tip_sure` of joined strokes: the tips of both their pieces."""
     at = single.start[pieces, None] + single.tip_along[pieces] * single.along[pieces, None]
     places = ((at - start[:, None, None]) * np.conj(along)[:, None, None]).real
     same_way = (single.along[pieces] * np.conj(along)[:, None]).real > 0
     kinds = np.where(same_way[:, :, None], single.tip_kind[pieces], single.tip_kind[pieces] ^ 1)
-    sure = np.where(repeated[:, :, None], 0.0, single.tip_sure[pieces])
-    sure = sure.reshape(len(pieces), -1)
+    sure = single.tip_sure[pieces].reshape(len(pieces), -1)
     # Rows no wider than the fullest one.
     most = int(np.count_nonzero(sure, axis=1).max(initial=0))
     known = np.argsort(sure <= 0.0, axis=1, kind="stable")[:, :most]
@@ -256,7 +214,7 @@ def _joined_tips(
 
 
 def _pairs_in_line(single: Lines) -> IntArray:
-    """Return (p, 2) strokes that continue one another, the one that determines the line first."""
+    """Return (p, 2) strokes that continue one another, the longer one, which determines the line, first."""
     long = np.flatnonzero(single.length >= JOINABLE_MM)
     pairs = [np.zeros((0, 2), dtype=np.int64)]
     for start in range(0, len(long), PART):

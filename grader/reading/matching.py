@@ -250,18 +250,12 @@ FIRST_GATE = 60.0
 """The same before any stroke is assigned: strokes of other edges change the expectation."""
 TURN_SINE, FIRST_TURN_SINE = 0.7, 0.85
 """Sine of the angle to the edge at which a stroke is not the edge, later and at first."""
-PENALTY_OF_THIN = 2.0
-"""Nats against a line drawn thinner than vectors are: it is more likely a construction line."""
 INVISIBLE_MM = 0.8
 """A shorter edge is a dot under its nodes."""
 COST_OF_SHARING = 0.3
 """Nats for an edge on a stroke that serves another: two vectors in line are not rare."""
 COST_OF_BARENESS = 1e3
 """Nats for leaving an edge without the stroke that is fixed to it: more than any evidence."""
-RUN_ON_EXPLAINED = 3.0
-"""Nats given back if a second edge explains why a stroke extends past the first."""
-LITTLE_COMMON = 0.4
-"""Share of an edge that may lie on ink its stroke already serves, if it explains the rest."""
 BAND_MM = 0.3
 """Distance of a line from the middle of a band of ink, if two lines lie in it."""
 SHARED_RADIUS2_MM2 = 1.0
@@ -482,11 +476,8 @@ def _strokes_taken(states: _States, edge: int, problem: _AssignmentProblem) -> _
     gains, ended, covers = ends_at(spans, lines, problem.prior)
     shared = np.asarray(_in_use(states, problem.lines)[state[:, None], lines.members].any(axis=1))
     alone = -0.5 * (distance + log_det)[state, place] - np.log(2 * np.pi) + np.log(size) + gains
-    alone -= chance[state] + PENALTY_OF_THIN * lines.thin
+    alone -= chance[state]
     both = _log_of_sharing(residual[:, state, place], spread[:, state, place])
-    for choice in np.flatnonzero(shared & covers):
-        explains = _explains_run_on(states, state[choice], edge, rows[place[choice]], problem)
-        both[choice] += RUN_ON_EXPLAINED * explains
     score = states.score[state] + np.where(shared, both, alone)
     return _Choices(state, rows[place], shared, ended & ~shared[:, None], score).take(covers)
 
@@ -504,19 +495,6 @@ def _in_use(states: _States, lines: Lines) -> BoolArray:
     state, edge = np.nonzero(states.stroke >= 0)
     used[state[:, None], lines.members[states.stroke[state, edge]]] = True
     return used
-
-
-def _explains_run_on(states: _States, state: int, edge: int, row: int, problem: _AssignmentProblem) -> bool:
-    """Return whether the edge lies where a stroke extends past the edges assigned to it."""
-    place = (states.beliefs.at[state] * np.conj(problem.lines.along[row])).real.tolist()
-    stroke, pieces = states.stroke[state].tolist(), set(problem.lines.members[row].tolist())
-    low, high = sorted((place[problem.edges[edge].tail], place[problem.edges[edge].head]))
-    for other, taken in zip(problem.edges, stroke, strict=True):
-        if taken >= 0 and pieces & set(problem.lines.members[taken].tolist()):
-            first, last = sorted((place[other.tail], place[other.head]))
-            if min(high, last) - max(low, first) > LITTLE_COMMON * (high - low):
-                return False
-    return True
 
 
 def _log_chance(spans: Spans, lines: Lines) -> FloatArray:

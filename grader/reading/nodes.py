@@ -1,19 +1,15 @@
 """Nodes fitted to the strokes assigned to them, with standard errors and confidence."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from grader.reading.expected import xy
 from grader.reading.lines import TIP_MM, BoolArray, Lines
 from grader.reading.matching import StrokeAssignment
 from grader.records import FloatArray, IntArray
 from reference.geometry import ComplexArray
-
-Float32Array = NDArray[np.float32]
 
 ROUNDS = 6
 """Rounds of the fit, each with half a step of the ends' moments."""
@@ -25,8 +21,6 @@ REDRAW_WEIGHT = 4.0
 """The usual redraw error counts as much as this many spare observations."""
 SHARED_MM = 0.5
 """Standard error of a stroke that serves two edges, as a distance from their nodes."""
-WIDE_MM = 0.7
-"""An end's density wider than this has several maxima, with its mean between them."""
 AT_MM = 0.2
 """Standard error of an end at its node, in addition to the error of the end in the ink."""
 HIDDEN_MM = 0.5
@@ -52,20 +46,19 @@ SPREAD = 0.7
 0.8 to 0.95 of their standard errors on sheets drawn by two simulations."""
 LOOSE_MM = 6.0
 """Standard error of the prior, which is needed only for nodes without strokes."""
-GRID = np.linspace(-4.0, 4.0, 241)
-"""Places of an end, in standard errors about its mean, at which its density is taken."""
-NORMAL = np.exp(-0.5 * GRID**2).astype(np.float32)
+UNSEEN = 1e-9
+"""Density per mm that is left to other places, however well an end is seen."""
 
 
 @dataclass(frozen=True, slots=True)
 class EndDensity:
-    """The density of strokes' ends near their nodes: at it, a little or far beyond, or short of it.
+    """The density of a node near a stroke's end: a mixture of four Gaussians.
 
     Attributes
     ----------
     at_mm : standard error of an end at its node
     shares : of ends at the node, a little beyond, far beyond, and short of it
-    reach_mm : mean lengths of the last three
+    reach_mm : mean distances of the last three, and their standard deviations
     merged_shares, merged_reach_mm : the same two if other ink hides the end
     """
 
@@ -75,32 +68,22 @@ class EndDensity:
     merged_shares: tuple[float, float, float, float] = (0.35, 0.25, 0.2, 0.2)
     merged_reach_mm: tuple[float, float, float] = (1.0, 4.0, 2.5)
 
-    def at(self, gap: Float32Array, se_end: FloatArray) -> Float32Array:
-        """Per mm, of ends `gap` mm beyond their nodes; `se_end` is the end's own standard error."""
-        hidden = se_end > HIDDEN_MM
-        shares = np.where(hidden, _columns(self.merged_shares), _columns(self.shares)).astype(gap.dtype)
-        reach = np.where(hidden, _columns(self.merged_reach_mm), _columns(self.reach_mm))
-        little, far, short = reach.astype(gap.dtype)
-        sigma = np.hypot(self.at_mm, se_end).astype(gap.dtype)
-        at = np.exp(-0.5 * (gap / sigma) ** 2) / (sigma * math.sqrt(2.0 * math.pi))
-        beyond = 1.0 / (1.0 + np.exp(-np.clip(1.7 * gap / sigma, -60.0, 60.0)))
-        over, under = np.maximum(gap, 0.0), np.minimum(gap, 0.0)
-        return np.asarray(
-            shares[0] * at
-            + shares[1] * beyond * np.exp(-over / little) / little
-            + shares[2] * beyond * np.exp(-over / far) / far
-            + shares[3] * (1.0 - beyond) * np.exp(under / short) / short
-        )
+    def before(self, se_end: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return means, mm from the ends inward, variances and shares of the four (r, 4).
+
+        Arguments: `se_end` (r,) are the ends' own standard errors.
+        """
+        hidden = (se_end > HIDDEN_MM)[:, None]
+        little, far, short = np.where(hidden, self.merged_reach_mm, self.reach_mm).T
+        mean = np.column_stack([np.zeros_like(little), little, far, -short])
+        variance = mean**2 + (self.at_mm**2 + se_end**2)[:, None]
+        return mean, variance, np.where(hidden, self.merged_shares, self.shares)
 
 
 PLAN_ENDS = EndDensity()
 """For a plan's vectors, whose strokes end at their nodes or extend past them."""
 LINK_ENDS = EndDensity(1.5, (0.7, 0.1, 0.1, 0.1), (2.0, 6.0, 3.0), (0.7, 0.1, 0.1, 0.1), (2.0, 6.0, 3.0))
 """For a sketch's links, which stop at joint circles, short of the joint by the circle's radius."""
-
-
-def _columns(values: tuple[float, ...]) -> FloatArray:
-    return np.array(values)[:, None, None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,17 +131,16 @@ class _LineRows:
 
 @dataclass(frozen=True, slots=True)
 class _EndRows:
-    """Observations (r,) that a stroke ends near a node: along its outward direction, `design`, at `end`.
+    """Observations (r,) of a node along a stroke's outward direction, `design`.
 
-    `end` is nan if the stroke extends beyond reach. `tip` and `sure` (r, t): possible ends of the vector
-    itself, by an arrowhead or another mark of the node.
+    Its position has one of some Gaussians (r, c), by the stroke's end and by marks of the vector's own end:
+    their means, variances and shares. What the shares lack of 1 is for a stroke that extends beyond reach.
     """
 
     design: FloatArray
-    end: FloatArray
-    se: FloatArray
-    tip: FloatArray
-    sure: FloatArray
+    mean: FloatArray
+    variance: FloatArray
+    share: FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,10 +167,10 @@ def fit_nodes(
     """
     expected = assignment.expected
     taken = _taken(assignment, lines)
-    rows, ends = _line_rows(assignment, taken, centres or {}), _end_rows(taken, expected.at)
+    rows, ends = _line_rows(assignment, taken, centres or {}), _end_rows(taken, expected.at, density)
     prior = np.eye(2 * len(expected.at)) / LOOSE_MM**2
     redraw = USUAL_REDRAW_MM
-    sites = _Sites(np.zeros(len(ends.end)), np.zeros(len(ends.end)))
+    sites = _Sites(*np.zeros((2, len(ends.design))))
     state = xy(expected.at)
     for _ in range(ROUNDS):
         sigma = np.sqrt(rows.sigma**2 + np.where(rows.own, redraw**2, 0.0))
@@ -200,21 +182,21 @@ def fit_nodes(
         cov = np.asarray(np.linalg.inv(normal), dtype=np.float64)
         state = cov @ right
         redraw = _redraw((rows.goal - rows.design @ state)[rows.own], len(state))
-        used, sites = sites, _renewed(sites, ends, state, cov, density)
-    repeated = ends.design.T @ (ends.design * (used.precision * _repeated(ends))[:, None])
+        used, sites = sites, _renewed(sites, ends, state, cov)
+    repeated = ends.design.T @ (ends.design * (used.precision * _repeated(ends.design))[:, None])
     at = state[0::2] + 1j * state[1::2]
     residual_mm = np.full((len(assignment.stroke), 2), np.nan)
     residual_mm[taken.edge] = taken.from_middle(at).imag
     return NodeFit(at, SPREAD**2 * np.linalg.inv(normal - repeated), residual_mm)
 
 
-def _repeated(ends: _EndRows) -> FloatArray:
+def _repeated(design: FloatArray) -> FloatArray:
     """Return the share of each end's evidence that other ends of its bundle already give.
 
     Strokes that reach a node side by side merge their ink, and end wrongly together: for the covariance all
     their ends count as one.
     """
-    bundled = ends.design @ ends.design.T > BUNDLE_COSINE
+    bundled = design @ design.T > BUNDLE_COSINE
     return np.asarray(1.0 - 1.0 / np.maximum(bundled.sum(axis=1), 1))
 
 
@@ -230,43 +212,24 @@ def _redraw(residual_mm: FloatArray, unknowns: int) -> float:
 # Ends of strokes ----------------------------------------------------------------------------------
 
 
-def _renewed(
-    sites: _Sites, ends: _EndRows, state: FloatArray, cov: FloatArray, density: EndDensity
-) -> _Sites:
+def _renewed(sites: _Sites, ends: _EndRows, state: FloatArray, cov: FloatArray) -> _Sites:
     """Return half a step towards the moments of each end's own density given everything else."""
-    if not len(ends.end):
-        return sites
     mean = ends.design @ state
     variance = np.maximum(np.einsum("ij,jk,ik->i", ends.design, cov, ends.design), 1e-6)
     rest = np.maximum(1.0 / variance - sites.precision, 1.0 / LOOSE_MM**2)
     rest_mean = (mean / variance - sites.pull) / rest
-    # Distances from the mean are short enough for single precision, in which this takes half the time.
-    place = (GRID / np.sqrt(rest)[:, None]).astype(np.float32)
-    weight = NORMAL * _likelihood(ends, rest_mean, place, density)
-    weight /= weight.sum(axis=1, keepdims=True)
-    off = (weight * place).sum(axis=1)
-    spread = np.sqrt((weight * (place - off[:, None]) ** 2).sum(axis=1))
-    likeliest = place[np.arange(len(place)), weight.argmax(axis=1)]
-    off = np.where(spread > WIDE_MM, likeliest, off)
-    variance = np.maximum((weight * (place - off[:, None]) ** 2).sum(axis=1).astype(np.float64), 1e-4)
+    off, spread = ends.mean - rest_mean[:, None], ends.variance + 1.0 / rest[:, None]
+    weight = ends.share * np.exp(-0.5 * off**2 / spread) / np.sqrt(2.0 * np.pi * spread)
+    elsewhere = THROUGH * np.maximum(1.0 - ends.share.sum(axis=1), 0.0) + UNSEEN
+    weight /= (weight.sum(axis=1) + elsewhere)[:, None]
+    # Each Gaussian moves the rest's mean by its gain times the distance, and takes as much of its variance.
+    gain = 1.0 / (rest[:, None] * spread)
+    moved = (weight * gain * off).sum(axis=1)
+    variance = 1.0 / rest - moved**2 + (weight * gain**2 * (off**2 - spread)).sum(axis=1)
+    variance = np.maximum(variance, 1e-4)
     fresh = np.maximum(1.0 / variance - rest, 0.0)
-    fresh_pull = np.where(fresh > 0.0, (rest_mean + off) / variance - rest_mean * rest, 0.0)
+    fresh_pull = np.where(fresh > 0.0, (rest_mean + moved) / variance - rest_mean * rest, 0.0)
     return _Sites(0.5 * (sites.precision + fresh), 0.5 * (sites.pull + fresh_pull))
-
-
-def _likelihood(ends: _EndRows, mean: FloatArray, place: Float32Array, density: EndDensity) -> Float32Array:
-    """(r, n) per mm: how likely the ink along each stroke is for nodes at `place` (r, n) from `mean` (r,)."""
-    known = np.isfinite(ends.end)
-    gap = (ends.end - mean)[known].astype(np.float32)[:, None] - place[known]
-    inked = np.full_like(place, THROUGH)
-    inked[known] = density.at(gap, ends.se[known, None])
-    inked *= (1.0 - ends.sure.sum(axis=1)).astype(np.float32)[:, None]
-    for tip, sure in zip((ends.tip - mean[:, None]).T, ends.sure.T, strict=True):
-        row = np.flatnonzero(sure)
-        off = (tip[row].astype(np.float32)[:, None] - place[row]) / np.float32(TIP_MM)
-        share = (sure[row] / (TIP_MM * math.sqrt(2.0 * math.pi))).astype(np.float32)[:, None]
-        inked[row] += share * np.exp(np.float32(-0.5) * off * off)
-    return inked
 
 
 # Observations -------------------------------------------------------------------------------------
@@ -317,7 +280,7 @@ def _both_axes(nodes: IntArray, count: int) -> FloatArray:
     return _design(np.repeat(nodes, 2), np.tile([1.0 + 0j, 1j], len(nodes)), count)
 
 
-def _end_rows(taken: _Taken, at: ComplexArray) -> _EndRows:
+def _end_rows(taken: _Taken, at: ComplexArray, density: EndDensity) -> _EndRows:
     """Return rows for ends of strokes that serve one edge, and tips on any stroke, within reach of a node."""
     lines, rows, slots = taken.lines, np.arange(len(taken.edge)), []
     for slot in (0, 1):
@@ -326,23 +289,20 @@ def _end_rows(taken: _Taken, at: ComplexArray) -> _EndRows:
         outward = np.where(forward, lines.along, -lines.along)
         ends = np.stack([lines.start, lines.end])
         nearer = np.abs(ends - node).argmin(axis=0)
-        end = ends[nearer, rows]
+        end, place = ((points * np.conj(outward)).real for points in (ends[nearer, rows], node))
         along, sure = lines.tips_towards(rows, forward)
         tip = ((lines.start[:, None] + along * lines.along[:, None]) * np.conj(outward)[:, None]).real
-        sure = np.where(np.abs(tip - (node * np.conj(outward)).real[:, None]) < TIP_REACH_MM, sure, 0.0)
+        sure = np.where(np.abs(tip - place[:, None]) < TIP_REACH_MM, sure, 0.0)
         sure = sure * np.minimum(1.0, SUREST / np.maximum(sure.sum(axis=1), 1e-9))[:, None]
-        here = (np.abs(((end - node) * np.conj(outward)).real) < END_REACH_MM) & ~taken.shared
+        here = (np.abs(end - place) < END_REACH_MM) & ~taken.shared
+        before, variance, share = density.before(lines.se_end[rows, nearer])
+        unmarked = here * (1.0 - sure.sum(axis=1))
         slots.append((
             _design(taken.nodes[:, slot], outward, len(at)),
-            np.where(here, (end * np.conj(outward)).real, np.nan),
-            lines.se_end[rows, nearer],
-            tip,
-            sure,
+            np.column_stack([end[:, None] - before, tip]),
+            np.column_stack([variance, np.full(tip.shape, TIP_MM**2)]),
+            np.column_stack([share * unmarked[:, None], sure]),
         ))  # fmt: skip
     every = _EndRows(*(np.concatenate(parts) for parts in zip(*slots, strict=True)))
-    near = np.flatnonzero(np.isfinite(every.end) | every.sure.any(axis=1))
-    # Columns of tips without evidence are left out.
-    most = int(np.count_nonzero(every.sure[near], axis=1).max(initial=0))
-    first = np.argsort(-every.sure[near], axis=1, kind="stable")[:, :most]
-    tip, sure = (np.take_along_axis(values[near], first, axis=1) for values in (every.tip, every.sure))
-    return _EndRows(every.design[near], every.end[near], every.se[near], tip, sure)
+    near = every.share.any(axis=1)
+    return _EndRows(every.design[near], every.mean[near], every.variance[near], every.share[near])

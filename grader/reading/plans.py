@@ -1,7 +1,7 @@
 """Read a velocity or acceleration plan by comparing each hypothesis of how it was drawn with the strokes."""
 
 import math
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
@@ -10,7 +10,6 @@ import numpy as np
 from grader.reading.by_ink import Look, held_against_ink
 from grader.reading.expected import (
     LEFT_OUT,
-    REGULAR,
     DraftingErrors,
     Expected,
     PlanHypothesis,
@@ -70,8 +69,6 @@ SAME_SIZE = 0.06
 """Tolerance of a size's logarithm: a drawn crank and a ruler agree no better."""
 POOR = 0.7
 """A plan supported over less of its length may be another one, drawn with a mistake."""
-CLEARLY = 0.08
-"""Share of the length by which a mistaken plan must be better supported to be placed elsewhere."""
 BEAM_OF_MISTAKES = 4
 """Beam of the search if all vectors that the mistake does not affect are fixed."""
 SMALLEST_MM, LARGEST_MM = 20.0, 280.0
@@ -89,8 +86,6 @@ WORSE = 0.3
 """Poses supported by this much less of the plan's length are not examined."""
 LEAST_VISIBLE_MM = 2.5
 """A shorter vector may have no stroke of its own."""
-LONG_MM = 8.0
-"""A vector that is too long to be overlooked."""
 RIVALS = 25
 """Number of explanations used for the confidences; the others weigh next to nothing."""
 BEAM_OF_DOUBTS = 3
@@ -216,10 +211,7 @@ def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) 
     everything = list(plans)
     if plans:
         bases = {plan.hypothesis.label: plan.hypothesis for plan in reversed(plans)}
-        everything.extend(_with_mistakes(problem, plans[0], list(bases.values())))
-        best = max(everything, key=lambda plan: plan.score)
-        if best.hypothesis.label not in REGULAR and _leaves_long_ones(best):
-            everything.extend(_with_mistakes(problem, best, [best.hypothesis]))
+        everything.extend(_with_mistakes(problem, plans[0], bases.values()))
     if not plans or plans[0].pose.score < EXPLAINED or _suspects(plans[0]):
         for base in regular(drawing, problem.figure):
             everything.extend(_by_letters(problem, base))
@@ -264,47 +256,25 @@ def _poses(expected: Expected, lines: Lines) -> list[Pose]:
     return [pose for pose in laid if pose.score > best - WORSE]
 
 
-def _better_poses(expected: Expected, lines: Lines, than: Pose) -> list[Pose]:
-    """Return poses at which a mistaken plan has clearly more support by strokes than the regular one."""
-    search = Search(turns_rad=tuple({0.0, than.turn_rad}), sizes=tuple({1.0, than.size}))
-    laid = poses(expected, lines.take(lines.length > LEAST_LAID_MM), search, count=2)
-    return [pose for pose in laid if pose.score > than.score + CLEARLY]
-
-
 # Mistakes and doubts ------------------------------------------------------------------------------
 
 
-def _leaves_long_ones(plan: PlanReading) -> bool:
-    """Return whether a vector too long to be overlooked has no stroke."""
-    expected = plan.assignment.expected
-    return any(
-        row < 0 and expected.length_mm(edge) > LONG_MM
-        for edge, row in zip(expected.edges, plan.assignment.stroke, strict=True)
-    )
-
-
 def _with_mistakes(
-    problem: PlanProblem, best: PlanReading, bases: Sequence[PlanHypothesis]
+    problem: PlanProblem, best: PlanReading, bases: Iterable[PlanHypothesis]
 ) -> list[PlanReading]:
-    """Return the plan with a mistake, in the best one's position; elsewhere too if that is poor."""
-    poor = best.pose.score < POOR and best.hypothesis.label in REGULAR
-    suspect = None if poor else _suspects(best)
+    """Return the plan with a mistake, in the best one's position."""
+    suspect = None if best.pose.score < POOR else _suspects(best)
     # The strokes give the plan's pole more exactly than the pose does.
     here = replace(best.pose, at=complex(best.assignment.expected.at[0]))
-    in_place: list[_PlanCase] = []
-    elsewhere: list[_PlanCase] = []
+    cases: list[_PlanCase] = []
     for hypothesis, mistake in (pair for base in bases for pair in mistaken(base, problem.figure)):
         if suspect is not None and mistake.at not in suspect:
             continue
         expected = problem.expected(hypothesis)
-        if expected is None:
-            continue
-        if poor:
-            laid = _better_poses(expected, problem.lines, best.pose)
-            elsewhere.extend(_PlanCase(hypothesis, expected, pose) for pose in laid)
-        touched = affected(mistake, hypothesis.drawing.construction)
-        in_place.append(_PlanCase(hypothesis, expected, here, touched))
-    return [*_read(elsewhere, problem.lines), *_read(in_place, problem.lines, best)]
+        if expected is not None:
+            touched = affected(mistake, hypothesis.drawing.construction)
+            cases.append(_PlanCase(hypothesis, expected, here, touched))
+    return _read(cases, problem.lines, best)
 
 
 def _suspects(plan: PlanReading) -> frozenset[str]:

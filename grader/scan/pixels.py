@@ -33,13 +33,13 @@ _PART = 1 << 21
 _SAMPLED_ROWS = 37
 """Every such row tells whether a page has tones."""
 _RIM = 0.06
-"""Of the long side: paper's edges on a copier's glass are broad and black."""
+"""Share of the long side: paper's edges on a copier's glass are broad and black."""
 _INKED = 200
-"""Of 255: lines that an office scanner thinned have so much of grey left."""
+"""Brightness of 255: lines that an office scanner thinned are up to this bright."""
 _BLEACHED = 253, 0.9
 """Brightness of paper that a scanner made white, and its share of a page: only then faint ink is in dots."""
 _LONELY = 3
-"""Of the nine pixels around a dot: so many are ink at most. A line that is drawn through has more."""
+"""Most inked pixels among the nine around a dot. A line that is drawn through has more."""
 _DOTTED = 0.12
 """Share of ink in such dots: copies have up to 0.06, faint ones 0.16 to 0.42, dithered pages over 0.3."""
 _TUKEY_ROUNDS = 6
@@ -70,7 +70,7 @@ def through_corners(corners: FloatArray, onto: FloatArray) -> FloatArray:
 
 
 def local_axes(homography: FloatArray, at: FloatArray, step: float = 1.0) -> tuple[FloatArray, FloatArray]:
-    """Where steps along x and along y lead from points (n, 2): two (n, 2), per unit of the step."""
+    """Return where steps along x and along y lead from points (n, 2): two (n, 2), per unit of the step."""
     origin = mapped(homography, at)
     right, down = (mapped(homography, at + step * axis) - origin for axis in np.eye(2))
     return right / step, down / step
@@ -114,7 +114,7 @@ def cut_out(
 
 
 def reached(low: FloatArray, high: FloatArray, start: tuple[float, float], gap: float) -> BoolArray:
-    """Which stretches of a line, from `low` to `high` (n,), are reached from another over gaps no wider."""
+    """Return which stretches of a line, `low` to `high` (n,), are reached from another over gaps no wider."""
     at_once = (low <= start[1] + gap) & (high >= start[0] - gap)
     if at_once.all():
         return np.asarray(at_once)
@@ -163,10 +163,6 @@ class Flat:
         dark /= np.maximum(level, np.float32(1.0))[:, None]
         np.subtract(np.float32(1.0), dark, out=dark)
         return np.clip(dark, np.float32(0.0), np.float32(1.0), out=dark)
-
-    def brightness(self, x: FloatArray, y: FloatArray) -> Float32Array:
-        """Pixels as stored, 0..255, at points (r, m) given in pixels."""
-        return sampled(self.grey, x, y)
 
     def _paper_at(self, x: FloatArray, y: FloatArray) -> Float32Array:
         """(r,) brightness of the paper at points given in pixels."""
@@ -231,13 +227,13 @@ def averaged(grey: GreyImage, side: int) -> GreyImage:
 
 
 def is_black_and_white(grey: GreyImage) -> bool:
-    """Whether a page has no tones between."""
+    """Return whether a page has no tones between black and white."""
     rows = grey[::_SAMPLED_ROWS]
     return not np.any((rows > 0) & (rows < 255))
 
 
 def is_dotted(grey: GreyImage) -> bool:
-    """Whether a page's paper was made white, by one bit or stretched contrast, and much of its ink dots."""
+    """Return whether paper was made white, by one bit or stretched contrast, and much of the ink is dots."""
     level, share = _BLEACHED
     if not is_black_and_white(grey) and np.mean(grey[::_SAMPLED_ROWS] >= level) < share:
         return False
@@ -253,7 +249,7 @@ def is_dotted(grey: GreyImage) -> bool:
 
 
 def connected(mask: GreyImage) -> tuple[NDArray[np.int32], FloatArray]:
-    """Which piece each pixel of a mask of 0 and 1 is of, 0 for none, and the pieces' boxes.
+    """Return which piece each pixel of a mask of 0 and 1 is of, 0 for none, and the pieces' boxes.
 
     Boxes are (c, 4) left, top, width, height. OpenCV's own take six times as long on a page.
     """
@@ -412,7 +408,7 @@ def _crossing(
     inward: int,
     level: Float32Array,
 ) -> FloatArray:
-    """Where rows' contrast passes `level` between `outer` (paper) and its neighbour inward (ink)."""
+    """Return where rows' contrast passes `level` between `outer` (paper) and its neighbour inward (ink)."""
     last = len(across) - 1
     beyond = (outer < 0) | (outer > last)
     outside, inside = np.clip(outer, 0, last), np.clip(outer + inward, 0, last)

@@ -15,13 +15,13 @@ _COARSE = 8
 _COLOURED = 24
 """Difference of a pixel's channels, of 255, from which it has a colour: grey scans in colour have 5 to 15."""
 _LEAST_SHARE = 3e-4
-"""Of the page's pixels: 40 mm of a pencil's stroke."""
+"""Share of the page's pixels: 40 mm of a pencil's stroke."""
 _HUES = 12
 _BLOCKS = (16, 24)
 _IN_BLOCKS, _OF_BLOCK = 0.75, (0.004, 0.5)
 """Rulings are in so many of the blocks, in each with such a share of its pixels: two lines, no tint."""
 _DARKER = 20
-"""What is darker than nearly all of the rulings by so much of 255 is drawn on them."""
+"""Pixels darker than nearly all of the rulings by this much of 255 are drawn on them."""
 _YELLOW = 0.6
 """Share of its darkness in blue that a stroke keeps: of yellow 0.9, beside a luma of 0.1. Of all pencils it
 alone is lost in luma."""
@@ -29,7 +29,7 @@ alone is lost in luma."""
 
 @dataclass(frozen=True, slots=True)
 class Colours:
-    """How the colours of a page become grey.
+    """The conversion of a page's colours to grey.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Colours:
 
 
 def colours_of(sample: GreyImage, *, rgb: bool) -> Colours:
-    """What a page's (h, w, 3) colours are of: nothing, strokes, or rulings that are all over it.
+    """Return what has colours on a page (h, w, 3): nothing, strokes, or rulings that are all over it.
 
     Arguments: `sample` is every `COLOUR_STEP`-th pixel of every such row.
     """

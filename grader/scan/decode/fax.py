@@ -47,7 +47,7 @@ _MAX_PADDING = 64
 
 @dataclass(frozen=True, slots=True)
 class Coding:
-    """How rows are coded.
+    """The coding of rows.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ def damaged_row(data: bytes, width: int, rows: int, coding: Coding) -> int | Non
 
 
 def _row_start(bits: str, at: int, coding: Coding, *, line_ends: bool) -> tuple[bool, int]:
-    """Whether the next row is one-dimensional, and where it starts."""
+    """Return whether the next row is one-dimensional, and where it starts."""
     if line_ends:
         line_end = _LINE_END.match(bits, at)
         if line_end is None:

@@ -126,7 +126,7 @@ def changed(name: str) -> InputFileError:
 
 @dataclass(frozen=True, slots=True)
 class Door:
-    """How one kind of file is read.
+    """The functions that read one kind of file.
 
     Attributes
     ----------

@@ -26,11 +26,11 @@ _DOTTED_DARK = 0.08
 _DOT_GAP_PX = 7
 """Dots of a faint copy's line are this near to each other: 1.7 mm."""
 _LONG = 0.012
-"""Of the long side (5 mm on A3): longer than dust, hairs and letters that show through."""
+"""Share of the long side (5 mm on A3): longer than dust, hairs and letters that show through."""
 _RIM = 0.03
-"""Of the long side: scanners leave shadows there."""
+"""Share of the long side: scanners leave shadows there."""
 _ENOUGH = 0.1
-"""Of the long side (42 mm): all long marks together on a page that is drawn on."""
+"""Share of the long side (42 mm): all long marks together on a page that is drawn on."""
 
 
 def pages_of(source: InputFile | Path | str) -> Iterator[Page]:

@@ -23,13 +23,13 @@ RENDER_DPI = 300.0
 _POINTS_PER_INCH = 72.0
 _END, _END_WITHIN = (b"%%EOF", b"startxref"), 1 << 16
 _PIXEL_BYTES = 4
-"""Of a picture or a page, as pdfium unpacks it."""
+"""Bytes of a pixel of a picture or a page, as pdfium unpacks it."""
 _COVERS = 0.9
 """An image over this share of the page, alone on it, is the page."""
 _SHOWN = 0.94
-"""Of an image; where the page hides more, what a viewer shows is another picture."""
+"""Share of an image; if the page hides more, a viewer shows another picture."""
 _SQUARE = 1e-3
-"""Of the image's size: by more than rounding askew, it is resampled by what renders the page."""
+"""Share of the image's size: if it is askew by more than rounding, rendering the page resamples it."""
 _OTHERWISE_SHOWN = re.compile(rb"/S?Mask\s*[\d\[]|/Decode\s*\[")
 """In a file whose pictures may be shown otherwise than stored; dictionaries of pictures are never packed."""
 _OF_LIGHT = frozenset((
@@ -38,9 +38,9 @@ _OF_LIGHT = frozenset((
 ))  # fmt: skip
 """Colour spaces whose stored values are grey or colours of light."""
 _MOST_BYTES, _SLACK = 8, 1 << 16
-"""Of a pixel, four inks of 16 bits; behind the last row, as writers may leave them."""
+"""Bytes of a pixel (four inks of 16 bits), and bytes behind the last row, as writers may leave them."""
 _CODINGS = [Coding(k, aligned) for k in (-1, 0, 1) for aligned in (False, True)]
-"""Of a fax picture, most usual first: pdfium does not tell which of them it is."""
+"""Codings of a fax picture, most usual first: pdfium does not say which of them it has."""
 
 
 def _page(file: InputFile, number: int) -> Page | None:
@@ -143,7 +143,7 @@ def _taken_out(file: InputFile, number: int, page: pypdfium2.PdfPage) -> _Taken 
 
 
 def _is_invisible(one: pypdfium2.PdfObject) -> bool:
-    """Whether it is text that optical character recognition lays over a scan."""
+    """Return whether it is text that optical character recognition lays over a scan."""
     if one.type != raw.FPDF_PAGEOBJ_TEXT:
         return False
     return bool(raw.FPDFTextObj_GetTextRenderMode(one) == raw.FPDF_TEXTRENDERMODE_INVISIBLE)

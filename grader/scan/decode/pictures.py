@@ -135,7 +135,7 @@ def from_unit(x: float, y: float, unit: int) -> Dpi | None:
 
 @dataclass(frozen=True, slots=True)
 class Tags:
-    """What a file says of its picture: its resolution, and how a viewer shows it.
+    """A file's statements about its picture: its resolution, and how a viewer shows it.
 
     `mirrored` pictures (a selfie's camera, a scan through film) are mirrored left to right first, then
     turned by `turn_deg` counter-clockwise.

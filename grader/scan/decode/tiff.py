@@ -26,10 +26,10 @@ from grader.scan.decode.pictures import from_pillow, from_unit, of_four_inks, ta
 _FAX = ("tiff_ccitt", "group3", "group4")
 _REVERSED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
 _PIXEL_BYTES = 8
-"""Of a pixel, at most, as Pillow holds it and hands it over."""
+"""Most bytes of a pixel as Pillow holds it and hands it over."""
 
 Parts = list[tuple[int, int]]
-"""Where each strip or tile begins, and its bytes."""
+"""Tags of the beginning of each strip or tile, and of its bytes."""
 
 
 def _opened(file: InputFile, number: int) -> TiffImageFile | None:
@@ -90,7 +90,7 @@ def _parts(file: InputFile, number: int, image: TiffImageFile) -> Parts:
 
 
 def _unpacked_bytes(packed: bytes) -> int:
-    """How many bytes PackBits unpacks to: it has no checksum, and libtiff passes over what is too much."""
+    """Return the bytes that PackBits unpacks to: it has no checksum, and libtiff ignores what is too much."""
     size = at = 0
     while at < len(packed):
         code = packed[at]

@@ -7,6 +7,7 @@ are read, show what is left: errors of lengths, of directions, and of places ove
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -33,7 +34,7 @@ ALL_IS_WELL = "printer and scanner are fit for grading"
 _PHOTO_MM = 0.4
 """Markers farther off a linear map than this are a camera's view, not a scanner's."""
 _NEAR_MM, _NEAR_RAD = 1.5, 0.03
-"""How far beside its segment, and how much turned, a stroke was read that is the segment's."""
+"""Largest distance of a segment's stroke beside it, and its largest turn."""
 _SHIFT_MM = 4.0
 """Ends of strokes are known less well than their lines."""
 
@@ -137,7 +138,7 @@ def _matched(known: FloatArray, strokes: FloatArray) -> list[FloatArray | None]:
 
 
 def _lies_along(segment: FloatArray, read: FloatArray) -> bool:
-    """Whether a stroke lies along a segment, not across its end."""
+    """Return whether a stroke lies along a segment, not across its end."""
     along = segment[1] - segment[0]
     drawn = read[1] - read[0]
     cross = along[0] * drawn[1] - along[1] * drawn[0]
@@ -146,7 +147,7 @@ def _lies_along(segment: FloatArray, read: FloatArray) -> bool:
 
 
 def _aside(segment: FloatArray, read: FloatArray) -> FloatArray:
-    """How far a stroke's middle lies beside its segment; where a stroke ends is known less well."""
+    """Return the offset of a stroke's middle beside its segment; the stroke's ends are known less well."""
     _, (u,) = lengths_and_directions(segment[None])
     normal = np.array([-u[1], u[0]])
     return np.asarray(((read - segment).mean(axis=0) @ normal) * normal)
@@ -175,16 +176,14 @@ def _segments(known: FloatArray, reads: list[FloatArray | None]) -> CalibrationS
     )
 
 
-def _point(kind: str, at: FloatArray, off: FloatArray) -> CalibrationPoint:
+def _point(kind: Literal["marker", "segment"], at: FloatArray, off: FloatArray) -> CalibrationPoint:
     return CalibrationPoint(
-        kind="marker" if kind == "marker" else "segment",
-        at_mm=(float(at[0]), float(at[1])),
-        off_mm=(float(off[0]), float(off[1])),
+        kind=kind, at_mm=(float(at[0]), float(at[1])), off_mm=(float(off[0]), float(off[1]))
     )
 
 
 def _advice(document: CalibrationDocument) -> list[str]:
-    """What to do, in words; a single sentence where all is well."""
+    """Return advice in words; a single sentence if all is well."""
     advice: list[str] = []
     if document.camera:
         advice.append(

@@ -30,13 +30,13 @@ _LEAST_POINTS = 16
 _ROUNDS = 12
 """Each makes the error eight times smaller at the corner of a picture with the strongest bend."""
 _BAND_ROWS = 64
-"""Whose maps fit the processor's cache together."""
+"""Number of rows whose maps fit the processor's cache together."""
 _BINS = 15
 """Pieces of a side whose median place is taken: letters and stains on it do not count."""
 _CUTS = 300
 """Places at which a side is followed."""
 _REACH_PX = 14.0
-"""How far to either side of its straight line a bent side is looked for."""
+"""Distance to either side of its straight line at which a bent side is looked for."""
 _POINT_MM = 0.06
 """A ruled line's or a cut edge's own waves."""
 _BEND_SE = 0.02
@@ -51,7 +51,7 @@ _LEAST_SIDES = 4
 
 
 def straight(points_px: FloatArray, bend: float, shape: tuple[int, int]) -> FloatArray:
-    """Where points (n, 2) would be stored without the bend; the inverse of the model, by iteration."""
+    """Return where points (n, 2) would be stored without the bend; the inverse of the model, by iteration."""
     centre, radius = _middle(shape)
     stored = (points_px - centre) / radius
     unbent = stored

@@ -23,13 +23,13 @@ _CENTRE_MM = np.array(PAGE_MM) / 2.0
 _SIZE_MM = 100.0
 """About which, and in units of which, a map is given by numbers: they are then of a usual size each."""
 _LOOSE = np.array([0.1, 0.1, 0.1, 20.0, 20.0])
-"""How far a scanner's map may be from its first guess, mm for the place: keeps what no line settles."""
+"""Standard errors of a scanner's map about its first guess, mm for the place: for what no line settles."""
 DPI_SE = 0.002
 """Relative error of a scanner's or copier's stated resolution along one axis."""
 _POINT_SE_MM = 0.02
-"""Of a corner found at 150 dpi or better; printers and paper do no better."""
+"""Standard error of a corner found at 150 dpi or better; printers and paper do no better."""
 _GAIN_SE_MM = 0.15
-"""How far ink spreads on usual printers and copiers."""
+"""Standard deviation of the spread of ink on usual printers and copiers."""
 _WORTH = 12.0
 """Fall of chi squared for each of two further parameters that makes them worth having."""
 _FREEDOMS = (4, 6, 8)
@@ -272,7 +272,7 @@ class Projection:
 
     @property
     def is_slanted(self) -> bool:
-        """Whether a perspective was needed: a camera's picture, no scanner's."""
+        """True if a perspective was needed: the picture is a camera's, not a scanner's."""
         return len(self.params) == _FREEDOMS[-1]
 
     def se_mm(self, points_mm: FloatArray) -> FloatArray:

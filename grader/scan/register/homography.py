@@ -108,9 +108,10 @@ def rotation_deg(mm_to_px: FloatArray) -> float:
 
 
 def off_turn_deg(mm_to_px: FloatArray, turn_deg: int) -> float:
-    """How far a map's upright is from the turn that the file asks for (EXIF, PDF), 0 to 180 degrees.
+    """Return the angle, 0 to 180 degrees, between a map's upright and the turn that the file asks for.
 
-    Evidence where nothing drawn tells a half turn from none: people turn what they see upside down.
+    The file's turn (EXIF, PDF) is evidence if nothing drawn tells a half turn from none: people turn what
+    they see upside down.
     """
     return abs((rotation_deg(mm_to_px) - turn_deg + 180.0) % 360.0 - 180.0)
 
@@ -126,7 +127,7 @@ def size_mm(page: Page, dpi: tuple[float, float]) -> tuple[float, float]:
 
 
 def looks_a4(page: Page) -> bool:
-    """Whether the picture is as large as A4, by its resolution or, without one, by a scanner's usual."""
+    """Return whether the picture is as large as A4, by its resolution or else by one that scanners have."""
     stated = page.dpi is not None and min(page.dpi) >= UNSET_DPI
     tried = [page.dpi] if stated and page.dpi is not None else [(dpi, dpi) for dpi in _SCANNERS_DPI]
     return any(np.all(np.abs(np.subtract(size_mm(page, dpi), _A4_MM)) < _A4_WITHIN_MM) for dpi in tried)

@@ -14,9 +14,9 @@ from grader.scan.register.lines import RIDGE, STEP, LongLine
 from reference.drawing.canvas import MM_PER_INCH
 
 _LINES_EACH_WAY = 12
-"""Of the longest lines in each direction: a title block adds a few to the four of paper and frame."""
+"""Number of the longest lines in each direction: a title block adds a few to the four of paper and frame."""
 _APART = 0.4
-"""Of the image's width or height: opposite sides of a sheet are farther apart than this."""
+"""Share of the image's width or height: opposite sides of a sheet are farther apart than this."""
 _LEAST_LENGTH = 0.4
 """Sides are at least this share of the image's width or height."""
 _SCAN_BEND_MM = 1.2
@@ -28,17 +28,17 @@ _TILT_MM = 2.0
 _UNEQUAL_SE = 0.004
 """Relative difference of a scanner's scales along its two axes."""
 _DPI_SE = 0.005
-"""Of a stated resolution, with room for copies at a slightly other scale."""
+"""Relative error of a stated resolution, with room for copies at a slightly other scale."""
 _SCANNED_WITHIN = 0.03
 """A page that is A3 by its stated resolution has that scale, or a copier's, a per cent or two beside it."""
 _WINDOW_SE = 0.02
-"""Of a resolution that was only guessed by the size of the image."""
+"""Relative error of a resolution that was only guessed by the size of the image."""
 _HOPELESS = 12.0
 """A reading with a larger penalty is no longer followed."""
 _FLAT = 1e-9
 """Least determinant of a map that can be inverted."""
 _CAMERA_SE = 0.015
-"""How far off a camera's view may be, by the lines' errors: right angle in radians, ratio of the axes."""
+"""Error of a camera's view by the lines' errors: of the right angle in radians, of the ratio of the axes."""
 _MOST_READINGS = 80
 """Readings whose sides are compared with the lines, the best first."""
 _BLOCK_MM = 200.0
@@ -127,7 +127,7 @@ def _quadrilaterals(lines: list[LongLine], shape: tuple[int, int]) -> list[tuple
 
 
 def _kind_trust(model: Outline, quad: tuple[LongLine, ...]) -> float:
-    """How well the looks of four lines fit a model: frames are drawn, edges are steps."""
+    """Return how well the kinds of four lines fit a model: frames are drawn, edges are steps."""
     kinds = [line.kind for line in quad]
     if model is not PAPER:
         return 1.0 if kinds.count(RIDGE) >= 3 else 0.0
@@ -166,7 +166,7 @@ def _both_ways(
 
 
 def _is_scan(resolution: Resolution | None, shape: tuple[int, int]) -> bool:
-    """Whether the file states a resolution by which the page is A3, and the page has the sheet's shape.
+    """Return whether the page is A3 by the resolution that its file states, and has the sheet's shape.
 
     Long lines of a drawing may be taken for a frame; the page itself says that it was scanned as it is. A
     camera's picture seldom has the shape of the sheet.
@@ -176,7 +176,7 @@ def _is_scan(resolution: Resolution | None, shape: tuple[int, int]) -> bool:
 
 
 def _is_possible(params: FloatArray, resolution: Resolution) -> bool:
-    """Whether a map has the scale of a scan of this resolution."""
+    """Return whether a map has the scale of a scan of this resolution."""
     off = params[:2] - np.log(np.array(resolution.dpi) / MM_PER_INCH)
     return bool(np.all(np.abs(off) < _SCANNED_WITHIN))
 
@@ -225,7 +225,7 @@ def _scan_misfit(params: FloatArray, resolution: Resolution | None) -> float:
 
 
 def _camera_misfit(mm_to_px: FloatArray, shape: tuple[int, int]) -> float:
-    """How unlike a photo of a flat sheet.
+    """Return how unlike a photo of a flat sheet a map is.
 
     The sheet's axes must be at right angles and equal in scale before a camera of some focal length
     (Zhang 2000, principal point at the image's middle).

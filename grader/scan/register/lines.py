@@ -14,6 +14,7 @@ from grader.scan.pixels import (
     lengths_and_directions,
     reached,
     robust_lines,
+    sampled,
     shrink,
 )
 
@@ -29,7 +30,7 @@ _LEAST_CHANGE = 6
 _NOISES = 4.0
 """A border changes by so many standard deviations of the paper's noise."""
 _NOISE_SHARE = 0.84
-"""Of normal noise this share is below one standard deviation."""
+"""Share of normal noise below one standard deviation."""
 _LEAST_PX = 12
 """Shorter borders are grain, letters and arrowheads."""
 _CROOKED_PX, _CROOKED_SHARE = 0.7, 0.002
@@ -43,11 +44,11 @@ _COLLINEAR_PX, _BENT_LINE_SHARE, _MOST_BENT_PX = 1.8, 0.003, 4.0
 _GAP_PX = 80.0
 """Letters that touch a frame, and clips on the paper's edge, leave a line out over less than this."""
 _SEED_PX = 40.0
-"""Of a chain's longest piece: dashes and letters in a row are no side of a sheet."""
+"""Least length of a chain's longest piece: dashes and letters in a row are no side of a sheet."""
 _ROUNDS = 4
 """A chain grows as its line becomes better known."""
 _LEAST_SHARE = 0.12
-"""Of the image's width or height; the title block's lines are kept too."""
+"""Least length as a share of the image's width or height; the title block's lines are kept too."""
 _STROKE_PX = (0.3, 6.5)
 """Distance of the two borders of a drawn line at the reduced resolution."""
 _SHARED = 0.6
@@ -166,7 +167,7 @@ def _noise(change: GreyImage) -> float:
 
 
 def _within_row(change: GreyImage, row: IntArray, column: IntArray) -> FloatArray:
-    """How far beside its row's middle the change is greatest, by a parabola."""
+    """Return the distance from its row's middle to where the change is greatest, by a parabola."""
     above, middle, below = (change[row + k, column].astype(np.float64) for k in (-1, 0, 1))
     return np.asarray(0.5 * (above - below) / np.minimum(above - 2.0 * middle + below, -1.0))
 
@@ -330,7 +331,7 @@ def edge_offsets(flat: Flat, line: LongLine, cuts: int, reach_px: float) -> Floa
     share = (np.arange(cuts) + 0.5) / cuts
     normal = np.array([-u[1], u[0]])
     at = line.ends[0] + share[:, None, None] * length * u + across[None, :, None] * normal
-    level = flat.brightness(at[..., 0], at[..., 1]).astype(np.float64)
+    level = sampled(flat.grey, at[..., 0], at[..., 1]).astype(np.float64)
     rise = (level[:, _OVER:] - level[:, :-_OVER]) * bright
     places = across[_OVER // 2 : -_OVER // 2]
     strong = rise.max(axis=1)

@@ -53,7 +53,7 @@ _BLUR_PX, _SHARPER = 6.0, 1.5
 
 
 def identify(page: Page, mm_to_px: FloatArray | None = None) -> Identity | None:
-    """What the page's code says; None without a code of ours, or with two that differ.
+    """Return the identity in the page's code; None without a code of ours, or with two that differ.
 
     Arguments: `mm_to_px` is the printed sheet's map, where known: its place is then searched first.
     """
@@ -118,7 +118,7 @@ _PRINTER_SE, _SCANNER_SE = 0.002, 0.002
 Markers are printed by the same printer, so that what it does to lengths shows in them only against the
 stated resolution, and there together with what the scanner does."""
 _USUAL_LENGTH_MM = 60.0
-"""Of a vector: what the map leaves unexplained is an error of lengths over this distance."""
+"""Length of a vector: what the map leaves unexplained is an error of lengths over this distance."""
 _FLAT_MM = 0.12
 """Misfit from which paper is reported as not flat; printers and flatbeds stay under 0.1."""
 _SCALE_REPORTED = 0.004
@@ -129,7 +129,7 @@ _SCALE_FAR = 1.6
 """Between A3 and A4 lies a factor of 1.41; what is farther off is a wrong resolution."""
 
 _REACH = 0.9 / MARKER_CELLS
-"""How far outward and inward to look, in sides: within the border's cell and the quiet zone."""
+"""Reach of profiles outward and inward, in sides: within the border's cell and the quiet zone."""
 _ACROSS, _SAMPLES = 37, 40
 """Places across a side at which the grey is taken, and profiles along it."""
 _ENDS = 0.12
@@ -137,11 +137,11 @@ _ENDS = 0.12
 _LEAST_CONTRAST = 30.0
 """Grey levels from a marker's black to the paper's white; less is a shadow or a smear."""
 _LEAST_SHARE = 0.5
-"""Of the places along a side at which an edge must be seen."""
+"""Share of the places along a side at which an edge must be seen."""
 _ROUNDS = 2
 """Guesses may be off by half a cell: the second time profiles run straight across the sides."""
 _NOISE_FLOOR = 0.0005
-"""Of an edge's place, in sides: 0.006 mm."""
+"""Least noise of an edge's place, in sides: 0.006 mm."""
 
 _START = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
 _ALONG = np.roll(_START, -1, axis=0) - _START
@@ -200,7 +200,7 @@ def middles(page: Page) -> tuple[FloatArray, FloatArray]:
 
 
 def _crossing(corners: FloatArray) -> FloatArray:
-    """Where the diagonals of four corners in a row meet."""
+    """Return the intersection of the diagonals of four corners in order."""
     a, b, c, d = corners
     share = np.linalg.solve(np.column_stack([c - a, b - d]), b - a)
     return np.asarray(a + share[0] * (c - a))
@@ -265,7 +265,7 @@ def _agreed(markers: _Markers) -> tuple[_Markers, Projection] | None:
 
 
 def _plausible(fit: Projection) -> bool:
-    """Whether a camera or scanner could have made this map, well enough to measure by."""
+    """Return whether a camera or scanner could have made this map, and it is good enough to measure by."""
     if fit.rms_mm > _MAX_RMS_MM or fit.se_mm(_GRID_MM).max() > _MAX_SE_MM:
         return False
     scales = _local_scales(fit.mm_to_px)
@@ -406,7 +406,7 @@ def _edges(grey: GreyImage, to_px: list[FloatArray]) -> tuple[FloatArray, BoolAr
 
 
 def _crossings(values: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """Where profiles (sides, samples, across) pass half-way from black inside to white outside."""
+    """Return where profiles (sides, samples, across) pass half-way from black inside to white outside."""
     third = _ACROSS // 3
     black = np.median(values[:, :, :third], axis=(1, 2))[:, None]
     white = np.median(values[:, :, -third:], axis=(1, 2))[:, None]

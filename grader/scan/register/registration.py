@@ -11,7 +11,15 @@ import numpy as np
 
 from grader.printed.layout import PAGE_MM
 from grader.records import FloatArray, Identity, Page, Reason, Sheet, Unread, Value
-from grader.scan.pixels import Flat, flatten, inverted, local_axes, mapped, through_corners
+from grader.scan.pixels import (
+    Flat,
+    flatten,
+    inverted,
+    is_black_and_white,
+    local_axes,
+    mapped,
+    through_corners,
+)
 from grader.scan.register import markers
 from grader.scan.register.distortion import find_lens
 from grader.scan.register.fitting import Fit, affine_of, affine_params, fit_sides
@@ -62,7 +70,7 @@ def register(
 
 
 def _why(why: str, **known: Value) -> Reason:
-    """Why a sheet cannot be placed: the code of the clause that says it, and what that names."""
+    """Return the reason why a sheet cannot be placed, by the code of its clause and the values in it."""
     return Reason("sheet_refused", {"why": why, **known})
 
 
@@ -117,11 +125,11 @@ _LEAST_PX_PER_MM = 3.0
 _USUAL_DPI = (100.0, 150.0, 200.0, 240.0, 250.0, 300.0, 400.0, 500.0, 600.0, 800.0, 1200.0)
 """Resolutions that scanners and copiers for A3 offer."""
 _DEFAULT_DPI = (72.0, 96.0)
-"""What programs write when they do not know; no evidence either way."""
+"""The value that programs write if they do not know the resolution; it is no evidence."""
 _DPI_ROUNDING = 0.5
 """PNG stores pixels a metre, TIFF fractions: 72 may come back as 72.009."""
 _WINDOW_SHAPE = 0.03
-"""Of the logarithm of the sides' ratio: windows of A3 scanners; cameras (4:3, 3:2) differ by 0.06."""
+"""Tolerance of the logarithm of the sides' ratio for A3 scanners; cameras (4:3, 3:2) differ by 0.06."""
 _SCANNED_SE = 0.008
 """Largest relative error of a scale: of a scanner 0.2 %, of a frame ruled by hand to a millimetre, thrice."""
 _EDGE_SE = 0.002
@@ -146,19 +154,17 @@ _ALL_SIDES = 4
 _COPY_SE = 0.02
 """Copiers enlarge or reduce by a per cent or two by default, to make a page fit by up to four."""
 _PITCHES_MM = np.array([1.0, 2.0, 2.5, 4.0, 5.0, 6.35, 7.0, 8.0, 10.0])
-"""Of printed squares: pads, millimetre paper, quarter inches, French and double squares."""
+"""Pitches of printed squares: pads, millimetre paper, quarter inches, French and double squares."""
 _PITCH_WITHIN = 0.03
 """Printers and copiers change sizes by a per cent or two."""
 _PITCH_SE = 0.004
-"""Of three real pads the squares were 0.1 to 0.4 per cent off."""
+"""Relative error of printed squares: those of three real pads were 0.1 to 0.4 per cent off."""
 _PITCH_AGREES = 3.0
 """Standard errors; where scale and squares are farther apart, the pad is none of these, or a copy."""
 _UNKNOWN_SE = 0.03
 """A page is about as large as this says, if it is an A3 sheet at all: to be borne out by its drawing."""
 _CUT_OFF_MM = 60.0
 """A scanner's window may be so much smaller than the sheet."""
-_SAMPLED, _WHITE = 7, 255
-"""Every seventh pixel is tested; the value of white ones."""
 _FAR_OFF_MM = 1.5
 """A side farther off after the fit was taken for the wrong line."""
 _EDGE_WITHIN_MM = 6.0
@@ -187,19 +193,21 @@ def register_plain(page: Page) -> Sheet | Unread:
     problems: list[Reason] = []
     resolution = _resolution(page, problems)
     dpi = resolution.dpi if resolution is not None and resolution.is_sure else None
-    if resolution is not None and _is_copy(page):
+    # Copiers send black and white pages: the drawing on one may be of any size.
+    copied = is_black_and_white(page.grey)
+    if resolution is not None and copied:
         resolution = replace(resolution, copied=True)
     ranked = hypotheses(lines, shape, resolution)
     if page.turn_is_sure:
         ranked = [
             reading for reading in ranked if off_turn_deg(reading.mm_to_px, page.turn_deg) < _NEAR_TURN_DEG
         ]
-    if dpi is not None and not _is_copy(page):
+    if dpi is not None and not copied:
         ranked = _as_scanned(ranked, dpi)
     if ranked:
         if dpi is None and resolution is not None and _passes_for_frame(ranked, resolution.dpi):
             return _from_resolution(page, resolution, lines, problems)
-        rival = None if dpi is not None and not _is_copy(page) else _rival_scale(ranked)
+        rival = None if dpi is not None and not copied else _rival_scale(ranked)
         best = _turned_as_stated(ranked, page.turn_deg)
         told = list(problems)
         sheet = _from_lines(page, best, lines, dpi, told)
@@ -233,7 +241,7 @@ def _as_scanned(ranked: list[Hypothesis], dpi: tuple[float, float]) -> list[Hypo
 
 
 def _passes_for_frame(ranked: list[Hypothesis], dpi: tuple[float, float]) -> bool:
-    """Whether the best reading has a resolution that no scanner has, and one about as likely has a usual one.
+    """Return whether the best reading has an unusual resolution, and one about as likely a usual one.
 
     The edges of paper that fills a scanner's window may pass for a frame.
     """
@@ -250,7 +258,7 @@ def _turned_as_stated(ranked: list[Hypothesis], turn_deg: int) -> Hypothesis:
 
 
 def _rival_scale(ranked: list[Hypothesis]) -> float | None:
-    """How far, relatively, the scale would be another one by a reading about as likely as the best.
+    """Return the relative difference of the scale by a reading about as likely as the best; None if small.
 
     A sheet's edge may pass for a frame, their sides are nearly in the same ratio; a stated resolution
     tells them apart.
@@ -301,7 +309,7 @@ def _resolution(page: Page, problems: list[Reason]) -> Resolution | None:
 
 
 def _is_cut_off(page: Page, dpi: tuple[float, float]) -> bool:
-    """Whether by a resolution a page may be A3 with its borders cut off."""
+    """Return whether by a resolution a page may be A3 with its borders cut off."""
     larger = np.subtract(size_mm(page, dpi), PAGE_MM)
     return bool(np.all((larger >= -_CUT_OFF_MM) & (larger <= _A3_SLACK_MM))) and not looks_a4(page)
 
@@ -318,7 +326,7 @@ def _from_lines(
     dpi: tuple[float, float] | None,
     problems: list[Reason],
 ) -> Sheet | Unread:
-    copied = _is_copy(page)
+    copied = is_black_and_white(page.grey)
     try:
         fit, frame = _settled(best, dpi, copied=copied), best.frame
     except np.linalg.LinAlgError:
@@ -343,16 +351,10 @@ def _from_lines(
     return _sheet(fit, frame, scale_se, problems)
 
 
-def _is_copy(page: Page) -> bool:
-    """Whether the page is black and white only, as copiers send it: its drawing may be of any size."""
-    sample = page.grey[::_SAMPLED, ::_SAMPLED]
-    return bool(np.all((sample == 0) | (sample == _WHITE)))
-
-
 def _doubt(
     best: Hypothesis, fit: Fit, block_mm: float, *, stated_a3: bool, stated_other: bool
 ) -> Reason | None:
-    """Why the lines found are not enough to know the sheet, or None.
+    """Return the reason why the lines found do not determine the sheet, or None.
 
     Arguments: whether by its stated resolution the page is A3, or something else.
     """
@@ -371,7 +373,7 @@ def _doubt(
 
 
 def _is_at_another_scale(fit: Fit, dpi: tuple[float, float], block_mm: float) -> bool:
-    """Whether a fit has another scale than a scanner's resolution without looking like a copy."""
+    """Return whether a fit has another scale than a scanner's resolution and does not look like a copy."""
     off = np.abs(affine_params(fit.mm_to_px)[:2] - np.log(np.array(dpi) / MM_PER_INCH)).max()
     return bool(off > _SCANNED_SE) and (block_mm == 0.0 or fit.chi2 > _BAD_FIT * fit.freedom)
 
@@ -444,7 +446,7 @@ def _from_resolution(
         problems.append(Reason("resolution_assumed", assumed, page.source))
     copied: dict[str, Value] = {}
     scale_se = 0.0015 if resolution.stated else _WINDOW_SE
-    if _is_copy(page):
+    if is_black_and_white(page.grey):
         scale_se = float(np.hypot(scale_se, _COPY_SE))
         copied = {"copy_percent": round(100.0 * _COPY_SE)}
     problems.append(Reason("frame_missing", copied, page.source))

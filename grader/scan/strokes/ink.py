@@ -45,7 +45,7 @@ from grader.scan.strokes.seeds import (
 from grader.scan.strokes.symbols import arcs, find_circles, led_to
 
 _DARK = 64.0
-"""Of 255, a quarter of white: paper in photos is brighter than 130, a negative's darker than 20."""
+"""Brightness of 255, a quarter of white: paper in photos has more than 130, a negative's less than 20."""
 _USUAL_BLOCK_MM = (200.0, 72.0)
 """From the paper's edges: the largest title blocks, of ISO 7200 and GOST 2.104, are 180 and 185 x 55 mm, in a
 frame up to 10 mm from the edge."""
@@ -82,7 +82,7 @@ def find_ink(page: Page, sheet: Sheet, boxes: Sequence[Box] | None = None) -> In
 
 
 def _left_out(field: Field, file: str) -> tuple[Reason, ...]:
-    """What a person must know: that an area larger than usual title blocks was left out."""
+    """Return a problem for a person if an area larger than usual title blocks was left out."""
     if field.block is None or not np.any(np.array(field.block[2:]) > _USUAL_BLOCK_MM):
         return ()
     wide, high = field.block[2:]
@@ -127,7 +127,7 @@ _SHORT_MM = 6.0
 _LONG_MM = 8.0
 """The pen's width is taken from strokes of this length and more."""
 _COVERED = 0.85
-"""Of a short stroke's length: so much inside of others is no stroke of its own."""
+"""Share of a short stroke's length: with this much inside of others it is no stroke of its own."""
 _SE_END_MM = 0.8
 _SE_MERGED_MM = 2.5
 """Ends err by this much, measured on simulated students: lines run on along their neighbours."""
@@ -206,7 +206,7 @@ def _sound(fitted: Fitted, unit: float) -> Fitted:
 
 
 def distinct(fitted: Fitted, unit: float, covered_share: float = 1.0) -> BoolArray:
-    """Which strokes, longest first, have ink of their own.
+    """Return which strokes, longest first, have ink of their own.
 
     A stroke that lies along a longer one is the same ink; a short one mostly inside others is what
     a joint, an arrowhead or a letter left over.
@@ -265,13 +265,13 @@ _MOST_LONG = 6
 _LONGEST_MM = 60.0
 """Across the largest plate."""
 _RATIO = 2.5
-"""Of the longer to the shorter of two neighbours in hatching."""
+"""Largest ratio of the lengths of two neighbours in hatching."""
 _WEIGHT_RATIO = 1.35
-"""Of the width times darkness of two neighbours: one pen, one pressure."""
+"""Largest ratio of the width times darkness of two neighbours: one pen, one pressure."""
 
 
 def hatching(strokes: Strokes) -> BoolArray:
-    """Which strokes are hatching.
+    """Return which strokes are hatching.
 
     At least five short or seven long parallel ones of like length and weight, each within 6 mm of
     the next, side by side. A plan has no such family.
@@ -343,7 +343,7 @@ _LINE_MM = 4.2
 _DIRECTIONS = 24
 """A line as wide as its softened dots stays on one of them over its whole length."""
 _AROUND = 2.0
-"""Of the mean over all directions: dots spread evenly, as in a dithered area, are no line."""
+"""Multiple of the mean over all directions: dots spread evenly, as in a dithered area, are no line."""
 _GAIN = 2.5
 """A line a third of which is left becomes as dark as one drawn through."""
 
@@ -361,7 +361,7 @@ def joined_dots(grey: GreyImage, px_per_mm: float) -> GreyImage:
 
 
 def _along_lines(dark: GreyImage) -> GreyImage:
-    """How much darker the darkest line through each place is than its surroundings.
+    """Return how much darker the darkest line through each place is than its surroundings.
 
     Arguments: `dark` is 0 (paper) to 255 (ink) at the working resolution.
     """

@@ -29,7 +29,7 @@ _TURN = 0.16
 _ROUNDS = 6
 """A line grows as it becomes better known."""
 _MOST_OFF = 1.7
-"""Of the distance allowed beside a line: so far off are pieces that lie far beyond its ends."""
+"""Multiple of the distance allowed beside a line that is allowed far beyond its ends."""
 _BLOCK = 64
 """Pieces of which it is found at once whether anything lies on their lines."""
 PROBES = 13
@@ -168,7 +168,7 @@ def _on_line(
 def _lying_on(
     apart: FloatArray, line: tuple[float | FloatArray, ...], off_px: float
 ) -> tuple[BoolArray, FloatArray, FloatArray]:
-    """Which pieces lie near a line, and from where to where along it, (n,) each.
+    """Return which pieces lie near a line, and from where to where along it, (n,) each.
 
     Arguments: `apart` (2, 2, n) of both ends from the line's start; `line` its direction and length.
     """
@@ -199,7 +199,7 @@ def _fitted(points: FloatArray, length: FloatArray) -> FloatArray:
 _FRAME_MM = 1.5
 """Inside of the frame's middle line: its pen and the registration's error."""
 _SQUARE = 0.05
-"""Of its length: how far askew a ruled line may be."""
+"""Largest skew of a ruled line, as a share of its length."""
 _PIECE_MM = 3.0
 """Shorter pieces of borders are letters'."""
 _RULED_MM = 6.0
@@ -244,7 +244,7 @@ class Field:
         return mapped(inverted(self.sheet.mm_to_px), points)
 
     def holds(self, points: FloatArray) -> BoolArray:
-        """Which points, (n, 2) mm, are in the field."""
+        """Return which points, (n, 2) mm, are in the field."""
         inside = np.zeros(len(points), dtype=bool)
         for box in self.boxes:
             inside |= _in_box(points, box)
@@ -424,7 +424,7 @@ def _spread(
 
 
 def _beside(box: FloatArray, written: BoolArray, rows: NDArray[np.intp]) -> BoolArray:
-    """Which of the pieces `rows` have at least two letters close by."""
+    """Return which of the pieces `rows` have at least two letters close by."""
     centre = (box[:, :2] + box[:, 2:] / 2.0) / PX_PER_MM
     letters = centre[written]
     result = np.zeros(len(rows), dtype=bool)

@@ -14,13 +14,13 @@ PX_PER_MM = 6.0
 _WHOLE = 0.08
 """Relative difference up to which a whole fraction of the resolution is near enough."""
 _FAINT = 20
-"""Of 255: fainter than a construction line drawn with a hard pencil is paper."""
+"""Contrast of 255: ink fainter than a construction line drawn with a hard pencil is paper."""
 _PEAK_WINDOW_PX = 7
 """Wider than a stroke with its blur, narrower than the distance of two strokes."""
 _DARK = 0.62
-"""Of the darkest strokes' contrast: construction lines are lighter."""
+"""Share of the darkest strokes' contrast: construction lines are lighter."""
 _DARK_QUANTILE = 0.85
-"""Of the ink's contrast: that of the darkest strokes."""
+"""Quantile of the ink's contrast that is the darkest strokes'."""
 _POLYGON_PX = 1.0
 """Distance of a border from the straight runs that replace it."""
 _LEAST_PX = 5.0
@@ -110,7 +110,7 @@ def _runs_of(mask: GreyImage, pen_px: float | None = None) -> _Runs:
 
 
 def dark_mask(soft: GreyImage, mask: GreyImage) -> GreyImage:
-    """What is nearly as dark as the darkest strokes of the sheet, as 1."""
+    """Return a mask of the ink that is nearly as dark as the darkest strokes of the sheet, as 1."""
     inked = soft[mask.view(bool)]
     level = _DARK * float(np.quantile(inked[::7], _DARK_QUANTILE)) if len(inked) else 255.0
     return np.asarray((soft >= level).astype(np.uint8))

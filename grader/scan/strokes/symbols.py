@@ -10,7 +10,7 @@ from grader.scan.strokes.regions import Components, Field
 from grader.scan.strokes.seeds import PX_PER_MM, Seeds
 
 _RADIUS_MM = (0.5, 4.0)
-"""Of joints and poles as people draw them."""
+"""Radii of joints and poles as people draw them."""
 _LEAST_HOLE_MM = 0.4
 """Inside a ring of the least radius, drawn with a pen."""
 _LONG_HOLE = 1.7
@@ -39,7 +39,7 @@ _DRAWN_ALONE = 0.5
 _THICK = 0.7
 """Share of the places across the ring that are inked where a stroke runs along the ray."""
 _POINTS_TO_MM = 0.35
-"""Of the radius: a line that leads to a circle passes its centre so near."""
+"""Share of the radius: a line that leads to a circle passes its centre this near."""
 _LEADS_TO_MM = 1.5
 """It ends at most so far from the ring."""
 _LEAST_LINK_MM = 4.0
@@ -50,7 +50,7 @@ _HOLLOW_AT = 0.55
 _EDGE_BYTES = 12.0
 """Rise of the contrast across a border of ink, at least."""
 _CHORD = 0.65
-"""Of the radius: least distance of a piece of the ring from the centre."""
+"""Least distance of a piece of the ring from the centre, as a share of the radius."""
 _TANGENT_MM = 0.35
 """Largest distance of a piece of the ring outside of it."""
 _CHORD_MM = 6.0
@@ -75,7 +75,7 @@ def find_circles(flat: Flat, seeds: Seeds, components: Components, field: Field)
 
 
 def led_to(circles: FloatArray, strokes: Strokes) -> BoolArray:
-    """Which circles a stroke of 4 mm or more leads to or through: joints and poles, not letters."""
+    """Return which circles a stroke of 4 mm or more leads to or through: joints and poles, not letters."""
     length, u = lengths_and_directions(strokes.ends)
     links = length >= _LEAST_LINK_MM
     result = np.zeros(len(circles), dtype=bool)
@@ -88,7 +88,7 @@ def led_to(circles: FloatArray, strokes: Strokes) -> BoolArray:
 
 
 def arcs(strokes: Strokes, circles: FloatArray) -> BoolArray:
-    """Which strokes are short chords or tangents of a circle, pieces of its ring."""
+    """Return which strokes are short chords or tangents of a circle, pieces of its ring."""
     result = np.zeros(len(strokes), dtype=bool)
     length, u = lengths_and_directions(strokes.ends)
     for x, y, radius in circles:
@@ -100,7 +100,7 @@ def arcs(strokes: Strokes, circles: FloatArray) -> BoolArray:
 
 
 def _beside(strokes: Strokes, u: FloatArray, at: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-    """How far along each stroke a point lies, and how far beside it; `u` are the strokes' directions."""
+    """Return a point's distance along each stroke, and beside it; `u` are the strokes' directions."""
     relative = np.array(at) - strokes.ends[:, 0]
     return (relative * u).sum(axis=1), np.abs(relative[:, 0] * u[:, 1] - relative[:, 1] * u[:, 0])
 

@@ -56,14 +56,6 @@ def test_pieces_beside_one_another_are_not_joined():
     assert len(lines) == 2
 
 
-def test_a_line_much_thinner_than_the_others_is_called_thin():
-    ink = ink_of([(10j * row, 30 + 10j * row) for row in range(8)])
-    width = ink.strokes.width.copy()
-    width[3] *= 0.4
-    thin = lines_of(replace(ink, strokes=replace(ink.strokes, width=width))).thin
-    assert thin.tolist() == [row == 3 for row in range(8)]
-
-
 def test_a_node_lies_where_strokes_end_together():
     fit = fitted_fan(0.0, 0.0, 0.0)
     assert abs(fit.at[0]) < PLACE_MM
@@ -203,5 +195,4 @@ def test_ends_that_reach_a_node_side_by_side_count_as_one():
         return row
 
     rows = np.array([outward(0, 10), outward(0, 14), outward(0, 18), outward(0, 100), outward(1, 10)])
-    ends = nodes._EndRows(rows, np.zeros(5), np.zeros(5), np.zeros((5, 0)), np.zeros((5, 0)))
-    assert nodes._repeated(ends) == pytest.approx([2 / 3, 2 / 3, 2 / 3, 0.0, 0.0])
+    assert nodes._repeated(rows) == pytest.approx([2 / 3, 2 / 3, 2 / 3, 0.0, 0.0])
