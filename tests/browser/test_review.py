@@ -13,7 +13,7 @@ SHEETS = 30
 
 
 def test_a_class_is_settled_by_keys_alone(open_window, server):
-    window = open_window(server)
+    window = open_window(server, student="s02")
     was_open = window.open
     assert was_open > SHEETS
     while not window.is_done:
@@ -128,7 +128,7 @@ def test_two_windows_lose_nothing_and_show_the_clash(open_window, server):
 
 
 def test_a_dragged_node_snaps_and_the_marks_follow(open_window, server):
-    window = open_window(server)
+    window = open_window(server, student="s02")
     page = window.page
     page.wait_for_selector("#view[data-loaded]")
     page.wait_for_selector("body:not([data-busy])")
@@ -162,7 +162,7 @@ def nearest_node(page, besides):
 
 
 def test_wheel_and_buttons_zoom_into_the_scan(open_window, server):
-    window = open_window(server)
+    window = open_window(server, student="s02")
     page = window.page
     page.wait_for_selector("#view[data-loaded]")
 
@@ -183,7 +183,7 @@ def test_wheel_and_buttons_zoom_into_the_scan(open_window, server):
 
 
 def test_eight_to_a_screen(open_window, server):
-    window = open_window(server)
+    window = open_window(server, student="s02")
     page = window.page
     page.click("[data-mode=eight]")
     page.wait_for_selector(".tile.now")
@@ -200,7 +200,7 @@ def test_eight_to_a_screen(open_window, server):
 
 
 def test_names_are_hidden_where_that_is_asked_for(open_window, server):
-    window = open_window(server)
+    window = open_window(server, student="s02")
     page = window.page
     assert "s02" in page.inner_text("#who")
     page.click("#settings summary")
@@ -221,7 +221,7 @@ def test_the_focus_is_seen(open_window, server, scheme):
 
 
 def test_a_page_that_is_nobodys_is_given_an_owner_and_corners(open_window, server):
-    window = open_window(server)
+    window = open_window(server, student="s02")
     page = window.page
     page.click("[data-mode=pages]")
     page.wait_for_selector("#page-view image")
@@ -254,7 +254,7 @@ def test_sure_proposals_are_listed_before_they_are_accepted(open_window, server)
                 one.model_copy(update=said) if one.id == "v_DC" else one for one in student.report.criteria
             ]
             student.report = student.report.model_copy(update={"criteria": criteria})
-    window = open_window(server)
+    window = open_window(server, student="s02")
     page = window.page
 
     def listed():
@@ -278,7 +278,7 @@ def test_sure_proposals_are_listed_before_they_are_accepted(open_window, server)
 
 
 def test_a_comment_on_the_whole_is_kept(open_window, server):
-    window = open_window(server)
+    window = open_window(server, student="s02")
     page = window.page
     page.click("#whole-student summary")
     page.fill("#remark", "drawn with care")
@@ -304,7 +304,7 @@ def places_asked(window):
 def test_a_reading_is_asked_between_strokes_and_the_verdict_follows(open_window, server):
     for one in server.session.students:
         spread_confidence(server.session, one)
-    window = open_window(server)
+    window = open_window(server, student="s02")
     places_asked(window)
     page, shown = window.page, window.shown
     assert page.locator(".place").count() == page.locator("#choices [data-key]").count() - 1
@@ -366,7 +366,7 @@ def test_buttons_stay_where_they_are(open_window, server):
 
 
 def test_keys_wait_for_the_picture(open_window, server):
-    window = open_window(server)
+    window = open_window(server, student="s02")
     page = window.page
     page.route("**/scan?*", lambda _route: None)
     page.evaluate("() => { state.fetched.clear(); showQuestion(); }")
