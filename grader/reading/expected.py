@@ -215,6 +215,11 @@ class PlanHypothesis:
     absent: Mapping[str, Reason]
     cost: float
 
+    def is_side(self, name: str) -> bool:
+        """Return whether a similar triangle's side is drawn where the vector of this name would be."""
+        reason = self.absent.get(self.drawing.construction.vectors[name].tail)
+        return reason is not None and reason not in LEFT_OUT.values()
+
 
 def regular(drawing: Drawing, figure: str) -> list[PlanHypothesis]:
     """Return the right hypotheses: by perpendiculars throughout, and with plates by similarity."""
@@ -259,12 +264,12 @@ def _by_similarity(construction: Construction, figure: str) -> tuple[Constructio
 
 
 def tied(hypothesis: PlanHypothesis) -> Construction:
-    """Start vectors from the start of a normal component that was left out."""
+    """Start vectors from the start of a component that was left out; a similar triangle's sides run so."""
     construction = hypothesis.drawing.construction
     vectors = dict(construction.vectors)
-    for node, reason in hypothesis.absent.items():
+    for node in hypothesis.absent:
         step = construction.step(node)
-        if reason not in LEFT_OUT.values() or not isinstance(step, Given):
+        if not isinstance(step, Given):
             continue
         for name, vector in vectors.items():
             if vector.tail == node:

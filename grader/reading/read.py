@@ -382,6 +382,8 @@ def _vectors(
     vectors: dict[str, ReadVector] = {}
     unread: list[Unread] = []
     for index, edge in enumerate(expected.edges):
+        if plan.hypothesis.is_side(edge.name):
+            continue
         span = complex(fit.at[edge.head] - fit.at[edge.tail])
         row = int(plan.assignment.stroke[index])
         if row < 0 and abs(span) > LEAST_VECTOR_MM:

@@ -135,6 +135,16 @@ def test_a_vector_that_is_not_drawn_is_unread_with_its_reason():
     assert "v_B" not in reasons
 
 
+def test_the_sides_of_a_similar_triangle_are_not_read_as_tangential_components():
+    assignment, variant, drawing = task("pump", Variant(n=22))
+    nodes = draw(drawing).nodes
+    sides = [(nodes[start], nodes["c'"]) for start in ("a'", "b'")]
+    left_out = frozenset({"a_CA_n", "a_CA_t", "a_CB_n", "a_CB_t"})
+    reading = read(draw(drawing, pen=Pen(left_out=left_out, extra=sides)), assignment, variant)
+    reasons = {one.name: one.reason.code for one in reading.unread}
+    assert {name: reasons.get(name) for name in left_out} == dict.fromkeys(left_out, "by_similarity")
+
+
 def test_a_line_that_leaves_a_vector_by_a_degree_is_not_its_stroke():
     ink = np.zeros((60, 480), np.uint8)
     ink[29:32, 30:390] = 255
