@@ -91,6 +91,8 @@ EXAMPLES: Mapping[str, str] = {
     "faults": "row 3: ...", "folder": "marks", "here": "10", "host": "desk", "item": "Plan",
     "option": "--item", "pid": "4711", "platform": "Canvas", "score": "7.5", "sheets": "class",
     "there": "20", "to": "moodle", "version": "3", "was": "class",
+    "extra": "web", "findings": "$.reports: ...", "found": "--groups", "port": "8000", "table_row": "3",
+    "versions": "python 3.12 / 3.11", "whole": "7", "worker": "tcp://desk:40001",
     "wide": "@90 mm", "zone_high": "@120 mm", "zone_wide": "@180 mm",
 }  # fmt: skip
 """Parameters by name: after ``@`` a number with its unit; other texts of the catalogues are translated."""

@@ -25,6 +25,12 @@ class OutputError(PlanmarkError):
     exit_status = 5
 
 
+def _unwritten(path: object, error: OSError) -> OutputError:
+    why = error.strerror or str(error)
+    message = f"{path}: cannot be written ({why}); choose another place, or make room"
+    return OutputError(CANNOT_WRITE, message, file=str(path), error=why)
+
+
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """A temporary file's path; what is written there takes the place of `path` at the end, if nothing failed.
@@ -38,10 +44,7 @@ def replacing(path: Path) -> Iterator[Path]:
         yield temporary
         temporary.replace(path)
     except OSError as error:
-        raise OutputError(
-            CANNOT_WRITE,
-            f"{path}: cannot be written ({error.strerror or error}); choose another place or make room",
-        ) from error
+        raise _unwritten(path, error) from error
     finally:
         _remove(temporary)
 
@@ -107,8 +110,7 @@ def log_to(path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         handler = logging.FileHandler(path, encoding="utf-8")
     except OSError as error:
-        why = f"{error.strerror or error}; choose another place"
-        raise OutputError(CANNOT_WRITE, f"{path}: the log cannot be written ({why})") from error
+        raise _unwritten(path, error) from error
     handler.setFormatter(_Lines("%(asctime)s %(process)d %(message)s"))
     logging.getLogger("planmark").addHandler(handler)
 
@@ -127,10 +129,7 @@ def make_folder(path: Path) -> None:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise OutputError(
-            CANNOT_WRITE,
-            f"{path}: cannot be made ({error.strerror or error}); choose another place",
-        ) from error
+        raise _unwritten(path, error) from error
 
 
 def _write_parts(path: Path, parts: Iterable[bytes | str]) -> None:
@@ -195,16 +194,13 @@ def create_whole(files: Mapping[Path, str]) -> None:
         if isinstance(error, FileExistsError):
             raise _taken(Path(str(error.filename))) from error
         if isinstance(error, OSError):
-            raise OutputError(
-                CANNOT_WRITE,
-                f"{error.filename}: cannot be written ({error.strerror or error}); choose another place",
-            ) from error
+            raise _unwritten(error.filename, error) from error
         raise
 
 
 def _taken(path: Path) -> CallError:
-    message = "is there already and is left as it is; choose another name, or remove it first"
-    return CallError("file_exists", f"{path}: {message}")
+    message = f"{path}: is there already; name another file, or remove it first"
+    return CallError("file_exists", message, cause="file_taken", file=str(path))
 
 
 class OfStudent(Protocol):

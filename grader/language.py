@@ -96,7 +96,8 @@ def tongue(lang: str) -> Tongue:
     code = lang.replace("_", "-").partition("-")[0].lower()
     if code not in LANGUAGES:
         known = ", ".join(LANGUAGES)
-        raise CallError("unknown_language", f"'{lang}' is no language of planmark; choose one of {known}")
+        message = f"'{lang}' is no language of planmark; choose one of {known}"
+        raise CallError("unknown_language", message, text=lang, names=known)
     return Tongue(code, _catalogue(code))
 
 

@@ -13,7 +13,7 @@ import unicodedata
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 MOST_FINDINGS = 20
 """Findings shown at once: a hostile file may have a million."""
@@ -29,9 +29,11 @@ class PlanmarkError(Exception):
     Attributes
     ----------
     parameters : what the message names, from which it can be told in another language; empty where it cannot
+    faults : reasons that are listed below its sentence
     """
 
     exit_status = 2
+    faults: tuple[Any, ...] = ()
 
     def __init__(self, code: str, message: str, **parameters: float | str | tuple[str, ...]) -> None:
         # A file's name may hold bytes that are no text; told as they are, no report could be written.

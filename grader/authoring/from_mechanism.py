@@ -16,6 +16,7 @@ from grader.authoring.lint import lint, names_in
 from grader.authoring.round_scales import asked_vectors
 from grader.language import LANGUAGES, N_, tongue
 from grader.rubric import RubricFile, load_rubric
+from grader.texts.spoken import failure
 from reference.authored.assignment import SUFFIXES, Assignment, load_assignment
 from reference.authored.formula import Formula
 from reference.authored.mechanism import (
@@ -97,11 +98,7 @@ def texts_for(mechanism: Path, name: str, start: Texts, table: Path | None) -> d
     file = load(MechanismFile, mechanism)
     needed = names_in(file) - {*KEYS}
     if needed and table is None:
-        raise CallError(
-            "table_needed",
-            f"{mechanism}: give the values of {', '.join(sorted(needed))} by a CSV with a row for each"
-            " student, which names them in its first line beside n (--table)",
-        )
+        raise failure(CallError, "table_needed", file=mechanism, names=tuple(sorted(needed)))
     first: dict[str, float | str] = {
         "kL": 0.001,
         "kv": f"{_first_speed(file)} / {_PLANS_MM:g}",
@@ -125,8 +122,7 @@ def texts_for(mechanism: Path, name: str, start: Texts, table: Path | None) -> d
         paths["rubric"].write_text(rubric, encoding="utf-8")
         proposed = lint(loaded, load_rubric(paths["rubric"])).scales
         if not proposed:
-            message = "no variant of it assembles: its lengths and sides do not fit"
-            raise CallError("no_variant", f"{mechanism}: {message}")
+            raise failure(CallError, "no_variant", file=mechanism)
         scales = {scale: float(f"{np.max(getattr(proposed[1].scales, scale)):.6g}") for scale in SCALES}
         paths["assignment"].write_text(
             _assignment(file, name, start["assignment"], scales, table), encoding="utf-8"

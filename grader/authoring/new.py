@@ -13,6 +13,7 @@ from pathlib import Path
 from grader.authoring.from_mechanism import texts_for
 from grader.files import create_whole
 from grader.rubric import load_rubric
+from grader.texts.spoken import failure
 from reference.authored.assignment import SUFFIXES, Assignment, library, load_assignment, locate, names_in
 from reference.authored.toml_file import text_of
 from reference.errors import CallError
@@ -56,12 +57,12 @@ def new_assignment(
     files of `like` have faults.
     """
     if like is not None and mechanism is not None:
-        raise CallError("like_or_mechanism", "--like and --mechanism both say what to start from: give one")
+        raise failure(CallError, "like_or_mechanism", "unused_beside", option="--like", other="--mechanism")
     path, name = _path_and_name(file)
     if mechanism is not None and mechanism.endswith(".toml"):
         return _of_own_mechanism(path, name, Path(mechanism), table)
     if table is not None:
-        raise CallError("option_unused", "--table goes with a mechanism of your own: --mechanism FILE.toml")
+        raise failure(CallError, "option_unused", "table_unused")
     if like is not None:
         source = load_assignment(like)
         what = f"An assignment like {source.id}."
@@ -108,7 +109,7 @@ def _path_and_name(file: Path) -> tuple[Path, str]:
     """Return the assignment's file and its name."""
     name = file.name.removesuffix(".toml").removesuffix(".assignment")
     if not NAME.fullmatch(name):
-        raise CallError("new_name", f"'{file.name}': a name of letters, digits, ., _ or - is needed")
+        raise failure(CallError, "new_name", text=file.name)
     is_whole = file.name.endswith(".toml")
     return (file if is_whole else file.with_name(f"{name}{SUFFIXES['assignment']}")), name
 
@@ -145,9 +146,7 @@ def _renamed(text: str, names: Mapping[str, str]) -> str:
         line = rf"""(?m)^{key}\s*=\s*("[^"\n]*"|'[^'\n]*')"""
         renamed = re.sub(line, f'{key} = "{name}"', renamed, count=1)
     if tomllib.loads(renamed) != {**tomllib.loads(text), **names}:
-        keys = ", ".join(names)
-        message = f'a copy needs other names: write {keys} as KEY = "NAME", each on a line of its own'
-        raise CallError("like_form", message)
+        raise failure(CallError, "like_form", names=tuple(names))
     return renamed
 
 
@@ -167,8 +166,5 @@ def starts() -> list[str]:
 def load_start(name: str) -> Assignment:
     """Load a mechanism to start from, as an assignment; CallError for an unknown name."""
     if name not in starts():
-        raise CallError(
-            "unknown_mechanism",
-            f"--mechanism {name}: there are {', '.join(starts())}, or a .toml file; or --like an assignment",
-        )
+        raise failure(CallError, "unknown_mechanism", text=name, names=tuple(starts()))
     return load_assignment(starts_folder() / f"{name}{SUFFIXES['assignment']}")

@@ -89,10 +89,10 @@ def check_photo(name: str, options: CheckOptions) -> bool:
     from grader.folder.workers import Limits, Workers, result_of
     from grader.self_check.photo import photo_check
 
-    lang, file = options.lang, cast("Path", options.photo)
+    lang, file, speaker = options.lang, cast("Path", options.photo), tongue(options.lang)
     if any((options.measured, options.page, options.template)):
-        raise CallError("photo_alone", "--photo goes without --measured, --page and --template")
-    speaker = tongue(lang)
+        alone = {"option": "--measured, --page, --template", "other": "--photo"}
+        raise failure(CallError, "photo_alone", "unused_beside", speaker, **alone)
     wanted = checked_level(options.level, speaker)
     assignment = _assignment(name, speaker)
     variant = _variant(assignment, None, options, speaker)
@@ -124,7 +124,8 @@ def checked_level(level: str, speaker: Tongue = ENGLISH) -> Level:
 def _write_template(file: Path, rubric: RubricFile, variant: Variant, speaker: Tongue) -> None:
     """Write the file that a student fills in: columns, a comment with units, a line for the values."""
     if file.suffix.lower() != ".csv":
-        raise failure(CallError, "template_file", "", speaker, file=file)
+        known = {"option": "--template", "file": file, "names": ".csv"}
+        raise failure(CallError, "template_file", "ending", speaker, **known)
     if file.exists():
         raise failure(CallError, "template_exists", "", speaker, file=file)
     known = {"n": variant.n, "position": variant.position}

@@ -52,8 +52,7 @@ def schema(name: str) -> dict[str, Any]:
         written: dict[str, Any] = json.loads(WRITTEN[name].read_bytes())
         return written
     if name not in MODELS:
-        known = ", ".join([*MODELS, *WRITTEN])
-        raise CallError("unknown_schema", f"there is no schema '{name}': known are {known}")
+        raise failure(CallError, "unknown_schema", text=name, names=(*MODELS, *WRITTEN))
     model, mode = MODELS[name]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

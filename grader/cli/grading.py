@@ -52,8 +52,7 @@ def grade_folder(folder: Path, name: str, out: Path, options: GradeOptions) -> R
     rubric = rubric_of(assignment)
     address = address_of(folder)
     if address is not None and cluster is None:
-        why = "a folder elsewhere is read by the workers of a cluster; give --cluster ADDRESS"
-        raise CallError("cluster_needed", f"{address}: {why}")
+        raise failure(CallError, "cluster_needed", folder=address)
     if cluster is not None:
         on_cluster = _cluster_module()
         if address is not None:
@@ -66,7 +65,7 @@ def grade_folder(folder: Path, name: str, out: Path, options: GradeOptions) -> R
         assignment, rubric, folder, out, jobs=options.jobs or os.cpu_count() or 1, limits=limits, **given
     )
     if options.watch and cluster is not None:
-        raise CallError("option_unused", "--watch looks at a folder of this machine: leave --cluster out")
+        raise failure(CallError, "option_unused", "unused_beside", option="--cluster", other="--watch")
     if options.watch:
         return _watch(batch, options.every)
     with ExitStack() as stack:
@@ -137,8 +136,7 @@ def _cluster_module() -> ModuleType:
     try:
         return importlib.import_module("grader.folder.cluster")
     except ModuleNotFoundError as error:
-        why = f"--cluster needs Dask ({error}): pip install 'planmark[cluster]'"
-        raise CallError("extra_missing", why) from error
+        raise failure(CallError, "extra_missing", extra="cluster", error=error) from error
 
 
 def demo(out: Path, lang: str, jobs: int | None) -> None:

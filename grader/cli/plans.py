@@ -10,6 +10,7 @@ from grader.files import write_whole
 from grader.language import tongue
 from grader.options import PlanOptions
 from grader.solution.document import plan_document
+from grader.texts.spoken import failure
 from reference.authored.assignment import Assignment, load_assignment
 from reference.errors import CallError
 from reference.plan import Plan, exact_plan
@@ -26,9 +27,9 @@ def show_plan(name: str, options: PlanOptions) -> None:
     check_crank(options.crank_mm)
     steps = options.steps
     if steps is not None and steps.suffix.lower() not in STEP_FILES:
-        raise CallError("steps_file", f"--steps {steps}: the name must end in {' or '.join(STEP_FILES)}")
+        raise failure(CallError, "steps_file", "ending", option="--steps", file=steps, names=STEP_FILES)
     if options.altitude and options.svg is None and options.pdf is None:
-        raise CallError("altitude", "--altitude is drawn on the sketch: name a file by --svg or --pdf")
+        raise failure(CallError, "altitude")
     assignment = load_assignment(name)
     variants = [assignment.variant(options.n, options.position)]
     plan = exact_plan(assignment, variants, assignment.scales(variants, crank_mm=options.crank_mm))
@@ -44,9 +45,7 @@ def show_plan(name: str, options: PlanOptions) -> None:
 def check_crank(crank_mm: float | None) -> None:
     """Refuse a drawn length that no crank on paper has."""
     if crank_mm is not None and not 0.0 < crank_mm < 1000.0:
-        raise CallError(
-            "crank_mm", f"--crank-mm {crank_mm:g}: a length in mm above 0 and below 1000 is needed"
-        )
+        raise failure(CallError, "crank_mm", value=crank_mm)
 
 
 def _draw(assignment: Assignment, plan: Plan, options: PlanOptions) -> None:

@@ -16,6 +16,7 @@ from grader.folder.batch import noted_batch
 from grader.options import ReviewOptions
 from grader.review.server import LOOPBACK, application
 from grader.review.session import Session
+from grader.texts.spoken import failure
 from reference.errors import CallError
 
 LEAST_TOKEN = 8
@@ -29,11 +30,9 @@ def review_class(folder: Path, options: ReviewOptions) -> None:
     """
     host, token = options.host, options.token
     if host not in LOOPBACK and not token:
-        raise CallError(
-            "token_needed", f"--host {host} opens the class to other machines: give a --token, too"
-        )
+        raise failure(CallError, "token_needed", host=host)
     if token and len(token) < LEAST_TOKEN:
-        raise CallError("token_short", f"--token must have at least {LEAST_TOKEN} characters")
+        raise failure(CallError, "token_short", "secret_short", option="--token", least=LEAST_TOKEN)
     batch = replace(noted_batch(folder), jobs=options.jobs or os.cpu_count() or 1)
     fill_image(batch.folder)
     listener = listener_on(host, options.port)
@@ -59,8 +58,8 @@ def listener_on(host: str, port: int) -> socket.socket:
     try:
         listener = socket.create_server((host, port), family=family)
     except OSError as error:
-        why = f"{error.strerror or error}; choose another with --port, 0 takes any that is free"
-        raise CallError("port_taken", f"--host {host} --port {port}: {why}") from error
+        known = {"host": host, "port": port, "error": error.strerror or error}
+        raise failure(CallError, "port_taken", **known) from error
     # Head and body of an answer are two packets: the second would wait until the first is confirmed.
     listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     return listener

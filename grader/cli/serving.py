@@ -17,9 +17,8 @@ from grader.cli import terminal
 from grader.cli.reviewing import answer, listener_on
 from grader.options import ServeOptions
 from grader.review.server import LOOPBACK
+from grader.texts.spoken import failure
 from reference.errors import CallError
-
-MISSING = "planmark serve needs its extra: install it with pip install 'planmark[web]'"
 
 HEAD_S = 10.0
 """For the lines before a body: a browser sends them at once."""
@@ -91,10 +90,9 @@ def serve(data: Path, options: ServeOptions) -> None:
         from grader.web.app import application, first_invitation
         from grader.web.settings import settings_of
     except ImportError as error:
-        raise CallError("extra_missing", f"{MISSING} ({error})") from error
+        raise failure(CallError, "extra_missing", extra="web", error=error) from error
     if address is None and host not in LOOPBACK:
-        why = "say under which name students reach it: --address https://NAME"
-        raise CallError("address_needed", f"--host {host} opens the server to other machines: {why}")
+        raise failure(CallError, "address_needed", host=host)
     with listener_on(host, options.port) as listener:
         shown = f"[{host}]" if ":" in host else host
         settings = settings_of(

@@ -142,9 +142,9 @@ def _suggest_scales(name: str, roster: Path) -> None:
 def print_handout(name: str, roster: Path | None, variant: VariantOptions, out: Path, lang: str) -> None:
     """Write the PDF of task sheets, of a class or of one variant."""
     if out.suffix.lower() != ".pdf":
-        raise CallError("handout_file", f"--out {out}: the name must end in .pdf")
+        raise failure(CallError, "handout_file", "ending", option="--out", file=out, names=".pdf")
     if roster is not None and variant != VariantOptions():
-        raise CallError("option_unused", "--roster says each student's n and position: leave --n out")
+        raise failure(CallError, "option_unused", "unused_beside", option="--n, --position", other="--roster")
     assignment = load_assignment(name)
     if roster is None:
         rows: tuple[RosterRow, ...] = (RosterRow("", n=variant.n, position=variant.position),)

@@ -21,6 +21,7 @@ from grader.files import write_whole
 from grader.language import Tongue, tongue
 from grader.options import CycleOptions, PlanOptions
 from grader.solution.document import plan_documents
+from grader.texts.spoken import failure
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant, load_assignment
 from reference.errors import CallError, MechanismError
 from reference.kinematics.cycle import cycle
@@ -39,12 +40,12 @@ LONG = 20
 def _refuse_single(options: PlanOptions) -> None:
     """Refuse `--all` with options for one variant, and `--csv` for one."""
     if not options.every:
-        raise CallError("all_or_one", "--csv is a table of all variants: add --all")
+        raise failure(CallError, "all_or_one")
     single = ("n", "position", "svg", "steps", "altitude")
     given = [f"--{name}" for name in single if getattr(options, name) not in (None, False)]
     if given:
-        told = "--all is every variant, and" if given != ["--svg"] else "drawings of --all go into --pdf:"
-        raise CallError("all_or_one", f"{told} {' and '.join(given)} one of them: leave out either")
+        cause = "all_on_pages" if given == ["--svg"] else "unused_beside"
+        raise failure(CallError, "all_or_one", cause, option=tuple(given), other="--all")
 
 
 def show_class(name: str, options: PlanOptions) -> bool:
@@ -163,8 +164,7 @@ def _diagrams(
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != "matplotlib":
             raise
-        message = "a diagram of a cycle needs matplotlib: install it with pip install 'planmark[plots]'"
-        raise CallError("matplotlib_needed", message) from error
+        raise failure(CallError, "matplotlib_needed", "extra_missing", extra="plots", error=error) from error
     return cycle_diagram(subject, selection, Setting(assignment, variant, words), formats)
 
 

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from grader.files import guarded
+from grader.texts.spoken import failure
 from reference.construction.derive import construction_of
 from reference.construction.graph import Construction
 from reference.errors import CallError
@@ -90,24 +91,22 @@ class CycleSubject:
             return Selection(tuple(self._known[name] for name in every))
         for name in names:
             if name not in self._known and name not in self.points:
-                raise CallError("unknown_quantity", self._unknown(name))
+                raise self._unknown(name)
         chosen = dict.fromkeys(names)
         return Selection(
             tuple(self._known[name] for name in chosen if name in self._known),
             tuple(name for name in chosen if name in self.points),
         )
 
-    def _unknown(self, name: str) -> str:
+    def _unknown(self, name: str) -> CallError:
         plain = [known for known in self._known if not known.endswith(("_x", "_y"))]
         everything = [*self.points, *plain]
         by_case = {known.lower(): known for known in [*self.points, *self._known]}
         same = by_case.get(name.lower())
         near = [same] if same else difflib.get_close_matches(name, everything, n=2, cutoff=0.5)
-        meant = f" (did you mean {' or '.join(near)}?)" if near else ""
-        listed = ", ".join(everything[:MANY]) + (", ..." if len(everything) > MANY else "")
-        return (
-            f"nothing on this cycle is called '{name}'{meant}: known are {listed}; _x or _y for a component"
-        )
+        listed = (*everything[:MANY], *(["..."] if len(everything) > MANY else []))
+        known = {"text": name, "near": tuple(near), "names": listed}
+        return failure(CallError, "unknown_quantity", "quantity_near" if near else "", **known)
 
     @cached_property
     def fine(self) -> tuple[FloatArray, Motion]:

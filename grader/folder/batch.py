@@ -452,8 +452,8 @@ def _marked(
             LOG.debug("%s: %s, %s", jobs[index].folder, report.status, points)
             progress("marking", len(reports), len(jobs))
     except KeyboardInterrupt as error:
-        done = f"{len(reports)} of {len(jobs)} submissions are marked and kept in {batch.out}"
-        raise InterruptedRunError("interrupted", f"interrupted; {done}; the same command goes on") from error
+        counts = {"done": len(reports), "total": len(jobs)}
+        raise failure(InterruptedRunError, "interrupted", folder=batch.out, **counts) from error
     return [reports[index] for index in range(len(jobs))]
 
 

@@ -46,7 +46,7 @@ from grader.folder.workers import Limits, Workers
 from grader.records import PageRef, Reason
 from grader.scan.decode.limits import MAX_FILE_BYTES
 from grader.tables.decisions import FILE_NAME as DECISIONS
-from grader.texts.spoken import message
+from grader.texts.spoken import failure, message
 from reference.errors import CallError, PlanmarkError
 
 Result = TypeVar("Result")
@@ -88,7 +88,7 @@ def image_of(address: str, out: Path) -> Path:
     stays while it is the same. Raises CallError for a folder that cannot be read or holds nothing.
     """
     image = out / CACHE_FOLDER / IMAGE
-    with _storage(address, "check the address, and the storage's settings in the environment"):
+    with _storage(address):
         files, root = fsspec.core.url_to_fs(address)
         entries = (one for one in files.find(root, detail=True).values() if one["type"] == "file")
         listed = ((entry["name"].removeprefix(root).strip("/"), entry) for entry in entries)
@@ -104,7 +104,7 @@ def image_of(address: str, out: Path) -> Path:
         if DECISIONS in names and not (out / DECISIONS).exists():
             write_whole(out / DECISIONS, files.cat_file(_address_in(files, root, DECISIONS)))
     if not names:
-        raise CallError("folder_missing", f"{address}: there is no such folder, or nothing in it")
+        raise failure(CallError, "folder_missing", "folder_empty", folder=address)
     return image
 
 
@@ -115,15 +115,15 @@ def _is_web(files: fsspec.AbstractFileSystem) -> bool:
 
 
 @contextlib.contextmanager
-def _storage(address: str, advice: str) -> Iterator[None]:
-    """Raises CallError with the advice for whatever a storage raises."""
+def _storage(address: str) -> Iterator[None]:
+    """Raises CallError for whatever a storage raises."""
     try:
         yield
     except PlanmarkError:
         raise
     except Exception as error:
-        why = f"cannot be read ({type(error).__name__}: {error}); {advice}"
-        raise CallError("storage_unreadable", f"{address}: {why}") from error
+        why = f"{type(error).__name__}: {error}"
+        raise failure(CallError, "storage_unreadable", folder=address, error=why) from error
 
 
 def _address_in(files: fsspec.AbstractFileSystem, root: str, name: str) -> str:
@@ -134,7 +134,7 @@ def _address_in(files: fsspec.AbstractFileSystem, root: str, name: str) -> str:
 def _inside(folder: Path, name: str) -> Path:
     """A file's path in a folder. Raises CallError for a name that leads out of it."""
     if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
-        raise CallError("name_unusable", f"{name}: no name of a file below the folder; rename it")
+        raise failure(CallError, "name_unusable", name=name)
     return folder / name
 
 
@@ -158,7 +158,7 @@ def fill(folder: Path) -> None:
     if folder.name != IMAGE or not note.is_file():
         return
     address = note.read_text(encoding="utf-8")
-    with _storage(address, "grade it again, or try later"):
+    with _storage(address):
         files, root = fsspec.core.url_to_fs(address)
         for path in folder.rglob("*"):
             if path.is_file() and not (known := path.stat()).st_size:
@@ -373,7 +373,7 @@ def work(run: Run, task: Task, versions: Mapping[str, str]) -> tuple[bytes, dict
 def _difference(here: Mapping[str, str], there: Mapping[str, str]) -> str:
     """Describe the differences between the client's versions and a worker's."""
     names = sorted(name for name in {*here, *there} if here.get(name) != there.get(name))
-    told = [f"{name} {there.get(name, 'none')[:12]}, here {here.get(name, 'none')[:12]}" for name in names]
+    told = [f"{name} {there.get(name, '-')[:12]} / {here.get(name, '-')[:12]}" for name in names]
     return "; ".join(told[:4])
 
 
@@ -406,7 +406,7 @@ class Cluster:
         self._size, self._asked = 1, 0.0
 
     def __enter__(self) -> Self:
-        given = f"--cluster {self._address}"
+        known = {"address": self._address, "limit": CONNECT_S}
         for name in ("distributed", "distributed.client"):
             # What it logs of a lost scheduler are tracebacks; the run says it in a sentence.
             logging.getLogger(name).setLevel(logging.CRITICAL)
@@ -414,17 +414,14 @@ class Cluster:
             get_address_host_port(self._address)
             self._client = distributed.Client(self._address, timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
-            why = f"no scheduler answers within {CONNECT_S:g} s; start one: dask scheduler"
-            raise CallError("cluster_unreachable", f"{given}: {why}") from error
+            raise failure(CallError, "cluster_unreachable", **known) from error
         try:
             with self._connected():
                 self._client.wait_for_workers(1, timeout=CONNECT_S)
                 self._check()
         except TimeoutError as error:
             self._client.close()
-            start = f"dask worker {self._address} --nworkers 2 --nthreads 1"
-            why = f"no worker within {CONNECT_S:g} s; start some: {start}"
-            raise CallError("cluster_unreachable", f"{given}: {why}") from error
+            raise failure(CallError, "cluster_unreachable", "no_workers", **known) from error
         except BaseException:
             self._client.close()
             raise
@@ -443,21 +440,17 @@ class Cluster:
         answers = self._client.run(probe, self._run, first, on_error="return")
         for worker, answer in sorted(answers.items()):
             if isinstance(answer, BaseException):
-                why = f"planmark does not run there ({answer}); pip install 'planmark[cluster]' beside Dask"
-                raise CallError("cluster_versions", f"worker {worker}: {why}")
+                raise failure(CallError, "cluster_versions", "not_installed", worker=worker, error=answer)
             versions, unread = answer
             if versions != self._versions:
                 raise self._other_program(worker, _difference(self._versions, versions))
             if unread:
-                why = "put the class where all workers see it under this name, or on s3:// or the like"
-                raise CallError(
-                    "cluster_folder", f"worker {worker} cannot read {self._run.sheets} ({unread}); {why}"
-                )
+                known = {"worker": worker, "folder": self._run.sheets, "error": unread}
+                raise failure(CallError, "cluster_folder", **known)
 
     @staticmethod
     def _other_program(worker: str, difference: str) -> CallError:
-        why = "marks could differ; install the same version everywhere"
-        return CallError("cluster_versions", f"worker {worker} has {difference}: {why}")
+        return failure(CallError, "cluster_versions", worker=worker, versions=difference)
 
     def run(
         self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]], sheets: Iterable[int] = ()
@@ -542,7 +535,7 @@ class Cluster:
             if self._workers():
                 alive = time.monotonic()
             elif time.monotonic() - alive > self._wait_s:
-                raise self._lost(f"no worker is left since {self._wait_s:g} s")
+                raise self._lost()
 
     def _workers(self) -> int:
         """Return the present number of workers."""
@@ -558,10 +551,7 @@ class Cluster:
         try:
             yield
         except (*_LOST, *more) as error:
-            raise self._lost("the scheduler has ended") from error
+            raise self._lost() from error
 
-    def _lost(self, why: str) -> CallError:
-        return CallError(
-            "cluster_lost",
-            f"--cluster {self._address}: {why}; what was marked is kept, the same command goes on",
-        )
+    def _lost(self) -> CallError:
+        return failure(CallError, "cluster_lost", address=self._address, limit=self._wait_s)

@@ -29,6 +29,7 @@ from grader.scan.handwriting.lines import find_lines
 from grader.scan.pixels import TITLE_BLOCK_MM, mapped
 from grader.tables.decision_texts import audit_answer
 from grader.tables.reader import TableKind, check_rows, short, written
+from grader.texts.spoken import failure
 from reference.construction.graph import Construction
 from reference.errors import CallError
 from reference.plan import construction_for
@@ -78,12 +79,12 @@ def preview_of(file: Path) -> Path:
 def check_target(file: Path) -> None:
     """Raise CallError for a file that cannot be written, or a folder that is no preview."""
     if file.suffix.lower() != ".zip":
-        raise CallError("not_a_zip", f"--to {file}: name a .zip file")
+        raise failure(CallError, "not_a_zip", "ending", option="--to", file=file, names=".zip")
     if file.exists():
-        raise CallError("file_exists", f"{file} is there already; name another file or remove it")
+        raise failure(CallError, "file_exists", "file_taken", file=file)
     preview = preview_of(file)
     if preview.exists() and not (preview / STATE).is_file():
-        raise CallError("file_exists", f"{preview} is there already and is no preview; name another file")
+        raise failure(CallError, "file_exists", "no_preview", file=preview)
 
 
 def check_scans(batch: Batch, reports: Sequence[ReportDocument]) -> None:
@@ -91,11 +92,8 @@ def check_scans(batch: Batch, reports: Sequence[ReportDocument]) -> None:
     files = {sheet.source for report in reports for sheet in report.reading.sheets}
     gone = sorted(files.difference(shown_names(files_of(batch), batch.folder, batch.called)))
     if gone:
-        named = f"{', '.join(gone[:3])}{' ...' if len(gone) > 3 else ''}"
-        raise CallError(
-            "scans_moved",
-            f"{batch.folder}: {len(gone)} scan(s) are not there any more ({named}); grade again",
-        )
+        named = (*gone[:3], *["..."][: len(gone) - 3 > 0])
+        raise failure(CallError, "scans_moved", folder=batch.folder, names=named)
 
 
 # The preview --------------------------------------------------------------------------------------
@@ -109,12 +107,11 @@ def collect(batch: Batch, graded: Graded, file: Path) -> Collected:
     preview, known = preview_of(file), list(_known(batch, graded))
     state = digest_of([(page.ref.digest, page.ref.page, row) for page, _, row in known])
     if not known:
-        raise CallError("nothing_to_give", f"{batch.folder}: no figure was read on any page of this class")
+        raise failure(CallError, "nothing_to_give", folder=batch.folder)
     if not preview.exists():
         return _make(preview, known, state, batch.lang)
     if (preview / STATE).read_text(encoding="utf-8") != state:
-        why = "scans or decisions have changed since the pages were looked at; remove it, and begin again"
-        raise CallError("preview_outdated", f"{preview}: {why}")
+        raise failure(CallError, "preview_outdated", folder=preview)
     return _give(preview, file, batch.lang)
 
 
@@ -304,7 +301,7 @@ def _give(preview: Path, file: Path, lang: str) -> Collected:
         return Collected(preview, None, waiting)
     given = [row for row in rows if answers[row["page"]][0]]
     if not given:
-        raise CallError("nothing_to_give", f"{preview / PAGES}: no page says yes")
+        raise failure(CallError, "nothing_to_give", "no_page_given", file=preview / PAGES)
     _write_zip(preview, file, given)
     return Collected(preview, len(given))
 
@@ -361,7 +358,7 @@ def _write_zip(preview: Path, file: Path, rows: Sequence[Row]) -> None:
     for number, row in enumerate(rows, 1):
         grey = reopened((preview / row["page"]).read_bytes())
         if grey is None:
-            raise CallError("answers_wrong", f"{preview / row['page']}: is no picture any more")
+            raise failure(CallError, "answers_wrong", file=preview / row["page"])
         name = f"{number:04}.png"
         given.append({**row, "page": name})
         content[name] = bare_png(grey)

@@ -14,8 +14,9 @@ from grader.documents import SCHEMA_VERSION, ResultsDocument
 from grader.files import create_whole, replacing, write_whole
 from grader.lms import gradebooks, moodle, moodle_guide, scores
 from grader.lms.api import canvas, classroom, graph, openedx
-from grader.lms.grades import Content, Delivery, Grade, Options, grades_of, in_a_row, ready
+from grader.lms.grades import Content, Delivery, Grade, Options, grades_of, ready
 from grader.lms.table import criteria_text, not_as_meant, parsed, summary_text
+from grader.records import Reason
 from grader.texts.spoken import failure
 from reference.authored.toml_file import findings_of
 from reference.errors import CallError, InputFileError, lines_of
@@ -33,8 +34,8 @@ def read_results(out_dir: Path) -> ResultsDocument:
             InputFileError, "results_missing", "unreadable", file=path, error=error.strerror
         ) from error
     except ValidationError as error:
-        faults = lines_of(list(findings_of(error, ResultsDocument)))
-        raise failure(InputFileError, "results_wrong", "no_results", file=path, faults=faults) from error
+        found = lines_of(list(findings_of(error, ResultsDocument)))
+        raise failure(InputFileError, "results_wrong", "no_results", file=path, findings=found) from error
     except ValueError as error:
         raise failure(InputFileError, "results_wrong", "results_no_json", file=path, error=error) from error
 
@@ -161,7 +162,10 @@ def _check_maxima(grades: Sequence[Grade], options: Options, what: str) -> None:
         maxima.setdefault(round(grade.max_score, 6), []).append(grade.student_id)
     is_converted = options.rescale and (options.maximum is not None or options.form is not None)
     if len(maxima) > 1 and not is_converted and what != "feedback":
-        faults = lines_of([f"{most:g}: {in_a_row(students)}" for most, students in sorted(maxima.items())])
+        faults = [
+            Reason("maximum_of", {"most_points": most, "names": tuple(students)})
+            for most, students in sorted(maxima.items())
+        ]
         raise failure(CallError, "maximum_differs", "maxima_differ", faults=faults)
 
 
@@ -242,4 +246,4 @@ def write_archive(path: Path, content: Content) -> None:
         with zipfile.ZipFile(temporary) as archive:
             is_same = archive.namelist() == list(content)
             if not is_same or any(archive.read(name) != _bytes(data) for name, data in content.items()):
-                raise not_as_meant("the archive")
+                raise not_as_meant()

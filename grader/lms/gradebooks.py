@@ -40,8 +40,9 @@ from grader.lms.table import (
     number,
     parse,
 )
+from grader.records import Reason
 from grader.texts.spoken import failure
-from reference.errors import CallError, InputFileError, lines_of
+from reference.errors import CallError, InputFileError
 
 HEADER = ("Student", "ID", "SIS User ID", "SIS Login ID", "Section")
 _ABOUT = (*HEADER, "Integration ID", "Root Account", "LastName", "FirstName")
@@ -125,9 +126,9 @@ def gradebook(grades: Sequence[Grade], options: Options) -> Delivery:
     item = options.item.strip() or grades[0].assignment
     faults = list(_faults(ready(grades)))
     if is_formula(item) or item in _ABOUT:
-        faults.append(f"'{item}' is no title of an assignment")
+        faults.append(Reason("title", {"text": item}))
     if faults:
-        raise failure(CallError, "gradebook", faults=lines_of(faults))
+        raise failure(CallError, "gradebook", faults=faults)
     table = [["    " + _POINTS, "", "", "", "", number(options.maximum or grades[0].max_score)]]
     for grade in ready(grades):
         person = grade.person
@@ -166,21 +167,22 @@ def _new_for_brightspace(grades: Sequence[Grade], options: Options) -> Delivery:
     return Delivery(csv_text(header, rows), notes=notes)
 
 
-def _faults(grades: Sequence[Grade]) -> Iterator[str]:
+def _faults(grades: Sequence[Grade]) -> Iterator[Reason]:
     owner: dict[str, str] = {}
     for grade in grades:
-        person = grade.person
+        person, who = grade.person, {"cell": grade.student_id, "platform": "Canvas"}
+        user = {**who, "text": person.platform_id, "column": "ID"}
         if _MANGLED.fullmatch(grade.student_id) and not person.platform_id:
-            yield f"{grade.student_id}: Canvas takes this for a number; give Canvas's own (--ids)"
+            yield Reason("taken_for_number", who)
         if person.platform_id and not re.fullmatch(r"[1-9][0-9]*", person.platform_id):
-            yield f"{grade.student_id}: '{person.platform_id}' is no number of a Canvas user"
+            yield Reason("no_user", user)
         if _POINTS in person.name:
-            yield f"{grade.student_id}: '{person.name}' would be read as the row of points"
+            yield Reason("taken_for_points", {**who, "text": person.name})
         for text in (person.name, person.username):
             if is_formula(text):
-                yield f"{grade.student_id}: '{text}' would be run as a formula by a spreadsheet"
+                yield Reason("formula", {**who, "text": text})
         if person.platform_id and owner.setdefault(person.platform_id, grade.student_id) != grade.student_id:
-            yield f"{grade.student_id}: the same number as {owner[person.platform_id]}"
+            yield Reason("same_user", {**user, "other": owner[person.platform_id]})
 
 
 # The teacher's own gradebook ----------------------------------------------------------------------
@@ -201,9 +203,9 @@ class Gradebook(Form):
         faults = table.ragged()
         points = next((row for row in range(1, min(len(table.rows), 4)) if _POINTS in table.value(row, 0)), 0)
         if layout.has_points and not points:
-            faults.append(f"there is no row '{_POINTS}' below the first")
+            faults.append(Reason("points_row", {"text": _POINTS}))
         if faults:
-            raise _refused(file, layout.platform, faults)
+            raise _refused(file, layout.platform, *faults)
         about = {kind: header.index(name) for name, kind in layout.who.items() if name in header}
         others = [header.index(name) for name in layout.kept if name in header]
         first = max(others) + 1 if layout.has_points else 0
@@ -212,8 +214,8 @@ class Gradebook(Form):
         stated = table.value(points, assignment).strip() if points else match and match["maximum"]
         possible = cls.amount(stated or "")
         if stated and not possible:
-            fault = f"row {points + 1}: '{header[assignment]}' has '{stated}' points possible"
-            raise _refused(file, layout.platform, [fault])
+            known = {"table_row": points + 1, "item": header[assignment], "text": stated}
+            raise _refused(file, layout.platform, Reason("points_possible", known))
         columns = {**about, "grade": assignment}
         if layout.is_whole:
             columns |= {"update": header.index("update"), "feedback": header.index("comment")}
@@ -293,9 +295,9 @@ def fill_gradebook(data: bytes, file: str, grades: Sequence[Grade], options: Opt
     form = Gradebook.opened(data, file, options.item)
     asked = LAYOUTS[options.to].platform
     if not form.people:
-        raise _refused(file, asked, ["it has no students"])
+        raise _refused(file, asked, Reason("no_students"))
     if form.platform != asked:
-        raise _refused(file, asked, [f"it is one of {form.platform}'s"])
+        raise _refused(file, asked, Reason("of_platform", {"platform": form.platform}))
     if form.possible and options.maximum is not None:
         raise failure(CallError, "option_unused", "maximum_stated", other="--gradebook")
     comments = {grade.student_id: plain_comment(grade) for grade in ready(grades)}
@@ -310,14 +312,12 @@ def _layout(header: Sequence[str], file: str) -> Layout:
     for layout in LAYOUTS.values():
         if all(any(name in header for name in each.split("|")) for each in layout.required):
             return layout
-    known = ", ".join(layout.platform for layout in LAYOUTS.values())
-    found = ", ".join(header[:8])
-    raise _refused(file, "its platform", [f"row 1: not the columns of {known} (found: {found})"])
+    known = " / ".join(layout.platform for layout in LAYOUTS.values())
+    raise _refused(file, known, Reason("columns_unknown", {"table_row": 1, "names": tuple(header[:8])}))
 
 
-def _refused(file: str, platform: str, faults: Sequence[str]) -> InputFileError:
-    known = {"file": file, "platform": platform, "faults": lines_of(faults)}
-    return failure(InputFileError, "gradebook_file", **known)
+def _refused(file: str, platform: str, *faults: Reason) -> InputFileError:
+    return failure(InputFileError, "gradebook_file", faults=faults, file=file, platform=platform)
 
 
 def _assignment(header: Sequence[str], first: int, layout: Layout, wanted: str, file: str) -> int:

@@ -9,10 +9,11 @@ from types import MappingProxyType
 from grader.documents import ReportDocument, ResultsDocument
 from grader.files import result_folders
 from grader.options import ExportOptions
-from grader.tables.reader import why_no_id
+from grader.records import Reason, Value
+from grader.tables.reader import refused_id
 from grader.tables.roster import read_roster
 from grader.texts.spoken import failure
-from reference.errors import CallError, InputFileError, lines_of
+from reference.errors import CallError, InputFileError
 
 Content = Mapping[str, bytes | Path]
 """Names, and the content of each: bytes, or a file that is read when it is written."""
@@ -195,21 +196,24 @@ def grades_of(results: ResultsDocument, options: Options) -> list[Grade]:
 
 def _check(reports: Sequence[ReportDocument]) -> None:
     """Check the results; raises InputFileError where they contradict themselves."""
-    faults = []
+    faults: list[Reason] = []
     keys = set()
     for report in reports:
-        who = report.student_id if report.position is None else f"{report.student_id} at {report.position}"
-        if why_no_id(report.student_id) is not None:
-            faults.append(f"'{report.student_id}' is no student_id")
+        who: dict[str, Value] = {
+            "cell": "/".join(map(str, filter(None, (report.student_id, report.position))))
+        }
+        if (refused := refused_id(report.student_id)) is not None:
+            faults.append(refused)
         if (report.student_id, report.position) in keys:
-            faults.append(f"{who}: has two reports")
+            faults.append(Reason("two_reports", who))
         keys.add((report.student_id, report.position))
         if report.score is not None and not 0.0 <= report.score <= report.max_score + 1e-9:
-            faults.append(f"{who}: the score {report.score:g} is not between 0 and {report.max_score:g}")
+            known = {**who, "score_points": report.score, "most_points": report.max_score}
+            faults.append(Reason("score_range", known))
         if report.max_score <= 0.0:
-            faults.append(f"{who}: the maximum is {report.max_score:g}")
+            faults.append(Reason("no_maximum", {**who, "most_points": report.max_score}))
     if faults:
-        raise failure(InputFileError, "results_wrong", "results_contradict", faults=lines_of(faults))
+        raise failure(InputFileError, "results_wrong", "results_contradict", faults=faults)
 
 
 _WHY = {

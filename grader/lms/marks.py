@@ -14,8 +14,9 @@ from grader.language import Tongue, tongue
 from grader.lms.grades import Grade, Options, ready
 from grader.lms.table import bytes_of, parsed, read_table
 from grader.overlay.scene import MARKS
+from grader.records import Reason, Value
 from grader.texts.spoken import failure
-from reference.errors import CallError, InputFileError, lines_of
+from reference.errors import CallError, InputFileError
 
 DECIMALS = 6
 """Decimals of points: more than any platform stores, fewer than rounding errors change."""
@@ -147,18 +148,21 @@ def marks_of(grade: Grade) -> list[Mark]:
     """
     marks = outline(grade)
     faults = [
-        f"{mark.criterion}: {mark.points:g} of {mark.max_points:g} points"
+        Reason(
+            "points_range",
+            {"cell": mark.criterion, "given_points": mark.points, "most_points": mark.max_points},
+        )
         for mark in marks
         if not -CLOSE <= mark.points <= mark.max_points + CLOSE or mark.max_points <= 0.0
     ]
     if faults:
-        told = {"student": grade.student_id, "faults": lines_of(faults)}
-        raise failure(InputFileError, "results_wrong", "points_impossible", **told)
+        known = {"student": grade.student_id}
+        raise failure(InputFileError, "results_wrong", "points_impossible", faults=faults, **known)
     total = math.fsum(mark.points for mark in marks)
     score = math.fsum(report.score or 0.0 for report in grade.reports)
     if not math.isclose(total, score, abs_tol=CLOSE):
-        known = {"student": grade.student_id, "total": total, "score": score}
-        raise failure(InputFileError, "results_wrong", "points_sum", **known)
+        told = {"student": grade.student_id, "total": total, "score": score}
+        raise failure(InputFileError, "results_wrong", "points_sum", **told)
     return marks
 
 
@@ -260,12 +264,12 @@ def class_criteria(grades: Sequence[Grade], options: Options) -> list[Criterion]
     titles: dict[str, list[str]] = {criterion: [] for criterion in maxima}
     for student, marks in students.items():
         if {mark.criterion: mark.max_points for mark in marks} != maxima:
-            faults.append(f"{student}: other criteria or points than {first}")
+            faults.append(Reason("other_criteria", {"cell": student, "other": first}))
             continue
         for mark in marks:
             titles[mark.criterion].append(mark.title)
     if faults:
-        raise failure(InputFileError, "criteria_differ", faults=lines_of(faults))
+        raise failure(InputFileError, "criteria_differ", faults=faults)
     return [
         Criterion(each, _titles(titles[each], options.titles.get(each)), most)
         for each, most in maxima.items()
@@ -302,27 +306,28 @@ def numbered(criteria: Sequence[Criterion], path: Path) -> list[PlatformCriterio
     Raises InputFileError where one is missing, stands there twice, or has other points there.
     """
     known = _criteria_of(path)
-    names = ", ".join(f"'{name}'" for _, name, _ in known)
-    faults: list[str] = []
+    names = tuple(f"'{name}'" for _, name, _ in known)
+    faults: list[Reason] = []
     result: list[PlatformCriterion] = []
     for criterion in criteria:
         same = [(number, points) for number, name, points in known if criterion.is_named(name)]
         if len(same) != 1:
-            why = f"there ({len(same)} times)" if same else f"not there ({names})"
-            faults.append(f"{criterion.name}: {why}")
+            found: dict[str, Value] = {"count": len(same)} if same else {"names": names}
+            faults.append(Reason("criterion_absent", {"cell": criterion.name, **found}))
             continue
         (number, points), most = same[0], criterion.max_points
         if points is not None and abs(points - most) > CLOSE:
-            faults.append(f"{criterion.name}: {points:g} points there, {most:g} in the rubric")
+            found = {"cell": criterion.name, "there_points": points, "here_points": most}
+            faults.append(Reason("points_differ", found))
         result.append(PlatformCriterion(criterion=criterion.id, id=number, max_points=most))
     numbers = {each.id for each in result}
     faults += [
-        f"'{name}': there, and not in the rubric" for number, name, _ in known if number not in numbers
+        Reason("criterion_extra", {"cell": f"'{name}'"}) for number, name, _ in known if number not in numbers
     ]
     if len(numbers) < len(result):
-        faults.append("two criteria have one number")
+        faults.append(Reason("one_number"))
     if faults:
-        raise failure(InputFileError, "criteria", file=path, faults=lines_of(faults))
+        raise failure(InputFileError, "criteria", faults=faults, file=path)
     return result
 
 

@@ -34,8 +34,9 @@ from grader.lms.table import (
     number,
     parse,
 )
+from grader.records import Reason
 from grader.texts.spoken import failure
-from reference.errors import CallError, InputFileError, lines_of
+from reference.errors import CallError, InputFileError
 
 # The worksheet ------------------------------------------------------------------------------------
 
@@ -111,24 +112,19 @@ class Worksheet(Form):
         if not table.rows:
             raise failure(InputFileError, "worksheet", "worksheet_empty", file=file)
         columns = _columns(table, file)
-        header = ", ".join(map(str.strip, table.header()))
-        faults = [
-            f"row 1: there is no column '{COLUMNS[name][0].capitalize()}' (columns: {header})"
-            for name in _REQUIRED
-            if name not in columns
-        ]
+        at, names = {"table_row": 1}, tuple(map(str.strip, table.header()))
+        missing = [COLUMNS[name][0].capitalize() for name in _REQUIRED if name not in columns]
+        faults = [Reason("column_missing", {**at, "name": name, "names": names}) for name in missing]
         if "scale" in columns:
-            faults.append(
-                "row 1: the assignment is graded by a scale, and Moodle would skip points: let it be points"
-            )
+            faults.append(Reason("scale_graded", at))
         if columns.get("feedback") == 0:
-            faults.append("row 1: feedback comments stand in the first column, where Moodle drops them")
+            faults.append(Reason("comments_first", at))
         faults += table.ragged()
         sheet = cls(table, columns)
         if not faults:
             faults += _row_faults(sheet)
         if faults:
-            raise failure(InputFileError, "worksheet", file=file, faults=lines_of(faults))
+            raise failure(InputFileError, "worksheet", faults=faults, file=file)
         return sheet
 
     @staticmethod
@@ -313,39 +309,39 @@ def _is_read_by_moodle(moment: str) -> bool:
     )
 
 
-def _row_faults(sheet: Worksheet) -> Iterator[str]:
+def _row_faults(sheet: Worksheet) -> Iterator[Reason]:
     words = {
         match[1] for row in sheet.people if (match := _PARTICIPANT.fullmatch(sheet.value(row, "identifier")))
     }
     if len(words) > 1:
-        yield f"participants are called by different words: {', '.join(map(repr, sorted(words)))}"
+        yield Reason("participant_words", {"names": tuple(map(repr, sorted(words)))})
     rows: dict[int, int] = {}
     comma = sheet.value(0, "grade").casefold() != COLUMNS["grade"][0]
     for row in sheet.people:
-        participant, maximum = sheet.participant(row), sheet.maximum(row)
+        participant, maximum, at = sheet.participant(row), sheet.maximum(row), {"table_row": row + 1}
         if participant is None:
-            yield f"row {row + 1}: '{sheet.value(row, 'identifier')}' is not 'Participant' and a number"
+            yield Reason("participant_form", {**at, "text": sheet.value(row, "identifier")})
             continue
         if participant in rows:
-            yield f"row {row + 1}: the same participant as in row {rows[participant] + 1}"
-        rows[participant] = row
+            yield Reason("participant_twice", {**at, "first": rows[participant]})
+        rows[participant] = row + 1
         if "maximum" in sheet.columns and not maximum:
-            yield f"row {row + 1}: the maximum grade '{sheet.value(row, 'maximum')}' is no positive number"
-        why = _misread(sheet.value(row, "grade"), maximum, comma=comma)
-        if why:
-            yield f"row {row + 1}: the grade '{sheet.value(row, 'grade')}' {why}"
+            yield Reason("maximum_wrong", {**at, "text": sheet.value(row, "maximum")})
+        grade = sheet.value(row, "grade")
+        if code := _misread(grade, maximum, comma=comma):
+            yield Reason(code, {**at, "text": grade, "whole": grade.partition(",")[0]})
 
 
 def _misread(text: str, maximum: float | None, *, comma: bool) -> str:
-    """Return what Moodle would misread in a grade that is in the worksheet already; empty if nothing."""
+    """Return the code of what Moodle would misread in a grade that is there already; empty if nothing."""
     value = Worksheet.amount(text)
     if text in NO_GRADE:
         return ""
     if value is None:
-        return "is no number; Moodle would store 0"
+        return "grade_no_number"
     if "," in text and not comma:
-        return f"has a comma; Moodle would store {text.partition(',')[0]}"
-    return "is above the maximum; Moodle would skip it" if maximum and value > maximum else ""
+        return "grade_comma"
+    return "grade_above" if maximum and value > maximum else ""
 
 
 # The gradebook ------------------------------------------------------------------------------------
@@ -378,12 +374,12 @@ def gradebook(grades: Sequence[Grade], options: Options) -> Delivery:
     comments = [comment(grade) for grade in graded]
     faults = list(_faults(graded, identity))
     faults += [
-        f"{grade.student_id}: the comment has more than {_LONGEST_COMMENT} characters"
+        Reason("comment_long", {"cell": grade.student_id, "most": _LONGEST_COMMENT})
         for grade, text in zip(graded, comments, strict=True)
         if len(text) > _LONGEST_COMMENT
     ]
     if faults:
-        raise failure(CallError, "gradebook", "import_aborted", faults=lines_of(faults))
+        raise failure(CallError, "gradebook", "import_aborted", faults=faults)
     scores = [grade.out_of(options.maximum, rescale=options.rescale) for grade in graded]
     users = [_user(grade, identity) for grade in graded]
     rows = zip(users, [number(score, 2) for score in scores], comments, strict=True)
@@ -406,19 +402,19 @@ def _user(grade: Grade, identity: str) -> str:
     return names.get(identity, student_id)
 
 
-def _faults(grades: Sequence[Grade], identity: str) -> Iterator[str]:
+def _faults(grades: Sequence[Grade], identity: str) -> Iterator[Reason]:
     owner: dict[str, str] = {}
-    source = {"email": "the roster gives", "username": "the table of ids gives"}.get(identity, "there is")
     for grade in grades:
         name, shape = _user(grade, identity), _SHAPES.get(identity)
+        known = {"cell": grade.student_id, "column": identity, "text": name}
         if not name:
-            yield f"{grade.student_id}: {source} no {identity}"
+            yield Reason("identity_missing", known)
         elif is_formula(name):
-            yield f"{grade.student_id}: {identity} '{name}' would be run as a formula by a spreadsheet"
+            yield Reason("formula", known)
         elif shape is not None and not shape.fullmatch(name):
-            yield f"{grade.student_id}: '{name}' is no {identity} that Moodle knows"
+            yield Reason("identity_unknown", known)
         elif name.casefold() in owner:
-            yield f"{grade.student_id}: has the same {identity} as {owner[name.casefold()]}, '{name}'"
+            yield Reason("same_user", {**known, "other": owner[name.casefold()]})
         owner.setdefault(name.casefold(), grade.student_id)
 
 
@@ -442,28 +438,23 @@ def feedback_files(grades: Sequence[Grade], options: Options) -> Delivery:
     folders = {who: f"Participant_{number}_assignfeedback_file" for who, number in numbers.items()}
     files = pages_in(folders, graded, options.out or Path())
     if missing and not files:
-        faults = lines_of([f"{student}: {reason}" for student, reason in missing.items()])
+        faults = [Reason("no_number_known", {"cell": student}) for student in missing]
         raise failure(CallError, "nothing_to_export", "no_numbers", faults=faults)
     first = "upload grades before feedback files: they make Moodle take a worksheet for outdated"
     return Delivery(files, unplaced=missing, notes=(first, *notes))
 
 
-def _group_error(reason: str) -> CallError:
-    """Source: mod/assign/feedback/file/importziplib.php, get_participant_mapping."""
-    return CallError(
-        "groups",
-        "students hand in as groups, and Moodle takes a number in this archive for a group's: others would"
-        f" get the page ({reason}); export grades with comments (--worksheet without --what)",
-    )
-
-
 def _participants(
     grades: Sequence[Grade], options: Options
 ) -> tuple[dict[str, int], dict[str, str], list[str]]:
-    """Moodle's number of each participant, why others have none, and what a person should check."""
+    """Moodle's number of each participant, why others have none, and what a person should check.
+
+    In the archive of groups Moodle takes a number for a group's: others would get the page.
+    Source: mod/assign/feedback/file/importziplib.php, get_participant_mapping.
+    """
     people = {grade.student_id: grade.person for grade in grades}
     if options.groups:
-        raise _group_error("as --groups says")
+        raise failure(CallError, "groups", found="--groups")
     if options.form is None:
         numbers = {student: who.participant for student, who in people.items() if who.participant is not None}
         if all(person.participant is None for person in options.people.values()):
@@ -475,9 +466,8 @@ def _participants(
         return numbers, dict.fromkeys(others, "the table of ids has no participant"), notes
     sheet = Worksheet.opened(bytes_of(options.form, "form_missing"), options.form_name)
     if "group" in sheet.columns or (options.groups is None and sheet.group_columns):
-        titles = ", ".join(f"'{sheet.table.value(0, place)}'" for place in sheet.group_columns)
-        maybe = "" if "group" in sheet.columns else "; if that is none of groups, give --no-groups"
-        raise _group_error(f"as the worksheet's column {titles} tells{maybe}")
+        titles = tuple(f"'{sheet.table.value(0, place)}'" for place in sheet.group_columns)
+        raise failure(CallError, "groups", "" if "group" in sheet.columns else "groups_maybe", found=titles)
     matches = sheet.match(grades, options)
     rows = {student: row for student, row in matches.rows.items() if student in people}
     locked = {student: why for student, row in rows.items() if (why := sheet.why_fixed(row))}
@@ -492,28 +482,30 @@ def pages_in(folders: Mapping[str, str], graded: Sequence[Grade], out: Path) -> 
     Raises InputFileError for pages that are missing, or of another run than the results.
     """
     files: dict[str, Path] = {}
-    faults: list[str] = []
+    faults: list[Reason] = []
     for grade in graded:
         if grade.student_id in folders:
             files.update(_pages(grade, out, folders[grade.student_id], faults))
     if faults:
-        raise failure(InputFileError, "feedback_missing", faults=lines_of(faults))
+        raise failure(InputFileError, "feedback_missing", faults=faults)
     return files
 
 
-def _pages(grade: Grade, out: Path, folder: str, faults: list[str]) -> Iterator[tuple[str, Path]]:
+def _pages(grade: Grade, out: Path, folder: str, faults: list[Reason]) -> Iterator[tuple[str, Path]]:
     """A student's pages by their names in the archive; what is missing or of another run goes to `faults`."""
     for report, where in zip(grade.reports, grade.folders, strict=True):
         before = "" if len(grade.reports) == 1 else f"position-{where.rpartition('/')[2]}-"
+        at = {"cell": str(out / where)}
         try:
             written = json.loads((out / where / "report.json").read_bytes())
             if (written["status"], written["score"]) != (report.status, report.score):
-                faults.append(f"{grade.student_id}: {out / where} holds another result than results.json")
+                faults.append(Reason("other_result", at))
         except (OSError, ValueError, KeyError, TypeError) as error:
-            faults.append(f"{grade.student_id}: {out / where}: {getattr(error, 'strerror', None) or error}")
+            why = str(getattr(error, "strerror", None) or error)
+            faults.append(Reason("not_readable", {**at, "error": why}))
         page, *printable = (out / where / name for name in FEEDBACK_FILES)
         if not page.is_file():
-            faults.append(f"{grade.student_id}: {page} is not there")
+            faults.append(Reason("page_absent", {"cell": str(page)}))
         for file in (page, *printable):
             if file.is_file():
                 yield f"{folder}/{before}{file.name}", file

@@ -90,25 +90,11 @@ def _place(options: Options) -> tuple[int, int]:
     context_id = options.context_id or _number(area.get("contextid"))
     method = area.get("activemethod") or ""
     if cmid is None or context_id is None:
-        raise CallError(
-            "place_needed",
-            "which assignment? Give Moodle's answer to core_grading_get_definitions (--criteria),"
-            " or --cmid and --context-id",
-        )
+        raise failure(CallError, "place_needed", "guide_place")
     if method not in ("", "guide"):
-        raise CallError(
-            "guide_exists",
-            f"{options.criteria}: the assignment is graded by '{method}', and saving a guide would put"
-            " that aside; choose 'Marking guide' or 'Simple direct grading' in Moodle first",
-        )
+        raise failure(CallError, "guide_exists", "other_method", file=options.criteria, text=method)
     if options.replace_guide is None and (not area or any(criteria_in(area))):
-        known = "has a guide already" if area else "may have a guide (Moodle's answer, --criteria, tells)"
-        raise CallError(
-            "guide_exists",
-            f"the assignment {known}, and saving another deletes it with everybody's points. If that is meant"
-            " give Moodle's answer to core_grading_get_gradingform_instances, which tells how many"
-            " (--replace-guide)",
-        )
+        raise failure(CallError, "guide_exists")
     return cmid, context_id
 
 
@@ -158,16 +144,12 @@ def fillings(grades: Sequence[Grade], options: Options) -> Delivery:
     InputFileError where the criteria are not the rubric's.
     """
     if options.assignment_id is None or options.criteria is None:
-        raise CallError(
-            "place_needed",
-            "Moodle's number of the assignment (--assignment-id) and of the criteria (--criteria: its answer"
-            " to core_grading_get_definitions, or a CSV table criterion,id) are needed",
-        )
+        raise failure(CallError, "place_needed", "guide_numbers")
     criteria, marked = platform_marks(grades, options, options.criteria)
     for each in criteria:
         if not _NUMBER.fullmatch(each.id):
-            message = f"{each.criterion}: '{each.id}' is no number of a criterion in Moodle"
-            raise InputFileError("criteria", f"{options.criteria}: {message}")
+            known = {"file": options.criteria, "name": each.criterion, "text": each.id}
+            raise failure(InputFileError, "criteria", "criterion_number", **known)
     calls, missing = [], {}
     for grade, marks in marked:
         user = grade.person.platform_id
@@ -175,7 +157,7 @@ def fillings(grades: Sequence[Grade], options: Options) -> Delivery:
             missing[grade.student_id] = "the table of ids (--ids) has no id: Moodle's number of the user"
             continue
         if not _NUMBER.fullmatch(user):
-            raise CallError("ids", f"{grade.student_id}: '{user}' is no number of a user of Moodle (--ids)")
+            raise failure(CallError, "ids", student=grade.student_id, text=user, platform="Moodle")
         filled = [_filled(int(number), mark) for number, mark in marks.items()]
         arguments = {
             "assignmentid": int(options.assignment_id),
@@ -195,9 +177,7 @@ def fillings(grades: Sequence[Grade], options: Options) -> Delivery:
         call = {"student_id": grade.student_id, "wsfunction": "mod_assign_save_grade", "arguments": arguments}
         calls.append(call)
     if missing and not calls:
-        raise CallError(
-            "ids_needed", "nobody's number in Moodle is known: give a table student_id,id (--ids)"
-        )
+        raise failure(CallError, "ids_needed")
     check_unique((grade.person.platform_id for grade, _ in marked if grade.person.platform_id), "user")
     content = own_document(grades, criteria=[asdict(each) for each in criteria], calls=calls)
     note = "each call also replaces the student's feedback comment: without one Moodle stores half of it"

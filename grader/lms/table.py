@@ -44,7 +44,7 @@ def csv_text(header: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
     csv.writer(buffer, lineterminator="\r\n").writerows(table)
     text = buffer.getvalue()
     if list(csv.reader(io.StringIO(text, newline=""), strict=True)) != table:
-        raise not_as_meant("the table")
+        raise not_as_meant()
     return text
 
 
@@ -67,9 +67,9 @@ def number(value: float, decimals: int = 5) -> str:
     return "0" if text == "-0" else text
 
 
-def not_as_meant(what: str) -> OutputError:
+def not_as_meant() -> OutputError:
     """The error of a file that is read back before it is written, and differs."""
-    return OutputError("not_as_meant", f"{what} does not read back as it was meant; nothing was written")
+    return failure(OutputError, "not_as_meant")
 
 
 # Plain tables of the results ----------------------------------------------------------------------
@@ -244,12 +244,12 @@ class RawTable:
         cells = self.rows[row]
         return cells if self.kept is None or cells == [""] else [cells[column] for column in self.kept]
 
-    def ragged(self) -> list[str]:
+    def ragged(self) -> list[Reason]:
         """Faults of rows that have more or fewer cells than the first; empty lines are none."""
         wide = len(self.rows[0])
         return [
-            f"row {row + 1}: has {len(cells)} cells, the first row has {wide}"
-            for row, cells in enumerate(self.rows)
+            Reason("fields_missing", {"table_row": row, "fields": len(cells), "columns": wide})
+            for row, cells in enumerate(self.rows, 1)
             if len(cells) != wide and cells != [""]
         ]
 
@@ -553,10 +553,7 @@ def fill_in(
         maximum = form.maximum(row) or options.maximum
         if maximum is None:
             raise failure(CallError, "maximum_unknown", file=file, platform=form.platform)
-        try:
-            score = grade.out_of(maximum, rescale=options.rescale)
-        except CallError as error:
-            raise CallError(error.code, f"{file}: {error.message}", **error.parameters) from error
+        score = grade.out_of(maximum, rescale=options.rescale)
         texts[row] = number(score, form.decimals(row))
         zeros += [student] if texts[row] == "0" else []
         changed += [row] if form.put_grade(row, texts[row]) else []
@@ -569,7 +566,7 @@ def fill_in(
     for place, row in enumerate(staying):
         written = again.amount(again.value(place, "grade")) if row in texts else None
         if row in texts and (written is None or number(written) != texts[row]):
-            raise not_as_meant(form.name)
+            raise not_as_meant()
     notes = [*form.notes, *form.notes_on(len(changed), zeros)]
     replaced = sum(row in held for row in changed)
     if replaced:

@@ -50,6 +50,7 @@ from grader.tables.reader import (
 )
 from grader.tables.roster import ScanRef, parse_scan
 from grader.tables.scale_text import TextError
+from grader.texts.spoken import failure
 from reference.errors import PlanmarkError
 
 FILE_NAME = "decisions.csv"
@@ -394,13 +395,10 @@ class DecisionFile:
         try:
             lock.acquire()
         except Timeout as error:
-            why = f"another program holds it for more than {_LOCK_S:g} s; end that program"
-            raise OutputError("cannot_write", f"{self.path}: cannot be written: {why}") from error
+            raise failure(OutputError, "cannot_write", "held", file=self.path, limit=_LOCK_S) from error
         except (OSError, NotImplementedError) as error:
-            why = f"{getattr(error, 'strerror', None) or error}"
-            raise OutputError(
-                "cannot_write", f"{self.path}: cannot be written: its folder takes no lock file ({why})"
-            ) from error
+            known = {"file": self.path, "error": getattr(error, "strerror", None) or error}
+            raise failure(OutputError, "cannot_write", "no_lock", **known) from error
         try:
             yield read_table(self.path)
         finally:

@@ -6,7 +6,7 @@ FAILURES: dict[str, str] = {
     # Results and folders
     "results_missing": N_("%(file)s: there is no such file; run planmark grade first"),
     "unreadable": N_("%(file)s: cannot be read (%(error)s)"),
-    "no_results": N_("%(file)s: is not a planmark results file; grade again\n%(faults)s"),
+    "no_results": N_("%(file)s: is not a planmark results file; grade again\n%(findings)s"),
     "results_no_json": N_("%(file)s: is not JSON (%(error)s); grade again"),
     "results_newer": N_(
         "%(file)s: a later version of planmark wrote this (schema_version %(version)s, known is"
@@ -21,29 +21,97 @@ FAILURES: dict[str, str] = {
     "folder_missing": N_("%(folder)s: there is no such folder"),
     "nothing_to_grade": N_("%(folder)s: there is nothing to grade in this folder"),
     "nothing_came": N_("%(folder)s: nothing came that could be graded"),
-    "run_unknown": N_(
-        "%(folder)s: nothing says what was graded here; run planmark grade first, then name its --out"
+    "run_unknown": N_("%(folder)s: nothing was graded here; run planmark grade first, then name its --out"),
+    "cannot_write": N_("%(file)s: cannot be written (%(error)s); choose another place, or make room"),
+    "process_ended": N_("the process that graded has ended; begin it again: what was marked is kept"),
+    "folder_empty": N_("%(folder)s: there is no such folder, or nothing in it"),
+    "interrupted": N_(
+        "interrupted; %(done)s of %(total)s submissions are marked and kept in %(folder)s; the same command"
+        " goes on"
     ),
-    "submissions_moved": N_(
-        "%(folder)s: the submissions are not in %(was)s any more; grade them again where they are now"
-    ),
+    "held": N_("%(file)s: another program holds it for more than %(limit)s s; end that program"),
+    "no_lock": N_("%(file)s: cannot be written: its folder takes no lock file (%(error)s)"),
+    "file_taken": N_("%(file)s: is there already; name another file, or remove it first"),
+    "submissions_moved": N_("%(folder)s: its submissions have left %(was)s; grade them where they are now"),
     "results_in_use": N_(
         "%(folder)s: another run writes its results here (process %(pid)s on %(host)s, since %(began)s,"
         " over %(sheets)s); wait until it ends, or choose another --out"
     ),
     "in_use_unsaid": N_(
-        "%(folder)s: another run writes its results here (it does not say which); wait until it ends, or"
-        " choose another --out"
+        "%(folder)s: another run writes its results here; wait until it ends, or choose another --out"
     ),
     "of_another_assignment": N_(
         "%(folder)s: holds the results of the assignment %(there)s, not of %(given)s; choose another"
         " --out, or remove this folder first"
     ),
-    "of_another_folder": N_(
-        "%(folder)s: holds the results of %(there)s; choose another --out, or remove this folder first"
-    ),
+    "of_another_folder": N_("%(folder)s: holds results of %(there)s; choose another --out, or remove it"),
     "decisions_missing": N_("%(file)s: there is no such file of decisions"),
     "roster_needed": N_("answer sheets need --roster: a sheet carries its student's code"),
+    # A class for others to learn from
+    "no_preview": N_("%(file)s: is there already and is no preview; name another file"),
+    "scans_moved": N_("%(folder)s: scans are not there any more (%(names)s); grade again"),
+    "nothing_to_give": N_("%(folder)s: no figure was read on any page of this class"),
+    "preview_outdated": N_(
+        "%(folder)s: scans or decisions have changed since the pages were looked at; begin again without it"
+    ),
+    "no_page_given": N_("%(file)s: no page says yes"),
+    "answers_wrong": N_("%(file)s: is no picture any more; remove the preview, and begin again"),
+    # A cluster
+    "cluster_needed": N_("%(folder)s: workers of a cluster read a folder elsewhere; give --cluster ADDRESS"),
+    "storage_unreadable": N_(
+        "%(folder)s: cannot be read (%(error)s); check the address, and the storage's settings in the"
+        " environment, or try later"
+    ),
+    "name_unusable": N_("%(name)s: no name of a file below the folder; rename it"),
+    "cluster_unreachable": N_("%(address)s: no scheduler answers in %(limit)s s; start one: dask scheduler"),
+    "no_workers": N_(
+        "--cluster %(address)s: no worker within %(limit)s s; start some: dask worker %(address)s"
+        " --nworkers 2 --nthreads 1"
+    ),
+    "not_installed": N_("worker %(worker)s lacks planmark (%(error)s): pip install 'planmark[cluster]'"),
+    "cluster_versions": N_(
+        "worker %(worker)s has other versions (there / here): %(versions)s; marks could differ: install the"
+        " same version everywhere"
+    ),
+    "cluster_folder": N_(
+        "worker %(worker)s cannot read %(folder)s (%(error)s); put the class where all workers see it under"
+        " this name, or on s3:// or the like"
+    ),
+    "cluster_lost": N_(
+        "--cluster %(address)s: the scheduler has ended, or has no worker for %(limit)s s; what was marked is"
+        " kept, the same command goes on"
+    ),
+    # Calls of other commands
+    "ending": N_("%(option)s %(file)s: the name must end in %(names)s"),
+    "extra_missing": N_("a package is missing (%(error)s): pip install 'planmark[%(extra)s]'"),
+    "unknown_schema": N_("there is no schema '%(text)s': known are %(names)s"),
+    "unknown_language": N_("'%(text)s' is no language of planmark; choose one of %(names)s"),
+    "quantity_near": N_("no '%(text)s' on this cycle (did you mean %(near)s?): known are %(names)s"),
+    "unknown_quantity": N_("no '%(text)s' on this cycle: known are %(names)s; _x or _y for a component"),
+    "altitude": N_("--altitude is drawn on the sketch: name a file by --svg or --pdf"),
+    "crank_mm": N_("--crank-mm %(value)s: a length in mm above 0 and below 1000 is needed"),
+    "all_or_one": N_("--csv is a table of all variants: add --all"),
+    "all_on_pages": N_("%(option)s is the drawing of one variant: drawings of --all go into --pdf"),
+    "table_needed": N_(
+        "%(file)s: give the values of %(names)s by a CSV with a row for each student, which names them in its"
+        " first line beside n (--table)"
+    ),
+    "no_variant": N_("%(file)s: no variant of it assembles: its lengths and sides do not fit"),
+    "table_unused": N_("--table goes with a mechanism of your own: --mechanism FILE.toml"),
+    "new_name": N_("'%(text)s': a name of letters, digits, ., _ or - is needed"),
+    "like_form": N_('a copy needs other names: write %(names)s as KEY = "NAME", each on a line of its own'),
+    "unknown_mechanism": N_("--mechanism %(text)s: there are %(names)s, or a .toml file; or use --like"),
+    "token_needed": N_("--host %(host)s opens the class to other machines: give a --token, too"),
+    "port_taken": N_("--host %(host)s --port %(port)s: %(error)s; choose another --port, 0 is any free one"),
+    "address_needed": N_("--host %(host)s opens the server to others: give --address https://NAME, too"),
+    "address": N_("--address %(address)s: write it as https://NAME or http://NAME:PORT"),
+    "mail": N_(
+        "--mail: write it as smtps://USER:PASSWORD@HOST/SENDER, or with smtp:// where the server does"
+        " STARTTLS; SENDER is the address that letters come from"
+    ),
+    "secret_short": N_("%(option)s must have at least %(least)s characters"),
+    "data_base": N_("--database: the data base cannot be opened (%(error)s)"),
+    "publication_key": N_("this publication's key is no name of a folder"),
     # Calls of an export
     "unknown_target": N_("'%(to)s' is no export target: known are %(names)s"),
     "unknown_thing": N_("%(to)s is given no '%(what)s': known are %(names)s"),
@@ -64,9 +132,7 @@ FAILURES: dict[str, str] = {
         "students' maxima differ: choose one position, combine them by mean, or convert all to one maximum"
         " (--maximum and --rescale, where the platform is given grades)\n%(faults)s"
     ),
-    "maximum_unknown": N_(
-        "%(file)s: states no maximum grade; look it up in %(platform)s and give it (--maximum)"
-    ),
+    "maximum_unknown": N_("%(file)s: no maximum grade; look it up in %(platform)s, then give it (--maximum)"),
     "combine": N_("'%(combine)s' is no way to combine positions: choose sum or mean"),
     "position_or_combine": N_("either one position or a way to combine them, not both"),
     "several_positions": N_(
@@ -80,37 +146,27 @@ FAILURES: dict[str, str] = {
     "several_files": N_("%(file)s: %(count)s files; name a .zip, or a folder"),
     "visibility": N_("'%(text)s' is no visibility: choose %(names)s"),
     "identity": N_("users are found by %(names)s, not by '%(text)s'"),
-    "criteria_differ": N_(
-        "one rubric cannot hold all; grade all with one rubric, or choose a position\n%(faults)s"
-    ),
+    "criteria_differ": N_("rubrics differ; grade all with one rubric, or choose a position\n%(faults)s"),
     "named_twice": N_(
         "the platform would not take this as it is meant; nothing was written\n  %(what)s %(name)s stands"
         " twice"
     ),
     # Calls of a check
-    "measured_needed": N_(
-        "--measured FILE is needed: your measurements; --template FILE writes a file to fill in"
-    ),
+    "measured_needed": N_("--measured FILE is needed; --template FILE writes one for your measurements"),
     "page_file": N_("--page %(file)s: the name must end in .html; print the page for paper"),
     "page_students": N_("--page is one student's: %(file)s holds %(count)s"),
-    "template_file": N_("--template %(file)s: the name must end in .csv"),
-    "template_exists": N_(
-        "--template %(file)s: there is such a file already, perhaps filled in: choose another name"
-    ),
+    "template_exists": N_("--template %(file)s: is there already, perhaps filled in; choose another name"),
     "unknown_level": N_("--level %(level)s: known are %(names)s"),
-    "unknown_assignment": N_(
-        "there is no assignment '%(name)s'; built in are %(names)s; or give the path of a .toml file"
-    ),
+    "unknown_assignment": N_("no assignment '%(name)s'; built in are %(names)s; or give a .toml file's path"),
     "number_needed": N_("--%(what)s is needed: this assignment has %(what)s from %(first)s to %(last)s"),
     "number_range": N_("%(what)s = %(value)s: this assignment has %(what)s from %(first)s to %(last)s"),
     "number_disagrees": N_("--%(what)s %(called)s, but %(file)s says %(what)s %(filed)s: which is right?"),
     # Files of a platform
+    "not_as_meant": N_("the file does not read back as it was meant; nothing was written"),
     "not_utf8": N_("%(file)s: is not UTF-8 text (byte %(byte)s); download it again and do not resave it"),
     "quote_broken": N_("%(file)s, row %(row)s: text follows a closing quote"),
     "quote_open": N_("%(file)s, row %(row)s: a quote is opened and never closed"),
-    "worksheet": N_(
-        "%(file)s: Moodle would not take this worksheet; download it again and do not resave it\n%(faults)s"
-    ),
+    "worksheet": N_("%(file)s: Moodle would not take it; download it again and do not resave it\n%(faults)s"),
     "worksheet_empty": N_("%(file)s: the worksheet is empty; download it from Moodle again"),
     "worksheet_column": N_("%(file)s, row 1: there are %(count)s columns '%(name)s'"),
     "worksheet_needed": N_(
@@ -121,16 +177,10 @@ FAILURES: dict[str, str] = {
         "%(file)s: is no gradebook as %(platform)s exports it; export it again and do not resave"
         " it\n%(faults)s"
     ),
-    "gradebook_needed": N_(
-        "%(platform)s takes grades only in its own file: download it there and give it (--gradebook)"
-    ),
-    "archive_needed": N_(
-        "ILIAS's archive is needed: Multi-Feedback, Download (--gradebook multi_feedback_....zip)"
-    ),
+    "gradebook_needed": N_("%(platform)s takes only its own file: download it and give it (--gradebook)"),
+    "archive_needed": N_("ILIAS's archive is needed: Multi-Feedback, Download (--gradebook multi_....zip)"),
     "no_archive": N_("%(file)s: is no archive of ILIAS (%(error)s)"),
-    "archive_folders": N_(
-        "%(file)s: has no folders multi_feedback.../Last_First_login_number; download it again"
-    ),
+    "archive_folders": N_("%(file)s: no folders multi_feedback.../Last_First_login_number; download it anew"),
     "gradebook": N_("Canvas would misread this; nothing was written\n%(faults)s"),
     "import_aborted": N_("Moodle would abort this import; nothing was written\n%(faults)s"),
     "item_formula": N_("'%(item)s' is no name for a grade item: a spreadsheet would run it"),
@@ -145,4 +195,37 @@ FAILURES: dict[str, str] = {
     ),
     "no_json_answer": N_("%(file)s: is not JSON (%(error)s)"),
     "no_answer_to": N_("%(file)s: is not Moodle's answer to %(asked)s"),
+    "no_rubric": N_("%(file)s: is no educationRubric with its id and levels"),
+    "submissions": N_("%(file)s: no submissions are in this answer; ask for %(asked)s"),
+    # Calls of a platform
+    "points": N_("Canvas keeps two decimals of a rubric's points; nothing was written\n%(faults)s"),
+    "ids": N_("%(student)s: '%(text)s' is no number of a user of %(platform)s (--ids)"),
+    "ids_needed": N_("nobody's number in Moodle is known: give a table student_id,id (--ids)"),
+    "criteria_many": N_("%(platform)s takes %(most)s criteria, not %(count)s; export totals (--to csv)"),
+    "criterion_number": N_("%(file)s: %(name)s: '%(text)s' is no number of a criterion in Moodle"),
+    "place_needed": N_("%(to)s needs %(names)s, which say where the rubric goes"),
+    "guide_place": N_(
+        "which assignment? Give Moodle's core_grading_get_definitions (--criteria), or --cmid, --context-id"
+    ),
+    "guide_numbers": N_(
+        "Moodle's number of the assignment (--assignment-id) and of the criteria (--criteria: its answer to"
+        " core_grading_get_definitions, or a CSV table criterion,id) are needed"
+    ),
+    "other_method": N_(
+        "%(file)s: the assignment is graded by '%(text)s', and saving a guide would put that aside; choose"
+        " 'Marking guide' or 'Simple direct grading' in Moodle first"
+    ),
+    "guide_exists": N_(
+        "the assignment has a guide, or may have one (--criteria tells); saving another deletes it with"
+        " everybody's points: if that is meant, give Moodle's answer to"
+        " core_grading_get_gradingform_instances (--replace-guide)"
+    ),
+    "groups": N_(
+        "students hand in as groups (%(found)s), and Moodle takes a number in this archive for a group's:"
+        " others would get the page; export grades with comments (--worksheet without --what)"
+    ),
+    "groups_maybe": N_(
+        "the worksheet's column %(found)s may be one of groups: if it is none, give --no-groups; else others"
+        " would get the page, so export grades with comments (--worksheet without --what)"
+    ),
 }

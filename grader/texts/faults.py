@@ -129,7 +129,51 @@ FAULTS: dict[str, tuple[str, ...]] = {
         N_("corners: give the upright sheet's from the top left clockwise; no three may lie in a line"),
     ),
     "audit_unknown": (N_("'%(text)s': %(names)s are known, then ; said=VERDICT"),),
+    # Of results that are exported.
+    "two_reports": (N_("has two reports"),),
+    "score_range": (N_("the score %(score)s is not between 0 and %(most)s"),),
+    "no_maximum": (N_("the maximum is %(most)s"),),
+    "maximum_of": (N_("%(most)s points: %(names)s"),),
+    "points_range": (N_("%(given)s of %(most)s points"),),
+    "points_rough": (N_("%(given)s points"),),
+    "other_criteria": (N_("other criteria or points than %(other)s"),),
+    "other_result": (N_("holds another result than results.json"),),
+    "page_absent": (N_("is not there"),),
+    "comment_long": (N_("the comment has more than %(most)s characters"),),
+    # Of platforms' files, and of what they would not take.
+    "title": (N_("'%(text)s' is no title of an assignment"),),
+    "taken_for_number": (N_("%(platform)s takes this for a number; give its own of the user (--ids)"),),
+    "no_user": (N_("'%(text)s' is no number of a user of %(platform)s (--ids)"),),
+    "no_number_known": (N_("has no number of a participant"),),
+    "taken_for_points": (N_("'%(text)s' would be read as the row of points"),),
+    "formula": (N_("'%(text)s' would be run as a formula by a spreadsheet"),),
+    "same_user": (N_("'%(text)s' is already the %(column)s of %(other)s"),),
+    "points_row": (N_("there is no row '%(text)s' below the first"),),
+    "points_possible": (N_("'%(item)s' has '%(text)s' points possible"),),
+    "no_students": (N_("it has no students"),),
+    "of_platform": (N_("it is a file of %(platform)s"),),
+    "columns_unknown": (N_("no platform's columns: %(names)s"),),
+    "scale_graded": (
+        N_("the assignment is graded by a scale, and Moodle would skip points: let it be points"),
+    ),
+    "comments_first": (N_("feedback comments stand in the first column, where Moodle drops them"),),
+    "participant_words": (N_("participants are called by different words: %(names)s"),),
+    "participant_form": (N_("'%(text)s' is not 'Participant' and a number"),),
+    "participant_twice": (N_("the same participant as in row %(first)s"),),
+    "maximum_wrong": (N_("the maximum grade '%(text)s' is no positive number"),),
+    "grade_no_number": (N_("the grade '%(text)s' is no number; Moodle would store 0"),),
+    "grade_comma": (N_("the grade '%(text)s' has a comma; Moodle would store %(whole)s"),),
+    "grade_above": (N_("the grade '%(text)s' is above the maximum; Moodle would skip it"),),
+    "identity_missing": (N_("has no %(column)s; the roster gives an email, a table (--ids) the others"),),
+    "identity_unknown": (N_("'%(text)s' is no %(column)s that Moodle knows"),),
+    "criterion_absent": (
+        N_("there %(count)s times; one must be named so"),
+        N_("not there; there are %(names)s"),
+    ),
+    "points_differ": (N_("%(there)s points there, %(here)s in the rubric"),),
+    "criterion_extra": (N_("there, and not in the rubric"),),
+    "one_number": (N_("two criteria have one number"),),
 }
 
-ON_LINE = N_("line %(number)s")
+WHERE = N_("line %(line)s"), N_("row %(table_row)s")
 """The place of a fault; a column follows behind a comma."""

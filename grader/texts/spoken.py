@@ -8,12 +8,13 @@ from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
 from grader.records import Reason, Unread, Value, of_error
 from grader.texts.clauses import CLAIMS, CLAUSES
 from grader.texts.failures import FAILURES
-from grader.texts.faults import FAULTS, ON_LINE
+from grader.texts.faults import FAULTS, WHERE
 from grader.texts.problems import PROBLEMS
 from grader.texts.refusals import REFUSALS
-from reference.errors import PlanmarkError
+from reference.errors import PlanmarkError, lines_of
 
 ENGLISH = tongue(ROOT_LANGUAGE)
+SENTENCES = {**FAILURES, **REFUSALS}
 NO_NAMES: Mapping[str, str] = {}
 
 
@@ -135,7 +136,7 @@ def clauses(code: str) -> Sequence[str]:
 
 def _placed(text: str, said: Mapping[str, str], speaker: Tongue) -> str:
     """Return a fault behind its place: a path in a document, or a line, a column of it, or both."""
-    line = speaker.gettext(ON_LINE) % {"number": said["line"]} if "line" in said else ""
+    line = filled(WHERE, said, speaker)
     return ": ".join(filter(None, (", ".join(filter(None, (line, said.get("cell", "")))), text)))
 
 
@@ -222,14 +223,14 @@ def told_parameters(reason: Reason) -> dict[str, Any]:
     return {key: value for key, value in reason.parameters.items() if key != "detail"}
 
 
-def refusal(reason: Reason, speaker: Tongue = ENGLISH) -> str:
+def refusal(reason: Reason, speaker: Tongue = ENGLISH, faults: Sequence[Reason] = ()) -> str:
     """Return a refused request's sentence; of an error its own words, in other languages its sentence."""
-    text = FAILURES.get(str(reason.parameters.get("cause", reason.code)))
+    text = SENTENCES.get(str(reason.parameters.get("cause", reason.code)))
     said = {key: _plain(one, speaker) for key, one in reason.parameters.items()}
+    if faults:
+        said["faults"] = lines_of([fault(one, speaker) for one in faults])
     if text and (told := filled([text], said, speaker)):
         return told
-    if reason.code in REFUSALS:
-        return speaker.gettext(REFUSALS[reason.code]) % reason.parameters
     return (speaker is not ENGLISH and sentence(reason, speaker)) or message(reason, speaker)
 
 
@@ -243,18 +244,21 @@ Failed = TypeVar("Failed", bound=PlanmarkError)
 
 
 def failure(
-    kind: type[Failed], code: str, cause: str = "", speaker: Tongue = ENGLISH, /, **known: object
-) -> Failed:
+    kind: type[Failed], code: str, cause: str = "", speaker: Tongue = ENGLISH, /,
+    faults: Any = (), **known: object,  # noqa: ANN401 - reasons; mappings of anything are spread behind it
+) -> Failed:  # fmt: skip
     """Return an error that is told by the sentence of its cause, else of its code: see `FAILURES`.
 
-    Arguments: `known` are what the sentence names; paths and the like become text.
+    Arguments: `faults` are reasons listed below it; `known` is what it names, paths and the like become text.
     """
     told: dict[str, Value] = {"cause": cause} if cause else {}
     for name, one in known.items():
         # A path may hold bytes that are no text: no answer could be written with them.
         text = str(one).encode("utf-8", "backslashreplace").decode()
         told[name] = one if isinstance(one, int | float | tuple) else text
-    return kind(code, refusal(Reason(code, told), speaker), **told)
+    error = kind(code, refusal(Reason(code, told), speaker, faults), **told)
+    error.faults = tuple(faults)
+    return error
 
 
 class RefusedError(PlanmarkError):
@@ -272,7 +276,8 @@ class RefusedError(PlanmarkError):
 
 def told_of(error: PlanmarkError, speaker: Tongue) -> str:
     """Return the sentence of an error in a language."""
-    return refusal(error.reason if isinstance(error, RefusedError) else of_error(error), speaker)
+    reason = error.reason if isinstance(error, RefusedError) else of_error(error)
+    return refusal(reason, speaker, error.faults)
 
 
 # Documents ----------------------------------------------------------------------------------------

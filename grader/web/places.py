@@ -19,7 +19,7 @@ from grader.folder.inventory import is_tool_file
 from grader.rubric import rubric_of
 from grader.tables.reader import why_no_id
 from grader.tables.roster import RosterRow, read_roster
-from grader.texts.spoken import RefusedError
+from grader.texts.spoken import RefusedError, failure
 from grader.web.store import Publication
 from reference.authored.assignment import Assignment, built_in, load_assignment
 from reference.authored.toml_file import MAX_BYTES
@@ -110,7 +110,7 @@ class Places:
 def places_of(data: Path, publication: Publication) -> Places:
     """Return a publication's folders; they are made as they are needed."""
     if not _NAME_OF_KEY.fullmatch(publication.key):
-        raise CallError("publication_key", "this publication's key is no name of a folder")
+        raise failure(CallError, "publication_key")
     return Places(data / "publications" / publication.key)
 
 

@@ -24,7 +24,7 @@ from grader.folder.batch import Batch, grade
 from grader.folder.workers import Workers, guarded, result_of
 from grader.records import Reason
 from grader.review.session import moves
-from grader.texts.spoken import message, told_parameters
+from grader.texts.spoken import failure, message, told_parameters
 from grader.web.judges import MOST_JUDGES, Judges, end_with_parent
 from grader.web.places import batch_of, places_of
 from grader.web.settings import Settings
@@ -247,8 +247,7 @@ class Queue:
                     state = session.get_one(Job, job.id).state
                 if state != "running" or self._workers is None:
                     raise _StoppedError from None
-                why = "the process that graded has ended; begin it again: what was marked is kept"
-                raise PlanmarkError("crashed", why) from None
+                raise failure(PlanmarkError, "crashed", "process_ended") from None
             match said:
                 case ("progress", stage, done, total):
                     turn_s = TURN_S * (1 + self._turns[job.id])

@@ -10,6 +10,7 @@ from urllib.parse import urlsplit
 from grader.files import make_folder, write_whole
 from grader.folder.workers import Limits
 from grader.review.server import LOOPBACK
+from grader.texts.spoken import failure
 from reference.errors import CallError
 
 SECRET = "PLANMARK_SECRET"  # noqa: S105 - the name of the variable
@@ -92,7 +93,7 @@ def settings_of(
     """
     parts = urlsplit(address)
     if parts.scheme not in {"http", "https"} or not parts.netloc or parts.path.strip("/"):
-        raise CallError("address", f"--address {address}: write it as https://NAME or http://NAME:PORT")
+        raise failure(CallError, "address", address=address)
     make_folder(data)
     url = database or os.environ.get(DATABASE) or f"sqlite:///{data.resolve() / 'planmark.sqlite'}"
     photos = max(1, (os.cpu_count() or 1) - 1)
@@ -108,15 +109,14 @@ def _mail(url: str) -> str:
             parts.scheme in {"smtp", "smtps"} and parts.hostname and "@" in parts.path and is_port
         ):
             return url
-    why = "write it as smtps://USER:PASSWORD@HOST/SENDER, or with smtp:// where the server does STARTTLS"
-    raise CallError("mail", f"--mail: {why}; SENDER is the address that letters come from")
+    raise failure(CallError, "mail")
 
 
 def _secret(data: Path) -> str:
     given = os.environ.get(SECRET, "")
     if given:
         if len(given) < LEAST_SECRET:
-            raise CallError("secret_short", f"{SECRET} must have {LEAST_SECRET} signs or more")
+            raise failure(CallError, "secret_short", option=SECRET, least=LEAST_SECRET)
         return given
     path = data / "secret"
     if not path.is_file():

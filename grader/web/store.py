@@ -28,6 +28,7 @@ from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 from sqlalchemy.orm import DeclarativeBase, Mapped, Session, mapped_column, relationship, sessionmaker
 from sqlalchemy.schema import CreateColumn
 
+from grader.texts.spoken import failure
 from reference.errors import CallError
 
 KEY_BYTES = 9
@@ -360,7 +361,7 @@ class Store:
             _add_columns(self.engine)
         except (ArgumentError, ImportError, SQLAlchemyError) as error:
             why = str(getattr(error, "orig", None) or error).splitlines()[0]
-            raise CallError("data_base", f"--database: the data base cannot be opened ({why})") from error
+            raise failure(CallError, "data_base", error=why) from error
         self._sessions = sessionmaker(self.engine, expire_on_commit=False)
         with self.session() as session:
             _take_over(session)

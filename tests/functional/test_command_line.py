@@ -162,7 +162,7 @@ def test_a_log_that_cannot_be_written_is_told(tmp_path):
     (tmp_path / "file").touch()
     status, _, err = told(tmp_path, "plan", "pump", "--n", "7", "--log", "file/x.log")
     assert status == 5
-    assert "the log cannot be written" in err
+    assert "cannot be written" in err
 
 
 # What comes next ----------------------------------------------------------------------------------

@@ -19,7 +19,9 @@ from grader.lms.marks import (
     platform_marks,
 )
 from grader.lms.table import csv_text, number
-from reference.errors import CallError, lines_of
+from grader.records import Reason
+from grader.texts.spoken import failure
+from reference.errors import CallError
 
 _RATING = ("Rating Name", "Rating Description", "Rating Points")
 RUBRIC_HEADER = (
@@ -32,9 +34,8 @@ def _canvas_criteria(grades: Sequence[Grade], options: Options) -> list[Criterio
     criteria = class_criteria(grades, options)
     rough = [each for each in criteria if abs(round(each.max_points, 2) - each.max_points) > CLOSE]
     if rough:
-        message = "Canvas keeps two decimals of a rubric's points; nothing was written"
-        lines = lines_of([f"{each.name}: {each.max_points:g}" for each in rough])
-        raise CallError("points", f"{message}\n{lines}")
+        lines = [Reason("points_rough", {"cell": one.name, "given_points": one.max_points}) for one in rough]
+        raise failure(CallError, "points", faults=lines)
     return criteria
 
 
@@ -56,7 +57,7 @@ def _canvas_user(grade: Grade) -> str:
     """By Canvas's own number, else by the institution's; CallError for what is none of Canvas's."""
     user = grade.person.platform_id or f"sis_user_id:{grade.student_id}"
     if not _CANVAS_USER.fullmatch(user):
-        raise CallError("ids", f"{grade.student_id}: '{user}' is no number of a Canvas user (--ids)")
+        raise failure(CallError, "ids", student=grade.student_id, text=user, platform="Canvas")
     return user
 
 

@@ -7,6 +7,7 @@ from grader.lms.api.requests import Plan, place_of, students_submissions
 from grader.lms.grades import Delivery, Grade, Options, ready
 from grader.lms.marks import class_criteria, platform_marks
 from grader.lms.table import number
+from grader.texts.spoken import failure
 from reference.errors import CallError
 
 _MOST_CRITERIA = 50
@@ -30,8 +31,8 @@ def google_classroom(grades: Sequence[Grade], options: Options) -> Delivery:
     if options.criteria is None:
         criteria = class_criteria(grades, options)
         if len(criteria) > _MOST_CRITERIA:
-            message = f"Google Classroom takes {_MOST_CRITERIA} criteria, the rubric has {len(criteria)}"
-            raise CallError("criteria", f"{message}; export the totals alone (--to csv)")
+            count = {"most": _MOST_CRITERIA, "count": len(criteria)}
+            raise failure(CallError, "criteria", "criteria_many", platform=plan.platform, **count)
         body = {
             "criteria": [
                 {

@@ -9,6 +9,7 @@ from grader.lms.api.requests import Plan, place_of, students_submissions
 from grader.lms.grades import Delivery, Grade, Options, ready
 from grader.lms.marks import Mark, class_criteria, plain_comment, platform_marks, read_answer
 from grader.lms.table import number
+from grader.texts.spoken import failure
 from reference.errors import CallError
 
 _TYPE = "#microsoft.graph.education"
@@ -53,7 +54,7 @@ def ms_education(grades: Sequence[Grade], options: Options) -> Delivery:
     known, missing = students_submissions(grades, options, ask)
     rubric_id = answer.get("id") if isinstance(answer, dict) else None
     if not levels or not isinstance(rubric_id, str):
-        raise CallError("criteria", f"{options.criteria}: is no educationRubric with its id and levels")
+        raise failure(CallError, "criteria", "no_rubric", file=options.criteria)
     if options.submissions is None:
         reference = {"@odata.id": f"https://graph.microsoft.com/v1.0/education/me/rubrics/{quote(rubric_id)}"}
         plan.add(f"PUT {base}/rubric/$ref", reference, "attach")

@@ -8,6 +8,7 @@ from urllib.parse import quote
 from grader.lms.grades import Delivery, Grade, Options, Person, ready
 from grader.lms.marks import Mark, check_unique, json_text, marks_of, read_answer, together
 from grader.lms.table import Evidence, match_class
+from grader.texts.spoken import failure
 from reference.errors import CallError
 
 # The plan -----------------------------------------------------------------------------------------
@@ -50,7 +51,7 @@ def place_of(options: Options, *names: str) -> list[str]:
     values = [getattr(options, name) for name in names]
     missing = [f"--{name.replace('_', '-')}" for name, value in zip(names, values, strict=True) if not value]
     if missing:
-        raise CallError("place_needed", f"{options.to} needs {' and '.join(missing)}: where the rubric goes")
+        raise failure(CallError, "place_needed", to=options.to, names=tuple(missing))
     return [quote(str(value), safe="") for value in values]
 
 
@@ -104,8 +105,7 @@ def students_submissions(
         return {}, {grade.student_id: why for grade in ready(grades)}
     known = list(submissions_in(read_answer(options.submissions)))
     if not known:
-        message = f"{options.submissions}: no submissions are in this answer; ask for {ask}"
-        raise CallError("submissions", message)
+        raise failure(CallError, "submissions", file=options.submissions, asked=ask)
     rows = {row: submission.user for row, submission in enumerate(known)}
     matches = match_class(rows, grades, options, _evidence, options.submissions.name)
     graded = [grade.student_id for grade in ready(grades)]

@@ -266,7 +266,7 @@ def test_a_target_that_is_there_is_not_written_over(tmp_path):
     for name, why in (
         ("there.zip", "is there already"),
         ("other.zip", "is no preview"),
-        ("f.tar", "a .zip file"),
+        ("f.tar", "must end in .zip"),
     ):
         with pytest.raises(CallError, match=why):
             check_target(tmp_path / name)

@@ -110,7 +110,7 @@ def test_the_ids_that_canvas_gave_are_used_and_the_rubric_is_not_made_twice(tmp_
 
 @pytest.mark.parametrize("to", ["canvas-api", "google-classroom", "ms-education"])
 def test_the_place_of_a_rubric_must_be_told(tmp_path, to):
-    with pytest.raises(CallError, match="needs --course-id and --assignment-id"):
+    with pytest.raises(CallError, match="needs --course-id, --assignment-id"):
         planned(tmp_path, to)
 
 
@@ -205,7 +205,7 @@ def test_classroom_has_the_rubric_and_grades_of_two_decimals(tmp_path):
 
 
 def test_a_rubric_of_more_criteria_than_classroom_takes_is_refused(tmp_path):
-    with pytest.raises(CallError, match="takes 50 criteria, the rubric has 51"):
+    with pytest.raises(CallError, match="takes 50 criteria, not 51"):
         planned(tmp_path, "google-classroom", marked("s01", *[5.0] * 51), **PLACE)
 
 

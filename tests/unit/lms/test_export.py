@@ -203,7 +203,7 @@ def test_an_archive_that_reads_otherwise_is_not_written(tmp_path, monkeypatch, b
 def test_maxima_that_differ_have_no_one_row_of_points(tmp_path):
     two = results(report("s01", 5.0), report("s02", 5.0, max_score=20.0))
     for to in ("canvas", "moodle", "lti", "gradescope"):
-        with pytest.raises(CallError, match=r"(?s)maxima differ.*10: s01\n  20: s02"):
+        with pytest.raises(CallError, match=r"(?s)maxima differ.*10 points: s01\n  20 points: s02"):
             export(two, tmp_path / "o.csv", Options(to=to))
     with pytest.raises(CallError, match="maxima differ"):
         export(two, tmp_path / "o.csv", Options(to="moodle", rescale=True))

@@ -151,13 +151,13 @@ def test_a_row_of_nobody_below_the_points_is_left(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "not the columns"),
+        ("", "no platform's columns"),
         (EXPORTED[: EXPORTED.index('"Popescu')], "no students"),
-        ("a,b\n1,2\n", "not the columns"),
+        ("a,b\n1,2\n", "no platform's columns"),
         (EXPORTED.replace("    Points Possible", "x"), "no row 'Points Possible'"),
         (EXPORTED.replace("10.00", "(read only)"), "has '\\(read only\\)' points possible"),
         (EXPORTED.replace("10.00", "0"), "has '0' points possible"),
-        (EXPORTED.replace("55,55", "55"), "row 3: has 8 cells"),
+        (EXPORTED.replace("55,55", "55"), "row 3: has 8 fields"),
         (EXPORTED.encode("utf-16"), "not UTF-8"),
         (EXPORTED + '"open', "never closed"),
     ],
@@ -271,18 +271,18 @@ def test_a_status_file_of_ilias_stays_whole_and_says_which_rows_count(tmp_path):
         ("brightspace", BRIGHTSPACE, {"item": "Quiz"}, "maximum there is 5, the rubric's is 10"),
         ("blackboard", BLACKBOARD, {"item": "Total"}, "maximum there is 43, the rubric's is 10"),
         ("blackboard", BLACKBOARD, {"item": "Note"}, "0 assignments fit 'Note'"),
-        ("brightspace", BLACKBOARD, {"item": "Pump"}, "it is one of Blackboard's"),
-        ("brightspace", EXPORTED, {"item": "Pump"}, "it is one of Canvas's"),
+        ("brightspace", BLACKBOARD, {"item": "Pump"}, "it is a file of Blackboard"),
+        ("brightspace", EXPORTED, {"item": "Pump"}, "it is a file of Canvas"),
         (
             "brightspace",
             BRIGHTSPACE.replace(" <Numeric MaxPoints:5>", ""),
             {"item": "Quiz"},
-            "states no maximum grade",
+            "no maximum grade",
         ),
-        ("ilias", ILIAS, {}, "states no maximum grade"),
+        ("ilias", ILIAS, {}, "no maximum grade"),
         ("ilias", ILIAS, {"maximum": 20.0}, "maximum there is 20, the rubric's is 10"),
-        ("brightspace", BRIGHTSPACE.replace(",#\r", ",#,x\r", 1), {"item": "Pump"}, "row 2: has 10 cells"),
-        ("blackboard", b"\xff\xfe\x00", {}, "not the columns"),
+        ("brightspace", BRIGHTSPACE.replace(",#\r", ",#,x\r", 1), {"item": "Pump"}, "row 2: has 10 fields"),
+        ("blackboard", b"\xff\xfe\x00", {}, "no platform's columns"),
     ],
 )
 def test_what_these_platforms_would_swallow_is_refused(tmp_path, to, data, how, message):
@@ -349,7 +349,7 @@ def test_a_title_without_its_number_is_told_to_be_a_new_assignment(tmp_path):
     ("student", "person", "item", "message"),
     [
         ("1.2.3", Person(), "", "takes this for a number"),
-        ("s01", Person(platform_id="x"), "", "no number of a Canvas user"),
+        ("s01", Person(platform_id="x"), "", "no number of a user of Canvas"),
         ("s01", Person(name="Points Possible"), "", "the row of points"),
         ("s01", Person(name="=cmd()"), "", "formula"),
         ("s01", Person(), "=Pump", "no title"),
@@ -364,7 +364,7 @@ def test_what_canvas_would_misread_is_refused(tmp_path, student, person, item, m
 
 def test_two_students_with_one_number_are_refused(tmp_path):
     people = {"s01": Person(platform_id="1"), "s02": Person(platform_id="1")}
-    with pytest.raises(CallError, match="the same number as s01"):
+    with pytest.raises(CallError, match="s02: '1' is already the ID of s01"):
         canvas(tmp_path / "out.csv", report("s01", 7.5), report("s02", 7.5), people=people)
 
 
@@ -444,7 +444,7 @@ def test_points_add_up_to_the_grade_and_go_to_canvass_own_criteria(tmp_path, rub
 
 @pytest.mark.parametrize("number", ["0", "a/b", "sis_user_id:", "sis_user_id:a/../b", "name"])
 def test_a_number_that_canvas_would_not_take_is_refused(tmp_path, rubric, number):
-    with pytest.raises(CallError, match="no number of a Canvas user"):
+    with pytest.raises(CallError, match="no number of a user of Canvas"):
         points(tmp_path, rubric, marked("s01", 5.0, 2.5), people={"s01": Person(platform_id=number)})
 
 
@@ -478,7 +478,7 @@ def test_criteria_may_be_told_in_a_table(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"description": "v_X"}, "c1: Vector 1: not there .*'v_X': there, and not in the rubric"),
+        ({"description": "v_X"}, "c1: Vector 1: not there; .*'v_X': there, and not in the rubric"),
         ({"points": 4.0}, "4 points there, 5 in the rubric"),
         ({"description": "c2: Vector 2"}, "2 times"),
         ({"id": "_2"}, "two criteria have one number"),

@@ -47,8 +47,8 @@ def test_a_sum_waits_for_all_its_parts():
         ([report("s01", 12.0)], "12 is not between 0 and 10"),
         ([report("s01", 0.0, max_score=0.0)], "maximum is 0"),
         ([report("s01", 1.0), report("s01", 2.0)], "s01: has two reports"),
-        ([report("..", 1.0)], "no student_id"),
-        ([report("a/b", 1.0)], "no student_id"),
+        ([report("..", 1.0)], "is refused: "),
+        ([report("a/b", 1.0)], "is refused: "),
     ],
 )
 def test_results_that_contradict_themselves_are_refused(reports, message):

@@ -153,7 +153,7 @@ def test_a_worksheet_downloaded_in_romanian_or_russian_is_understood():
     assert b",8.5," in filled_in(data, report("s01", 8.5)).content
     russian = "Идентификатор,Полное имя,Адрес электронной почты,Оценка,Последнее изменение (оценка)"
     data = worksheet("Участник 7,Ion Popescu,ion@x.ro,,-", header=russian)
-    with pytest.raises(CallError, match="states no maximum"):
+    with pytest.raises(CallError, match="no maximum grade"):
         filled_in(data, report("s01", 8.5))
     assert b",8.5,-" in filled_in(data, report("s01", 8.5), maximum=10.0).content
     with pytest.raises(CallError, match="maximum there is 100"):
@@ -230,10 +230,10 @@ def test_columns_of_people_are_known_by_what_stands_in_them_where_their_names_ar
     ("data", "why"),
     [
         (b"", "empty"),
-        (worksheet(line("x"), header=HEADER.replace("Identifier", "Id")), "no column 'Identifier'"),
-        (worksheet("Participant 7,x", header="Identifier,Mark"), "no column 'Grade'"),
+        (worksheet(line("x"), header=HEADER.replace("Identifier", "Id")), "column Identifier is missing"),
+        (worksheet("Participant 7,x", header="Identifier,Mark"), "column Grade is missing"),
         (worksheet("Participant 7,7.0,10.0", header="Identifier,Grade,Maximum grade"), "Last modified"),
-        (worksheet(line(101) + ",extra"), "row 2: has 12 cells"),
+        (worksheet(line(101) + ",extra"), "row 2: has 12 fields"),
         (worksheet(line(101), line(101, email="b@x.ro")), "same participant"),
         (worksheet(line("x")), "is not 'Participant' and a number"),
         (worksheet(line(101)).replace(b"Participant ", b""), "'101' is not 'Participant' and a number"),
@@ -249,7 +249,7 @@ def test_columns_of_people_are_known_by_what_stands_in_them_where_their_names_ar
         ),
         (worksheet(line(101), header=HEADER.replace("Maximum grade", "Scale")), "graded by a scale"),
         (worksheet(line(101)).decode().encode("utf-16"), "not UTF-8"),
-        (worksheet(line(101)).replace(b",", b";"), "no column"),
+        (worksheet(line(101)).replace(b",", b";"), "is missing"),
     ],
 )
 def test_what_moodle_would_swallow_is_refused(data, why):
@@ -291,11 +291,11 @@ def test_users_by_address_come_from_the_roster():
 @pytest.mark.parametrize(
     ("people", "identity", "message"),
     [
-        ({}, "email", "s01: the roster gives no email"),
+        ({}, "email", "s01: has no email; the roster gives"),
         ({"s01": Person(email="ion")}, "email", "is no email"),
         ({"s01": Person(email="=1@x.ro")}, "email", "formula"),
         ({"s01": Person(username="Ion Pop")}, "username", "is no username"),
-        ({}, "username", "the table of ids gives no username"),
+        ({}, "username", "has no username; .*--ids"),
         ({}, "id", "is no id"),
         ({}, "phone", "not by 'phone'"),
     ],
@@ -307,7 +307,7 @@ def test_a_row_that_would_abort_moodles_import_is_refused(people, identity, mess
 
 def test_two_students_with_one_address_are_refused_together_with_all_other_faults():
     people = {"s01": Person(email="a@x.ro"), "s02": Person(email="A@x.ro")}
-    with pytest.raises(CallError, match=r"(?s)s02: has the same email.*s03: the roster gives no"):
+    with pytest.raises(CallError, match=r"(?s)s02: 'A@x.ro' is already the email of s01.*s03: has no email"):
         gradebook(report("s01", 1.0), report("s02", 2.0), report("s03", 3.0), people=people, identity="email")
 
 
@@ -441,7 +441,7 @@ def test_pages_that_are_missing_or_of_another_run_are_refused(tmp_path, broken):
     pages(tmp_path / "marks", one if broken else marked("s01", 2.5))
     if broken:
         (tmp_path / "marks" / "s01" / broken).unlink()
-    with pytest.raises(InputFileError, match=r"grade again, nothing was written\n  s01: "):
+    with pytest.raises(InputFileError, match=r"grade again, nothing was written\n  .*s01"):
         archive(tmp_path, one)
     assert not (tmp_path / "out.zip").exists()
 

@@ -89,7 +89,7 @@ def points(tmp_path):
 
 
 def test_an_activity_told_by_its_numbers_alone_may_have_a_guide(tmp_path, points):
-    with pytest.raises(CallError, match=r"may have a guide .*another deletes it"):
+    with pytest.raises(CallError, match=r"may have one .* another deletes it"):
         moodle(tmp_path, "rubric", marked("s01", 5.0), cmid=1, context_id=2)
     delivery, path = moodle(
         tmp_path, "rubric", marked("s01", 5.0), cmid=1, context_id=2, replace_guide=points
@@ -99,14 +99,14 @@ def test_an_activity_told_by_its_numbers_alone_may_have_a_guide(tmp_path, points
 
 
 def test_an_activity_that_nobody_tells_is_asked_for(tmp_path, answer):
-    with pytest.raises(CallError, match="--cmid and --context-id"):
+    with pytest.raises(CallError, match="--cmid, --context-id"):
         moodle(tmp_path, "rubric", marked("s01", 5.0), cmid=1)
-    with pytest.raises(CallError, match="--cmid and --context-id"):
+    with pytest.raises(CallError, match="--cmid, --context-id"):
         moodle(tmp_path, "rubric", marked("s01", 5.0), criteria=answer(contextid="57"))
 
 
 def test_a_guide_is_never_written_over_another(tmp_path, answer):
-    with pytest.raises(CallError, match="has a guide already"):
+    with pytest.raises(CallError, match="has a guide, or"):
         moodle(tmp_path, "rubric", marked("s01", 5.0), criteria=answer(GUIDE))
     assert not (tmp_path / "out.json").exists()
 

@@ -100,7 +100,7 @@ def test_an_unknown_visibility_is_refused(tmp_path):
     [
         ({"score": 7.0}, "the criteria give 7.5 points together, the score is 7"),
         ({"points": 6.0}, "c1: 6 of 5 points"),
-        ({"points": -1.0}, "c1: -1 of 5 points"),
+        ({"points": -1.0}, "c1: −1 of 5 points"),
     ],
 )
 def test_points_that_there_are_not_are_refused(tmp_path, changes, message):

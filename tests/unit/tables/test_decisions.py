@@ -275,7 +275,7 @@ def test_a_comment_is_no_formula_in_a_spreadsheet(path):
 
 def test_a_place_that_cannot_be_written_is_told(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(PlanmarkError, match="cannot be made"):
+    with pytest.raises(PlanmarkError, match="cannot be written"):
         DecisionFile(tmp_path / "file" / "decisions.csv").add(ROW)
 
 

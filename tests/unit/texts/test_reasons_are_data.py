@@ -1,6 +1,7 @@
 """Reasons are data: no code takes a message apart, and sentences are made of codes and parameters alone."""
 
 import ast
+import pickle
 import re
 from collections.abc import Iterator
 from functools import cache
@@ -8,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from grader.files import OutputError, create_whole, write_whole
 from grader.language import LANGUAGES, tongue
 from grader.records import Reason, Unread, of_error
 from grader.texts.clauses import CLAIMS, CLAUSES
@@ -154,6 +156,7 @@ def test_every_refusal_and_failure_is_told_in_every_language(lang: str) -> None:
 
 
 def test_every_failure_has_its_sentence_and_every_sentence_its_failure() -> None:
+    assert FAILURES.keys() & REFUSALS.keys() == set()
     said = {one.value for _, tree in trees() for one in ast.walk(tree) if isinstance(one, ast.Constant)}
     assert FAILURES.keys() <= said
     for name, tree in trees():
@@ -162,6 +165,74 @@ def test_every_failure_has_its_sentence_and_every_sentence_its_failure() -> None
                 case ast.Call(func=ast.Name(id="failure"), args=[_, *args]):
                     named = [one.value for one in ast.walk(ast.Tuple(args)) if isinstance(one, ast.Constant)]
                     assert [*filter(None, named), "item"][-1] in FAILURES, f"{name}:{node.lineno}"
+
+
+BELOW_TEXTS = ("grader/files.py", "grader/language.py", "grader/rubric.py", "grader/scan/", "reference/")
+"""Rooms that `texts` imports, or that must not import it: their errors hold parameters beside their words."""
+
+
+ERRORS = {"PlanmarkError", "CallError", "InputFileError", "OutputError", "InterruptedRunError"}
+
+
+def words_of_errors(tree: ast.AST) -> Iterator[int]:
+    """The lines on which an error is made whose message is, or holds, a text of the code itself."""
+    told = {
+        target.id: node.value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Assign)
+        for target in node.targets
+        if isinstance(target, ast.Name)
+    }
+    for node in ast.walk(tree):
+        match node:
+            case ast.Call(func=ast.Name(id=kind), args=[_, text, *_]) if kind in ERRORS:
+                names = [one.id for one in ast.walk(text) if isinstance(one, ast.Name)]
+                parts = [text, *(told[name] for name in names if name in told)]
+                constants = [one for part in parts for one in ast.walk(part) if isinstance(one, ast.Constant)]
+                if any(re.search("[a-z]{2,} [a-z]", str(one.value)) for one in constants):
+                    yield node.lineno
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        'raise CallError("no", "there is none")',
+        'raise OutputError("no", f"{path}: cannot be written")',
+        'why = f"{path} is none"; raise InputFileError("no", why)',
+        'why = "there is none"; raise PlanmarkError("no", f"{path}: {why}")',
+    ],
+)
+def test_an_errors_own_words_are_seen(code: str) -> None:
+    assert list(words_of_errors(ast.parse(code))) == [1]
+
+
+def test_outside_of_texts_no_error_has_words_of_its_own() -> None:
+    found = [f"{name}:{line}" for name, tree in trees() for line in words_of_errors(tree)]
+    assert [where for where in found if not where.startswith(BELOW_TEXTS)] == []
+    assert all(any(where.startswith(room) for where in found) for room in BELOW_TEXTS)
+
+
+def test_an_error_of_a_room_below_has_the_words_of_its_sentence(tmp_path: Path) -> None:
+    taken = tmp_path / "taken"
+    taken.write_text("")
+    calls = (lambda: write_whole(taken / "a", ""), lambda: create_whole({taken: ""}), lambda: tongue("xx"))
+    for call, romanian in zip(calls, ("nu se poate scrie", "există deja", "nu este o limbă"), strict=True):
+        with pytest.raises((OutputError, CallError)) as told:
+            call()
+        assert told_of(told.value, ENGLISH) == told.value.message
+        assert romanian in told_of(told.value, tongue("ro"))
+
+
+def test_faults_below_a_sentence_are_told_in_the_readers_language_too() -> None:
+    faults = [Reason("fields_missing", {"table_row": 3, "fields": 8, "columns": 9}), Reason("no_students")]
+    error = failure(InputFileError, "worksheet", faults=faults, file="w.csv")
+    assert pickle.loads(pickle.dumps(error)).faults == tuple(faults)  # noqa: S301 - its own
+    assert error.message.splitlines()[1:] == [
+        "  row 3: has 8 fields, the first line names 9 columns", "  it has no students",
+    ]  # fmt: skip
+    first, row, last = told_of(error, tongue("ro")).splitlines()
+    assert first.startswith("w.csv: Moodle nu ar primi")
+    assert (row[:12], last) == ("  rândul 3: ", "  nu conține studenți")
 
 
 def test_a_failure_is_told_in_the_readers_language_with_its_numbers() -> None:
