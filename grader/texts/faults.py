@@ -34,7 +34,7 @@ FAULTS: dict[str, tuple[str, ...]] = {
     "field_without_column": (
         N_("'%(text)s' stands in a column without a name; name the column, or move it to another"),
     ),
-    "no_json": (N_("is not JSON: look at line %(row)s, sign %(sign)s"),),
+    "no_json": (N_("is not JSON: look at line %(row)s, character %(sign)s"),),
     "no_braces": (N_("is no table: a file of measurements begins with a brace"),),
     # Of a cell, whatever its table, or of a key.
     "cell_empty": (N_("is empty"),),
