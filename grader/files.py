@@ -199,7 +199,7 @@ def create_whole(files: Mapping[Path, str]) -> None:
 
 
 def _taken(path: Path) -> CallError:
-    message = f"{path}: is there already; name another file, or remove it first"
+    message = f"{path}: already exists; name another file, or remove it first"
     return CallError("file_exists", message, cause="file_taken", file=str(path))
 
 

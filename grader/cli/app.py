@@ -121,7 +121,7 @@ class Commands(_Help, TyperGroup):
         except KeyboardInterrupt:
             # A second Ctrl+C would only break the end of this one.
             signal.signal(signal.SIGINT, signal.SIG_IGN)
-            told = "interrupted; every file that was written is whole; the same command goes on"
+            told = "interrupted; every file that was written is whole; run the same command to continue"
             self._end(ctx, told, terminal.INTERRUPTED)
 
     @staticmethod

@@ -13,26 +13,26 @@ FAILURES: dict[str, str] = {
         " %(known)s); update planmark, or grade again with this one"
     ),
     "results_contradict": N_("results.json contradicts itself; grade again\n%(faults)s"),
-    "points_impossible": N_("%(student)s: points that there are not; grade again\n%(faults)s"),
+    "points_impossible": N_("%(student)s: impossible points; grade again\n%(faults)s"),
     "points_sum": N_(
         "%(student)s: the criteria give %(total)s points together, the score is %(score)s; grade again, or"
         " export grades without criteria"
     ),
     "folder_missing": N_("%(folder)s: there is no such folder"),
     "nothing_to_grade": N_("%(folder)s: there is nothing to grade in this folder"),
-    "nothing_came": N_("%(folder)s: nothing came that could be graded"),
+    "nothing_came": N_("%(folder)s: no submission here can be graded"),
     "run_unknown": N_("%(folder)s: nothing was graded here; run planmark grade first, then name its --out"),
     "cannot_write": N_("%(file)s: cannot be written (%(error)s); choose another place, or make room"),
-    "process_ended": N_("the process that graded has ended; begin it again: what was marked is kept"),
+    "process_ended": N_("the grading process has ended; start it again: finished marks are kept"),
     "folder_empty": N_("%(folder)s: there is no such folder, or nothing in it"),
     "interrupted": N_(
-        "interrupted; %(done)s of %(total)s submissions are marked and kept in %(folder)s; the same command"
-        " goes on"
+        "interrupted; %(done)s of %(total)s submissions are marked and kept in %(folder)s; run the same"
+        " command to continue"
     ),
-    "held": N_("%(file)s: another program holds it for more than %(limit)s s; end that program"),
+    "held": N_("%(file)s: another program has locked it for more than %(limit)s s; close that program"),
     "no_lock": N_("%(file)s: cannot be written: its folder takes no lock file (%(error)s)"),
-    "file_taken": N_("%(file)s: is there already; name another file, or remove it first"),
-    "submissions_moved": N_("%(folder)s: its submissions have left %(was)s; grade them where they are now"),
+    "file_taken": N_("%(file)s: already exists; name another file, or remove it first"),
+    "submissions_moved": N_("%(folder)s: its submissions are no longer in %(was)s; grade them again"),
     "results_in_use": N_(
         "%(folder)s: another run writes its results here (process %(pid)s on %(host)s, since %(began)s,"
         " over %(sheets)s); wait until it ends, or choose another --out"
@@ -48,14 +48,14 @@ FAILURES: dict[str, str] = {
     "decisions_missing": N_("%(file)s: there is no such file of decisions"),
     "roster_needed": N_("answer sheets need --roster: a sheet carries its student's code"),
     # A class for others to learn from
-    "no_preview": N_("%(file)s: is there already and is no preview; name another file"),
-    "scans_moved": N_("%(folder)s: scans are not there any more (%(names)s); grade again"),
+    "no_preview": N_("%(file)s: already exists and is no preview; name another file"),
+    "scans_moved": N_("%(folder)s: scans are missing (%(names)s); grade again"),
     "nothing_to_give": N_("%(folder)s: no figure was read on any page of this class"),
     "preview_outdated": N_(
-        "%(folder)s: scans or decisions have changed since the pages were looked at; begin again without it"
+        "%(folder)s: scans or decisions have changed since the pages were reviewed; start again without it"
     ),
-    "no_page_given": N_("%(file)s: no page says yes"),
-    "answers_wrong": N_("%(file)s: is no picture any more; remove the preview, and begin again"),
+    "no_page_given": N_("%(file)s: no page is marked yes"),
+    "answers_wrong": N_("%(file)s: is no longer a picture; remove the preview, and start again"),
     # A cluster
     "cluster_needed": N_("%(folder)s: workers of a cluster read a folder elsewhere; give --cluster ADDRESS"),
     "storage_unreadable": N_(
@@ -78,8 +78,8 @@ FAILURES: dict[str, str] = {
         " this name, or on s3:// or the like"
     ),
     "cluster_lost": N_(
-        "--cluster %(address)s: the scheduler has ended, or has no worker for %(limit)s s; what was marked is"
-        " kept, the same command goes on"
+        "--cluster %(address)s: the scheduler has ended, or has no worker for %(limit)s s; finished marks"
+        " are kept; run the same command to continue"
     ),
     # Calls of other commands
     "ending": N_("%(option)s %(file)s: the name must end in %(names)s"),
@@ -107,7 +107,7 @@ FAILURES: dict[str, str] = {
     "address": N_("--address %(address)s: write it as https://NAME or http://NAME:PORT"),
     "mail": N_(
         "--mail: write it as smtps://USER:PASSWORD@HOST/SENDER, or with smtp:// where the server does"
-        " STARTTLS; SENDER is the address that letters come from"
+        " STARTTLS; SENDER is the address that messages come from"
     ),
     "secret_short": N_("%(option)s must have at least %(least)s characters"),
     "data_base": N_("--database: the data base cannot be opened (%(error)s)"),
@@ -148,21 +148,20 @@ FAILURES: dict[str, str] = {
     "identity": N_("users are found by %(names)s, not by '%(text)s'"),
     "criteria_differ": N_("rubrics differ; grade all with one rubric, or choose a position\n%(faults)s"),
     "named_twice": N_(
-        "the platform would not take this as it is meant; nothing was written\n  %(what)s %(name)s stands"
-        " twice"
+        "the platform would misread this file; nothing was written\n  %(what)s %(name)s appears twice"
     ),
     # Calls of a check
     "measured_needed": N_("--measured FILE is needed; --template FILE writes one for your measurements"),
     "page_file": N_("--page %(file)s: the name must end in .html; print the page for paper"),
     "page_students": N_("--page is one student's: %(file)s holds %(count)s"),
-    "template_exists": N_("--template %(file)s: is there already, perhaps filled in; choose another name"),
+    "template_exists": N_("--template %(file)s: already exists, perhaps filled in; choose another name"),
     "unknown_level": N_("--level %(level)s: known are %(names)s"),
     "unknown_assignment": N_("no assignment '%(name)s'; built in are %(names)s; or give a .toml file's path"),
     "number_needed": N_("--%(what)s is needed: this assignment has %(what)s from %(first)s to %(last)s"),
     "number_range": N_("%(what)s = %(value)s: this assignment has %(what)s from %(first)s to %(last)s"),
     "number_disagrees": N_("--%(what)s %(called)s, but %(file)s says %(what)s %(filed)s: which is right?"),
     # Files of a platform
-    "not_as_meant": N_("the file does not read back as it was meant; nothing was written"),
+    "not_as_meant": N_("the file would be read back differently; nothing was written"),
     "not_utf8": N_("%(file)s: is not UTF-8 text (byte %(byte)s); download it again and do not resave it"),
     "quote_broken": N_("%(file)s, row %(row)s: text follows a closing quote"),
     "quote_open": N_("%(file)s, row %(row)s: a quote is opened and never closed"),
@@ -212,7 +211,7 @@ FAILURES: dict[str, str] = {
         " core_grading_get_definitions, or a CSV table criterion,id) are needed"
     ),
     "other_method": N_(
-        "%(file)s: the assignment is graded by '%(text)s', and saving a guide would put that aside; choose"
+        "%(file)s: the assignment is graded by '%(text)s', and saving a guide would replace that; choose"
         " 'Marking guide' or 'Simple direct grading' in Moodle first"
     ),
     "guide_exists": N_(

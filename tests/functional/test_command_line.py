@@ -272,7 +272,7 @@ def test_ctrl_c_ends_grading_with_one_line_and_its_workers(tmp_path):
     said = interrupted(process, "opening")
     (line,) = [line for line in said if " of " not in line or line.startswith("planmark")]
     assert line.startswith("planmark: interrupted")
-    assert "the same command goes on" in line
+    assert "run the same command to continue" in line
     assert not list((tmp_path / "out").rglob("*.part"))
     with contextlib.suppress(ProcessLookupError):
         while True:  # until no worker is left of the group

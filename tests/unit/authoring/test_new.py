@@ -122,7 +122,7 @@ def test_a_key_is_explained_once_in_a_file(tmp_path):
 @pytest.mark.parametrize("there", ["mine.assignment.toml", "mine.mechanism.toml", "mine.rubric.toml"])
 def test_nothing_is_written_over_and_nothing_half(tmp_path, there):
     (tmp_path / there).write_text("mine", encoding="utf-8")
-    with pytest.raises(CallError, match="is there already") as told:
+    with pytest.raises(CallError, match="already exists") as told:
         new_assignment(tmp_path / "mine")
     assert told.value.code == "file_exists"
     assert [path.name for path in tmp_path.iterdir()] == [there]

@@ -212,7 +212,7 @@ def test_nothing_is_written_before_each_page_has_an_answer(known, preview):
     answer(file, {"0001.png": ("da", ""), "0002.png": ("No", "")})
     assert collect(*known, file).given == 1
     answer(file, ("no", ""))
-    with pytest.raises(CallError, match="no page says yes"):
+    with pytest.raises(CallError, match="no page is marked yes"):
         collect(*known, file)
 
 
@@ -255,7 +255,7 @@ def test_answers_that_cannot_be_understood_are_told(known, preview, text, why):
 def test_a_preview_of_another_state_of_the_class_is_refused(known, preview):
     file, made = preview
     (made.preview / "state.txt").write_text("another")
-    with pytest.raises(CallError, match="have changed since the pages were looked at"):
+    with pytest.raises(CallError, match="have changed since the pages were reviewed"):
         collect(*known, file)
 
 
@@ -264,7 +264,7 @@ def test_a_target_that_is_there_is_not_written_over(tmp_path):
     there.write_bytes(b"")
     (tmp_path / "other.preview").mkdir()
     for name, why in (
-        ("there.zip", "is there already"),
+        ("there.zip", "already exists"),
         ("other.zip", "is no preview"),
         ("f.tar", "must end in .zip"),
     ):
@@ -276,5 +276,5 @@ def test_scans_that_are_gone_are_told(known, tmp_path):
     batch, run = known
     check_scans(batch, run.results.reports)
     moved = Batch(PUMP, RUBRIC, tmp_path, batch.out)
-    with pytest.raises(CallError, match="not there any more"):
+    with pytest.raises(CallError, match="are missing"):
         check_scans(moved, run.results.reports)

@@ -121,7 +121,7 @@ def test_a_number_of_canvas_is_one(tmp_path):
 
 def test_two_students_with_one_user_are_refused(tmp_path):
     people = {"s01": Person(platform_id="sis_user_id:s02")}
-    with pytest.raises(InputFileError, match="submissions/sis_user_id:s02 stands twice"):
+    with pytest.raises(InputFileError, match="submissions/sis_user_id:s02 appears twice"):
         planned(tmp_path, "canvas-api", **PLACE, people=people)
 
 

@@ -184,7 +184,7 @@ def test_places_and_people_that_nobody_tells_are_asked_for(tmp_path, answer, how
         ({"s01": Person(platform_id="x")}, "s01: 'x' is no number of a user of Moodle"),
         ({"s01": Person(platform_id="0")}, "s01: '0' is no number"),
         ({"s01": Person(platform_id="5"), "s02": Person(platform_id="05")}, "s02: '05' is no number"),
-        ({"s01": Person(platform_id="5"), "s02": Person(platform_id="5")}, "user 5 stands twice"),
+        ({"s01": Person(platform_id="5"), "s02": Person(platform_id="5")}, "user 5 appears twice"),
     ],
 )
 def test_numbers_that_are_none_are_refused_with_the_student(tmp_path, answer, people, message):

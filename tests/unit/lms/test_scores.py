@@ -53,7 +53,7 @@ def test_each_student_with_a_grade_has_a_results_file(tmp_path):
 def test_a_folder_is_written_whole_and_never_over_another(tmp_path):
     gradescope(tmp_path / "out", *CLASS)
     assert json.loads((tmp_path / "out" / "s01" / "results.json").read_bytes())["score"] == 11.25
-    with pytest.raises(CallError, match="is there already"):
+    with pytest.raises(CallError, match="already exists"):
         gradescope(tmp_path / "out", *CLASS)
 
 
@@ -186,7 +186,7 @@ def test_a_maximum_is_a_positive_number(tmp_path, maximum):
 
 def test_two_students_with_one_user_are_refused(tmp_path):
     people = {"s01": Person(platform_id="a"), "s02": Person(platform_id="a")}
-    with pytest.raises(InputFileError, match="userId a stands twice"):
+    with pytest.raises(InputFileError, match="userId a appears twice"):
         lti(tmp_path, *CLASS, people=people)
     assert not (tmp_path / "lti.json").exists()
 
