@@ -122,7 +122,7 @@ def test_the_token_opens_it_once_and_a_cookie_keeps_it_open(guarded):
     [
         ("/page?file=a.jpg&page=1", "page_missing", "nu există această pagină"),
         ("/page?file=a.jpg&page=x", "answer_refused", "„x” nu este un număr care se poate folosi aici"),
-        ("/page?file=a.jpg&page=1.5", "answer_refused", "1.5 nu este un număr întreg"),
+        ("/page?file=a.jpg&page=1.5", "answer_refused", "1,5 nu este un număr întreg"),
         ("/api/question?student=s99", "student_unknown", "studentul s99 nu mai este în această grupă"),
     ],
 )

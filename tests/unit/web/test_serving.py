@@ -54,5 +54,5 @@ def test_a_port_that_is_taken_and_a_short_secret_are_told(tmp_path, monkeypatch)
     with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(CallError, match="--port"):
         serving.serve(tmp_path, replace(CALL, port=taken.getsockname()[1]))
     monkeypatch.setenv(SECRET, "short")
-    with pytest.raises(CallError, match="32 signs"):
+    with pytest.raises(CallError, match="32 characters"):
         serving.serve(tmp_path, CALL)
