@@ -10,7 +10,6 @@ from grader.files import write_whole
 from grader.language import tongue
 from grader.options import PlanOptions
 from grader.solution.document import plan_document
-from grader.texts.spoken import failure
 from reference.authored.assignment import Assignment, load_assignment
 from reference.errors import CallError
 from reference.plan import Plan, exact_plan
@@ -27,9 +26,9 @@ def show_plan(name: str, options: PlanOptions) -> None:
     check_crank(options.crank_mm)
     steps = options.steps
     if steps is not None and steps.suffix.lower() not in STEP_FILES:
-        raise failure(CallError, "steps_file", "ending", option="--steps", file=steps, names=STEP_FILES)
+        raise _refused("steps_file", "ending", option="--steps", file=steps, names=STEP_FILES)
     if options.altitude and options.svg is None and options.pdf is None:
-        raise failure(CallError, "altitude")
+        raise _refused("altitude")
     assignment = load_assignment(name)
     variants = [assignment.variant(options.n, options.position)]
     plan = exact_plan(assignment, variants, assignment.scales(variants, crank_mm=options.crank_mm))
@@ -42,10 +41,17 @@ def show_plan(name: str, options: PlanOptions) -> None:
         terminal.say(f"Drawn in {file}")
 
 
+def _refused(code: str, cause: str = "", **known: object) -> CallError:
+    """Return the error of a call that cannot be drawn; the sentences load only then, since they take time."""
+    from grader.texts.spoken import failure
+
+    return failure(CallError, code, cause, **known)
+
+
 def check_crank(crank_mm: float | None) -> None:
     """Refuse a drawn length that no crank on paper has."""
     if crank_mm is not None and not 0.0 < crank_mm < 1000.0:
-        raise failure(CallError, "crank_mm", value=crank_mm)
+        raise _refused("crank_mm", value=crank_mm)
 
 
 def _draw(assignment: Assignment, plan: Plan, options: PlanOptions) -> None:

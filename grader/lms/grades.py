@@ -104,8 +104,8 @@ class Grade:
         """The assignment's id."""
         return self.reports[0].assignment
 
-    def out_of(self, maximum: float | None, *, rescale: bool) -> float:
-        """The score out of a platform's maximum; None is the rubric's own.
+    def out_of(self, maximum: float | None, *, rescale: bool, file: str = "") -> float:
+        """The score out of a platform's maximum, which a `file` may say; None is the rubric's own.
 
         Raises CallError where the maxima differ and nobody asked for rescaling: a silent 9 of 10 would
         become a 9 of 100.
@@ -114,7 +114,8 @@ class Grade:
         if maximum is None or abs(maximum - self.max_score) <= 1e-6 * max(1.0, maximum):
             return score
         if not rescale:
-            raise failure(CallError, "maximum_differs", there=maximum, here=self.max_score)
+            cause = "maximum_in_file" if file else ""
+            raise failure(CallError, "maximum_differs", cause, there=maximum, here=self.max_score, file=file)
         return score * maximum / self.max_score
 
 

@@ -553,7 +553,7 @@ def fill_in(
         maximum = form.maximum(row) or options.maximum
         if maximum is None:
             raise failure(CallError, "maximum_unknown", file=file, platform=form.platform)
-        score = grade.out_of(maximum, rescale=options.rescale)
+        score = grade.out_of(maximum, rescale=options.rescale, file=file)
         texts[row] = number(score, form.decimals(row))
         zeros += [student] if texts[row] == "0" else []
         changed += [row] if form.put_grade(row, texts[row]) else []
