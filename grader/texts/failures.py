@@ -129,8 +129,8 @@ FAILURES: dict[str, str] = {
         " ask for rescaling (--rescale)"
     ),
     "maximum_in_file": N_(
-        "%(file)s: the grade's maximum is %(there)s, the rubric's is %(here)s: set the same maximum there, or"
-        " ask for rescaling (--rescale)"
+        "%(file)s: the grade's maximum there is %(there)s, the rubric's is %(here)s: set the same maximum"
+        " there, or ask for rescaling (--rescale)"
     ),
     "maxima_differ": N_(
         "students' maxima differ: choose one position, combine them by mean, or convert all to one maximum"
