@@ -115,7 +115,7 @@ def test_a_lost_scheduler_is_told_and_what_was_done_is_kept(handed_in, tmp_path)
         assert next(results)[1] is None
         scheduler.kill()
         scheduler.wait(timeout=PATIENCE_S)
-        with pytest.raises(CallError, match="the scheduler has ended.*finished marks are kept") as caught:
+        with pytest.raises(CallError, match=r"the scheduler has ended.*finished marks are kept") as caught:
             list(results)
     assert caught.value.code == "cluster_lost"
 
