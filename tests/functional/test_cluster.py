@@ -161,9 +161,7 @@ class _Quiet(http.server.SimpleHTTPRequestHandler):
 def test_a_worker_with_another_program_is_refused(address, handed_in, tmp_path, monkeypatch):
     versions = {**cluster.program(), "planmark": "of long ago"}
     monkeypatch.setattr(cluster, "program", lambda: versions)
-    with pytest.raises(
-        CallError, match=r"worker .* planmark [0-9a-f]{12} / of long ago.*install the same"
-    ):
+    with pytest.raises(CallError, match=r"worker .* planmark [0-9a-f]{12} / of long ago.*install the same"):
         cluster.Cluster(address, handed_in, tmp_path, PATIENT).__enter__()
 
 
