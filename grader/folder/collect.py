@@ -21,6 +21,7 @@ from grader.folder.batch import Batch, Graded, files_of, pages_read
 from grader.folder.cache import digest_of
 from grader.folder.inventory import shown_names
 from grader.lms.export import write_archive
+from grader.lms.grades import in_a_row
 from grader.marking.trust import said_of
 from grader.overlay.covered import Keep, bare_png, covered, painted, reopened, upright_pixels
 from grader.records import MECHANISM, ZONE_SLACK_MM, Box, FloatArray, Reason, ScannedPage, Sheet
@@ -92,8 +93,7 @@ def check_scans(batch: Batch, reports: Sequence[ReportDocument]) -> None:
     files = {sheet.source for report in reports for sheet in report.reading.sheets}
     gone = sorted(files.difference(shown_names(files_of(batch), batch.folder, batch.called)))
     if gone:
-        named = (*gone[:3], *["..."][: len(gone) - 3 > 0])
-        raise failure(CallError, "scans_moved", folder=batch.folder, names=named)
+        raise failure(CallError, "scans_moved", folder=batch.folder, names=in_a_row(gone, 3))
 
 
 # The preview --------------------------------------------------------------------------------------
