@@ -499,6 +499,31 @@ class TrustDocument(Document):
     moved: int = 0
 
 
+class LevelDocument(Document):
+    """A level of a criterion: its verdict, and the points that it gives; null if it counts neither way."""
+
+    verdict: Verdict
+    points: float | None
+
+
+class RubricCriterionDocument(Document):
+    """A criterion of the rubric: titles by language, levels from the best to the worst, then `not_judged`."""
+
+    id: str
+    titles: dict[str, str]
+    section: str
+    max_points: float
+    levels: list[LevelDocument]
+
+
+class RubricDocument(Document):
+    """The rubric by which a class is marked; `changed`: when its file was last changed (ISO 8601, UTC)."""
+
+    titles: dict[str, str]
+    changed: str
+    criteria: list[RubricCriterionDocument]
+
+
 class ResultsDocument(Document):
     """A class's results; `moved` against the run before, empty after the first; `alike` sheets."""
 
@@ -506,6 +531,8 @@ class ResultsDocument(Document):
     assignment: str
     titles: dict[str, str] = {}
     """The criteria's titles in the language of the class, by id; a report's are in its student's."""
+    rubric: RubricDocument | None = None
+    """Null in results of earlier versions."""
     reports: list[ReportDocument]
     unmatched: list[UnmatchedDocument] = []
     moved: list[MovedDocument] = []

@@ -226,7 +226,7 @@ class ExportOptions:
     """Options of an export; None or empty if not given."""
 
     to: str = option(
-        "csv, moodle, canvas, canvas-api, openedx, google-classroom, ms-education, brightspace,"
+        "csv, json, moodle, canvas, canvas-api, openedx, google-classroom, ms-education, brightspace,"
         " blackboard, ilias, gradescope or lti.",
         default=MISSING,
         key="platform",

@@ -286,6 +286,6 @@ def export(results: ResultsArgument, options: ExportCall) -> None:
     from grader.cli.exporting import export_results
 
     is_open, path = export_results(results, options)
-    where = "" if options.to == "csv" else f" to {options.to}; the documentation of exports says how"
-    note(f"next: {'upload' if where else 'open'} {path}{where}")
+    where = f" to {options.to}; the documentation of exports says how"
+    note(f"next: open {path}" if options.to in {"csv", "json"} else f"next: upload {path}{where}")
     raise typer.Exit(1 if is_open else 0)

@@ -68,7 +68,7 @@ def export_results(folder: Path, call: ExportCall) -> tuple[bool, Path]:
     if call.gradebook is not None and call.to in {"moodle", "canvas-api"}:
         raise failure(CallError, "option_unused", option="--gradebook", what=call.to)
     options = Options(form=call.worksheet or call.gradebook, out=folder, **taken(ExportOptions, call))
-    path = call.file or folder / usual_name(options)
+    path = call.file or (folder if call.to == "json" else folder / usual_name(options))
     sources = (options.form, options.criteria, options.submissions, call.roster, call.ids)
     for source in (folder / "results.json", *sources):
         if source is not None and path.resolve() == source.resolve():

@@ -72,8 +72,9 @@ def score_text(report: ReportDocument, speaker: Tongue) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Points scaled together: those given, those possible, and the factor."""
+    """Points scaled together, of a section or of all without a weight: given, possible, and the factor."""
 
+    section: str | None
     given: float
     judged: float
     factor: float
@@ -103,7 +104,7 @@ def parts_of(report: ReportDocument) -> list[Part]:
         judged = sum(one.max_points for one in own if one.verdict != "not_judged")
         if judged:
             whole = judged if section is None else sum(one.max_points for one in own)
-            parts.append(Part(sum(one.points or 0.0 for one in own), judged, whole / judged))
+            parts.append(Part(section, sum(one.points or 0.0 for one in own), judged, whole / judged))
     in_full = sum(part.judged * part.factor for part in parts)
     return [replace(part, factor=part.factor * report.max_score / in_full) for part in parts]
 

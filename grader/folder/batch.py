@@ -49,6 +49,7 @@ from grader.folder.inventory import FileContent, Progress, natural_key, submissi
 from grader.folder.lock import only_run
 from grader.folder.submissions import Unusable, submissions_of
 from grader.folder.workers import ENDED, Limits, Pool, Whole, Workers
+from grader.lms.assessments import rubric_document, write_documents
 from grader.lms.table import summary_text
 from grader.marking.report import unjudged_report
 from grader.marking.trust import opened_in, trust_of
@@ -192,6 +193,7 @@ def _graded(
     results = ResultsDocument(
         assignment=batch.assignment.id,
         titles={one.id: one.title.in_language(batch.lang) for one in batch.rubric.criterion},
+        rubric=rubric_document(batch.assignment, batch.rubric),
         reports=reports,
         unmatched=[*unmatched, *decisions.problems()],
         moved=changes_since(before, reports, list(submitted), (noted_inputs(notes), inputs)),
@@ -545,6 +547,7 @@ def _write_report(batch: Batch, job: Job, report: ReportDocument, pictures: Sequ
 
 def _write_results(batch: Batch, results: ResultsDocument, students: Sequence[StudentSubmission]) -> None:
     write_whole(batch.out / "summary.csv", summary_text(results))
+    write_documents(batch.out, results)
     names = {submission.student_id: submission.name for submission in students}
     title = batch.assignment.file.title.in_language(batch.lang)
     write_index(results, batch.out, batch.lang, title=title, student_names=names)

@@ -14,6 +14,7 @@ from grader.documents import SCHEMA_VERSION, ResultsDocument
 from grader.files import create_whole, replacing, write_whole
 from grader.lms import gradebooks, moodle, moodle_guide, scores
 from grader.lms.api import canvas, classroom, graph, openedx
+from grader.lms.assessments import documents, write_documents
 from grader.lms.grades import Content, Delivery, Grade, Options, grades_of, ready
 from grader.lms.table import criteria_text, not_as_meant, parsed, summary_text
 from grader.records import Reason
@@ -59,7 +60,7 @@ class _Kind:
     used: frozenset[str] = frozenset()
     """The options that it heeds, besides those that all do."""
     of_grades: Callable[[list[Grade], Options], Delivery] | None = None
-    of_results: Callable[[ResultsDocument], str] | None = None
+    of_results: Callable[[ResultsDocument], str | Content] | None = None
 
 
 def _of_grades(ending: str, make: Callable[[list[Grade], Options], Delivery], options: str) -> _Kind:
@@ -69,6 +70,7 @@ def _of_grades(ending: str, make: Callable[[list[Grade], Options], Delivery], op
 KINDS: Mapping[tuple[str, str], _Kind] = {
     ("csv", "marks"): _Kind(".csv", of_results=criteria_text),
     ("csv", "grades"): _Kind(".csv", of_results=summary_text),
+    ("json", "marks"): _Kind(".zip", of_results=documents),
     ("moodle", "grades"): _of_grades(".csv", moodle.grades_file, "maximum rescale form identity item"),
     ("moodle", "feedback"): _of_grades(".zip", moodle.feedback_files, "form groups"),
     ("moodle", "rubric"): _of_grades(
@@ -184,7 +186,9 @@ def export(results: ResultsDocument, path: Path, options: Options) -> Delivery:
     delivery = draft(results, options)
     kind = options.to, what_of(options)
     is_again = kind == ("moodle", "grades") and options.form is not None and path.exists()
-    if isinstance(delivery.content, Mapping):
+    if kind[0] == "json" and path == options.out:
+        write_documents(path, results)
+    elif isinstance(delivery.content, Mapping):
         if kind[1] == "feedback" and path.suffix.lower() != ".zip":
             raise failure(CallError, "archive_name", file=path, to=options.to)
         _write_files(path, delivery.content)

@@ -23,7 +23,9 @@ from reference.errors import InputFileError, lines_of, near_names
 _STUDENT_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 _DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECASE)
 """Windows opens a device in place of a file or folder of such a name, whatever its extension."""
-RESULT_FILES = frozenset({"results.json", "summary.csv", "index.html", "decisions.csv"})
+RESULT_FILES = frozenset(
+    {"results.json", "rubric.json", "assessments.json", "summary.csv", "index.html", "decisions.csv"}
+)
 """Files beside the students' folders of results."""
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 _COMMENT = re.compile(r'^[ \t]*"?#[^\n]*', re.MULTILINE)

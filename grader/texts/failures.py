@@ -13,6 +13,7 @@ FAILURES: dict[str, str] = {
         " %(known)s); update planmark, or grade again with this one"
     ),
     "results_contradict": N_("results.json contradicts itself; grade again\n%(faults)s"),
+    "results_without_rubric": N_("results.json is of an earlier version, which kept no rubric; grade again"),
     "points_impossible": N_("%(student)s: impossible points; grade again\n%(faults)s"),
     "points_sum": N_(
         "%(student)s: the criteria give %(total)s points together, the score is %(score)s; grade again, or"

@@ -12,6 +12,7 @@ from sqlalchemy.orm import Session
 from grader.documents import ResultsDocument
 from grader.files import result_folders, write_whole
 from grader.folder.changes import CACHE_FOLDER, RUN_NOTE
+from grader.lms.assessments import write_documents
 from grader.lms.export import read_results
 from grader.tables.decisions import DecisionFile
 from grader.tables.measurements import students_in
@@ -132,4 +133,6 @@ def _erase_results(places: Places, student: str) -> None:
     notes = (note for note in (places.results / CACHE_FOLDER).glob("*.json") if note.name != RUN_NOTE)
     for path in (*(places.results / page for page in PAGES), *notes):
         path.unlink(missing_ok=True)
+    if kept.rubric is not None:
+        write_documents(places.results, kept)
     write_whole(places.results / "results.json", kept.model_dump_json(indent=2))

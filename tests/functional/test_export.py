@@ -4,6 +4,9 @@ import json
 import re
 import shlex
 import shutil
+import subprocess
+import sys
+import textwrap
 import zipfile
 from pathlib import Path
 
@@ -15,6 +18,7 @@ from typer.testing import CliRunner
 from grader.cli.commands import app
 from grader.cli.exporting import schema
 from grader.lms.export import TARGETS
+from tests.inline import without_workers
 
 ROOT = Path(__file__).parents[2]
 RESULTS = Path(__file__).parent / "results.json"
@@ -102,7 +106,7 @@ def planmark(command):
 
 def test_the_documentation_shows_every_platform_and_thing():
     shown = {tuple(re.findall(r"--(?:to|what) (\S+)", command)) for command in COMMANDS}
-    assert {to for to, *_ in shown} >= set(TARGETS) - {"csv"}
+    assert {to for to, *_ in shown} >= set(TARGETS) - {"csv", "json"}
     assert {("moodle", what) for what in ("feedback", "rubric", "marks")} <= shown
     assert ("canvas", "rubric") in shown
 
@@ -123,6 +127,48 @@ def test_every_command_of_the_documentation_writes_its_file(desk, command):
         jsonschema.validate(json.loads(written.read_bytes()), schema(SCHEMAS[written.name]))
 
 
+@pytest.fixture
+def graded(tmp_path, monkeypatch):
+    """A class graded into the folder `marks` of the documentation."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "in").mkdir()
+    for name in ("s08.json", "roster.csv"):
+        shutil.copy(ROOT / "samples" / "pump" / name, tmp_path / "in")
+    with without_workers():
+        assert planmark("grade in --assignment pump --out marks").exit_code == 1
+    return tmp_path / "marks"
+
+
+BOTH = ("rubric.json", "assessments.json")
+
+
+def test_the_json_that_grading_wrote_is_written_again_and_elsewhere_from_the_results_alone(graded):
+    first = {name: (graded / name).read_bytes() for name in BOTH}
+    for name in BOTH:
+        (graded / name).write_text("{}")
+    for to in ("", " --file marks/both.zip", " --file elsewhere"):
+        ran = planmark(f"export marks --to json{to}")
+        assert ran.exit_code == 0, ran.output
+    assert "written to elsewhere" in ran.output
+    assert "next: open elsewhere" in ran.output
+    assert {name: (graded / name).read_bytes() for name in BOTH} == first
+    assert {name: (graded.parent / "elsewhere" / name).read_bytes() for name in BOTH} == first
+    with zipfile.ZipFile(graded / "both.zip") as archive:
+        assert {name: archive.read(name) for name in archive.namelist()} == first
+    assert "already exists" in planmark("export marks --to json --file elsewhere").output
+
+
+def test_the_example_of_the_documentation_reads_both(graded):
+    (example,) = re.findall(r"(?ms)^    import json$\n\n    rubric = .*?row\[\"comment\"\]\)$", DOCUMENT)
+    call = [sys.executable, "-X", "utf8", "-c", textwrap.dedent(example)]
+    ran = subprocess.run(call, capture_output=True, check=True)  # noqa: S603 - our own document
+    lines = ran.stdout.decode().splitlines()
+    results = json.loads((graded / "results.json").read_bytes())
+    assert len(lines) == sum(1 + len(report["criteria"]) for report in results["reports"])
+    s08 = next(place for place, line in enumerate(lines) if line.startswith("s08 None graded "))
+    assert lines[s08 + 1] == "  Scara lungimilor 1.0 right Right."
+
+
 def test_every_option_is_documented():
     parameters = typer.main.get_command(app).commands["export"].params
     options = {option for parameter in parameters for option in parameter.opts if option.startswith("--")}
@@ -134,6 +180,8 @@ def test_every_option_is_documented():
     ("command", "message"),
     [
         ("export marks --to sakai", "'sakai' is no export target"),
+        ("export marks --to json", "is of an earlier version, which kept no rubric; grade again"),
+        ("export marks --to json --file both.json", "kept no rubric"),
         ("export marks --to moodle --what results", "moodle is given no 'results'"),
         ("export marks --to canvas --what marks", "known are grades, rubric (or --to canvas-api)"),
         ("export marks --to canvas-api", "canvas-api needs --course-id, --assignment-id"),

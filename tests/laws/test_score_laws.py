@@ -1,6 +1,7 @@
 """What holds for every score."""
 
 import cmath
+import json
 
 import pytest
 from hypothesis import given, settings
@@ -8,10 +9,12 @@ from hypothesis import strategies as st
 
 from grader.comparison.criteria import compare
 from grader.comparison.evidence import Submission
-from grader.documents import Quantity, Tolerance
+from grader.documents import Quantity, ResultsDocument, Tolerance
 from grader.feedback.sentences import criterion_feedback
+from grader.lms.assessments import documents, rubric_document
 from grader.marking.mark import judge, score
-from grader.outcomes import Outcome
+from grader.marking.report import report_of
+from grader.outcomes import Judgement, Outcome
 from grader.records import Figure, Reading, ReadNode
 from grader.rubric import RubricFile, WeightsTable
 from reference.construction.mistakes import Mistake
@@ -107,15 +110,12 @@ def outcome(criterion, verdict):
     return Outcome(criterion.id, criterion.name, verdict, Quantity(), Quantity(), Tolerance(), 1.0, (), ends)
 
 
-@given(
-    st.lists(verdicts, min_size=len(PUMP.rubric.criterion), max_size=len(PUMP.rubric.criterion)), st.data()
-)
-def test_weights_give_a_section_what_they_say_and_missing_ones_are_scaled(found, data):
-    weights = {
-        section: data.draw(st.floats(0.5, 50.0))
-        for section in PUMP.rubric.sections
-        if data.draw(st.booleans())
-    }
+all_verdicts = st.lists(verdicts, min_size=len(PUMP.rubric.criterion), max_size=len(PUMP.rubric.criterion))
+section_weights = st.dictionaries(st.sampled_from(sorted(PUMP.rubric.sections)), st.floats(0.5, 50.0))
+
+
+@given(all_verdicts, section_weights)
+def test_weights_give_a_section_what_they_say_and_missing_ones_are_scaled(found, weights):
     rubric: RubricFile = PUMP.rubric.model_copy(update={"weights": WeightsTable(**weights)})
     for section, weight in weights.items():
         own = [rubric.points[one.id] for one in rubric.criterion if one.section == section]
@@ -128,3 +128,18 @@ def test_weights_give_a_section_what_they_say_and_missing_ones_are_scaled(found,
         assert counted.total == pytest.approx(rubric.max_score)
     if judged and set(judged) == {"none"}:
         assert counted.total == 0.0
+
+
+@given(all_verdicts, section_weights)
+@settings(max_examples=examples(FEW))
+def test_a_score_is_the_sum_of_an_assessments_points_times_their_factors(found, weights):
+    task = with_rubric(PUMP, weights=WeightsTable(**weights))
+    outcomes = [outcome(one, verdict) for one, verdict in zip(task.rubric.criterion, found, strict=True)]
+    counted = score(task.rubric, outcomes)
+    report = report_of(task, Judgement(tuple(outcomes), (), {}, counted), "s1")
+    kept = rubric_document(PUMP.assignment, task.rubric)
+    told = documents(ResultsDocument(assignment="pump", rubric=kept, reports=[report]))["assessments.json"]
+    (one,) = json.loads(told)["assessments"]
+    points = sum((row["points"] or 0.0) * row["factor"] for row in one["criteria"])
+    assert points == pytest.approx(counted.low, abs=1e-3)
+    assert one["score"] == counted.total

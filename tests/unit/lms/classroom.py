@@ -9,6 +9,7 @@ from grader.documents import (
     Quantity,
     ReportDocument,
     ResultsDocument,
+    RubricDocument,
     Tolerance,
 )
 from grader.lms.export import export
@@ -39,7 +40,8 @@ def report(student_id, score=None, *, status="graded", position=None, n=None, **
 
 
 def results(*reports):
-    return ResultsDocument(assignment="pump", reports=list(reports))
+    rubric = RubricDocument(titles={"en": "Pump"}, changed="2026-11-22T18:00:00Z", criteria=[])
+    return ResultsDocument(assignment="pump", rubric=rubric, reports=list(reports))
 
 
 def a_class():

@@ -120,7 +120,9 @@ def test_ids_that_only_case_tells_apart_are_refused():
     assert told.startswith("line 3, student_id: S1 differs in case only from s1 on line 2")
 
 
-@pytest.mark.parametrize("student", ["results.json", "Index.HTML", "summary.csv", "decisions.csv"])
+@pytest.mark.parametrize(
+    "student", ["results.json", "Assessments.json", "Index.HTML", "summary.csv", "decisions.csv"]
+)
 def test_an_id_that_a_file_of_the_results_has_for_its_name_is_refused(student):
     (told,) = faults(f"student_id,name\n{student},A\n")
     assert told == (

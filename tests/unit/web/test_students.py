@@ -304,7 +304,7 @@ def test_all_of_a_student_is_deleted_and_nothing_of_the_others(graded, admin, st
 
 def test_platform_files_are_downloaded(graded, admin):
     key, _ = graded
-    for platform in ("csv", "canvas", "gradescope", "lti"):
+    for platform in ("csv", "json", "canvas", "gradescope", "lti"):
         answer = admin.get(f"/api/v1/publications/{key}/exports/{platform}")
         assert answer.status_code == 200, answer.text
         assert answer.headers["content-disposition"].startswith('attachment; filename="export-')
