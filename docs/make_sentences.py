@@ -72,6 +72,7 @@ EXAMPLES: Mapping[str, str] = {
     "mechanism": "crank-rocker", "level": "all", "what": "n", "last": "30", "value": "31", "called": "7",
     "unfit": "14", "unit": "cm", "axis": "+y",
     "filed": "8", "areas": "lower left", "corners": "the lower left corner", "files": "38", "limit": "150",
+    "become": "80", "grades": "12", "moment": "2026-11-23 20:35", "status": "503",
     "students": "30", "right": "24", "audited": "24", "unclear": "1", "student": "s07",
     "criterion": "Acceleration of B", "allowed": "3\u00a0%", "raised": "98.2\u00a0%",
     "times": "10", "vectors": "v_BA, v_CA", "letter": "A",

@@ -248,8 +248,8 @@ class ExportOptions:
     maximum: float | None = option("The grade item's maximum.")
     rescale: bool = option("Convert points to the platform's.", "--rescale", default=False)
     visibility: str | None = option("Gradescope: visible, hidden, after_due_date, after_published.")
-    course_id: str | None = option("The platform's ID of the course or class.")
-    assignment_id: str | None = option("The platform's ID of the assignment.")
+    course_id: str | None = option("The platform's ID of the course or class.", longest=200)
+    assignment_id: str | None = option("The platform's ID of the assignment.", longest=200)
     cmid: int | None = option("Moodle's number of the activity: the id in its address.", least=1)
     context_id: int | None = option("Moodle's number of the activity's context.", least=1)
     replace_guide: Path | None = option(

@@ -18,6 +18,7 @@ from grader.documents import (
     ReportDocument,
     ResultsDocument,
 )
+from grader.language import N_, tongue
 from grader.lms.export import export as deliver
 from grader.lms.export import read_results, usual_name
 from grader.lms.grades import Delivery, Options, people_of
@@ -25,7 +26,7 @@ from grader.lms.table import with_ids
 from grader.options import ExportCall, ExportOptions, taken
 from grader.rubric import RubricFile
 from grader.solution.document import PlanDocument
-from grader.texts.spoken import failure
+from grader.texts.spoken import clause, failure
 from reference.authored.assignment import AssignmentFile
 from reference.authored.mechanism import MechanismFile
 from reference.errors import CallError
@@ -78,16 +79,23 @@ def export_results(folder: Path, call: ExportCall) -> tuple[bool, Path]:
     if call.ids is not None:
         people = with_ids(people, call.ids)
     delivery = deliver(results, path, replace(options, people=people))
-    _report(delivery, path)
+    _report(delivery, path, options.lang)
     return not delivery.is_complete, path
 
 
-def _report(delivery: Delivery, path: Path) -> None:
+LABELS = {
+    "withheld": N_("withheld"), "unplaced": N_("no place in the file"), "note": N_("note"),
+}  # fmt: skip
+
+
+def _report(delivery: Delivery, path: Path, lang: str) -> None:
+    speaker = tongue(lang)
+    words = {name: speaker.gettext(text) for name, text in LABELS.items()}
     is_of_students = delivery.written or delivery.withheld or delivery.unplaced
     who = f"{len(delivery.written)} students " if is_of_students else ""
     terminal.note(f"{who}written to {path}")
-    for reason, students in (("withheld", delivery.withheld), ("no place in the file", delivery.unplaced)):
-        for student, why in students.items():
-            terminal.say(f"  {student}: {reason}: {why}")
+    for student, label, reasons in delivery.left_out():
+        why = ", ".join(clause(reason, speaker) for reason in reasons)
+        terminal.say(f"  {student}: {words[label]}: {why}")
     for note in delivery.notes:
-        terminal.say(f"  note: {note}")
+        terminal.say(f"  {words['note']}: {clause(note, speaker)}")

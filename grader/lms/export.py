@@ -149,7 +149,7 @@ def draft(results: ResultsDocument, options: Options) -> Delivery:
         delivery = delivery.among(grades)
     here = {grade.student_id for grade in grades}
     others = [student for student in students if student not in here]
-    why = f"has no position {options.position}"
+    why = (Reason("position_absent", {"position": options.position or 0}),)
     return replace(delivery, withheld={**delivery.withheld, **dict.fromkeys(others, why)})
 
 
@@ -171,12 +171,6 @@ def _check_maxima(grades: Sequence[Grade], options: Options, what: str) -> None:
         raise failure(CallError, "maximum_differs", "maxima_differ", faults=faults)
 
 
-_AGAIN = (
-    "this file was made before: if Moodle has it already, it skips what it holds, unless the worksheet was"
-    " downloaded afresh or the box for updating records is ticked at the upload"
-)
-
-
 def export(results: ResultsDocument, path: Path, options: Options) -> Delivery:
     """Write an export file, or of several files an archive; into a folder where `path` has no ``.zip``.
 
@@ -194,21 +188,20 @@ def export(results: ResultsDocument, path: Path, options: Options) -> Delivery:
         _write_files(path, delivery.content)
     else:
         write_whole(path, delivery.content)
-    notes = [*delivery.notes, *([_AGAIN] if is_again else []), *_similar(results, delivery.written)]
+    again = [Reason("made_before")] if is_again else []
+    notes = [*delivery.notes, *again, *_similar(results, delivery.written)]
     if kind[1] == "feedback":
-        notes.insert(0, f"{path.stat().st_size / 1e6:.1f} MB: the site's upload limit must allow it")
+        notes.insert(0, Reason("archive_size", {"size_mb": path.stat().st_size / 1e6}))
     if delivery.withheld and not delivery.written and not delivery.unplaced:
-        notes.insert(0, "nobody has a grade yet: there is none to upload")
+        notes.insert(0, Reason("nobody_ready"))
     return replace(delivery, notes=tuple(notes))
 
 
-def _similar(results: ResultsDocument, written: Sequence[str]) -> list[str]:
+def _similar(results: ResultsDocument, written: Sequence[str]) -> list[Reason]:
     """Notes on similar sheets among those whose grades go out."""
-    pairs = [list(dict.fromkeys(pair.students)) for pair in results.alike]
+    pairs = [tuple(dict.fromkeys(pair.students)) for pair in results.alike]
     return [
-        f"the sheets of {' and '.join(students)} look alike: look at them before their grades are out"
-        for students in pairs
-        if set(students) & set(written)
+        Reason("look_alike", {"students": students}) for students in pairs if set(students) & set(written)
     ]
 
 

@@ -135,12 +135,9 @@ def gradebook(grades: Sequence[Grade], options: Options) -> Delivery:
         score = grade.out_of(options.maximum, rescale=options.rescale)
         name = person.name or grade.student_id
         table.append([name, person.platform_id, grade.student_id, person.username, "", number(score)])
-    notes = ["Canvas sets the assignment's points possible to those of the file's second row"]
-    if not _NUMBERED.fullmatch(item):
-        notes.append(
-            f"Canvas takes '{item}' for a new assignment: give --item as it stands in an exported gradebook,"
-            " 'title (number)', or that file itself (--gradebook)"
-        )
+    most = options.maximum or grades[0].max_score
+    notes = [Reason("points_become", {"platform": "Canvas", "most_points": most})]
+    notes += [] if _NUMBERED.fullmatch(item) else [Reason("new_assignment", {"text": item})]
     return Delivery(csv_text([*HEADER, item], table), notes=tuple(notes))
 
 
@@ -149,8 +146,8 @@ def _new_for_brightspace(grades: Sequence[Grade], options: Options) -> Delivery:
     item = options.item.strip() or (grades[0].assignment if grades else "planmark")
     if found := _NO_TITLE.search(item):
         raise failure(CallError, "item", "item_sign", item=item, sign=found[0])
-    maximum = number(options.maximum or (grades[0].max_score if grades else 1.0))
-    header = ("OrgDefinedId", "Username", f"{item} Points Grade <Numeric MaxPoints:{maximum}>", _END)
+    most = options.maximum or (grades[0].max_score if grades else 1.0)
+    header = ("OrgDefinedId", "Username", f"{item} Points Grade <Numeric MaxPoints:{number(most)}>", _END)
     rows = [
         (
             f"#{grade.student_id}",
@@ -160,10 +157,7 @@ def _new_for_brightspace(grades: Sequence[Grade], options: Options) -> Delivery:
         )
         for grade in grades
     ]
-    notes = (
-        "OrgDefinedId is the student_id: where it is another number, give Brightspace's export (--gradebook)",
-        f"an item '{item}' that is there must be out of {maximum}: Brightspace cuts what is above",
-    )
+    notes = Reason("org_defined_id"), Reason("item_cut", {"text": item, "most_points": most})
     return Delivery(csv_text(header, rows), notes=notes)
 
 
@@ -191,8 +185,6 @@ def _faults(grades: Sequence[Grade]) -> Iterator[Reason]:
 @dataclass(slots=True)
 class Gradebook(Form):
     """A downloaded gradebook."""
-
-    name = "the gradebook"
 
     @classmethod
     def opened(cls, data: bytes, file: str, item: str) -> Self:
@@ -222,8 +214,7 @@ class Gradebook(Form):
         else:
             table.kept = sorted({*about.values(), *others, assignment})
         columns |= {kind: header.index(name) for name, kind in _NAMES.items() if name in header}
-        tabs = "its cells are apart by tabs: let its name end with .xls, or choose Tab at the upload"
-        notes = [tabs] if table.delimiter == "\t" else []
+        notes = [Reason("tabs")] if table.delimiter == "\t" else []
         return cls(table, columns, points, possible, notes, layout.platform)
 
     @staticmethod
@@ -234,11 +225,11 @@ class Gradebook(Form):
         *whole, last = re.split("[.,]", text)
         return float("".join(whole) + "." + last) if whole else float(last)
 
-    def why_fixed(self, row: int) -> str:
-        """Return what the platform says where it wants no grade; empty where it wants one."""
+    def why_fixed(self, row: int) -> Reason | None:
+        """Return what the platform says where it wants no grade; None where it wants one."""
         grade = self.value(row, "grade")
         is_out = grade.casefold() in {"ex", "n/a", "exempt"}
-        return f"{self.platform} says '{grade}': excused, or not given this assignment" if is_out else ""
+        return Reason("grade_excused", {"platform": self.platform, "text": grade}) if is_out else None
 
     def identity(self, row: int) -> Mapping[str, str]:
         """The platform's numbers of the student, and the name.
@@ -360,8 +351,8 @@ def feedback_files(grades: Sequence[Grade], options: Options) -> Delivery:
         raise failure(InputFileError, "gradebook_file", "archive_folders", file=options.form)
     folders = list(found)
     rows = {row: {"ID": match["id"], "login": match["login"]} for row, match in enumerate(found.values())}
-    matches = match_class(rows, grades, options, Gradebook.evidence, options.form_name)
+    matches = match_class(rows, grades, options, Gradebook.evidence)
     own = {student: folders[row] for student, row in matches.rows.items()}
     files = pages_in(own, ready(grades), options.out or Path())
-    missing = {grade.student_id: matches.missing.get(grade.student_id, "") for grade in ready(grades)}
-    return Delivery(files, unplaced={student: why for student, why in missing.items() if why})
+    graded = {grade.student_id for grade in ready(grades)}
+    return Delivery(files, unplaced={who: why for who, why in matches.missing.items() if who in graded})

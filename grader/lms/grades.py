@@ -1,10 +1,11 @@
 """A grade for each student, or the reason why there is none yet; options and result of an export."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from types import MappingProxyType
+from typing import Literal
 
 from grader.documents import ReportDocument, ResultsDocument
 from grader.files import result_folders
@@ -87,7 +88,7 @@ class Grade:
     ----------
     score : None where there is none yet
     person : the student, with the language of the comments
-    withheld : why there is none yet
+    withheld : why there is none yet: of each position that is open
     folders : of each report below the results: the student's, with several positions one for each
     """
 
@@ -96,7 +97,7 @@ class Grade:
     max_score: float
     reports: tuple[ReportDocument, ...]
     person: Person = Person()
-    withheld: str = ""
+    withheld: tuple[Reason, ...] = ()
     folders: tuple[str, ...] = ()
 
     @property
@@ -134,14 +135,21 @@ class Delivery:
 
     content: str | bytes | Content
     written: tuple[str, ...] = ()
-    withheld: Mapping[str, str] = field(default_factory=dict)
-    unplaced: Mapping[str, str] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    withheld: Mapping[str, tuple[Reason, ...]] = field(default_factory=dict)
+    unplaced: Mapping[str, Reason] = field(default_factory=dict)
+    notes: tuple[Reason, ...] = ()
 
     @property
     def is_complete(self) -> bool:
         """Return whether everybody's grade is in the file."""
         return not self.withheld and not self.unplaced
+
+    def left_out(self) -> Iterator[tuple[str, Literal["withheld", "unplaced"], tuple[Reason, ...]]]:
+        """The students who are not in the file, with why."""
+        for student, reasons in self.withheld.items():
+            yield student, "withheld", reasons
+        for student, reason in self.unplaced.items():
+            yield student, "unplaced", (reason,)
 
     def among(self, grades: Sequence[Grade]) -> "Delivery":
         """The same delivery, with the students who are written and those who are withheld."""
@@ -217,13 +225,10 @@ def _check(reports: Sequence[ReportDocument]) -> None:
         raise failure(InputFileError, "results_wrong", "results_contradict", faults=faults)
 
 
-_WHY = {
-    "needs_review": "needs review",
-    "unreadable": "unreadable",
-    "missing": "nothing handed in",
-    "graded": "has no score",
-}
-"""The reason, by status, for which a report has no grade yet; for the terminal."""
+_OPEN = {
+    "needs_review": "needs_review", "unreadable": "unreadable", "missing": "missing", "graded": "no_score",
+}  # fmt: skip
+"""The reason, by status, for which a report has no grade yet."""
 
 
 def _grade(student_id: str, chosen: Sequence[tuple[ReportDocument, str]], options: Options) -> Grade:
@@ -234,8 +239,8 @@ def _grade(student_id: str, chosen: Sequence[tuple[ReportDocument, str]], option
     maximum = sum(report.max_score for report in reports)
     score = sum(report.score or 0.0 for report in reports)
     parts = len(reports) if options.combine == "mean" else 1
-    why = ", ".join(
-        ("" if report.position is None else f"position {report.position}: ") + _WHY[report.status]
+    why = tuple(
+        Reason(_OPEN[report.status], {} if report.position is None else {"position": report.position})
         for report in reports
         if report.status != "graded" or report.score is None
     )

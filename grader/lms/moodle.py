@@ -8,8 +8,8 @@ Gradebook: the first bad row aborts Moodle's whole import, so every row is check
 a grade have no row: in a new grade item Moodle would store a blank as 0, and in an old one `-` takes back
 what a teacher has entered. Decimal dots, whatever the language of the site.
 
-Feedback: a folder `Participant_<n>_assignfeedback_file` for each student. Moodle splits a folder's name at
-its underscores, so a file's own name has none.
+Feedback: a folder `Participant_<n>_assignfeedback_file_` for each student. Moodle splits a folder's name at
+its underscores, so a file's own name has none; before 4.1 it passes over a folder without the last one.
 """
 
 import json
@@ -59,6 +59,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "grade": ("grade", "notă", "nota", "оценка"),
     "maximum": ("maximum grade", "notă maximă", "nota maximă", "максимальная оценка"),
     "scale": ("scale", "scală", "scala", "шкала"),
+    "workflow": ("marking workflow state", "starea fluxului de notare", "этап процесса оценивания"),
     "changeable": ("grade can be changed", "nota poate fi schimbată", "оценка может быть изменена"),
     "modified": (
         "last modified (grade)", "ultima modificare (nota)", "ultima modificare (notă)",
@@ -91,19 +92,30 @@ _ENGLISH = re.compile(
 )
 """The words in dates that PHP's strtotime reads."""
 _ISO = re.compile(r"\d{4}-\d\d-\d\dT?.*")
-LOCKED = "Moodle says that this grade cannot be changed"
+_MONTHS = {
+    word: month
+    for month, words in enumerate((
+        "ianuarie январь января", "februarie февраль февраля", "martie март марта", "aprilie апрель апреля",
+        "mai май мая", "iunie июнь июня", "iulie июль июля", "august август августа",
+        "septembrie сентябрь сентября", "octombrie октябрь октября", "noiembrie ноябрь ноября",
+        "decembrie декабрь декабря",
+    ), start=1)
+    for word in words.split()
+}  # fmt: skip
+"""Whole names: by their beginnings a Finnish November would be a March."""
+_WRITTEN = re.compile(
+    r"\D*(?P<day>\d{1,2})\.? (?P<month>[^\W\d_]+) (?P<year>\d{4})(?: ?г\.| года)?,? (?P<hour>\d{1,2})"
+    r":(?P<minute>\d\d)(?: ?(?P<half>[ap]\.?m\.?|до полудня|после полудня))?"
+)
+"""Moodle's strftimedaydatetime in its Romanian and Russian packs, with 12 or 24 hours, over its versions."""
 
 
 @dataclass(slots=True)
 class Worksheet(Form):
     """A worksheet that Moodle would take."""
 
-    name = "the worksheet"
     platform: str = "Moodle"
-    replaced = (
-        ": it skips them unless the box for updating records is ticked at the upload, or the worksheet was"
-        " downloaded afresh"
-    )
+    replaced = "changed_if_fresh"
 
     @classmethod
     def opened(cls, data: bytes, file: str, item: str = "") -> Self:  # noqa: ARG003 - a worksheet is of one item
@@ -125,6 +137,8 @@ class Worksheet(Form):
             faults += _row_faults(sheet)
         if faults:
             raise failure(InputFileError, "worksheet", faults=faults, file=file)
+        sheet.notes += [] if columns.keys() & {"name", "email", "id", "username"} else [Reason("anonymous")]
+        sheet.notes += [Reason("workflow")] if "workflow" in columns else []
         return sheet
 
     @staticmethod
@@ -133,9 +147,9 @@ class Worksheet(Form):
         plain = text.strip().replace("\u00a0", "").replace(",", ".")
         return float(plain) if re.fullmatch(r"\d+(\.\d+)?", plain) else None
 
-    def why_fixed(self, row: int) -> str:
-        """Return a sentence if Moodle says that the grade cannot be changed."""
-        return LOCKED if self.value(row, "changeable").casefold() in _NO else ""
+    def why_fixed(self, row: int) -> Reason | None:
+        """Return a reason if Moodle says that the grade cannot be changed."""
+        return Reason("grade_locked") if self.value(row, "changeable").casefold() in _NO else None
 
     def participant(self, row: int) -> int | None:
         """The participant's number, by which Moodle knows the row."""
@@ -146,29 +160,28 @@ class Worksheet(Form):
         """As many as the maximum is written with."""
         return len(self.value(row, "maximum").replace(",", ".").partition(".")[2]) or 2
 
-    def notes_on(self, changed: int, zeros: Sequence[str]) -> Sequence[str]:
+    def notes_on(self, changed: int, zeros: Sequence[str]) -> Sequence[Reason]:
         """The worksheet does not say of which assignment it is; Moodle's count does."""
-        note = (
-            f"Moodle must tell {changed} updated grades (more only where it holds more decimals"
-            " than it shows): otherwise this is the worksheet of another assignment or course, or an old one"
-        )
-        zero = f"newer versions of Moodle pass over a grade of 0, enter it there: {', '.join(zeros)}"
-        return [note, zero] if zeros else [note]
+        note = Reason("updates", {"count": changed})
+        return [note, Reason("zeros", {"names": tuple(zeros)})] if zeros else [note]
 
     def date_by(self, downloaded: datetime) -> None:
         """Write dates as ISO: of another language than English Moodle reads none, and updates nothing.
 
-        Every one becomes the worksheet's own: Moodle still skips what was graded after it.
-        Source: assignfeedback_offline_grade_importer::next takes them by PHP's strtotime.
+        Moodle skips what was graded after a date. One in Romanian or Russian stays the same local time,
+        without a zone, as it stands in an English worksheet; others become the time of the file.
+        Source: assignfeedback_offline_grade_importer::next takes them by PHP's strtotime, in the site's zone.
         """
-        rows = [row for row in self.people if not _is_read_by_moodle(self.value(row, "modified"))]
-        for row in rows:
-            self.table.put(row, self.columns["modified"], downloaded.isoformat(timespec="seconds"))
-        if rows:
-            self.notes.append(
-                "Moodle reads no date in this language: they are written as"
-                f" {downloaded.isoformat(sep=' ', timespec='minutes')}, when the worksheet was downloaded"
-            )
+        is_unknown = False
+        for row in self.people:
+            if not _is_read_by_moodle(written := self.value(row, "modified")):
+                moment = _moment(written)
+                is_unknown |= moment is None
+                iso = f"{moment:%Y-%m-%d %H:%M}" if moment else downloaded.isoformat(timespec="seconds")
+                self.table.put(row, self.columns["modified"], iso)
+        if is_unknown:
+            at = downloaded.isoformat(sep=" ", timespec="minutes")
+            self.notes.append(Reason("dates_of_file", {"moment": at}))
 
     @property
     def group_columns(self) -> list[int]:
@@ -239,7 +252,7 @@ def fill_worksheet(
         raise failure(CallError, "option_unused", "maximum_stated", other="--worksheet")
     sheet.date_by(downloaded)
     if "feedback" not in sheet.columns:
-        sheet.notes.append("the worksheet has no column for feedback comments: only grades are filled in")
+        sheet.notes.append(Reason("no_comments"))
     return fill_in(sheet, file, grades, options, comments)
 
 
@@ -307,6 +320,20 @@ def _is_read_by_moodle(moment: str) -> bool:
         or bool(_ISO.fullmatch(moment))
         or (bool(words) and all(map(_ENGLISH.fullmatch, words)))
     )
+
+
+def _moment(written: str) -> datetime | None:
+    """Return a date as Moodle writes it in Romanian or Russian; None for another one."""
+    found = _WRITTEN.fullmatch(" ".join(written.casefold().split()))
+    month = _MONTHS.get(found["month"]) if found else None
+    if found is None or month is None:
+        return None
+    hour, half = int(found["hour"]), found["half"]
+    hour = hour % 12 + 12 * (half[0] in "pп") if half else hour
+    try:
+        return datetime(int(found["year"]), month, int(found["day"]), hour, int(found["minute"]))  # noqa: DTZ001 - the site's zone
+    except ValueError:
+        return None
 
 
 def _row_faults(sheet: Worksheet) -> Iterator[Reason]:
@@ -384,15 +411,9 @@ def gradebook(grades: Sequence[Grade], options: Options) -> Delivery:
     users = [_user(grade, identity) for grade in graded]
     rows = zip(users, [number(score, 2) for score in scores], comments, strict=True)
     maximum = options.maximum or max((grade.max_score for grade in graded), default=0.0)
-    new = "a new item is out of 100 and takes no feedback"
-    notes = [
-        "where there is an assignment, its grading worksheet is the better way (--worksheet)",
-        f"make the grade item in Moodle first, out of {maximum:g}, and map grade and feedback to it: {new}",
-    ]
-    if len(graded) < len(grades):
-        notes.append("withheld students have no row: the import leaves their grades unchanged")
-    if any(score > _USUAL_LIMIT for score in scores):
-        notes.append("some grades are above 100: Moodle takes them only where the site allows it")
+    notes = [Reason("worksheet_better"), Reason("item_first", {"most_points": maximum})]
+    notes += [Reason("no_row")] if len(graded) < len(grades) else []
+    notes += [Reason("above_hundred")] if any(score > _USUAL_LIMIT for score in scores) else []
     return Delivery(csv_text([identity, item, f"{item} (feedback)"], rows), notes=tuple(notes))
 
 
@@ -435,18 +456,17 @@ def feedback_files(grades: Sequence[Grade], options: Options) -> Delivery:
     graded = ready(grades)
     numbers, why, notes = _participants(grades, options)
     missing = {grade.student_id: why[grade.student_id] for grade in graded if grade.student_id in why}
-    folders = {who: f"Participant_{number}_assignfeedback_file" for who, number in numbers.items()}
+    folders = {who: f"Participant_{number}_assignfeedback_file_" for who, number in numbers.items()}
     files = pages_in(folders, graded, options.out or Path())
     if missing and not files:
         faults = [Reason("no_number_known", {"cell": student}) for student in missing]
         raise failure(CallError, "nothing_to_export", "no_numbers", faults=faults)
-    first = "upload grades before feedback files: they make Moodle take a worksheet for outdated"
-    return Delivery(files, unplaced=missing, notes=(first, *notes))
+    return Delivery(files, unplaced=missing, notes=(Reason("grades_first"), *notes))
 
 
 def _participants(
     grades: Sequence[Grade], options: Options
-) -> tuple[dict[str, int], dict[str, str], list[str]]:
+) -> tuple[dict[str, int], dict[str, Reason], list[Reason]]:
     """Moodle's number of each participant, why others have none, and what a person should check.
 
     In the archive of groups Moodle takes a number for a group's: others would get the page.
@@ -460,10 +480,8 @@ def _participants(
         if all(person.participant is None for person in options.people.values()):
             raise failure(CallError, "worksheet_needed")
         others = people.keys() - numbers.keys()
-        notes = (
-            [] if options.groups is False else ["not for groups: there Moodle takes a number for a group's"]
-        )
-        return numbers, dict.fromkeys(others, "the table of ids has no participant"), notes
+        notes = [] if options.groups is False else [Reason("not_for_groups")]
+        return numbers, dict.fromkeys(others, Reason("participant_absent")), notes
     sheet = Worksheet.opened(bytes_of(options.form, "form_missing"), options.form_name)
     if "group" in sheet.columns or (options.groups is None and sheet.group_columns):
         titles = tuple(f"'{sheet.table.value(0, place)}'" for place in sheet.group_columns)
@@ -473,7 +491,7 @@ def _participants(
     locked = {student: why for student, row in rows.items() if (why := sheet.why_fixed(row))}
     numbers = {student: sheet.participant(row) or 0 for student, row in rows.items() if student not in locked}
     doubtful = matches.notes_on(grade.student_id for grade in ready(grades) if grade.student_id in numbers)
-    return numbers, {**matches.missing, **locked}, doubtful
+    return numbers, {**matches.missing, **locked}, [*doubtful, *sheet.notes]
 
 
 def pages_in(folders: Mapping[str, str], graded: Sequence[Grade], out: Path) -> dict[str, Path]:

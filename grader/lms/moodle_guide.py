@@ -22,6 +22,7 @@ from grader.lms.marks import (
     platform_marks,
     read_answer,
 )
+from grader.records import Reason
 from grader.texts.spoken import failure
 from reference.errors import CallError, InputFileError
 
@@ -79,7 +80,7 @@ def guide(grades: Sequence[Grade], options: Options) -> Delivery:
     if options.replace_guide is not None:
         lost = _fillings(options.replace_guide)
         call["fillings_lost"] = sum(lost)
-        notes = [f"saving this guide deletes the one there with {sum(lost)} fillings of {len(lost)} grades"]
+        notes = [Reason("guide_lost", {"count": sum(lost), "grades": len(lost)})]
     return Delivery(own_document(grades, **call), notes=tuple(notes))
 
 
@@ -154,7 +155,7 @@ def fillings(grades: Sequence[Grade], options: Options) -> Delivery:
     for grade, marks in marked:
         user = grade.person.platform_id
         if not user:
-            missing[grade.student_id] = "the table of ids (--ids) has no id: Moodle's number of the user"
+            missing[grade.student_id] = Reason("id_absent", {"platform": "Moodle"})
             continue
         if not _NUMBER.fullmatch(user):
             raise failure(CallError, "ids", student=grade.student_id, text=user, platform="Moodle")
@@ -180,8 +181,7 @@ def fillings(grades: Sequence[Grade], options: Options) -> Delivery:
         raise failure(CallError, "ids_needed")
     check_unique((grade.person.platform_id for grade, _ in marked if grade.person.platform_id), "user")
     content = own_document(grades, criteria=[asdict(each) for each in criteria], calls=calls)
-    note = "each call also replaces the student's feedback comment: without one Moodle stores half of it"
-    return Delivery(content, unplaced=missing, notes=(note,))
+    return Delivery(content, unplaced=missing, notes=(Reason("comments_go_too"),))
 
 
 def _filled(number: int, mark: Mark) -> dict[str, object]:

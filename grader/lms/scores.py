@@ -15,6 +15,7 @@ from typing import Literal, get_args
 from grader.lms.grades import Delivery, Grade, Options, ready
 from grader.lms.marks import Mark, check_unique, json_text, marks_of, own_document, plain_comment
 from grader.lms.table import number
+from grader.records import Reason
 from grader.texts.spoken import failure
 from reference.errors import CallError
 
@@ -95,7 +96,7 @@ def scores(grades: Sequence[Grade], options: Options) -> Delivery:
         if grade.score is None and all(report.status == "missing" for report in grade.reports):
             continue
         if is_mapped and not user:
-            missing[grade.student_id] = "the table of ids (--ids) has no id: the platform's userId"
+            missing[grade.student_id] = Reason("id_absent", {"platform": "LTI"})
             continue
         posted.append(
             {
@@ -105,11 +106,9 @@ def scores(grades: Sequence[Grade], options: Options) -> Delivery:
                 **_graded(grade, options),
             }
         )
-    notes = []
-    if not is_mapped:
-        notes.append("userId is the student_id: where the platform knows users otherwise, give --ids")
+    notes = [] if is_mapped else [Reason("users_by_id")]
     if pending := sum("scoreGiven" not in score for score in posted):
-        notes.append(f"{pending} of the withheld are told as PendingManual: the platform shows no grade")
+        notes.append(Reason("pending", {"count": pending}))
     assignment = grades[0].assignment
     line_item = {
         "label": options.item.strip() or assignment,

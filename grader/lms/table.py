@@ -19,8 +19,8 @@ from pydantic import TypeAdapter, ValidationError
 
 from grader.documents import CriterionDocument, ReportDocument, ResultsDocument
 from grader.files import OutputError, guarded
-from grader.lms.grades import Delivery, Grade, Options, Person, in_a_row, ready
-from grader.records import Reason
+from grader.lms.grades import Delivery, Grade, Options, Person, ready
+from grader.records import Reason, Value
 from grader.tables.reader import Row, TableKind, check_rows, short
 from grader.texts.spoken import failure
 from reference.authored.variant_table import delimiter_of
@@ -304,19 +304,17 @@ class Matches:
     """The row of each student, and why others have none; `by_name` are students known by their name alone."""
 
     rows: dict[str, int] = field(default_factory=dict)
-    missing: dict[str, str] = field(default_factory=dict)
+    missing: dict[str, Reason] = field(default_factory=dict)
     by_name: list[str] = field(default_factory=list)
 
-    def notes_on(self, students: Iterable[str]) -> list[str]:
+    def notes_on(self, students: Iterable[str]) -> list[Reason]:
         """Return what a person should check about these students."""
         chosen = set(students)
-        doubtful = [student for student in self.by_name if student in chosen]
-        return [f"found by name alone, look whether they are these: {in_a_row(doubtful)}"] if doubtful else []
+        doubtful = tuple(student for student in self.by_name if student in chosen)
+        return [Reason("by_name_alone", {"students": doubtful})] if doubtful else []
 
 
-def match_rows(
-    rows: Mapping[int, Mapping[str, str]], students: Mapping[str, Evidence], table: str
-) -> Matches:
+def match_rows(rows: Mapping[int, Mapping[str, str]], students: Mapping[str, Evidence]) -> Matches:
     """The row of each student in a table, without regard to case and spaces.
 
     Names also fit over accents, cedilla or comma below, the dots of ё, apostrophes, the order of their
@@ -325,7 +323,7 @@ def match_rows(
     The strongest evidence that fits decides, unless stronger evidence speaks against that row: a
     namesake with another address. Only columns that know anybody of these students can speak so.
 
-    Arguments: `rows` has cells by row and column, `table` is the table's name in words.
+    Arguments: `rows` has cells by row and column.
     """
     cells = {
         row: {column: _key(column, text) for column, text in texts.items()} for row, texts in rows.items()
@@ -341,8 +339,8 @@ def match_rows(
     for student, evidence in keys.items():
         stronger = list(takewhile(lambda key: key not in rows_with, evidence))
         if len(stronger) == len(evidence):
-            known = ", ".join(f"{column} '{text}'" for column, text in students[student] if text)
-            matches.missing[student] = f"nobody in {table} has {known or 'anything known of the student'}"
+            known = tuple(f"{column} '{text}'" for column, text in students[student] if text)
+            matches.missing[student] = Reason("row_absent", {"known": known} if known else {})
             continue
         key = evidence[len(stronger)]
         row, *others = rows_with[key]
@@ -352,17 +350,18 @@ def match_rows(
             if column in speaking - {key[0]} and cells[row].get(column) not in (None, "", text)
         ]
         if others:
-            fitting = " and ".join(f"{each + 1} ({_who(rows[each])})" for each in (row, *others))
-            matches.missing[student] = f"rows {fitting} of {table} all have the {key[0]}"
+            fitting = tuple(f"{each + 1} ({_who(rows[each])})" for each in (row, *others))
+            matches.missing[student] = Reason("row_several", {"rows": fitting, "column": key[0]})
         elif contrary:
-            matches.missing[student] = f"row {row + 1} of {table} has the {key[0]}, but another {contrary[0]}"
+            found: dict[str, Value] = {"row": row + 1, "column": key[0], "other": contrary[0]}
+            matches.missing[student] = Reason("row_contrary", found)
         else:
             claims[row][student] = key[0]
     for row, claiming in claims.items():
         if len(claiming) > 1:
-            both = " and ".join(f"{student} ({_who(dict(students[student]))})" for student in claiming)
-            why = f"row {row + 1} of {table} ({_who(rows[row])}) fits {both} alike"
-            matches.missing.update(dict.fromkeys(claiming, why))
+            both = tuple(f"{student} ({_who(dict(students[student]))})" for student in claiming)
+            found = {"row": row + 1, "who": _who(rows[row]), "students": both}
+            matches.missing.update(dict.fromkeys(claiming, Reason("row_shared", found)))
         else:
             matches.rows.update(dict.fromkeys(claiming, row))
             matches.by_name += [student for student, column in claiming.items() if column == NAME]
@@ -374,11 +373,10 @@ def match_class(
     grades: Sequence[Grade],
     options: Options,
     evidence: Callable[[str, Person], Evidence],
-    table: str,
 ) -> Matches:
     """Match everybody of a class as `match_rows` does; `evidence` gives the cells of a student."""
     students = {**options.people, **{grade.student_id: grade.person for grade in grades}}
-    return match_rows(rows, {student: evidence(student, who) for student, who in students.items()}, table)
+    return match_rows(rows, {student: evidence(student, who) for student, who in students.items()})
 
 
 def _who(cells: Mapping[str, str]) -> str:
@@ -450,12 +448,11 @@ class Form(ABC):
     columns: Mapping[str, int]
     above: int = 0
     possible: float | None = None
-    notes: list[str] = field(default_factory=list)
+    notes: list[Reason] = field(default_factory=list)
     platform: str = ""
 
-    name: ClassVar[str]
-    replaced: ClassVar[str] = ""
-    """The end of the note on changed grades that the platform holds already."""
+    replaced: ClassVar[str] = "grades_changed"
+    """The code of the note on changed grades that the platform holds already."""
 
     @classmethod
     @abstractmethod
@@ -468,8 +465,8 @@ class Form(ABC):
         """A number that is not negative, as the platform writes it."""
 
     @abstractmethod
-    def why_fixed(self, row: int) -> str:
-        """Return why the grade of a row must not be changed; empty where it may."""
+    def why_fixed(self, row: int) -> Reason | None:
+        """Return why the grade of a row must not be changed; None where it may."""
 
     @abstractmethod
     def identity(self, row: int) -> Mapping[str, str]:
@@ -502,9 +499,9 @@ class Form(ABC):
     def match(self, grades: Sequence[Grade], options: Options) -> Matches:
         """The rows of students, among the whole class: a row that fits two of them is given to neither."""
         rows = {row: cells for row in self.people if (cells := self.identity(row))}
-        return match_class(rows, grades, options, self.evidence, self.name)
+        return match_class(rows, grades, options, self.evidence)
 
-    def notes_on(self, changed: int, zeros: Sequence[str]) -> Sequence[str]:  # noqa: ARG002 - some platforms
+    def notes_on(self, changed: int, zeros: Sequence[str]) -> Sequence[Reason]:  # noqa: ARG002 - some platforms
         """Return what to check after the upload of so many changed grades; `zeros` are students who got 0."""
         return ()
 
@@ -541,7 +538,7 @@ def fill_in(
     """
     matches = form.match(grades, options)
     held = {row: cell for row in form.people if (cell := form.value(row, "grade")) not in NO_GRADE}
-    filled, unplaced, texts = list[str](), dict[str, str](), dict[int, str]()
+    filled, unplaced, texts = list[str](), dict[str, Reason](), dict[int, str]()
     changed, zeros, comments_replaced = list[int](), list[str](), 0
     for grade in ready(grades):
         student, row = grade.student_id, matches.rows.get(grade.student_id)
@@ -569,15 +566,12 @@ def fill_in(
             raise not_as_meant()
     notes = [*form.notes, *form.notes_on(len(changed), zeros)]
     replaced = sum(row in held for row in changed)
-    if replaced:
-        notes.append(f"{replaced} grade(s) that {form.platform} holds already are changed{form.replaced}")
-    if comments_replaced:
-        notes.append(f"{comments_replaced} comment(s) that {form.platform} holds already are replaced")
+    for code, count in ((form.replaced, replaced), ("comments_changed", comments_replaced)):
+        notes += [Reason(code, {"platform": form.platform, "count": count})] if count else []
     notes += matches.notes_on(filled)
     waiting = {
         grade.student_id: matches.rows.get(grade.student_id) for grade in grades if grade.score is None
     }
-    stays = [f"{student} ({held[row]})" for student, row in waiting.items() if row in held]
-    if stays:
-        notes.append(f"withheld, and a grade is there already, which stays: {in_a_row(stays)}")
+    stays = tuple(f"{student} ({held[row]})" for student, row in waiting.items() if row in held)
+    notes += [Reason("withheld_stay", {"students": stays})] if stays else []
     return Delivery(content, unplaced=unplaced, notes=tuple(notes))

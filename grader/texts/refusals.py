@@ -67,6 +67,7 @@ REFUSALS: dict[str, str] = {
     "file_of_student": N_("%(name)s: a student has handed this in; choose another name"),
     "file_ending": N_("“%(name)s”: the file's name must end in one of %(endings)s"),
     "file_of_program": N_("“%(name)s”: a file that other programs leave behind, no submission"),
+    "file_field": N_("no file is asked for as “%(name)s”; known are %(known)s"),
     "file_reserved": N_("upload the roster as the roster; decisions are made in the review"),
     # Learning platforms
     "lti_claimed": N_("somebody else has signed in as this student: your instructor will decide"),

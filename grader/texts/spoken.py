@@ -7,6 +7,7 @@ from grader.documents import ProblemDocument, UnmatchedDocument, UnreadDocument
 from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
 from grader.records import Reason, Unread, Value, of_error
 from grader.texts.clauses import CLAIMS, CLAUSES
+from grader.texts.exports import EXPORTS
 from grader.texts.failures import FAILURES
 from grader.texts.faults import FAULTS, WHERE
 from grader.texts.problems import PROBLEMS
@@ -83,6 +84,8 @@ def spoken(
         stem, _, suffix = key.rpartition("_")
         if isinstance(value, str):
             said[key] = value if key == "text" else place(value, speaker, names)  # as it was written
+        elif key == "students":
+            said[key] = _some(cast("Sequence[str]", value), speaker)
         elif not isinstance(value, int | float):
             words = _NOUNS.get(key, PLACES)
             said[key] = ", ".join(
@@ -104,6 +107,16 @@ def spoken(
         declared, expected = (cast("float", parameters[key]) for key in ("declared", "expected"))
         said["factor"] = _how_far_off(declared, expected, speaker)
     return said
+
+
+MOST_STUDENTS = 20
+AND_MORE = N_("%(names)s and %(more)s more")
+
+
+def _some(names: Sequence[str], speaker: Tongue) -> str:
+    """Return students in one line, of many only the first."""
+    told, more = ", ".join(names[:MOST_STUDENTS]), len(names) - MOST_STUDENTS
+    return told if more <= 0 else speaker.gettext(AND_MORE) % {"names": told, "more": more}
 
 
 def filled(texts: Sequence[str], said: Mapping[str, str], speaker: Tongue) -> str:
@@ -131,7 +144,8 @@ def _say_clauses(parameters: Mapping[str, object], said: dict[str, str], speaker
 
 def clauses(code: str) -> Sequence[str]:
     """The texts of a clause, the most precise first; none for what is the code of no clause."""
-    return FAULTS.get(code) or CLAIMS.get(code) or ([CLAUSES[code]] if code in CLAUSES else ())
+    texts = FAULTS.get(code) or CLAIMS.get(code) or EXPORTS.get(code) or CLAUSES.get(code) or ()
+    return [texts] if isinstance(texts, str) else texts
 
 
 def _placed(text: str, said: Mapping[str, str], speaker: Tongue) -> str:
@@ -175,6 +189,7 @@ _UNIT_WRITERS: dict[str, Callable[[Tongue, float], str]] = {
     "deg": lambda speaker, value: f"{speaker.number(value, 1)}°",
     "percent": _with_unit("%"),
     "dpi": _with_unit("dpi"),
+    "mb": _with_unit("MB"),
     "points": lambda speaker, value: speaker.trimmed(value, 6),
     "s": lambda speaker, value: f"{speaker.trimmed(value, 1)}\N{NO-BREAK SPACE}{speaker.unit('s')}",
 }
@@ -306,6 +321,11 @@ def unread_document(gap: Unread) -> UnreadDocument:
     return UnreadDocument(
         name=gap.name, reason=clause(reason, ENGLISH), code=reason.code, parameters=as_json(reason.parameters)
     )
+
+
+def told(reason: Reason, speaker: Tongue) -> dict[str, Any]:
+    """Convert a reason of an export to JSON values, with its sentence in a language."""
+    return {"code": reason.code, "message": clause(reason, speaker), "parameters": as_json(reason.parameters)}
 
 
 def as_json(parameters: Mapping[str, Value]) -> dict[str, float | str | list[str]]:

@@ -51,6 +51,7 @@ def erase_student(session: Session, publication: Publication, places: Places, st
         places.delete(path)
     _erase_rows(places, student)
     _erase_results(places, student)
+    shutil.rmtree(places.exports, ignore_errors=True)
     return shared
 
 

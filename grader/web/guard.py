@@ -395,7 +395,7 @@ MOST_SENDING = 60
 SHARE = 2 / 3
 """Part of the room for all bodies that one address may take."""
 _FILES = re.compile(
-    r"/api/v1/publications/[^/]+/(?:(?P<photo>photos|sheets)|(?:assignment/|roster/|exports/[^/]+/)?files/.+)/?"
+    r"/api/v1/publications/[^/]+/(?:(?P<photo>photos|sheets)|(?:assignment/|roster/|exports/[^/]+/)?files/.+|exports/[^/]+)/?"
 )
 """Addresses to which files are sent."""
 

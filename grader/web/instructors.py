@@ -1,14 +1,18 @@
 """Actions of instructors: publish, upload, grade, release, export, answer, delete."""
 
 import pathlib
+import secrets
+import shutil
 import tempfile
 import time
-from dataclasses import replace
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import PurePath
+from types import MappingProxyType
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query
-from fastapi.responses import Response
+from fastapi.responses import FileResponse, Response
 from pydantic import BaseModel, Field
 from sqlalchemy import select
 from sqlalchemy.orm import Session
@@ -16,12 +20,14 @@ from sqlalchemy.orm import Session
 from grader.authoring.lint import lint, lint_document
 from grader.documents import LintDocument
 from grader.folder.workers import result_of
+from grader.language import tongue
 from grader.lms.export import TARGETS, export, read_results, usual_name
-from grader.lms.grades import Options, people_of
+from grader.lms.grades import Delivery, Options, people_of
+from grader.lms.table import with_ids
 from grader.options import ExportOptions, PublicationOptions, model_of, offered
 from grader.rubric import rubric_of
 from grader.tables.roster import read_roster
-from grader.texts.spoken import RefusedError
+from grader.texts.spoken import RefusedError, told
 from grader.web.erase import erase_student
 from grader.web.guard import missing
 from grader.web.places import (
@@ -34,7 +40,7 @@ from grader.web.places import (
     store,
     stored_name,
 )
-from grader.web.service import FILE_BODY, LARGEST_ROW, Body, Call, Called, Key, Own, Route, Row
+from grader.web.service import FILE_BODY, LARGEST_ROW, Body, Call, Called, Files, Key, Own, Route, Row
 from grader.web.store import (
     UNFINISHED,
     Account,
@@ -335,21 +341,28 @@ def results(call: Called, own: Own) -> Response:
     return Response(path.read_bytes(), media_type="application/json")
 
 
-CHOSEN = ("what", "item", "position", "combine", "maximum", "rescale")
+CHOSEN = (
+    "what", "item", "position", "combine", "maximum", "rescale", "groups", "course_id", "assignment_id",
+)  # fmt: skip
+GIVEN = {
+    "form": (".csv", ".xls", ".txt", ".zip"), "ids": (".csv",), "criteria": (".csv", ".json"),
+    "submissions": (".json",),
+}  # fmt: skip
+"""The files that an export may be given, with the ends of their names."""
+_FIELDS = {"type": "object", "properties": {name: {"type": "string", "format": "binary"} for name in GIVEN}}
+FORM_BODY = {"requestBody": {"content": {"multipart/form-data": {"schema": _FIELDS}}}}
+KEPT_S = 3600.0
+"""Seconds for which a file for a platform can be downloaded."""
 
 
 class Chosen(model_of("Chosen", ExportOptions, BaseModel, CHOSEN)):  # type: ignore[misc]
-    """The options of an export that need no file of the platform."""
-
-
-def _options(platform: str, chosen: Chosen, **more: Any) -> Options:  # noqa: ANN401 - an export's options
-    return Options(to=platform, **chosen.model_dump(exclude_none=True), **more)
+    """The options of an export that are no files."""
 
 
 @router.get("/publications/{key}/exports/{platform}")
 def export_file(call: Called, own: Own, platform: str, chosen: Annotated[Chosen, Query()]) -> Response:
     """The file for a platform, as `planmark export` writes it without the platform's own file."""
-    return _exported(call, own, _options(platform, chosen))
+    return _download(_exported(call, own, platform, chosen)[0])
 
 
 @router.post("/publications/{key}/exports/{platform}/files/{name}", openapi_extra=FILE_BODY)
@@ -362,27 +375,82 @@ def filled_in(
     chosen: Annotated[Chosen, Query()],
 ) -> Response:
     """The platform's own worksheet or gradebook, which is sent as the body, filled in."""
-    called = person_name(name, (".csv", ".xls", ".txt"))
-    with tempfile.TemporaryDirectory() as folder:
-        form = pathlib.Path(folder) / stored_name(called)
-        store(form, body)
-        return _exported(call, own, _options(platform, chosen, form=form, called=called))
+    return _download(_exported(call, own, platform, chosen, {"form": (name, body)})[0])
 
 
-def _exported(call: Call, own: Publication, options: Options) -> Response:
-    if options.to not in TARGETS:
+@router.post("/publications/{key}/exports/{platform}", status_code=201, openapi_extra=FORM_BODY)
+def export_told(
+    call: Called, own: Own, platform: str, files: Files, chosen: Annotated[Chosen, Query()]
+) -> dict[str, Any]:
+    """Make the file for a platform, and tell who is not in it and what to look at.
+
+    Files of the form: `form` (the platform's own worksheet or gradebook), `ids`, `criteria`, `submissions`.
+    The file is at `address` for an hour.
+    """
+    path, delivery = _exported(call, own, platform, chosen, files)
+    speaker = tongue(call.lang)
+    answer: dict[str, Any] = {"withheld": {}, "unplaced": {}}
+    for student, state, reasons in delivery.left_out():
+        answer[state][student] = [told(reason, speaker) for reason in reasons]
+    return {
+        "name": path.name,
+        "address": f"/api/v1/publications/{own.key}/exported/{path.parent.name}",
+        "written": delivery.written,
+        **answer,
+        "notes": [told(note, speaker) for note in delivery.notes],
+    }
+
+
+@router.get("/publications/{key}/exported/{name}")
+def exported(call: Called, own: Own, name: Key) -> Response:
+    """A file for a platform that was made within the last hour."""
+    path = next((call.places(own).exports / name).glob("export-*"), None)
+    if path is None:
+        raise missing("file")
+    return _download(path)
+
+
+def _download(path: pathlib.Path) -> Response:
+    return FileResponse(path, filename=path.name, media_type="application/octet-stream")
+
+
+def _exported(
+    call: Call,
+    own: Publication,
+    platform: str,
+    chosen: Chosen,
+    files: Mapping[str, tuple[str, bytes]] = MappingProxyType({}),
+) -> tuple[pathlib.Path, Delivery]:
+    """Write a file for a platform into a folder of its own; delete those that nobody downloads any more."""
+    if platform not in TARGETS:
         raise RefusedError(404, "not_found", "no_export", known=", ".join(TARGETS))
+    if wrong := ", ".join(sorted(files.keys() - GIVEN.keys())):
+        raise RefusedError(422, "file_name", "file_field", name=wrong[:60], known=", ".join(GIVEN))
     places = call.places(own)
-    people = people_of(places.roster) if places.roster.is_file() else {}
-    options = replace(options, out=places.results, lang=own.lang, people=people)
-    name = usual_name(options)
-    with tempfile.TemporaryDirectory() as folder:
-        path = pathlib.Path(folder) / name
-        export(read_results(places.results), path, options)
-        content = path.read_bytes()
-    call.note("exported", f"{own.key} {name}")
-    head = {"Content-Disposition": f'attachment; filename="{name}"'}
-    return Response(content, media_type="application/octet-stream", headers=head)
+    for old in places.exports.glob("*"):
+        with suppress(FileNotFoundError):  # another request has deleted it
+            if old.stat().st_mtime < time.time() - KEPT_S:
+                shutil.rmtree(old, ignore_errors=True)
+    folder = places.exports / secrets.token_hex(12)
+    given: dict[str, Any] = chosen.model_dump(exclude_none=True)
+    try:
+        for field, endings in GIVEN.items():
+            if field in files:
+                ending = PurePath(person_name(files[field][0], endings)).suffix.lower()
+                given[field] = folder / "given" / f"{field}{ending}"
+                store(given[field], files[field][1])
+        people = people_of(places.roster) if places.roster.is_file() else {}
+        if ids := given.pop("ids", None):
+            people = with_ids(people, ids)
+        called = person_name(files["form"][0], GIVEN["form"]) if "form" in files else ""
+        given |= {"out": places.results, "lang": own.lang, "people": people, "called": called}
+        options = Options(to=platform, **given)
+        path = folder / usual_name(options)
+        delivery = export(read_results(places.results), path, options)
+    finally:
+        shutil.rmtree(folder / "given", ignore_errors=True)
+    call.note("exported", f"{own.key} {path.name}")
+    return path, delivery
 
 
 def _job(call: Call, own: Publication, job: str) -> Job:

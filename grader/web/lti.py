@@ -26,13 +26,17 @@ from pylti1p3.service_connector import ServiceConnector
 from sqlalchemy import delete, select
 
 from grader.files import write_whole
+from grader.language import tongue
 from grader.lms.export import draft, read_results
 from grader.lms.grades import Options, Person
-from grader.texts.spoken import RefusedError
+from grader.records import Reason
+from grader.rubric import rubric_of
+from grader.texts.spoken import RefusedError, told
 from grader.web.claims import claimed, row_of, take_back_links
 from grader.web.guard import missing
 from grader.web.launch import STATE_S, Message, began, checked, platform_of
 from grader.web.outside import caller, why_not_asked
+from grader.web.places import assignment_of
 from grader.web.service import Call, Called, Key, Own, Route, Row
 from grader.web.settings import Settings
 from grader.web.store import (
@@ -52,7 +56,6 @@ from grader.web.store import (
 from grader.web.students import Strict
 
 router = APIRouter(route_class=Route, tags=["lti"])
-REFUSED = "the platform does not answer as it should"
 
 
 # What a platform is registered with ---------------------------------------------------------------
@@ -391,6 +394,11 @@ def _deep_link(call: Call, platform: LtiPlatform, what: Mapping[str, Any], publi
     registration = registration_of(platform, settings)
     resource = DeepLinkResource().set_url(f"{settings.address}/lti/launch").set_title(publication.title)
     resource.set_custom_params({"publication": publication.key})
+    if publication.assignment:
+        # Without it Moodle makes an activity out of 100.
+        assignment = assignment_of(settings.data, publication)
+        item = LineItem().set_score_maximum(rubric_of(assignment).max_score).set_tag("grade")
+        resource.set_lineitem(item.set_label(publication.title).set_resource_id(assignment.id))
     made = DeepLink(registration, what["deployment"], what["settings"])
     return str(made.get_response_jwt([resource]))
 
@@ -409,7 +417,8 @@ def send_scores(call: Called, own: Own) -> dict[str, Any]:
     if not activities:
         raise RefusedError(404, "lti_activity")
     results = read_results(call.places(own).results)
-    told: dict[str, Any] = {"sent": [], "same": [], "refused": {}, "withheld": {}}
+    answer: dict[str, Any] = {"sent": [], "same": [], "refused": {}, "withheld": {}}
+    speaker = tongue(call.lang)
     for activity in activities:
         holding = select(LtiClaim.student_id, LtiUser.subject).join(LtiUser, LtiUser.id == LtiClaim.user_id)
         of_activity = (
@@ -420,21 +429,22 @@ def send_scores(call: Called, own: Own) -> dict[str, Any]:
         users: dict[str, str] = {row.student_id: row.subject for row in found}
         people = {student: Person(platform_id=subject) for student, subject in users.items()}
         delivery = draft(results, Options(to="lti", people=people, item=own.title))
-        told["withheld"] |= {**delivery.withheld, **delivery.unplaced}
+        for student, _, reasons in delivery.left_out():
+            answer["withheld"][student] = told(reasons[0], speaker)
         document = json.loads(str(delivery.content))
         students = {subject: student for student, subject in users.items()}
         for student, why in _sent(call, activity, document, students):
-            if why in {"sent", "same"}:
-                told[why].append(student)
+            if isinstance(why, Reason):
+                answer["refused"][student] = told(why, speaker)
             else:
-                told["refused"][student] = why
-    call.note("grades sent", f"{own.key}: {len(told['sent'])}")
-    return told
+                answer[why].append(student)
+    call.note("grades sent", f"{own.key}: {len(answer['sent'])}")
+    return answer
 
 
 def _sent(
     call: Call, activity: LtiActivity, document: Mapping[str, Any], students: Mapping[str, str]
-) -> Iterator[tuple[str, str]]:
+) -> Iterator[tuple[str, str | Reason]]:
     """Send grades; yield each student with ``sent``, ``same``, or the reason of a refusal."""
     platform = call.session.get_one(LtiPlatform, activity.platform_id)
     settings = call.service.settings
@@ -471,7 +481,8 @@ def _sent(
             ValueError,
         ) as error:
             response = getattr(error, "response", None)
-            yield student, REFUSED if response is None else f"the platform answers {response.status_code}"
+            known = {} if response is None else {"status": response.status_code}
+            yield student, Reason("platform_refuses", known)
         else:
             activity.sent = {**activity.sent, student: mark}
             call.session.commit()

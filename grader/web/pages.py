@@ -41,6 +41,9 @@ TEXTS = {
     "opening": N_("Opening files"),
     "looking_at": N_("Looking at pages"),
     "marking": N_("Marking"),
+    "in_file": N_("Students in the file: %(count)s."),
+    "withheld": N_("withheld"),
+    "unplaced": N_("no place in the file"),
 }
 
 

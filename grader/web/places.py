@@ -55,6 +55,11 @@ class Places:
         return self.top / "results"
 
     @property
+    def exports(self) -> Path:
+        """Files for platforms, each in a folder of its own, for a while."""
+        return self.top / "exports"
+
+    @property
     def photos(self) -> Path:
         """Photos of self-checks, each until it has been checked."""
         return self.top / "photos"

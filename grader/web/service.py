@@ -9,6 +9,7 @@ from fastapi import Depends, Path, Request, Response
 from fastapi.routing import APIRoute
 from sqlalchemy import select
 from sqlalchemy.orm import Session
+from starlette.datastructures import UploadFile
 
 from grader.texts.spoken import RefusedError
 from grader.web.guard import Guard, Visitor, forbidden, language_of, missing
@@ -197,7 +198,16 @@ def body_after(asked: Callable[..., object]) -> Callable[..., Awaitable[bytes]]:
     return body
 
 
+async def files_after(request: Request, own: Own) -> dict[str, tuple[str, bytes]]:
+    """Return the files of a form by their fields, each with its name; the form is read once it is allowed."""
+    _ = own
+    async with request.form() as form:
+        sent = {name: one for name, one in form.items() if isinstance(one, UploadFile) and one.filename}
+        return {name: (one.filename or "", await one.read()) for name, one in sent.items()}
+
+
 Body = Annotated[bytes, Depends(body_after(own_of))]
+Files = Annotated[dict[str, tuple[str, bytes]], Depends(files_after)]
 FILE_BODY = {
     "requestBody": {
         "required": True,

@@ -1,6 +1,7 @@
 """Settings of the web application: from the command line, secrets from the environment."""
 
 import os
+import re
 import secrets
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -80,7 +81,8 @@ class Settings:
 
     def without_folder(self, text: str) -> str:
         """Return a message for people elsewhere, without the path of the data folder."""
-        return text.replace(f"{self.data.resolve()}{os.sep}", "").replace(f"{self.data}{os.sep}", "")
+        text = text.replace(f"{self.data.resolve()}{os.sep}", "").replace(f"{self.data}{os.sep}", "")
+        return re.sub(r"publications/[\w-]+/exports/\w+/given/", "", text)
 
 
 def settings_of(

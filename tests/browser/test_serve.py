@@ -229,6 +229,21 @@ def test_a_student_checks_values_and_a_photo_and_asks_again(served, visit, local
     student.look(f"{name}-feedback")
 
 
+WORKSHEET = b"""Identifier,Full name,Status,Grade,Maximum grade,Grade can be changed,Last modified (grade)
+Participant 8,A. B.,-,,43.00,Yes,-
+"""
+IDS = b"student_id,participant\ns08,8\n"
+TOLD = {
+    "en": ("Students in the file: 1.", "withheld: nothing handed in: s02, s03", "Moodle reports must be 1"),
+    "ro": (
+        "Studenți în fișier: 1.",
+        "fără notă deocamdată: nepredat: s02, s03",
+        "numărul de note actualizate",
+    ),
+    "ru": ("Студентов в файле: 1.", "оценки пока нет: не сдано: s02, s03", "обновлено оценок: 1"),
+}
+
+
 @pytest.mark.parametrize("locale", LOCALES)
 def test_an_instructor_publishes_grades_and_gives_back(served, visit, locale):  # noqa: PLR0915 - one story
     lang = locale[:2]
@@ -283,10 +298,17 @@ def test_an_instructor_publishes_grades_and_gives_back(served, visit, locale):  
     with page.expect_navigation():
         page.click(".request button")
     assert "You are right" in page.inner_text(".request")
-    page.select_option("#platform", "csv")
+    page.select_option("#platform", "moodle")
+    page.set_input_files("#form-file", {"name": "Оценки.csv", "mimeType": "text/csv", "buffer": WORKSHEET})
+    page.click("#export summary")
+    page.set_input_files("#x-ids", {"name": "ids.csv", "mimeType": "text/csv", "buffer": IDS})
     with page.expect_download() as download:
-        page.click("#export button")
-    assert "s08" in Path(download.value.path()).read_text(encoding="utf-8")
+        page.click("#export > button")
+    assert download.value.suggested_filename == "export-moodle.csv"
+    assert "Participant 8," in Path(download.value.path()).read_text(encoding="utf-8")
+    told = page.inner_text("#exported")
+    assert [word for word in TOLD[lang] if word not in told] == []
+    instructor.look(f"{name}-exported")
     page.select_option("#student", "s08")
     with page.expect_navigation():
         page.click("[data-erase] button")

@@ -114,10 +114,8 @@ def canvas_api(grades: Sequence[Grade], options: Options) -> Delivery:
         marked = [
             (grade, {mark.criterion: mark for mark in ready_marks(grade, options)}) for grade in ready(grades)
         ]
-        notes = [
-            "Canvas sets the assignment's points possible to the rubric's",
-            "its answer tells the criteria's ids: where they are others, export again with it (--criteria)",
-        ]
+        become = Reason("points_become", {"platform": "Canvas", "most_points": grades[0].max_score})
+        notes = [become, Reason("ids_of_criteria")]
     else:
         _, marked = platform_marks(grades, options, options.criteria)
         notes = []

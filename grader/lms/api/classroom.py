@@ -7,6 +7,7 @@ from grader.lms.api.requests import Plan, place_of, students_submissions
 from grader.lms.grades import Delivery, Grade, Options, ready
 from grader.lms.marks import class_criteria, platform_marks
 from grader.lms.table import number
+from grader.records import Reason
 from grader.texts.spoken import failure
 from reference.errors import CallError
 
@@ -57,8 +58,6 @@ def google_classroom(grades: Sequence[Grade], options: Options) -> Delivery:
             call = f"PATCH {where}?updateMask=draftGrade,assignedGrade"
             fields = {"draftGrade": score, "assignedGrade": score}
             plan.add(call, fields, "grade", grade.student_id)
-    notes = (
-        f"the course work must be out of {number(options.maximum or grades[0].max_score)}",
-        "grades have two decimals there; points by criterion are read-only for the API: --to csv has them",
-    )
+    most = options.maximum or grades[0].max_score
+    notes = Reason("maximum_there", {"most_points": most}), Reason("two_decimals")
     return plan.delivery(grades, unplaced=missing, notes=notes)

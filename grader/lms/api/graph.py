@@ -9,6 +9,7 @@ from grader.lms.api.requests import Plan, place_of, students_submissions
 from grader.lms.grades import Delivery, Grade, Options, ready
 from grader.lms.marks import Mark, class_criteria, plain_comment, platform_marks, read_answer
 from grader.lms.table import number
+from grader.records import Reason
 from grader.texts.spoken import failure
 from reference.errors import CallError
 
@@ -46,7 +47,7 @@ def ms_education(grades: Sequence[Grade], options: Options) -> Delivery:
     ask = f"{base}/submissions?$expand=outcomes"
     if options.criteria is None:
         plan.add("POST /v1.0/education/me/rubrics", _graph_rubric(grades, options), "rubric")
-        why = "its points follow once the rubric is there: give Graph's answer for it (--criteria)"
+        why = Reason("rubric_first")
         return plan.delivery(grades, unplaced={grade.student_id: why for grade in ready(grades)})
     answer = read_answer(options.criteria)
     _, marked = platform_marks(grades, options, options.criteria)
@@ -64,7 +65,7 @@ def ms_education(grades: Sequence[Grade], options: Options) -> Delivery:
                 kind: submission.outcomes.get(f"education{kind.title()}Outcome") for kind in _OUTCOMES
             }
             if not all(outcomes.values()):
-                missing[grade.student_id] = f"no outcomes of all kinds in the answer: ask for {ask}"
+                missing[grade.student_id] = Reason("outcomes_absent", {"asked": ask})
                 continue
             score = grade.out_of(options.maximum, rescale=options.rescale)
             bodies = _graph_outcomes(grade, marks, levels, score)
@@ -72,12 +73,11 @@ def ms_education(grades: Sequence[Grade], options: Options) -> Delivery:
                 outcome = quote(outcomes[kind] or "", safe="")
                 path = f"{base}/submissions/{quote(submission.id, safe='')}/outcomes/{outcome}"
                 plan.add(f"PATCH {path}", bodies[kind], kind, grade.student_id)
-    notes = [
-        f"the assignment must be out of {number(options.maximum or grades[0].max_score)} points",
-        "a level is the nearest quarter; the points themselves are the grade's and stand in each feedback",
-        f"a published assignment has a rubric of its own: give the answer to {base}/rubric then (--criteria)",
-    ]
-    return plan.delivery(grades, unplaced=missing, notes=tuple(notes))
+    most = {"most_points": options.maximum or grades[0].max_score}
+    own = Reason("rubric_of_its_own", {"asked": f"{base}/rubric"})
+    return plan.delivery(
+        grades, unplaced=missing, notes=(Reason("maximum_there", most), Reason("quarters"), own)
+    )
 
 
 def _graph_rubric(grades: Sequence[Grade], options: Options) -> dict[str, Any]:

@@ -7,9 +7,10 @@ from urllib.parse import quote
 from xml.etree import ElementTree as ET
 
 from grader.lms.api.requests import Plan, place_of, ready_marks, students_submissions
-from grader.lms.grades import Delivery, Grade, Options, in_a_row, ready
+from grader.lms.grades import Delivery, Grade, Options, ready
 from grader.lms.marks import CLOSE, class_criteria, json_text, plain_comment
 from grader.lms.table import number
+from grader.records import Reason
 
 _FACTORS = (1, 2, 4, 5, 10, 20, 25, 50, 100)
 """Factors that make points whole; finer points than hundredths are rounded, and a note says so."""
@@ -77,20 +78,15 @@ def openedx(grades: Sequence[Grade], options: Options) -> Delivery:
         plan.add(f"POST {base}/lock?{where}", {}, "lock", student)
         plan.add(f"POST {base}/grade?{where}", body, "grade", student)
     total = math.fsum(each.max_points for each in criteria)
-    notes = [
-        (
-            f"Open edX takes whole points: all are times {factor}, {number(total)} become"
-            f" {number(factor * total)}; the grade is their share and stays the same"
-        ),
-        "the options are the points that this class has: after a regrade with others put the rubric in again",
-    ]
-    rough = [
+    whole = {"times": factor, "total_points": total, "become_points": factor * total}
+    notes = [Reason("whole_points", whole), Reason("options_of_class")]
+    rough = tuple(
         student
         for student, marks in marked.items()
         if not all(_is_whole(mark.points * factor) for mark in marks)
-    ]
+    )
     if rough:
-        notes.insert(1, f"rounded to hundredths: the points of {in_a_row(rough)}")
+        notes.insert(1, Reason("rounded", {"students": rough}))
     return plan.delivery(grades, unplaced=missing, notes=tuple(notes))
 
 

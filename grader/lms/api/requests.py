@@ -8,6 +8,7 @@ from urllib.parse import quote
 from grader.lms.grades import Delivery, Grade, Options, Person, ready
 from grader.lms.marks import Mark, check_unique, json_text, marks_of, read_answer, together
 from grader.lms.table import Evidence, match_class
+from grader.records import Reason
 from grader.texts.spoken import failure
 from reference.errors import CallError
 
@@ -95,19 +96,19 @@ def submissions_in(answer: object) -> Iterator[Submission]:
 
 def students_submissions(
     grades: Sequence[Grade], options: Options, ask: str
-) -> tuple[dict[str, Submission], dict[str, str]]:
+) -> tuple[dict[str, Submission], dict[str, Reason]]:
     """The submission of each student, and why others have none; `ask` is the request that lists them.
 
     Raises CallError for an answer without submissions.
     """
     if options.submissions is None:
-        why = f"its submission is not known: ask the platform for {ask} and give the answer (--submissions)"
+        why = Reason("submission_absent", {"asked": ask})
         return {}, {grade.student_id: why for grade in ready(grades)}
     known = list(submissions_in(read_answer(options.submissions)))
     if not known:
         raise failure(CallError, "submissions", file=options.submissions, asked=ask)
     rows = {row: submission.user for row, submission in enumerate(known)}
-    matches = match_class(rows, grades, options, _evidence, options.submissions.name)
+    matches = match_class(rows, grades, options, _evidence)
     graded = [grade.student_id for grade in ready(grades)]
     found = {student: known[matches.rows[student]] for student in graded if student in matches.rows}
     return found, {student: matches.missing[student] for student in graded if student not in found}

@@ -7,13 +7,13 @@ const fill = (text, known) => text.replace(/%\((\w+)\)s/g, (_, name) => known[na
 const pause = (ms) => new Promise((done) => setTimeout(done, ms));
 
 /** The answer to a request; throws {message} where it is refused or there is none. */
-async function call(method, path, body, { raw = false, answer = "json" } = {}) {
+async function call(method, path, body, { raw = body instanceof FormData } = {}) {
   const headers = { "X-Planmark-Form": token, "Accept-Language": document.documentElement.lang };
   if (body !== undefined && !raw) { headers["Content-Type"] = "application/json"; body = JSON.stringify(body); }
-  else if (raw) headers["Content-Type"] = "application/octet-stream";
+  else if (raw && !(body instanceof FormData)) headers["Content-Type"] = "application/octet-stream";
   let response;
   try { response = await fetch(path, { method, headers, body }); } catch { throw { message: texts.gone }; }
-  if (response.ok) return answer === "json" ? response.json() : response;
+  if (response.ok) return response.json();
   const told = await response.json().catch(() => ({}));
   throw { message: told.message || `${response.status} ${response.statusText}`, code: told.code };
 }
@@ -61,7 +61,7 @@ for (const form of document.querySelectorAll("form[data-send]")) {
     doing(event.submitter, place, async () => {
       const answer = await ("query" in form.dataset ? call(method, `${path}?${new URLSearchParams(values)}`) : call(method, path, values));
       if ("query" in form.dataset) tell(place, answer[form.dataset.shows], true);
-      else if (form.dataset.shows) tell(place, `${answer.sent.length} ✓ ${Object.entries({ ...answer.refused, ...answer.withheld }).map(([who, why]) => `${who}: ${why}`).join("; ")}`, !Object.keys(answer.refused).length);
+      else if (form.dataset.shows) tell(place, `${answer.sent.length} ✓ ${Object.entries({ ...answer.refused, ...answer.withheld }).map(([who, why]) => `${who}: ${why.message}`).join("; ")}`, !Object.keys(answer.refused).length);
       else if (form.dataset.told) { form.reset(); tell(place, texts[form.dataset.told], true); } else go(form.dataset.then, answer);
     });
   });
@@ -211,15 +211,23 @@ if (grade) {
 
 $("export")?.addEventListener("submit", (event) => {
   event.preventDefault();
-  const form = event.target, platform = $("platform").value, own = $("form-file").files[0];
+  const form = event.target, place = $("exported"), asked = new URLSearchParams(), files = new FormData();
+  const make = (name, known) => Object.assign(document.createElement(name), known);
+  for (const [name, value] of new FormData(form)) {
+    if (value instanceof File) { if (value.name) files.append(name, value); } else if (value && name !== "platform") asked.set(name, value);
+  }
+  place.replaceChildren();
   doing(event.submitter, form.querySelector(".said"), async () => {
-    const path = form.dataset.api + platform;
-    const response = own
-      ? await call("POST", `${path}/files/${encodeURIComponent(own.name)}`, own, { raw: true, answer: "file" })
-      : await call("GET", path, undefined, { answer: "file" });
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(await response.blob());
-    link.download = /filename="([^"]+)"/.exec(response.headers.get("Content-Disposition"))[1];
+    const made = await call("POST", `${form.dataset.api}${$("platform").value}?${asked}`, files), list = make("ul", { className: "plain" });
+    const link = make("a", { href: made.address, download: made.name, textContent: made.name }), head = make("p", {});
+    const left = {};
+    for (const state of ["withheld", "unplaced"]) {
+      for (const [who, reasons] of Object.entries(made[state])) (left[`${texts[state]}: ${reasons.map((one) => one.message).join(", ")}`] ||= []).push(who);
+    }
+    const lines = [...made.notes.map((note) => note.message), ...Object.entries(left).map(([why, who]) => `${why}: ${who.join(", ")}`)];
+    list.append(...lines.map((textContent) => make("li", { textContent })));
+    head.append(made.written.length || Object.keys(left).length ? fill(texts.in_file, { count: made.written.length }) : "", " ", link);
+    place.append(head, list);
     link.click();
   });
 });

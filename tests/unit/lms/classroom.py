@@ -14,6 +14,7 @@ from grader.documents import (
 )
 from grader.lms.export import export
 from grader.lms.grades import Options
+from grader.texts.spoken import ENGLISH, clause
 
 
 def criterion(name, verdict, points, feedback=""):
@@ -83,6 +84,19 @@ def marked(student_id, *points, position=None, status="graded", title="Vector {}
         student_id, score, status=status, position=position, max_score=5.0 * len(points), criteria=criteria,
         score_range=(0.0, 5.0 * len(points)), **more,
     )  # fmt: skip
+
+
+def notes(delivery):
+    """The notes on a file in English."""
+    return [clause(note, ENGLISH) for note in delivery.notes]
+
+
+def left_out(delivery):
+    """Who is not in a file, and why, in English."""
+    return {
+        student: ", ".join(clause(reason, ENGLISH) for reason in reasons)
+        for student, _, reasons in delivery.left_out()
+    }
 
 
 NOW = datetime(2026, 11, 22, 5, 0, tzinfo=UTC)

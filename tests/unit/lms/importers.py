@@ -68,8 +68,12 @@ def unformat_float(text, decimal_mark):
 
 
 def strtotime(text):
-    """Seconds since 1970; 0 where PHP's strtotime knows none of the words. The server's zone is UTC."""
-    for form in ("%A, %d %B %Y, %I:%M %p", "%Y-%m-%dT%H:%M:%S%z"):
+    """Seconds since 1970; 0 where PHP's strtotime knows none of the words. The site's zone is UTC.
+
+    Moodle writes dates in the user's zone and reads those without one in the site's: lib/classes/date.php,
+    get_user_timezone and set_default_server_timezone.
+    """
+    for form in ("%A, %d %B %Y, %I:%M %p", "%Y-%m-%dT%H:%M:%S%z", "%Y-%m-%d %H:%M"):
         with suppress(ValueError):
             read = datetime.strptime(text, form)  # noqa: DTZ007 - the zone is added below
             return (read if read.tzinfo else read.replace(tzinfo=UTC)).timestamp()
@@ -92,11 +96,12 @@ def moodle_gradebook(text, users, existing=None):
     return stored
 
 
-def moodle_feedback(data, participants):
+def moodle_feedback(data, participants, least=4):
     """Files by participant: a path's part with three underscores says whose and for which plugin.
 
-    Moodle 4.5: feedback/file/importziplib.php, assignfeedback_file_zip_importer. Where students hand in
-    as groups, get_participant_mapping gives groups' numbers instead of `participants`.
+    Moodle 4.5: feedback/file/importziplib.php, assignfeedback_file_zip_importer: `least` is how many parts
+    it needs between underscores, 5 from 3.1 to 4.0, then 4. Before 3.1 it looked at files' own names alone.
+    Where students hand in as groups, get_participant_mapping gives groups' numbers instead of `participants`.
     """
     stored = {}
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -105,9 +110,9 @@ def moodle_feedback(data, participants):
             while parts:
                 part, *parts = parts
                 info = part.split("_", 4)
-                if len(info) >= 4 and info[1].isdigit() and int(info[1]) in participants:
+                if len(info) >= least and info[1].isdigit() and int(info[1]) in participants:
                     assert info[2:4] == ["assignfeedback", "file"]
-                    rest = "/".join([*info[4:5], *parts])
+                    rest = "/".join([*info[4:5], *parts]).lstrip("/")
                     stored.setdefault(int(info[1]), {})[rest] = archive.read(name)
                     break
     return stored

@@ -11,7 +11,7 @@ from grader.cli.exporting import schema
 from grader.lms.export import export
 from grader.lms.grades import Options, Person
 from reference.errors import CallError, InputFileError
-from tests.unit.lms.classroom import marked, report, results
+from tests.unit.lms.classroom import left_out, marked, notes, report, results
 
 PLACE = {"course_id": "12", "assignment_id": "345"}
 CLASS = (
@@ -159,7 +159,7 @@ def test_open_edx_has_whole_points_and_options_that_are_in_its_rubric(tmp_path):
     jsonschema.validate(grade, schema("openedx-assessment"))
     assert [(one["name"], one["selectedOption"]) for one in grade["criteria"]] == [("c1", "5"), ("c2", "2.5")]
     assert all(one["selectedOption"] in options[one["name"]] for one in grade["criteria"])
-    assert "all are times 2, 10 become 20" in delivery.notes[0]
+    assert "all are multiplied by 2, 10 become 20" in notes(delivery)[0]
 
 
 def test_points_finer_than_hundredths_are_rounded_and_told(tmp_path):
@@ -167,7 +167,7 @@ def test_points_finer_than_hundredths_are_rounded_and_told(tmp_path):
     assert files["rubric.json"]["criteria"][1]["options"][1] == {
         "order_num": 1, "name": "0.33", "label": "0.33", "explanation": "", "points": 33,
     }  # fmt: skip
-    assert any("rounded to hundredths: the points of s01" in note for note in delivery.notes)
+    assert any("rounded to hundredths: the points of s01" in note for note in notes(delivery))
 
 
 def test_the_rubric_is_there_in_the_courses_own_form_too(tmp_path):
@@ -228,7 +228,7 @@ def test_a_classrooms_rubric_that_is_there_is_not_made_again(tmp_path):
         rescale=True,
     )
     assert [call["body"] for call in calls] == ["001-s02-grade.json"]
-    assert "nobody in submissions.json has" in delivery.unplaced["s01"]
+    assert "nobody in the platform's file has" in left_out(delivery)["s01"]
 
 
 def test_an_answer_without_submissions_is_refused(tmp_path):
@@ -267,7 +267,7 @@ def test_graph_takes_the_rubric_then_its_place_then_the_outcomes(tmp_path):
     assert rubric["levels"][0]["grading"] == {
         "@odata.type": "#microsoft.graph.educationAssignmentPointsGradeType", "maxPoints": 100.0,
     }  # fmt: skip
-    assert "--criteria" in delivery.unplaced["s01"]
+    assert "--criteria" in left_out(delivery)["s01"]
 
     answer = graph_answer(rubric)
     _, calls, files = planned(tmp_path, "ms-education", **PLACE, criteria=answer)
@@ -293,7 +293,7 @@ def test_graph_takes_the_rubric_then_its_place_then_the_outcomes(tmp_path):
     assert files["001-s01-rubric.json"]["rubricQualityFeedback"][1]["feedback"]["content"].startswith(
         "2.5 / 5. "
     )
-    assert "no outcomes of all kinds" in delivery.unplaced["s02"]
+    assert "no outcomes of all kinds" in left_out(delivery)["s02"]
 
 
 def test_a_rubric_without_its_id_is_refused(tmp_path):

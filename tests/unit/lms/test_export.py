@@ -13,7 +13,7 @@ from grader.lms.export import KINDS, export, usual_name
 from grader.lms.grades import Options, Person
 from grader.lms.table import RawTable
 from reference.errors import CallError
-from tests.unit.lms.classroom import a_class, marked, report, results
+from tests.unit.lms.classroom import a_class, left_out, marked, notes, report, results
 
 NEEDED = {
     ("moodle", "feedback"): {"people": {"s09": Person(participant=1)}},
@@ -60,7 +60,7 @@ def test_where_nobody_has_a_grade_the_file_has_nobody_and_everybody_is_told(key,
     if key[0] not in {"csv", "json"} and key[1] != "rubric":
         assert delivery.written == ()
         assert set(delivery.withheld) == {"s01", "s02"}
-        assert delivery.notes[0].startswith("nobody has a grade yet")
+        assert notes(delivery)[0].startswith("nobody has a grade yet")
 
 
 @pytest.mark.parametrize(
@@ -117,10 +117,10 @@ def test_sheets_that_look_alike_are_told_before_their_grades_are_out(tmp_path):
     pair = AlikeDocument(students=["s01", "s02"], positions=[None, None], why=["same_numbers"], measure=0.01)
     two = results(marked("s01", 5.0), marked("s02", 5.0, status="needs_review"))
     delivery = export(two.model_copy(update={"alike": [pair]}), tmp_path / "o", Options(to="lti"))
-    assert delivery.notes[-1].startswith("the sheets of s01 and s02 look alike")
+    assert notes(delivery)[-1].startswith("these sheets look alike")
     one = results(marked("s01", 5.0, status="needs_review"))
     delivery = export(one.model_copy(update={"alike": [pair]}), tmp_path / "o", Options(to="lti"))
-    assert not any("alike" in note for note in delivery.notes)
+    assert not any("alike" in note for note in notes(delivery))
 
 
 def test_a_worksheet_filled_in_again_is_told_to_be_skipped_by_moodle(tmp_path):
@@ -128,15 +128,15 @@ def test_a_worksheet_filled_in_again_is_told_to_be_skipped_by_moodle(tmp_path):
     form.write_text("Identifier,Grade,Maximum grade,Last modified (grade)\nParticipant 1,,5.00,-\n")
     options = Options(to="moodle", form=form, people={"s01": Person(participant=1)})
     one = results(marked("s01", 5.0))
-    assert not any("made before" in note for note in export(one, tmp_path / "o.csv", options).notes)
-    assert any("made before" in note for note in export(one, tmp_path / "o.csv", options).notes)
+    assert not any("made before" in note for note in notes(export(one, tmp_path / "o.csv", options)))
+    assert any("made before" in note for note in notes(export(one, tmp_path / "o.csv", options)))
 
 
 def test_who_has_no_such_position_is_told(tmp_path):
     two = results(marked("s01", 5.0, position=1), marked("s02", 5.0, position=2))
     delivery = export(two, tmp_path / "o.csv", Options(to="moodle", position=2))
     assert delivery.written == ("s02",)
-    assert delivery.withheld == {"s01": "has no position 2"}
+    assert left_out(delivery) == {"s01": "has no position 2"}
 
 
 def test_two_students_with_a_row_between_them_have_none_even_if_one_is_withheld(tmp_path):
@@ -146,14 +146,14 @@ def test_two_students_with_a_row_between_them_have_none_even_if_one_is_withheld(
     both = results(marked("s01", 5.0), marked("s02", 5.0, status="needs_review"))
     delivery = export(both, tmp_path / "o.csv", Options(to="moodle", form=form, people=people))
     assert delivery.written == ()
-    assert "fits s01 (Ion) and s02 (Ion) alike" in delivery.unplaced["s01"]
+    assert "fits several students: s01 (Ion), s02 (Ion)" in left_out(delivery)["s01"]
     assert set(delivery.withheld) == {"s02"}
 
 
 def test_export_writes_one_file_and_says_who_is_in_it(tmp_path):
     delivery = export(a_class(), tmp_path / "moodle.csv", Options(to="moodle", item="Pump"))
     assert delivery.written == ("s01",)
-    assert delivery.withheld == {"s02": "needs review", "s03": "nothing handed in", "s04": "unreadable"}
+    assert left_out(delivery) == {"s02": "needs review", "s03": "nothing handed in", "s04": "unreadable"}
     text = (tmp_path / "moodle.csv").read_text(encoding="utf-8")
     header, first = csv.reader(io.StringIO(text, newline=""))
     assert header == ["idnumber", "Pump", "Pump (feedback)"]

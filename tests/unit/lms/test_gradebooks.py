@@ -10,7 +10,7 @@ from grader.lms.export import export
 from grader.lms.grades import Options, Person
 from reference.errors import CallError, InputFileError
 from tests.unit.lms import importers
-from tests.unit.lms.classroom import marked, report, results
+from tests.unit.lms.classroom import left_out, marked, notes, report, results
 
 EXPORTED = (
     "Student,ID,SIS User ID,SIS Login ID,Section,Quiz (7),Pump (12345),Current Score,Final Score\r\n"
@@ -43,7 +43,7 @@ def filled(tmp_path, *reports, text=EXPORTED, **how):
 def test_only_the_cells_of_those_who_have_a_grade_change(tmp_path):
     delivery, text = filled(tmp_path, report("s01", 7.5), report("s02", None, status="needs_review"))
     assert text == GRADED
-    assert (delivery.written, delivery.withheld) == (("s01",), {"s02": "needs review"})
+    assert (delivery.written, left_out(delivery)) == (("s01",), {"s02": "needs review"})
 
 
 def test_a_mark_and_bare_line_ends_are_kept(tmp_path):
@@ -61,7 +61,7 @@ def test_a_semicolon_file_with_decimal_commas_is_understood(tmp_path):
     )
     delivery, text = filled(tmp_path, report("s01", 7.5), report("s02", 2.25), text=semi)
     assert text == semi.replace("ana@x.ro;1;", "ana@x.ro;1;2.25")
-    assert delivery.notes == ()
+    assert notes(delivery) == []
 
 
 @pytest.mark.parametrize(
@@ -79,8 +79,8 @@ def test_students_are_found_by_number_login_and_name(tmp_path, student, person):
     delivery, text = filled(tmp_path, report(student, 7.5), people={student: person})
     assert delivery.written == (student,)
     assert "tutu@x.ro,1,7.5\r\n" in text
-    assert delivery.notes[0] == "1 grade(s) that Canvas holds already are changed"
-    assert ("found by name alone" in delivery.notes[-1]) == bool(person.name)
+    assert notes(delivery)[0] == "grades changed that Canvas has already: 1"
+    assert ("found by name alone" in notes(delivery)[-1]) == bool(person.name)
 
 
 def test_who_is_not_there_or_shares_a_row_is_told(tmp_path):
@@ -94,15 +94,15 @@ def test_who_is_not_there_or_shares_a_row_is_told(tmp_path):
     delivery, text = filled(tmp_path, *(report(one, 7.5) for one in people), people=people)
     assert text == GRADED
     assert delivery.written == ("s01",)
-    assert "fits s02 (4712, s02) and S-02 (S-02) alike" in delivery.unplaced["s02"]
-    assert "has the name, but another student_id" in delivery.unplaced["s08"]
-    assert "nobody in the gradebook has" in delivery.unplaced["s09"]
+    assert "fits several students: s02 (4712, s02), S-02 (S-02)" in left_out(delivery)["s02"]
+    assert "has the name, but another student_id" in left_out(delivery)["s08"]
+    assert "nobody in the platform's file has" in left_out(delivery)["s09"]
 
 
 def test_a_grade_that_canvas_holds_for_a_withheld_student_stays_and_is_told(tmp_path):
     delivery, text = filled(tmp_path, report("S-02", None, status="needs_review"))
     assert text == WRITTEN
-    assert "withheld, and a grade is there already, which stays: S-02 (6.00)" in delivery.notes
+    assert "withheld, and a grade is there already, which stays: S-02 (6.00)" in notes(delivery)
 
 
 @pytest.mark.parametrize("cell", ["EX", "ex", "N/A"])
@@ -110,7 +110,7 @@ def test_excused_students_are_left(tmp_path, cell):
     text = EXPORTED.replace('2",3,,55', f'2",3,{cell},55')
     delivery, after = filled(tmp_path, report("s01", 7.5), text=text)
     assert after == WRITTEN
-    assert "excused" in delivery.unplaced["s01"]
+    assert "excused" in left_out(delivery)["s01"]
 
 
 @pytest.mark.parametrize("item", ["Pump (12345)", "Pump", "12345"])
@@ -225,7 +225,7 @@ def test_brightspace_has_the_users_the_item_and_the_end_of_its_lines(tmp_path):
     assert header[4] == "End-of-Line Indicator"
     assert first == ["#s01", "#ion", "ion@x.ro", "7.5", "#"]
     assert second == ["#s02", "#tutu", "tutu@x.ro", "0", "#"]
-    assert delivery.notes[0] == "1 grade(s) that Brightspace holds already are changed"
+    assert notes(delivery)[0] == "grades changed that Brightspace has already: 1"
 
 
 def test_a_new_file_for_brightspace_names_users_item_and_maximum(tmp_path):
@@ -236,7 +236,7 @@ def test_a_new_file_for_brightspace_names_users_item_and_maximum(tmp_path):
         "#s01,#ion,7.5,#",
         "#s02,#tutu,0,#",
     ]
-    assert "must be out of 10" in delivery.notes[1]
+    assert "must be out of 10" in notes(delivery)[1]
     with pytest.raises(CallError, match="cannot have '%'"):
         export(results(*TWO), out, Options(to="brightspace", item="50% Pump"))
 
@@ -309,7 +309,7 @@ def test_a_page_goes_into_the_students_own_folder_of_ilias(tmp_path):
     delivery = export(results(*TWO), tmp_path / "o.zip", options)
     with zipfile.ZipFile(tmp_path / "o.zip") as written:
         assert written.namelist() == ["multi_feedback_Pump_3/Popescu_Ion_ion_7/feedback.html"]
-    assert "nobody in structure.zip has" in delivery.unplaced["s02"]
+    assert "nobody in the platform's file has" in left_out(delivery)["s02"]
     archive.write_bytes(b"no archive")
     with pytest.raises(InputFileError, match="is no archive of ILIAS"):
         export(results(*TWO), tmp_path / "o.zip", options)
@@ -340,9 +340,9 @@ def test_canvas_reads_a_new_file_as_it_is_meant(tmp_path):
 
 def test_a_title_without_its_number_is_told_to_be_a_new_assignment(tmp_path):
     delivery, _ = canvas(tmp_path / "out.csv", report("s01", 7.5))
-    assert any("new assignment" in note for note in delivery.notes)
+    assert any("new assignment" in note for note in notes(delivery))
     delivery, _ = canvas(tmp_path / "out.csv", report("s01", 7.5), item="Pump (12345)")
-    assert not any("new assignment" in note for note in delivery.notes)
+    assert not any("new assignment" in note for note in notes(delivery))
 
 
 @pytest.mark.parametrize(

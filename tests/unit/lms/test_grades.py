@@ -5,6 +5,7 @@ import pytest
 from grader.lms.export import read_results
 from grader.lms.grades import Options, grades_of, in_a_row
 from grader.lms.marks import comment
+from grader.records import Reason
 from reference.errors import CallError, InputFileError
 from tests.unit.lms.classroom import a_class, criterion, report, results
 
@@ -38,7 +39,7 @@ def test_a_choice_that_is_none_is_refused(choice, message):
 def test_a_sum_waits_for_all_its_parts():
     half = results(report("s01", 4.0, position=1), report("s01", None, position=2, status="missing"))
     (grade,) = grades_of(half, Options(to="lti", combine="sum"))
-    assert (grade.score, grade.withheld) == (None, "position 2: nothing handed in")
+    assert (grade.score, grade.withheld) == (None, (Reason("missing", {"position": 2}),))
 
 
 @pytest.mark.parametrize(

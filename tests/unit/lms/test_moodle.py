@@ -8,11 +8,12 @@ from datetime import UTC, datetime
 import pytest
 
 from grader.lms.grades import Options, Person, grades_of
-from grader.lms.moodle import LOCKED, fill_worksheet
+from grader.lms.moodle import fill_worksheet
 from grader.lms.moodle import gradebook as drafted
+from grader.records import Reason
 from reference.errors import CallError, InputFileError
 from tests.unit.lms import importers
-from tests.unit.lms.classroom import criterion, marked, moodle, report, results
+from tests.unit.lms.classroom import criterion, left_out, marked, moodle, notes, report, results
 
 # The worksheet -------------------------------------------------------------------------------------
 HEADER = (
@@ -67,14 +68,14 @@ def test_rows_of_who_is_withheld_are_left_out_since_moodle_would_take_their_comm
 def test_grades_that_moodle_holds_already_are_changed_and_told():
     delivery = filled_in(worksheet(line(101, grade="3.00")), report("s01", 5.0))
     assert rows(delivery.content)[0]["Grade"] == "5"
-    assert delivery.notes[1].startswith("1 grade(s) that Moodle holds already")
+    assert notes(delivery)[1].startswith("grades changed that Moodle has already: 1")
 
 
 def test_a_grade_that_moodle_holds_already_stays_as_it_is_written():
     data = worksheet(line(101, grade="5.00"))
     delivery = filled_in(data, report("s01", 5.0))
     assert (delivery.content, delivery.written) == (data, ("s01",))
-    assert [note.partition(" (")[0] for note in delivery.notes] == ["Moodle must tell 0 updated grades"]
+    assert delivery.notes == (Reason("updates", {"count": 0}),)
 
 
 def test_a_grade_that_moodle_holds_for_a_withheld_student_stays_and_is_told():
@@ -82,18 +83,18 @@ def test_a_grade_that_moodle_holds_for_a_withheld_student_stays_and_is_told():
     waiting = report("s01", None, status="needs_review"), report("s02", None, status="missing")
     delivery = filled_in(data, *waiting)
     assert rows(delivery.content) == []
-    assert delivery.notes[1:] == ("withheld, and a grade is there already, which stays: s01 (3.00)",)
+    assert notes(delivery)[1:] == ["withheld, and a grade is there already, which stays: s01 (3.00)"]
 
 
 def test_comments_that_moodle_holds_already_are_replaced_and_told():
     data = worksheet(line(101) + "well done", line(102, "Ana Ionescu", "ana@x.ro"))
     comments = {"s01": "<p>a</p>", "s02": "<p>b</p>"}
     delivery = filled_in(data, report("s01", 5.0), report("s02", 5.0), comments=comments)
-    assert delivery.notes[1:] == ("1 comment(s) that Moodle holds already are replaced",)
+    assert notes(delivery)[1:] == ["comments replaced that Moodle has already: 1"]
     # Moodle shows a comment without its tags.
     shown = delivery.content.replace(b"<p>a</p>", b"a ")
     again = filled_in(shown, report("s01", 5.0), report("s02", 5.0), comments=comments)
-    assert again.notes[1:] == ()
+    assert notes(again)[1:] == []
 
 
 def test_students_are_found_by_address_before_name():
@@ -106,7 +107,7 @@ def test_names_that_two_rows_bear_are_nobodys_and_told():
     data = worksheet(line(101, email="a@x.ro"), line(102, email="b@x.ro"))
     delivery = filled_in(data, report("s01", 5.0), people={"s01": Person(name="ion  popescu")})
     assert delivery.written == ()
-    assert "rows 2 (Ion Popescu, a@x.ro) and 3 (Ion Popescu, b@x.ro)" in delivery.unplaced["s01"]
+    assert "rows 2 (Ion Popescu, a@x.ro), 3 (Ion Popescu, b@x.ro)" in left_out(delivery)["s01"]
 
 
 @pytest.mark.parametrize(
@@ -122,7 +123,7 @@ def test_names_fit_over_accents_order_and_apostrophes(roster, there):
     data = worksheet(line(101, there), line(102, "Ana Ionescu", "ana@x.ro"))
     delivery = filled_in(data, report("s01", 5.0), people={"s01": Person(name=roster)})
     assert [row["Grade"] for row in rows(delivery.content)] == ["5"]
-    assert "found by name alone" in delivery.notes[-1]
+    assert "found by name alone" in notes(delivery)[-1]
 
 
 def test_a_name_that_fits_two_rows_in_part_is_nobodys():
@@ -134,7 +135,7 @@ def test_a_name_that_fits_two_rows_in_part_is_nobodys():
 def test_a_locked_grade_is_left_and_told():
     data = worksheet(line(101, changeable="No"))
     delivery = filled_in(data, report("s01", 5.0))
-    assert (rows(delivery.content), delivery.unplaced) == ([], {"s01": LOCKED})
+    assert (rows(delivery.content), delivery.unplaced) == ([], {"s01": Reason("grade_locked")})
 
 
 def test_another_maximum_is_refused_unless_rescaling_is_asked_for():
@@ -189,25 +190,46 @@ def test_columns_of_any_language_are_known_by_what_stands_in_them(graded):
         filled_in(data, report("s01", 8.5, max_score=20.0))
 
 
-def test_dates_that_moodle_cannot_read_become_the_worksheets_own_so_that_a_regrade_is_stored():
+DATED = "Identificator,Nume complet,Adresa de e-mail,Notă,Notă maximă,Ultima modificare (nota)"
+
+
+@pytest.mark.parametrize(
+    ("written", "local"),
+    [
+        ("luni, 23 noiembrie 2026, 20:35", "2026-11-23 20:35"),
+        ("Luni, 23 Noiembrie 2026, 8:35 PM", "2026-11-23 20:35"),
+        ("marți, 3 martie 2026, 08:05", "2026-03-03 08:05"),
+        ("marti, 3 martie 2026, 12:05 a.m.", "2026-03-03 00:05"),
+        ("sâmbătă, 2 mai 2026, 12:05 p.m.", "2026-05-02 12:05"),
+        ("понедельник, 23 ноября 2026, 20:35", "2026-11-23 20:35"),
+        ("Понедельник, 23 Ноябрь 2026, 20:35", "2026-11-23 20:35"),
+        ("понедельник, 23 ноября 2026 г., 8:35 после полудня", "2026-11-23 20:35"),
+        ("суббота 2 мая 2026 12:05 до полудня", "2026-05-02 00:05"),
+        ("вторник, 3\u00a0марта 2026, 8:05", "2026-03-03 08:05"),
+        ("Montag, 2. März 2026, 10:15", None), ("maanantai, 2 marraskuuta 2026, 10:15", None),
+        ("marți, 31 februarie 2026, 08:05", None), ("luni, 23 noiembrie 2026, 20:35 GMT", None),
+        ("luni, 23 noiembrie 2026, 28:35", None),
+    ],
+)  # fmt: skip
+def test_a_romanian_or_russian_date_becomes_the_same_time_and_another_that_of_the_file(written, local):
     """PHP's strtotime knows English: importgradeslib.php, assignfeedback_offline_grade_importer::next."""
-    header = "Identificator,Nume complet,Adresa de e-mail,Notă,Notă maximă,Ultima modificare (nota)"
-    row = 'Participant7,Ion Popescu,ion@x.ro,"3,00","10,00","luni, 2 martie 2026, 10:15"'
-    delivery = filled_in(worksheet(row, header=header), report("s01", 5.0))
-    assert delivery.content.decode().splitlines()[1].endswith(',5,"10,00",2026-03-02T10:30:00+00:00')
-    assert "Moodle reads no date in this language: they are written" in delivery.notes[0]
+    row = f'Participant7,Ion Popescu,ion@x.ro,"3,00","10,00","{written}"'
+    delivery = filled_in(worksheet(row, header=DATED), report("s01", 5.0))
+    last = local or "2026-03-02T10:30:00+00:00"
+    assert delivery.content.decode().splitlines()[1].endswith(f',5,"10,00",{last}')
+    assert any("grades given in between are overwritten" in note for note in notes(delivery)) == (not local)
 
 
 def test_a_grade_is_rounded_as_moodle_shows_it_and_the_same_grade_is_no_change():
     data = worksheet(line(101, grade="6.67", maximum="10.00"), line(102, "Ana", "ana@x.ro", maximum="10.0"))
     delivery = filled_in(data, report("s01", 20.0 / 3.0), report("s02", 20.0 / 3.0))
     assert [row["Grade"] for row in rows(delivery.content)] == ["6.67", "6.7"]
-    assert delivery.notes[0].startswith("Moodle must tell 1 updated grades")
+    assert delivery.notes[0] == Reason("updates", {"count": 1})
 
 
 def test_a_grade_of_nothing_is_told_since_newer_versions_pass_over_it():
     delivery = filled_in(worksheet(line(101)), report("s01", 0.0))
-    assert delivery.notes[1].endswith("enter it there: s01")
+    assert notes(delivery)[1].endswith("enter it there: s01")
 
 
 @pytest.mark.parametrize("feedback", ["Comentarii de feedback", "Comentarii feedback", "Feedback comments"])
@@ -220,7 +242,7 @@ def test_columns_of_people_are_known_by_what_stands_in_them_where_their_names_ar
     )
     delivery = filled_in(data, report("s01", 8.5), report("s02", 6.0), comments={"s01": "<p>a</p>"})
     assert delivery.written == ("s02",)
-    assert "another email" in delivery.unplaced["s01"]
+    assert "another email" in left_out(delivery)["s01"]
     people = {"s01": Person(name="Ion Popescu")}
     delivery = filled_in(data, report("s01", 8.5), people=people, comments={"s01": "<p>a</p>"})
     assert b'x@x.ro,8.5,"10,00",-,<p>a</p>' in delivery.content
@@ -325,9 +347,9 @@ def test_a_grade_item_is_called_as_the_assignment_where_nothing_is_said_and_neve
 def test_grades_above_a_hundred_are_told_to_be_more_than_most_sites_allow():
     options = Options(to="moodle")
     draft = drafted(grades_of(results(report("s01", 150.0, max_score=200.0)), options), options)
-    assert "worksheet is the better way" in draft.notes[0]
-    assert "out of 200" in draft.notes[1]
-    assert "above 100" in draft.notes[2]
+    assert "worksheet is the better way" in notes(draft)[0]
+    assert "out of 200" in notes(draft)[1]
+    assert "above 100" in notes(draft)[2]
 
 
 def test_a_comment_longer_than_moodle_stores_is_refused():
@@ -374,19 +396,20 @@ def archive(tmp_path, *reports, worksheet=WORKSHEET, name="out.zip", **how):
     )
 
 
-def test_moodle_finds_everybodys_pages_in_the_archive(tmp_path):
+@pytest.mark.parametrize("least", [4, 5])
+def test_moodle_finds_everybodys_pages_in_the_archive(tmp_path, least):
     first, locked, third = marked("s01", 5.0), marked("s02", 5.0), marked("s_3", 2.5)
     for one, printable in ((first, b"%PDF"), (locked, None), (third, None)):
         pages(tmp_path / "marks", one, f"page of {one.student_id}", printable=printable)
     waiting = report("s04", None, status="needs_review")
     delivery, path = archive(tmp_path, first, locked, third, waiting, marked("s09", 5.0))
-    assert importers.moodle_feedback(path.read_bytes(), {101, 102, 103}) == {
+    assert importers.moodle_feedback(path.read_bytes(), {101, 102, 103}, least) == {
         101: {"feedback.html": b"page of s01", "feedback.pdf": b"%PDF"},
         103: {"feedback.html": b"page of s_3"},
     }
     assert delivery.written == ("s01", "s_3")
-    assert delivery.withheld == {"s04": "needs review"}
-    assert "cannot be changed" in delivery.unplaced["s02"]
+    assert left_out(delivery)["s04"] == "needs review"
+    assert "cannot be changed" in left_out(delivery)["s02"]
     assert set(delivery.unplaced) == {"s02", "s09"}
     with zipfile.ZipFile(path) as opened:
         assert all("_" not in name.partition("/")[2] for name in opened.namelist())
@@ -399,6 +422,14 @@ def test_pages_of_groups_are_refused_since_moodle_takes_the_number_for_a_groups(
     sheet = WORKSHEET.replace("Email address,", "Email address,Group,").replace("@x.ro,", "@x.ro,Team 1,")
     with pytest.raises(CallError, match="students hand in as groups"):
         archive(tmp_path, one, worksheet=sheet)
+
+
+def test_pages_too_are_kept_back_by_a_marking_workflow(tmp_path):
+    one = marked("s01", 5.0)
+    pages(tmp_path / "marks", one)
+    sheet = WORKSHEET.replace("Grade can", "Marking workflow state,Grade can").replace("10.00,", "10.00,-,")
+    delivery, _ = archive(tmp_path, one, worksheet=sheet)
+    assert any("marking workflow" in note for note in notes(delivery))
 
 
 def test_the_same_pages_make_the_same_archive(tmp_path):

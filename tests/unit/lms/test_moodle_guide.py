@@ -8,7 +8,7 @@ import pytest
 from grader.cli.exporting import schema
 from grader.lms.grades import Person
 from reference.errors import CallError, InputFileError, PlanmarkError
-from tests.unit.lms.classroom import marked, moodle
+from tests.unit.lms.classroom import marked, moodle, notes
 
 AREA = {
     "cmid": 31,
@@ -95,7 +95,7 @@ def test_an_activity_told_by_its_numbers_alone_may_have_a_guide(tmp_path, points
         tmp_path, "rubric", marked("s01", 5.0), cmid=1, context_id=2, replace_guide=points
     )
     assert json.loads(path.read_bytes())["arguments"]["areas"][0]["contextid"] == 2
-    assert "6 fillings of 3 grades" in delivery.notes[0]
+    assert "6 fillings of 3 grades" in notes(delivery)[0]
 
 
 def test_an_activity_that_nobody_tells_is_asked_for(tmp_path, answer):
@@ -115,7 +115,7 @@ def test_a_guide_is_replaced_only_with_a_count_of_the_points_that_go(tmp_path, a
     with_guide = answer(GUIDE)
     delivery, path = moodle(tmp_path, "rubric", marked("s01", 5.0), criteria=with_guide, replace_guide=points)
     assert json.loads(path.read_bytes())["fillings_lost"] == 6
-    assert "deletes the one there with 6 fillings of 3 grades" in delivery.notes[0]
+    assert "deletes the one there with 6 fillings of 3 grades" in notes(delivery)[0]
     with pytest.raises(InputFileError, match="core_grading_get_gradingform_instances"):
         moodle(tmp_path, "rubric", marked("s01", 5.0), criteria=with_guide, replace_guide=with_guide)
 

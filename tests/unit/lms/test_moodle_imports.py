@@ -5,6 +5,8 @@ are those of Moodle's language packs: assign.php (recordid, hiddenuser, gradenou
 gradecanbechanged, lastmodifiedgrade), moodle.php and assignfeedback_comments.php of each language.
 """
 
+import csv
+import io
 import os
 from datetime import UTC, datetime
 
@@ -12,9 +14,10 @@ import pytest
 
 from grader.lms.grades import Person
 from grader.lms.moodle import COLUMNS, Worksheet
+from grader.lms.table import csv_text
 from reference.errors import CallError, InputFileError
 from tests.unit.lms import importers
-from tests.unit.lms.classroom import moodle, report
+from tests.unit.lms.classroom import moodle, notes, report
 from tests.unit.lms.importers import MoodleSite
 
 ENGLISH = {
@@ -95,14 +98,14 @@ def site_of(language, **more):
     return MoodleSite(10.0, strings=strings, decimal_mark=language["mark"], **more)
 
 
-def download(site, language, *, locked=(), team=None, maximum="10.00"):
+def download(site, language, *, locked=(), team=None, maximum="10.00", people=PEOPLE):
     """A worksheet. Moodle 4.5: mod/assign/gradingtable.php, assign_grading_table::__construct."""
 
     def in_form(text):
         return f'"{text.replace(".", language["mark"])}"'
 
     lines = []
-    for at, who in enumerate(PEOPLE.values(), start=1):
+    for at, who in enumerate(people.values(), start=1):
         held = in_form(f"{site.grades[at][0]:.2f}") if at in site.grades else ""
         date = f'"{language["date"]}"' if at in site.grades else "-"
         can_be_changed = language["no"] if at in locked else "Yes"
@@ -118,15 +121,15 @@ def download(site, language, *, locked=(), team=None, maximum="10.00"):
     return "\r\n".join([",".join(header), *lines, ""]).encode()
 
 
-def exported(tmp_path, data, *reports, what="grades", **how):
+def exported(tmp_path, data, *reports, what="grades", written=DOWNLOADED, **how):
     form = tmp_path / "worksheet.csv"
     form.write_bytes(data)
-    os.utime(form, (DOWNLOADED, DOWNLOADED))
+    os.utime(form, (written, written))
     name = "o.zip" if what == "feedback" else "o.csv"
     delivery, path = moodle(
-        tmp_path, what, *reports, name=name, form=form, people=PEOPLE, out=tmp_path, **how
+        tmp_path, what, *reports, name=name, form=form, out=tmp_path, **{"people": PEOPLE, **how}
     )
-    return path.read_bytes(), " / ".join(delivery.notes), delivery
+    return path.read_bytes(), " / ".join(notes(delivery)), delivery
 
 
 def a_class(score=7.25):
@@ -136,21 +139,22 @@ def a_class(score=7.25):
 @pytest.mark.parametrize("language", LANGUAGES.values(), ids=LANGUAGES)
 def test_the_first_import_stores_every_grade_in_every_language(tmp_path, language):
     site = site_of(language)
-    data, notes, delivery = exported(tmp_path, download(site, language, locked=[23]), *a_class())
+    data, noted, delivery = exported(tmp_path, download(site, language, locked=[23]), *a_class())
     site.upload(data)
     assert {at: grade for at, (grade, _) in site.grades.items()} == dict.fromkeys(range(1, 23), 7.25)
     assert (site.updated, site.commented, list(delivery.unplaced)) == (22, 22, ["s23"])
-    assert "Moodle must tell 22 updated grades" in notes
+    assert "Moodle reports must be 22" in noted
 
 
 @pytest.mark.parametrize("language", LANGUAGES.values(), ids=LANGUAGES)
 def test_a_regrade_updates_every_grade_in_every_language(tmp_path, language):
     site = site_of(language, grades=dict.fromkeys(range(1, 24), (4.0, HELD)))
     as_it_was = download(site, language)
-    data, notes, _ = exported(tmp_path, as_it_was, *a_class())
+    data, noted, _ = exported(tmp_path, as_it_was, *a_class())
     assert site.upload(data).updated == 23
-    assert "Moodle must tell 23 updated grades" in notes
-    assert ("they are written as 2026-03-02 12:00" in notes) == (language is not ENGLISH)
+    assert "Moodle reports must be 23" in noted
+    is_known = language in (ENGLISH, LANGUAGES["ro"], LANGUAGES["ru"])
+    assert ("they are written as the file's time, 2026-03-02 12:00" in noted) != is_known
 
 
 def test_without_iso_a_date_of_another_language_lets_moodle_update_nothing():
@@ -160,13 +164,17 @@ def test_without_iso_a_date_of_another_language_lets_moodle_update_nothing():
     assert site.upload(regraded).updated == 0
 
 
-def test_a_grade_that_was_changed_after_the_download_is_not_overwritten(tmp_path):
-    language = LANGUAGES["ru"]
-    site = site_of(language, grades=dict.fromkeys(range(1, 24), (4.0, HELD)))
-    data, _, _ = exported(tmp_path, download(site, language), *a_class())
-    site.grades[5] = (9.0, DOWNLOADED + 3600)
-    assert site.upload(data).updated == 22
-    assert site.grades[5] == (9.0, DOWNLOADED + 3600)
+@pytest.mark.parametrize("code", ["ro", "ru", "de"])
+def test_a_grade_that_a_colleague_gave_after_the_download_stays(tmp_path, code):
+    """The file is copied after that, which sets its time; in a language that is not known it must not be."""
+    language, between = LANGUAGES[code], DOWNLOADED + 3600
+    site = site_of(language, grades=dict.fromkeys(range(1, 20), (4.0, HELD)))
+    copied = DOWNLOADED if code == "de" else between + 3600
+    data, _, _ = exported(tmp_path, download(site, language), *a_class(), written=copied)
+    given = {5: (9.0, between), 22: (9.0, between)}
+    site.grades |= given
+    assert site.upload(data).updated == 21
+    assert {at: site.grades[at] for at in given} == given
 
 
 def test_who_is_withheld_keeps_the_digits_of_a_grade_and_the_link_in_a_comment(tmp_path):
@@ -175,10 +183,10 @@ def test_who_is_withheld_keeps_the_digits_of_a_grade_and_the_link_in_a_comment(t
     site = site_of(ENGLISH, grades={1: (6.66667, HELD)}, comments={1: link})
     sheet = download(site, ENGLISH).replace(link.encode(), b"see")
     waiting = report("s1", None, status="needs_review")
-    data, notes, _ = exported(tmp_path, sheet, waiting, *a_class()[1:])
+    data, noted, _ = exported(tmp_path, sheet, waiting, *a_class()[1:])
     site.upload(data)
     assert (site.grades[1], site.comments[1]) == ((6.66667, HELD), link)
-    assert "withheld, and a grade is there already, which stays: s1 (6.67)" in notes
+    assert "withheld, and a grade is there already, which stays: s1 (6.67)" in noted
     as_before = site_of(ENGLISH, grades={1: (6.66667, HELD)}, comments={1: link}).upload(sheet)
     assert (as_before.updated, as_before.comments[1]) == (1, "see")
 
@@ -186,18 +194,43 @@ def test_who_is_withheld_keeps_the_digits_of_a_grade_and_the_link_in_a_comment(t
 def test_every_zero_is_told_since_newer_versions_pass_over_it(tmp_path):
     """Seen in versions after 4.5: `$record->grade && ...` in assign_feedback_offline."""
     site = site_of(ENGLISH)
-    data, notes, _ = exported(tmp_path, download(site, ENGLISH), *a_class(0.0))
-    assert "a grade of 0, enter it there: " + ", ".join(PEOPLE) in notes
+    data, noted, _ = exported(tmp_path, download(site, ENGLISH), *a_class(0.0))
+    assert "a grade of 0, enter it there: " + ", ".join(PEOPLE) in noted
     assert site.upload(data).updated == 23
     assert site_of(ENGLISH, passes_over_zero=True).upload(data).updated == 0
 
 
 def test_the_worksheet_of_another_assignment_updates_fewer_than_the_note_says(tmp_path):
-    data, notes, _ = exported(tmp_path, download(site_of(ENGLISH), ENGLISH), *a_class())
+    data, noted, _ = exported(tmp_path, download(site_of(ENGLISH), ENGLISH), *a_class())
     other = data.replace(b"Participant ", b"Participant x")
     assert site_of(ENGLISH).upload(other).updated == 0
-    assert "23 updated grades" in notes
-    assert "another assignment or course" in notes
+    assert "must be 23" in noted
+    assert "another assignment or course" in noted
+
+
+WORKFLOWS = {
+    "en": "Marking workflow state",
+    "ro": "Starea fluxului de notare",
+    "ru": "Этап процесса оценивания",
+}
+
+
+@pytest.mark.parametrize("code", WORKFLOWS)
+@pytest.mark.parametrize("kind", ["plain", "workflow", "anonymous"])
+def test_what_moodle_keeps_back_from_the_gradebook_is_told(tmp_path, code, kind):
+    """Moodle 4.5: mod/assign/gradingtable.php and locallib.php, assign::gradebook_item_update."""
+    language = LANGUAGES[code]
+    rows = list(csv.reader(io.StringIO(download(site_of(language), language).decode())))
+    if kind == "workflow":
+        rows = [[*row[:6], "-" if at else WORKFLOWS[code], *row[6:]] for at, row in enumerate(rows)]
+    people = {f"s{at}": Person(participant=at) for at in range(1, 24)}
+    if kind == "anonymous":
+        rows = [[row[0], *row[3:]] for row in rows]
+    sheet = csv_text(rows[0], rows[1:]).encode()
+    data, noted, _ = exported(tmp_path, sheet, *a_class(), people=people)
+    assert site_of(language).upload(data).updated == 23
+    assert ("participants are anonymous" in noted) == (kind == "anonymous")
+    assert ("has a marking workflow" in noted) == (kind == "workflow")
 
 
 @pytest.mark.parametrize("language", LANGUAGES.values(), ids=LANGUAGES)
@@ -269,7 +302,7 @@ def test_a_gradebook_item_that_is_new_is_out_of_100_and_takes_no_feedback(tmp_pa
     assert importers.moodle_gradebook(text, {"s1"}, existing=43.0) == {
         "s1": (36.57, "<p>Everything is right.</p>")
     }
-    first, second, *_ = delivery.notes
+    first, second, *_ = notes(delivery)
     assert "grading worksheet is the better way" in first
     assert "make the grade item in Moodle first, out of 43" in second
     assert "a new item is out of 100 and takes no feedback" in second

@@ -11,8 +11,9 @@ import pytest
 from grader.cli.exporting import schema
 from grader.lms.export import export
 from grader.lms.grades import Options, Person
+from grader.records import Reason
 from reference.errors import CallError, InputFileError
-from tests.unit.lms.classroom import marked, report, results
+from tests.unit.lms.classroom import left_out, marked, report, results
 
 WAITING = report("s02", None, status="needs_review", score_range=(1.0, 2.0))
 UNREADABLE = report("s03", None, status="unreadable")
@@ -149,7 +150,7 @@ def test_a_score_is_given_only_when_fully_graded(tmp_path):
         ),
     ]
     assert delivery.written == ("s01",)
-    assert delivery.withheld == {
+    assert left_out(delivery) == {
         "s02": "needs review",
         "s03": "unreadable",
         "s04": "nothing handed in",
@@ -168,7 +169,7 @@ def test_users_are_named_by_the_table_of_ids_and_who_is_not_in_it_is_told(tmp_pa
     delivery, scores = lti(tmp_path, *CLASS, people=people)
     assert [one["userId"] for one in scores] == ["a-b"]
     assert set(delivery.unplaced) == {"s02", "s03"}
-    assert "userId is the student_id" not in " ".join(delivery.notes)
+    assert Reason("users_by_id") not in delivery.notes
 
 
 def test_scores_are_converted_only_with_leave(tmp_path):

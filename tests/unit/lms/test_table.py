@@ -21,6 +21,7 @@ from grader.lms.table import (
     summary_text,
     with_ids,
 )
+from grader.records import Reason
 from reference.errors import InputFileError
 from tests.unit.lms.classroom import a_class, criterion, report, results
 
@@ -196,11 +197,11 @@ def test_a_table_with_faults_is_refused_with_the_line(tmp_path, text, why):
 def test_names_match_however_their_accents_are_written():
     name = "Țuțu Ștefănescu-Ильин"
     rows = {1: {"name": unicodedata.normalize("NFD", name)}, 2: {"name": "other"}}
-    assert match_rows(rows, {"s01": (("name", name.upper()),)}, "the table").rows == {"s01": 1}
+    assert match_rows(rows, {"s01": (("name", name.upper()),)}).rows == {"s01": 1}
 
 
 def matched(rows, **students):
-    return match_rows(dict(enumerate(rows, start=1)), students, "it")
+    return match_rows(dict(enumerate(rows, start=1)), students)
 
 
 ION = {"email": "ion@x.ro", "name": "Ion"}
@@ -214,7 +215,7 @@ def test_a_namesake_with_another_address_is_not_the_student():
         s02=[("email", "ana@x.ro"), ("name", "Ana")],
     )
     assert matches.rows == {"s02": 2}
-    assert matches.missing == {"s01": "row 2 of it has the name, but another email"}
+    assert matches.missing == {"s01": Reason("row_contrary", {"row": 2, "column": "name", "other": "email"})}
 
 
 def test_addresses_of_another_kind_do_not_speak_against_names_which_are_all_there_is():
@@ -224,9 +225,9 @@ def test_addresses_of_another_kind_do_not_speak_against_names_which_are_all_ther
         s02=[("email", ""), ("name", "Ana")],
     )
     assert matches.rows == {"s01": 1, "s02": 2}
-    assert matches.notes_on(["s01"]) == ["found by name alone, look whether they are these: s01"]
+    assert matches.notes_on(["s01"]) == [Reason("by_name_alone", {"students": ("s01",)})]
     assert matches.notes_on([]) == []
-    assert matches.notes_on(iter(["s01", "s02"]))[0].endswith(": s01, s02")
+    assert matches.notes_on(iter(["s01", "s02"]))[0].parameters == {"students": ("s01", "s02")}
 
 
 def test_the_work_of_matching_grows_with_the_class_not_with_its_square(monkeypatch):
@@ -235,5 +236,5 @@ def test_the_work_of_matching_grows_with_the_class_not_with_its_square(monkeypat
     monkeypatch.setattr(table, "_key", lambda *cell: compared.append(cell) or key(*cell))
     rows = {row: {"email": f"s{row}@x.ro", "name": f"Nume {row}"} for row in range(300)}
     students = {f"s{row}": (("email", f"s{row}@x.ro"), ("name", f"Nume {row}")) for row in rows}
-    assert match_rows(rows, students, "it").rows == {f"s{row}": row for row in rows}
+    assert match_rows(rows, students).rows == {f"s{row}": row for row in rows}
     assert len(compared) == 4 * len(rows)

@@ -13,6 +13,7 @@ from grader.files import OutputError, create_whole, write_whole
 from grader.language import LANGUAGES, tongue
 from grader.records import Reason, Unread, of_error
 from grader.texts.clauses import CLAIMS, CLAUSES
+from grader.texts.exports import EXPORTS
 from grader.texts.failures import FAILURES
 from grader.texts.faults import FAULTS
 from grader.texts.problems import PROBLEMS
@@ -21,6 +22,7 @@ from grader.texts.refusals import REFUSALS
 from grader.texts.spoken import (
     ENGLISH,
     clause,
+    clauses,
     failure,
     fault,
     message,
@@ -124,7 +126,7 @@ def codes_made() -> Iterator[tuple[str, str]]:
 
 
 def test_every_code_that_is_made_has_its_sentence() -> None:
-    known = {*PROBLEMS, *HINTS, *CLAUSES, *FOLLOWS, *FAULTS}
+    known = {*PROBLEMS, *HINTS, *CLAUSES, *FOLLOWS, *FAULTS, *EXPORTS}
     found = dict(codes_made())
     assert len(found) > 160
     assert {code: where for code, where in found.items() if code not in known} == {}
@@ -158,7 +160,7 @@ def test_every_refusal_and_failure_is_told_in_every_language(lang: str) -> None:
 def test_every_failure_has_its_sentence_and_every_sentence_its_failure() -> None:
     assert FAILURES.keys() & REFUSALS.keys() == set()
     said = {one.value for _, tree in trees() for one in ast.walk(tree) if isinstance(one, ast.Constant)}
-    assert FAILURES.keys() <= said
+    assert FAILURES.keys() | EXPORTS.keys() <= said
     for name, tree in trees():
         for node in ast.walk(tree):
             match node:
@@ -212,6 +214,50 @@ def test_outside_of_texts_no_error_has_words_of_its_own() -> None:
     assert all(any(where.startswith(room) for where in found) for room in BELOW_TEXTS)
 
 
+TOLD = {"notes", "note", "why", "missing", "unplaced", "withheld"}
+"""Names for what an export tells."""
+
+
+def words_told(tree: ast.AST) -> Iterator[int]:
+    """The lines on which an export is given a note, or a reason, that is a text of the code itself."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.keyword(arg=str(name), value=value):
+                parts = [value]
+            case ast.Call(func=ast.Attribute(value=ast.Name(name) | ast.Attribute(attr=name)), args=parts):
+                pass
+            case ast.Assign(targets=[target, *_], value=value) | ast.AugAssign(target=target, value=value):
+                inner = target.value if isinstance(target, ast.Subscript) else target
+                name, parts = getattr(inner, "id", getattr(inner, "attr", "")), [value]
+            case _:
+                continue
+        constants = [one for part in parts for one in ast.walk(part) if isinstance(one, ast.Constant)]
+        if name in TOLD and any(re.search("[a-z]{2,} [a-z]", str(one.value)) for one in constants):
+            yield constants[0].lineno
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        'Delivery(x, notes=("look at it",))',
+        'sheet.notes.append(f"{count} are changed")',
+        'missing[student] = f"nobody in {table} has it"',
+        'notes += ["nobody is there"]',
+        'why = "nobody is there"',
+    ],
+)
+def test_an_exports_own_words_are_seen(code: str) -> None:
+    assert list(words_told(ast.parse(code))) == [1]
+
+
+def test_notes_and_reasons_of_exports_are_data() -> None:
+    rooms = ("grader/lms/", "grader/cli/exporting", "grader/web/lti", "grader/web/instructors")
+    found = [
+        f"{name}:{line}" for name, tree in trees() if name.startswith(rooms) for line in words_told(tree)
+    ]
+    assert found == []
+
+
 def test_an_error_of_a_room_below_has_the_words_of_its_sentence(tmp_path: Path) -> None:
     taken = tmp_path / "taken"
     taken.write_text("")
@@ -253,7 +299,7 @@ def test_every_code_has_a_sentence_in_every_language(lang: str) -> None:
         assert not PLACEHOLDER.search(told), code
     for code in HINTS:
         assert reason_sentence(Reason(code), speaker, "full") not in {"", code}
-    several = [text for texts in (*FAULTS.values(), *CLAIMS.values()) for text in texts]
+    several = [text for code in (*FAULTS, *CLAIMS, *EXPORTS) for text in clauses(code)]
     for text in (*several, *CLAUSES.values(), *FULL.values()):
         assert lang == "en" or not PLACEHOLDER.sub("", text).strip() or speaker.gettext(text) != text
 

@@ -109,6 +109,10 @@ def test_deep_linking_answers_with_the_chosen_publication(platform, admin, app, 
     said = jwt.decode(told["JWT"], tool, algorithms=["RS256"], audience=platform.address)
     (item,) = said["https://purl.imsglobal.org/spec/lti-dl/claim/content_items"]
     assert item["custom"] == {"publication": key}
+    maximum = admin.get(f"/api/v1/publications/{key}/results").json()["reports"][0]["max_score"]
+    title = admin.get(f"/api/v1/publications/{key}").json()["title"]
+    told_item = {"scoreMaximum": maximum, "label": title, "resourceId": "pump", "tag": "grade"}
+    assert (item["lineItem"], maximum) == (told_item, 43.0)
     assert teacher.act("POST", f"/lti/chosen/{name}?key={key}").status_code == 404
 
 
@@ -400,7 +404,11 @@ def test_grades_are_returned_once_and_refusals_are_told(activity, platform, app,
     path = f"/publications/{key}/lti/scores"
     platform.broken = 500
     told = teacher.act("POST", path).json()
-    assert told["refused"] == {"s09": "the platform answers 500"}
+    assert told["refused"]["s09"] == {
+        "code": "platform_refuses",
+        "message": "the platform answers 500",
+        "parameters": {"status": 500},
+    }
     assert "s11" in told["withheld"]
     platform.broken = None
     told = teacher.act("POST", path).json()
