@@ -13,7 +13,7 @@ from pathlib import Path
 from packaging.requirements import Requirement
 
 PAGE = Path(__file__).resolve().parent / "licences.md"
-EXTRAS = ("", "web", "cluster", "plots")
+EXTRAS = ("", "heic", "web", "cluster", "plots")
 _CLASSIFIER = re.compile(r"License ::(?: OSI Approved ::)? (.+)")
 _LONGEST = 60
 """Of a licence's name; some packages have the whole text in its place."""

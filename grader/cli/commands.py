@@ -122,7 +122,7 @@ def schema(name: Annotated[str, typer.Argument(help="report, results, reading, m
 def grade(
     folder: FolderArgument, assignment: AssignmentOption, out: OutOption, options: GradeOptions
 ) -> None:
-    """Grade a folder of scans (JPEG, PNG, TIFF, PDF) and measurement files (CSV, JSON)."""
+    """Grade a folder of scans (JPEG, PNG, TIFF, HEIC, PDF) and measurement files (CSV, JSON)."""
     from grader.cli.grading import grade_folder, tell_next_of_class
     from grader.folder.batch import needs_person
 

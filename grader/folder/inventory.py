@@ -30,7 +30,7 @@ from reference.errors import InputFileError
 _TOOL_NAMES = RESULT_FILES | {"thumbs.db", "desktop.ini", "layout.json", "truth.jsonl"}
 _TOOL_STARTS = (".", "~$", "__MACOSX")
 _TOOL_ENDS = (".part", ".tmp", ".bak", ".crdownload", ".log", ".toml", "~")
-_FILE_TYPES = frozenset({".jpg", ".jpeg", ".png", ".tif", ".tiff", ".pdf", ".csv", ".json"})
+_FILE_TYPES = frozenset({".jpg", ".jpeg", ".png", ".tif", ".tiff", ".heic", ".heif", ".pdf", ".csv", ".json"})
 _DIGITS = re.compile(r"(\d+)")
 
 

@@ -16,9 +16,15 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
     "file_type_unsupported": (
         N_(
             "The file is named %(suffix)s, but is not a %(kind)s file: scan or export it as JPEG, PNG,"
-            " TIFF or PDF."
+            " TIFF, HEIC or PDF."
         ),
-        N_("The file is of a type that is not read: use JPEG, PNG, TIFF or PDF."),
+        N_("The file is of a type that is not read: use JPEG, PNG, TIFF, HEIC or PDF."),
+    ),
+    "heic_unreadable": (
+        N_(
+            "HEIC pictures are not read here; send JPEG: on an iPhone choose Settings, Camera, Formats,"
+            " Most Compatible, and take the picture again."
+        ),
     ),
     "image_too_large": (
         N_(

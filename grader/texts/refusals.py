@@ -55,7 +55,7 @@ REFUSALS: dict[str, str] = {
     "not_open": N_("the self-check is not open now"),
     "not_released": N_("the feedback is not released yet"),
     "attempts_used": N_("all %(count)s attempts are used"),
-    "file_type": N_("send a photo or scan: JPEG, PNG, TIFF or PDF"),
+    "file_type": N_("send a photo or scan: JPEG, PNG, TIFF, HEIC or PDF"),
     # Instructors
     "job_runs": N_("the class is being graded: cancel that, or wait for its end"),
     "assignment_missing": N_("no assignment is chosen yet"),

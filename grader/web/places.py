@@ -26,7 +26,7 @@ from reference.authored.toml_file import MAX_BYTES
 from reference.errors import CallError, PlanmarkError
 
 AUTHORED = (".toml", ".csv")
-SUBMITTED = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".pdf", ".csv", ".json")
+SUBMITTED = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".heic", ".heif", ".pdf", ".csv", ".json")
 LONGEST_NAME = 120
 """Characters of a file's name: with its folder a path stays within every file system's limit."""
 _PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")

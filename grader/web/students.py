@@ -24,7 +24,7 @@ from grader.language import tongue
 from grader.lms.export import read_results
 from grader.records import Reason, of_error
 from grader.review.server import page_file
-from grader.scan.decode.limits import load
+from grader.scan.decode.limits import InputFile, kind_of, load
 from grader.scan.decode.pages import count_pages
 from grader.texts.spoken import RefusedError, refusal
 from grader.web.guard import forbidden, missing
@@ -46,14 +46,8 @@ MOST_SHEETS = 40
 """Sheets that one student may hand in: ten times a plan of four pages."""
 HANDING_IN = threading.Lock()
 """Two sheets sent at once have two names, and count together."""
-_PICTURES = {
-    b"\xff\xd8\xff": ".jpg",
-    b"\x89PNG": ".png",
-    b"%PDF": ".pdf",
-    b"II*\x00": ".tif",
-    b"MM\x00*": ".tif",
-}
-"""First bytes of the files that a student may send, and how they are stored."""
+_ENDINGS = {"jpeg": ".jpg", "png": ".png", "tiff": ".tif", "heic": ".heic", "pdf": ".pdf"}
+"""The endings under which the files that a student may send are stored, by kind."""
 
 
 WITHOUT_NUL = r"^[^\x00]*$"
@@ -428,10 +422,10 @@ def enter(call: Call, token: str) -> Link:
 
 def ending_of(body: bytes) -> str:
     """Return the ending of a picture's file, by its first bytes. Raises RefusedError for other files."""
-    ending = next((one for start, one in _PICTURES.items() if body.startswith(start)), None)
-    if ending is None:
-        raise RefusedError(415, "file_type")
-    return ending
+    try:
+        return _ENDINGS[kind_of(InputFile("", body, ""))]
+    except InputFileError as error:
+        raise RefusedError(415, "file_type") from error
 
 
 def pages_in(call: Call, publication: Publication, path: Path, shown: str = "") -> int:

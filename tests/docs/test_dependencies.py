@@ -18,7 +18,12 @@ ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 EXTRAS = PROJECT["optional-dependencies"]
 STACKS = ("web", "cluster")
-OF_EXTRAS = {"grader/web": "web", "grader/folder/cluster.py": "cluster", "grader/cycle": "plots"}
+OF_EXTRAS = {
+    "grader/scan/decode/heic.py": "heic",
+    "grader/web": "web",
+    "grader/folder/cluster.py": "cluster",
+    "grader/cycle": "plots",
+}
 
 
 def plain(name):

@@ -18,7 +18,7 @@ REFUSED = {
     "s13.pdf": "pages_too_many",
     "s14.pdf": "pdf_encrypted",
     "s15.gif": "file_type_unsupported",
-    "s16.heic": "file_type_unsupported",
+    "s16.heic": "image_damaged",
     "s17.pdf": "file_missing",
     "s18.jpg": "file_missing",
     "s19_două pagini 'x' \"y\" ж.jpg": "image_truncated",

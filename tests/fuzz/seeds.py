@@ -45,6 +45,7 @@ def _pictures() -> list[bytes]:
         _tiff(grey, compression="packbits"),
     ]
     files += [_pdf_of_scans(files[0], files[1]), _pdf_of_pixels(grey), _pdf_drawn()]
+    files += [(ROOT / "tests/unit/scan/decode/turned.heic").read_bytes()]
     return files
 
 

@@ -11,7 +11,8 @@ Codes of `InputFileError` raised in this package:
 | file_empty | 0 bytes |
 | file_too_large | more bytes than the scans of one class can need |
 | file_changed | the file was written to while it was read |
-| file_type_unsupported | neither JPEG, PNG, TIFF nor PDF, whatever its name says |
+| file_type_unsupported | neither JPEG, PNG, TIFF, HEIC nor PDF, whatever its name says |
+| heic_unreadable | HEIC, which is read with the extra `heic` |
 | image_truncated | the file ends before the image does |
 | image_damaged | the image cannot be decoded |
 | image_too_large | more pixels, or more memory for them, than a sheet can need |
@@ -53,11 +54,16 @@ _MAGIC = {
     b"MM\x00*": "tiff",
     b"II+\x00": "tiff",
 }
+_HEIC = frozenset({b"heic", b"heix", b"heim", b"heis", b"mif1"})
+"""Brands of a still picture, behind the length and the type of a file's first box (ISO/IEC 23008-12)."""
 _PDF_HEADER_WITHIN = 1024
 """Readers accept junk before `%PDF-`, so copiers that write some are let in."""
 _NO_WAIT = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 """Not every system knows both."""
-_NAMES = {".jpg": "JPEG", ".jpeg": "JPEG", ".png": "PNG", ".tif": "TIFF", ".tiff": "TIFF", ".pdf": "PDF"}
+_NAMES = {
+    ".jpg": "JPEG", ".jpeg": "JPEG", ".png": "PNG", ".tif": "TIFF", ".tiff": "TIFF", ".heic": "HEIC",
+    ".heif": "HEIC", ".pdf": "PDF",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,10 +148,12 @@ class Door:
 
 
 def kind_of(file: InputFile) -> str:
-    """`jpeg`, `png`, `tiff` or `pdf`, by content; raises InputFileError for anything else."""
+    """`jpeg`, `png`, `tiff`, `heic` or `pdf`, by content; raises InputFileError for anything else."""
     for magic, kind in _MAGIC.items():
         if file.data.startswith(magic):
             return kind
+    if file.data[4:8] == b"ftyp" and file.data[8:12] in _HEIC:
+        return "heic"
     if b"%PDF-" in file.data[:_PDF_HEADER_WITHIN]:
         return "pdf"
     suffix = Path(file.name).suffix
@@ -154,7 +162,7 @@ def kind_of(file: InputFile) -> str:
     known = {"suffix": suffix, "kind": named} if named else {}
     raise InputFileError(
         "file_type_unsupported",
-        f"{file.name}: {what}; scan or export it as JPEG, PNG, TIFF or PDF",
+        f"{file.name}: {what}; scan or export it as JPEG, PNG, TIFF, HEIC or PDF",
         **known,
     )
 

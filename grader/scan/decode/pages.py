@@ -1,4 +1,4 @@
-"""Pages of files of any kind that is accepted (JPEG, PNG, TIFF, PDF), within limits."""
+"""Pages of files of any kind that is accepted (JPEG, PNG, TIFF, HEIC, PDF), within limits."""
 
 import warnings
 from collections.abc import Iterator
@@ -10,13 +10,15 @@ import cv2
 import numpy as np
 
 from grader.records import Page, PageRef
-from grader.scan.decode import pdf, pictures, tiff
+from grader.scan.decode import heic, pdf, pictures, tiff
 from grader.scan.decode.limits import Door, InputFile, changed, kind_of, load
 from grader.scan.decode.ruling import without_ruling
 from grader.scan.pixels import connected, is_dotted, shrink
 from reference.errors import InputFileError
 
-_DOORS: dict[str, Door] = {"jpeg": pictures.JPEG, "png": pictures.PNG, "tiff": tiff.TIFF, "pdf": pdf.PDF}
+_DOORS: dict[str, Door] = {
+    "jpeg": pictures.JPEG, "png": pictures.PNG, "tiff": tiff.TIFF, "heic": heic.HEIC, "pdf": pdf.PDF,
+}  # fmt: skip
 _LONG_SIDE_PX = 1700
 """About 4 px/mm on A3: strokes of 0.3 mm survive, dust and grain fade."""
 _DARK = 0.16

@@ -81,7 +81,7 @@ def test_a_file_that_is_nobodys_and_no_drawing_is_told_as_both(class_folder, tmp
     results, _ = run(class_folder, tmp_path / "out")
     (told,) = [one.message for one in results.unmatched if one.file == "notes.txt"]
     assert "Nothing says whose page this is" in told
-    assert "JPEG, PNG, TIFF or PDF" in told
+    assert "JPEG, PNG, TIFF, HEIC or PDF" in told
 
 
 def test_progress_is_told_to_the_end(class_folder, tmp_path):

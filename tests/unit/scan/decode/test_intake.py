@@ -2,7 +2,9 @@
 
 import io
 import struct
+import sys
 import zlib
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -74,6 +76,36 @@ def test_grey_pixels_come_through_as_stored(tmp_path, suffix):
     assert np.abs(page.grey.astype(int) - paper()).max() <= allowed
     assert page.dpi == pytest.approx((300, 300), rel=1e-3)
     assert (page.source, page.page, page.turn_deg) == (path.name, 1, 0)
+
+
+HEIC = {name: Path(__file__).with_name(f"{name}.heic") for name in ("plain", "turned")}
+"""`paper()` encoded by libheif: upright, and turned both by its box and by its EXIF tag, as phones do."""
+
+
+def test_a_phones_heic_is_turned_once():
+    pytest.importorskip("pi_heif")
+    for name, drawn in (("plain", paper()), ("turned", np.rot90(paper(), -1))):
+        page = only_page(HEIC[name])
+        assert page.grey.shape == drawn.shape
+        assert np.abs(page.grey.astype(int) - drawn).mean() < JPEG_ERROR_LEVELS
+        assert (page.dpi, page.turn_deg) == (None, 0)
+
+
+def test_a_heic_that_is_cut_off_or_of_too_many_pixels_is_refused(tmp_path):
+    pytest.importorskip("pi_heif")
+    data = HEIC["plain"].read_bytes()
+    (tmp_path / "cut.heic").write_bytes(data[:-200])
+    assert refused(lambda: only_page(tmp_path / "cut.heic")).code == "image_truncated"
+    at = data.index(b"ispe") + 8
+    (tmp_path / "bomb.heic").write_bytes(data[:at] + struct.pack(">II", 60_000, 60_000) + data[at + 8 :])
+    assert refused(lambda: only_page(tmp_path / "bomb.heic")).code in {"image_too_large", "image_damaged"}
+
+
+def test_without_its_decoder_a_heic_says_how_to_send_jpeg(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pi_heif", None)
+    told = refused(lambda: only_page(HEIC["plain"]))
+    assert told.code == "heic_unreadable"
+    assert "Most Compatible" in str(told)
 
 
 @pytest.mark.parametrize("compression", ["zlib", "lzw", "jpeg"])

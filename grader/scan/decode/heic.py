@@ -1,0 +1,41 @@
+"""HEIC pictures, as phones take them, by pi-heif, which comes with the extras `heic` and `web`.
+
+The library turns and mirrors a picture as the file says. Its EXIF tag says so once more, and is not heeded.
+"""
+
+import numpy as np
+
+from grader.records import Page
+from grader.scan.decode.limits import Door, InputFile, check_memory, check_size, truncated
+from grader.scan.decode.pictures import to_grey
+from reference.errors import InputFileError
+
+_PIXEL_BYTES = 9
+"""The planes of the decoder, the pixels made of them, and their copy: three bytes each."""
+
+
+def _page(file: InputFile, number: int) -> Page | None:
+    if number > 1:
+        return None
+    try:
+        from pi_heif import open_heif  # noqa: PLC0415 - an extra
+    except ModuleNotFoundError as error:
+        raise InputFileError(
+            "heic_unreadable",
+            f"{file.name}: HEIC pictures are read with `pip install 'planmark[heic]'`; or send JPEG: on an"
+            " iPhone choose Settings, Camera, Formats, Most Compatible, and take the picture again",
+        ) from error
+    try:
+        picture = open_heif(file.data)
+        wide, high = picture.size
+        check_memory(file, 1, wide * high, _PIXEL_BYTES * wide * high)
+        check_size(file, 1, wide, high)
+        pixels = np.asarray(picture)
+    except (EOFError, ValueError) as error:
+        if "end of file" in str(error).lower():
+            raise truncated(file, 1) from error
+        raise
+    return Page(file.name, 1, to_grey(pixels, rgb=True), None, 0)
+
+
+HEIC = Door(_page)
