@@ -272,6 +272,17 @@ class ExportCall(ExportOptions):
     ids: Path | None = option("The platform's numbers: a CSV student_id,id[,username,participant].")
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SendOptions:
+    """The options of ``planmark send``."""
+
+    site: str | None = option("The platform's address: https://NAME.")
+    yes: bool = option("Send; without it nothing is sent, only told.", "--yes", default=False)
+    allow_http: bool = option(
+        "Also send without https: others can read the token on its way.", "--allow-http", default=False
+    )
+
+
 # On the web ---------------------------------------------------------------------------------------
 
 

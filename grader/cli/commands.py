@@ -26,6 +26,7 @@ from grader.options import (
     GradeOptions,
     PlanOptions,
     ReviewOptions,
+    SendOptions,
     ServeOptions,
     VariantOptions,
 )
@@ -286,6 +287,24 @@ def export(results: ResultsArgument, options: ExportCall) -> None:
     from grader.cli.exporting import export_results
 
     is_open, path = export_results(results, options)
-    where = f" to {options.to}; the documentation of exports says how"
-    note(f"next: open {path}" if options.to in {"csv", "json"} else f"next: upload {path}{where}")
+    if options.assignment_id or options.cmid or options.criteria:
+        tell_next("send", path)  # calls, which alone have a place
+    elif options.to in {"csv", "json"}:
+        note(f"next: open {path}")
+    else:
+        note(f"next: upload {path} to {options.to}; the documentation of exports says how")
     raise typer.Exit(1 if is_open else 0)
+
+
+@app.command()
+def send(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="What `planmark export` wrote.")],
+    options: SendOptions,
+) -> None:
+    """Send an exported rubric and marks to a platform; a second run sends only what is open or changed.
+
+    The platform's token is read from the environment: PLANMARK_TOKEN. Without --yes nothing is sent.
+    """
+    from grader.cli.sending import send_export
+
+    raise typer.Exit(1 if send_export(file, options) else 0)

@@ -22,6 +22,7 @@ from grader.language import N_, tongue
 from grader.lms.export import export as deliver
 from grader.lms.export import read_results, usual_name
 from grader.lms.grades import Delivery, Options, people_of
+from grader.lms.send import SentDocument
 from grader.lms.table import with_ids
 from grader.options import ExportCall, ExportOptions, taken
 from grader.rubric import RubricFile
@@ -42,6 +43,7 @@ MODELS: dict[str, tuple[type[BaseModel], Literal["validation", "serialization"]]
     "mechanism": (MechanismFile, "validation"),
     "assignment": (AssignmentFile, "validation"),
     "rubric": (RubricFile, "validation"),
+    "sent": (SentDocument, "serialization"),
 }
 WRITTEN = {path.stem: path for path in sorted((Path(lms.__file__).parent / "schemas").glob("*.json"))}
 """The schemas of what is only written: documents that platforms take."""

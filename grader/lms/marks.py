@@ -298,6 +298,8 @@ def platform_marks(
 # The platform's criteria --------------------------------------------------------------------------
 
 CRITERION_COLUMNS = ("criterion", "id")
+PlatformEntry = tuple[str, str, float | None]
+"""A criterion in a platform's answer: its number, its name, and its points where they are given."""
 
 
 def numbered(criteria: Sequence[Criterion], path: Path) -> list[PlatformCriterion]:
@@ -305,7 +307,16 @@ def numbered(criteria: Sequence[Criterion], path: Path) -> list[PlatformCriterio
 
     Raises InputFileError where one is missing, stands there twice, or has other points there.
     """
-    known = _criteria_of(path)
+    result, faults = matched(criteria, _criteria_of(path))
+    if faults:
+        raise failure(InputFileError, "criteria", faults=faults, file=path)
+    return result
+
+
+def matched(
+    criteria: Sequence[Criterion], known: Sequence[PlatformEntry]
+) -> tuple[list[PlatformCriterion], list[Reason]]:
+    """The platform's number of each criterion, and in what its criteria are not these."""
     names = tuple(f"'{name}'" for _, name, _ in known)
     faults: list[Reason] = []
     result: list[PlatformCriterion] = []
@@ -326,13 +337,7 @@ def numbered(criteria: Sequence[Criterion], path: Path) -> list[PlatformCriterio
     ]
     if len(numbers) < len(result):
         faults.append(Reason("one_number"))
-    if faults:
-        raise failure(InputFileError, "criteria", faults=faults, file=path)
-    return result
-
-
-PlatformEntry = tuple[str, str, float | None]
-"""A criterion in a platform's answer: its number, its name, and its points where they are given."""
+    return result, faults
 
 
 def _criteria_of(path: Path) -> list[PlatformEntry]:
@@ -354,7 +359,7 @@ def read_answer(path: Path) -> Any:  # noqa: ANN401 - whatever a platform answer
         raise failure(InputFileError, "criteria", "no_json_answer", file=path, error=error) from error
 
 
-_LISTS = ("guide_criteria", "qualities", "criteria", "data", "rubric")
+_LISTS = ("guide_criteria", "qualities", "criteria", "data", "rubric", "rubrics")
 _NESTS = ("areas", "definitions", "guide", "rubric")
 _OF_A_CRITERION = {"maxscore", "points", "levels", "qualityId"}
 

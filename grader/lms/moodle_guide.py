@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from html import escape
 from pathlib import Path
+from typing import Any
 
 from grader.lms.grades import Delivery, Grade, Options
 from grader.lms.marks import (
@@ -99,12 +100,17 @@ def _place(options: Options) -> tuple[int, int]:
     return cmid, context_id
 
 
+def fillings_in(answer: Any) -> list[int]:  # noqa: ANN401 - whatever Moodle answers
+    """Count the points of each grade in Moodle's answer; LookupError and others for another answer."""
+    # An instance that nobody filled in has no guide.
+    return [len((each.get("guide") or {}).get("criteria", ())) for each in answer["instances"]]
+
+
 def _fillings(path: Path) -> list[int]:
-    """Count the points of each grade by a guide in Moodle's answer; InputFileError for another answer."""
+    """Count the points in an answer of Moodle; InputFileError for another answer."""
     answer = read_answer(path)
     try:
-        # An instance that nobody filled in has no guide.
-        return [len((each.get("guide") or {}).get("criteria", ())) for each in answer["instances"]]
+        return fillings_in(answer)
     except (LookupError, TypeError, AttributeError) as error:
         known = {"file": path, "asked": "core_grading_get_gradingform_instances"}
         raise failure(InputFileError, "criteria", "no_answer_to", **known) from error

@@ -333,6 +333,26 @@ def _fault(column: str, read: Callable[[], object]) -> Iterator[tuple[str, Reaso
 # Writing ------------------------------------------------------------------------------------------
 
 
+@contextmanager
+def held(path: Path) -> Iterator[None]:
+    """Hold a file that nobody else changes meanwhile; OutputError where another program holds it."""
+    from filelock import FileLock, Timeout  # noqa: PLC0415 - slow to import, and seldom needed
+
+    make_folder(path.parent)
+    lock = FileLock(path.with_name(f".{path.name}.lock"), timeout=_LOCK_S)
+    try:
+        lock.acquire()
+    except Timeout as error:
+        raise failure(OutputError, "cannot_write", "held", file=path, limit=_LOCK_S) from error
+    except (OSError, NotImplementedError) as error:
+        known = {"file": path, "error": getattr(error, "strerror", None) or error}
+        raise failure(OutputError, "cannot_write", "no_lock", **known) from error
+    try:
+        yield
+    finally:
+        lock.release()
+
+
 class DecisionFile:
     """One file of decisions, safe for several threads and processes, and for people who edit it in between.
 
@@ -388,21 +408,8 @@ class DecisionFile:
     @contextmanager
     def _open(self) -> Iterator[DecisionTable]:
         """The file's content, which nobody else changes meanwhile."""
-        from filelock import FileLock, Timeout  # noqa: PLC0415 - slow to import, and seldom needed
-
-        make_folder(self.path.parent)
-        lock = FileLock(self.path.with_name(f".{self.path.name}.lock"), timeout=_LOCK_S)
-        try:
-            lock.acquire()
-        except Timeout as error:
-            raise failure(OutputError, "cannot_write", "held", file=self.path, limit=_LOCK_S) from error
-        except (OSError, NotImplementedError) as error:
-            known = {"file": self.path, "error": getattr(error, "strerror", None) or error}
-            raise failure(OutputError, "cannot_write", "no_lock", **known) from error
-        try:
+        with held(self.path):
             yield read_table(self.path)
-        finally:
-            lock.release()
 
     def _write(self, table: DecisionTable, out: Iterable[Key], rows: Sequence[Decision]) -> None:
         """Write the table without what was decided on some things, and with new rows."""

@@ -103,9 +103,6 @@ EXPORTS: dict[str, str | tuple[str, ...]] = {
     "item_cut": N_(
         "an item '%(text)s' that is there must be out of %(most)s: Brightspace cuts what is above"
     ),
-    "ids_of_criteria": N_(
-        "its answer tells the criteria's ids: where they are others, export again with it (--criteria)"
-    ),
     "two_decimals": N_(
         "grades have two decimals there; programs cannot write points by criterion: --to csv has them"
     ),

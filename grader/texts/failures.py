@@ -224,6 +224,16 @@ FAILURES: dict[str, str] = {
         " everybody's points: if that is meant, give Moodle's answer to"
         " core_grading_get_gradingform_instances (--replace-guide)"
     ),
+    # Sending
+    "no_plan": N_(
+        "%(file)s: holds no calls to send; name what planmark export writes now for canvas-api, openedx,"
+        " google-classroom, ms-education, or for Moodle with --what rubric or marks"
+    ),
+    "site": N_("--site %(text)s: write it as https://NAME"),
+    "site_needed": N_("give the address of your %(platform)s: --site https://NAME"),
+    "https_needed": N_("--site %(text)s: others could read the token on its way; write https://NAME"),
+    "send_token": N_("put the platform's token into the environment as %(name)s, without blanks"),
+    "no_record": N_("%(file)s: is no record of what was sent; restore it, or remove it to send all again"),
     "groups": N_(
         "students hand in as groups (%(found)s), and Moodle takes a number in this archive for a group's:"
         " others would get the page; export grades with comments (--worksheet without --what)"

@@ -173,6 +173,28 @@ FAULTS: dict[str, tuple[str, ...]] = {
     "points_differ": (N_("%(there)s points there, %(here)s in the rubric"),),
     "criterion_extra": (N_("there, and not in the rubric"),),
     "one_number": (N_("two criteria have one number"),),
+    # Of calls to a platform.
+    "answered": (N_("the platform answered %(status)s: %(text)s"),),
+    "answer_no_api": (N_("the answer %(status)s is not one of the platform's API; check --site: %(text)s"),),
+    "answer_lost": (N_("no answer (%(error)s); run the same command later"),),
+    "answer_unclear": (
+        N_(
+            "it may have arrived (%(error)s), so it was not repeated; check there, then run the command again"
+        ),
+    ),
+    "token_refused": (N_("the token is refused (%(status)s): %(text)s"),),
+    "redirected": (N_("the site redirects to %(text)s, and nothing was sent there; check --site"),),
+    "wait_long": (N_("the platform asks to wait %(wait)s; run the same command then"),),
+    "rubric_other": (
+        N_("the assignment has another rubric, and a second one would delete all points; make the two agree"),
+    ),
+    "rubric_unseen": (N_("it was sent, but the assignment does not show it; check there"),),
+    "guide_filled": (
+        N_(
+            "the guide there has %(count)s fillings of %(grades)s grades; --replace-guide of export deletes"
+            " them"
+        ),
+    ),
 }
 
 WHERE = N_("line %(line)s"), N_("row %(table_row)s")

@@ -1,14 +1,15 @@
 """Canvas: the rubric, its place in an assignment, and students' grades and points.
 
 Canvas keeps the ids of criteria that it is given (app/models/rubric.rb, `generate_criteria`), so that the
-points can follow at once; its answer tells the ids it took.
+points can follow at once; where they are others, the sender puts them in.
 """
 
 import re
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import Any
 
-from grader.lms.api.requests import Plan, place_of, ready_marks
+from grader.lms.api.requests import Plan, place_of, ready_marks, rubric_at
 from grader.lms.grades import Delivery, Grade, Options, ready
 from grader.lms.marks import (
     CLOSE,
@@ -25,8 +26,18 @@ from reference.errors import CallError
 
 _RATING = ("Rating Name", "Rating Description", "Rating Points")
 RUBRIC_HEADER = (
-    "Rubric Name", "Criteria Name", "Criteria Description", "Criteria Enable Range", *_RATING, *_RATING,
+    "Rubric Name", "Criteria Name", "Criteria Description", "Criteria Enable Range", *(3 * _RATING),
 )  # fmt: skip
+
+
+def _ratings(criterion: Criterion) -> list[tuple[str, float]]:
+    """A criterion's ratings, the best first.
+
+    Canvas shows the one whose range has the points: from its own down to above those of the next one
+    (app/models/rubric_association.rb, `assess`). Points have two decimals.
+    """
+    most = criterion.max_points
+    return [("Full marks", most), ("Partial marks", round(most - 0.01, 2)), ("No marks", 0.0)]
 
 
 def _canvas_criteria(grades: Sequence[Grade], options: Options) -> list[Criterion]:
@@ -42,11 +53,10 @@ def _canvas_criteria(grades: Sequence[Grade], options: Options) -> list[Criterio
 def rubric(grades: Sequence[Grade], options: Options) -> Delivery:
     """The rubric as Canvas imports it: each criterion a range of points from nothing to its maximum."""
     name = options.item.strip() or grades[0].assignment
-    ratings = ("true", "Full marks", "", "{}", "No marks", "", "0")
-    rows = [
-        (name, each.name, each.titles[0], *(cell.format(number(each.max_points)) for cell in ratings))
-        for each in _canvas_criteria(grades, options)
-    ]
+    rows = []
+    for each in _canvas_criteria(grades, options):
+        ratings = [(called, "", number(points)) for called, points in _ratings(each)]
+        rows.append((name, each.name, each.titles[0], "true", *chain.from_iterable(ratings)))
     return Delivery(csv_text(RUBRIC_HEADER, rows))
 
 
@@ -85,7 +95,9 @@ def canvas_api(grades: Sequence[Grade], options: Options) -> Delivery:
             "https://canvas.instructure.com/doc/api/submissions.html (Grade or comment on a submission)",
         ],
     )
+    path = f"/api/v1/courses/{course}/assignments/{assignment}"
     if options.criteria is None:
+        criteria = _canvas_criteria(grades, options)
         rubric_body = {
             "title": options.item.strip() or grades[0].assignment,
             "free_form_criterion_comments": False,
@@ -98,11 +110,11 @@ def canvas_api(grades: Sequence[Grade], options: Options) -> Delivery:
                     "points": each.max_points,
                     "criterion_use_range": True,
                     "ratings": {
-                        "0": {"description": "Full marks", "points": each.max_points},
-                        "1": {"description": "No marks", "points": 0.0},
+                        str(place): {"description": called, "points": points}
+                        for place, (called, points) in enumerate(_ratings(each))
                     },
                 }
-                for index, each in enumerate(_canvas_criteria(grades, options))
+                for index, each in enumerate(criteria)
             },
         }
         place = {
@@ -110,17 +122,15 @@ def canvas_api(grades: Sequence[Grade], options: Options) -> Delivery:
             "purpose": "grading",
         }  # fmt: skip
         made = {"rubric": rubric_body, "rubric_association": place}
-        plan.add(f"POST /api/v1/courses/{course}/rubrics", made, "rubric")
+        plan.add(f"POST /api/v1/courses/{course}/rubrics", made, "rubric", unless=rubric_at(path, criteria))
         marked = [
             (grade, {mark.criterion: mark for mark in ready_marks(grade, options)}) for grade in ready(grades)
         ]
-        become = Reason("points_become", {"platform": "Canvas", "most_points": grades[0].max_score})
-        notes = [become, Reason("ids_of_criteria")]
+        notes = [Reason("points_become", {"platform": "Canvas", "most_points": grades[0].max_score})]
     else:
         _, marked = platform_marks(grades, options, options.criteria)
         notes = []
-    path = f"/api/v1/courses/{course}/assignments/{assignment}/submissions"
     for grade, marks in marked:
         body = _canvas_body(grade, marks)
-        plan.add(f"PUT {path}/{_canvas_user(grade)}", body, "grade", grade.student_id)
+        plan.add(f"PUT {path}/submissions/{_canvas_user(grade)}", body, "grade", grade.student_id)
     return plan.delivery(grades, notes=tuple(notes))

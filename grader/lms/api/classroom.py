@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from urllib.parse import quote
 
-from grader.lms.api.requests import Plan, place_of, students_submissions
+from grader.lms.api.requests import Plan, place_of, rubric_at, students_submissions
 from grader.lms.grades import Delivery, Grade, Options, ready
 from grader.lms.marks import class_criteria, platform_marks
 from grader.lms.table import number
@@ -47,7 +47,7 @@ def google_classroom(grades: Sequence[Grade], options: Options) -> Delivery:
                 for each in criteria
             ]
         }
-        plan.add(f"POST {path}/rubrics", body, "rubric")
+        plan.add(f"POST {path}/rubrics", body, "rubric", unless=rubric_at(f"{path}/rubrics", criteria))
     else:
         platform_marks(grades, options, options.criteria)
     known, missing = students_submissions(grades, options, "courses.courseWork.studentSubmissions.list")

@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 from urllib.parse import quote
 
-from grader.lms.api.requests import Plan, place_of, students_submissions
+from grader.lms.api.requests import Plan, place_of, rubric_at, students_submissions
 from grader.lms.grades import Delivery, Grade, Options, ready
-from grader.lms.marks import Mark, class_criteria, plain_comment, platform_marks, read_answer
+from grader.lms.marks import Criterion, Mark, class_criteria, plain_comment, platform_marks, read_answer
 from grader.lms.table import number
 from grader.records import Reason
 from grader.texts.spoken import failure
@@ -28,7 +28,7 @@ _OUTCOMES = ("rubric", "points", "feedback")
 
 
 def ms_education(grades: Sequence[Grade], options: Options) -> Delivery:
-    """The rubric; with Graph's answer for it (`--criteria`) the call that attaches it to the assignment.
+    """The rubric and the call that attaches it; with Graph's answer for it (`--criteria`) that call alone.
 
     With the answer and the submissions the students' outcomes: levels, points and feedback.
     """
@@ -46,7 +46,12 @@ def ms_education(grades: Sequence[Grade], options: Options) -> Delivery:
     )
     ask = f"{base}/submissions?$expand=outcomes"
     if options.criteria is None:
-        plan.add("POST /v1.0/education/me/rubrics", _graph_rubric(grades, options), "rubric")
+        criteria = class_criteria(grades, options)
+        # Without a rubric Graph answers 404 (educationassignment-get-rubric).
+        unless = rubric_at(f"{base}/rubric", criteria, absent=404)
+        body = _graph_rubric(criteria, options.item.strip() or grades[0].assignment)
+        plan.add("POST /v1.0/education/me/rubrics", body, "rubric", unless=unless)
+        plan.add(f"PUT {base}/rubric/$ref", _reference("{id}"), "attach")
         why = Reason("rubric_first")
         return plan.delivery(grades, unplaced={grade.student_id: why for grade in ready(grades)})
     answer = read_answer(options.criteria)
@@ -57,8 +62,7 @@ def ms_education(grades: Sequence[Grade], options: Options) -> Delivery:
     if not levels or not isinstance(rubric_id, str):
         raise failure(CallError, "criteria", "no_rubric", file=options.criteria)
     if options.submissions is None:
-        reference = {"@odata.id": f"https://graph.microsoft.com/v1.0/education/me/rubrics/{quote(rubric_id)}"}
-        plan.add(f"PUT {base}/rubric/$ref", reference, "attach")
+        plan.add(f"PUT {base}/rubric/$ref", _reference(quote(rubric_id)), "attach")
     for grade, marks in marked:
         if submission := known.get(grade.student_id):
             outcomes = {
@@ -80,10 +84,13 @@ def ms_education(grades: Sequence[Grade], options: Options) -> Delivery:
     )
 
 
-def _graph_rubric(grades: Sequence[Grade], options: Options) -> dict[str, Any]:
-    criteria = class_criteria(grades, options)
+def _reference(rubric: str) -> dict[str, str]:
+    """The body that attaches a rubric; the sender puts in an ``{id}`` that Graph gives."""
+    return {"@odata.id": f"https://graph.microsoft.com/v1.0/education/me/rubrics/{rubric}"}
+
+
+def _graph_rubric(criteria: Sequence[Criterion], title: str) -> dict[str, Any]:
     total = math.fsum(each.max_points for each in criteria)
-    title = options.item.strip() or grades[0].assignment
     kind = {"@odata.type": f"{_TYPE}AssignmentPointsGradeType"}
     return {
         "displayName": title,
@@ -119,14 +126,18 @@ def _graph_levels(answer: object) -> dict[str, float]:
     return {level: one / best for level, one in points.items()} if best > 0.0 else {}
 
 
+def _nearest(levels: Mapping[str, float], mark: Mark) -> str:
+    """The level of some points: all and none alone have the outer ones, where there are others."""
+    share = 1.0 if mark.is_full else min(mark.points / mark.max_points, 1.0)
+    inner = [level for level in levels if 0.0 < levels[level] < 1.0]
+    return min((0.0 < share < 1.0 and inner) or levels, key=lambda level: abs(levels[level] - share))
+
+
 def _graph_outcomes(
     grade: Grade, marks: Mapping[str, Mark], levels: Mapping[str, float], score: float
 ) -> dict[str, dict[str, Any]]:
     """The bodies of a student's three outcomes."""
-    nearest = {
-        quality: min(levels, key=lambda level: abs(levels[level] - mark.points / mark.max_points))
-        for quality, mark in marks.items()
-    }
+    nearest = {quality: _nearest(levels, mark) for quality, mark in marks.items()}
     said = {
         quality: f"{number(mark.points)} / {number(mark.max_points)}. {mark.remark}"
         for quality, mark in marks.items()

@@ -1,12 +1,12 @@
 """Requests to a platform: the plan of the calls, their addresses, and the owners of submissions."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 from urllib.parse import quote
 
 from grader.lms.grades import Delivery, Grade, Options, Person, ready
-from grader.lms.marks import Mark, check_unique, json_text, marks_of, read_answer, together
+from grader.lms.marks import Criterion, Mark, check_unique, json_text, marks_of, read_answer, together
 from grader.lms.table import Evidence, match_class
 from grader.records import Reason
 from grader.texts.spoken import failure
@@ -22,16 +22,23 @@ class Plan:
     platform: str
     server: str
     sources: Sequence[str]
-    calls: list[dict[str, str]] = field(default_factory=list)
+    calls: list[dict[str, Any]] = field(default_factory=list)
     files: dict[str, bytes] = field(default_factory=dict)
 
-    def add(self, call: str, body: Mapping[str, Any], what: str, student: str | None = None) -> None:
-        """Add a call, as ``POST /path``; `what` names its file, after the student."""
+    def add(
+        self, call: str, body: Mapping[str, Any], what: str, student: str | None = None,
+        unless: Mapping[str, Any] | None = None,
+    ) -> None:  # fmt: skip
+        """Add a call, as ``POST /path``; `what` names its file, after the student.
+
+        It is not made where the assignment has a rubric: `unless` says where to look, see `rubric_at`.
+        """
         method, _, path = call.partition(" ")
         name = "-".join(filter(None, (f"{len(self.calls) + 1:03}", student, what))) + ".json"
         self.files[name] = json_text(body).encode()
         whose = {} if student is None else {"student_id": student}
-        self.calls.append({"method": method, "path": path, "body": name, **whose})
+        looked = {} if unless is None else {"unless": unless}
+        self.calls.append({"method": method, "path": path, "body": name, **whose, **looked})
 
     def delivery(self, grades: Sequence[Grade], **more: Any) -> Delivery:  # noqa: ANN401 - fields of a delivery
         """The plan with its files."""
@@ -45,6 +52,14 @@ class Plan:
             "calls": self.calls,
         }
         return Delivery({"plan.json": json_text(content).encode(), **self.files}, **more)
+
+
+def rubric_at(path: str, criteria: Sequence[Criterion], **more: int) -> dict[str, Any]:
+    """The place where the platform shows an assignment's rubric, and the criteria that it has then.
+
+    `absent` is the status of an answer that says that there is none.
+    """
+    return {"path": path, "criteria": [asdict(each) for each in criteria], **more}
 
 
 def place_of(options: Options, *names: str) -> list[str]:

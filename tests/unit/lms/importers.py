@@ -7,6 +7,7 @@ import zipfile
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from itertools import pairwise
 
 CANVAS_NUMBER = re.compile(r"-?[0-9.,]+%?")
 
@@ -145,6 +146,16 @@ def canvas_gradebook(text, assignment, by_id=(), by_sis=(), by_login=(), by_name
             who = next((dict(users)[cell] for users, cell in known if cell in dict(users)), None)
             stored[who] = row[column].strip()
     return possible, stored
+
+
+def canvas_rating(ratings, points):
+    """The name of the rating that Canvas shows for points in a range: the first that fits.
+
+    app/models/rubric_association.rb, assess; ratings are sorted by points (rubric.rb, generate_criteria).
+    """
+    ranges = pairwise([*sorted(ratings, key=lambda one: -one[1]), ("", 0.0)])
+    fitting = [name for (name, most), (_, below) in ranges if most == points or most > points > below]
+    return next(iter(fitting), None)
 
 
 def canvas_rubric(text):

@@ -12,6 +12,7 @@ from grader.lms.export import export
 from grader.lms.grades import Options, Person
 from reference.errors import CallError, InputFileError
 from tests.unit.lms.classroom import left_out, marked, notes, report, results
+from tests.unit.lms.importers import canvas_rating
 
 PLACE = {"course_id": "12", "assignment_id": "345"}
 CLASS = (
@@ -77,6 +78,11 @@ def test_canvas_has_the_rubric_with_its_assignment_then_every_students_points(tm
     rubric = files["001-rubric.json"]
     jsonschema.validate(rubric, schema("canvas-rubric"))
     assert canvas_rubric(rubric) == [("c1", "c1: Vector 1", 5.0), ("c2", "c2: Vector 2", 5.0)]
+    ratings = rubric["rubric"]["criteria"]["1"]["ratings"].values()
+    named = [(one["description"], one["points"]) for one in ratings]
+    assert [canvas_rating(named, points) for points in (5.0, 2.5, 0.0)] == [
+        "Full marks", "Partial marks", "No marks",
+    ]  # fmt: skip
     assert rubric["rubric_association"] == {
         "association_id": 345, "association_type": "Assignment", "use_for_grading": True,
         "purpose": "grading",
@@ -262,7 +268,8 @@ def test_graph_takes_the_rubric_then_its_place_then_the_outcomes(tmp_path):
     delivery, calls, files = planned(tmp_path, "ms-education", **PLACE)
     rubric = files["001-rubric.json"]
     jsonschema.validate(rubric, schema("ms-rubric"))
-    assert [call["path"] for call in calls] == ["/v1.0/education/me/rubrics"]
+    attach = "/v1.0/education/classes/12/assignments/345/rubric/$ref"
+    assert [call["path"] for call in calls] == ["/v1.0/education/me/rubrics", attach]
     assert [one["weight"] for one in rubric["qualities"]] == [50.0, 50.0]
     assert rubric["levels"][0]["grading"] == {
         "@odata.type": "#microsoft.graph.educationAssignmentPointsGradeType", "maxPoints": 100.0,
@@ -271,9 +278,7 @@ def test_graph_takes_the_rubric_then_its_place_then_the_outcomes(tmp_path):
 
     answer = graph_answer(rubric)
     _, calls, files = planned(tmp_path, "ms-education", **PLACE, criteria=answer)
-    assert [(call["method"], call["path"]) for call in calls] == [
-        ("PUT", "/v1.0/education/classes/12/assignments/345/rubric/$ref")
-    ]
+    assert [(call["method"], call["path"]) for call in calls] == [("PUT", attach)]
     assert files["001-attach.json"] == {
         "@odata.id": "https://graph.microsoft.com/v1.0/education/me/rubrics/r-1"
     }
@@ -294,6 +299,13 @@ def test_graph_takes_the_rubric_then_its_place_then_the_outcomes(tmp_path):
         "2.5 / 5. "
     )
     assert "no outcomes of all kinds" in left_out(delivery)["s02"]
+    # Nearly all points are not rated as all, nor a few as none.
+    near = marked("s01", 4.9, 0.1)
+    _, _, files = planned(
+        tmp_path, "ms-education", near, **PLACE, criteria=answer, submissions=VALUE, people=people
+    )
+    levels = files["001-s01-rubric.json"]["rubricQualitySelectedLevels"]
+    assert [level["columnId"] for level in levels] == ["l2", "l4"]
 
 
 def test_a_rubric_without_its_id_is_refused(tmp_path):
