@@ -95,6 +95,7 @@ EXAMPLES: Mapping[str, str] = {
     "extra": "web", "findings": "$.reports: ...", "found": "--groups", "port": "8000", "table_row": "3",
     "versions": "python 3.12 / 3.11", "whole": "7", "worker": "tcp://desk:40001",
     "wait": "90\u00a0s",
+    "bias": "-0.05", "difference": "0.21", "equal": "17",
     "wide": "@90 mm", "zone_high": "@120 mm", "zone_wide": "@180 mm",
 }  # fmt: skip
 """Parameters by name: after ``@`` a number with its unit; other texts of the catalogues are translated."""

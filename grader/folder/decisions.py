@@ -65,7 +65,7 @@ def _handed_in(submission: StudentSubmission, assignment: Assignment) -> list[ob
 
 def _asked(submission: StudentSubmission, rubric: RubricFile, criterion: str) -> object:
     """Return what a criterion asks for; for a node, the turn and corners of its page."""
-    is_node, asked = criterion.startswith("node:"), criterion.removeprefix("audit:")
+    is_node, asked = criterion.startswith("node:"), criterion.removeprefix("audit:").removeprefix("second:")
     placed = [(page.turn_deg, page.corners_px) for page in submission.pages] if is_node else []
     return [one.name for one in rubric.criterion if one.id == asked], placed
 
@@ -256,8 +256,8 @@ class ClassDecisions:
         self.faults.append(at(Reason(code, known), row.line, column))
 
     def _out_of_date(self, row: Decision, code: str) -> None:
-        """Note a decision to be made again; an answer of an audit is no decision, and just stops counting."""
-        if row.kind == "audit":
+        """Note a decision to be made again; an audit's answer or a second mark just stops counting."""
+        if row.kind in {"audit", "second"}:
             return
         self.stale.append(
             StaleDecisionDocument(
@@ -306,13 +306,13 @@ class _Check:
         """The column that is wrong, and why; None for a decision that fits."""
         if row.kind == "node":
             return self._node(row)
-        if row.kind not in {"verdict", "audit"}:
+        if row.kind not in {"verdict", "audit", "second"}:
             return None
         criteria = {one.id: one for one in self.rubric.criterion}
-        asked = row.criterion.removeprefix("audit:")
+        asked = row.criterion if row.kind == "verdict" else row.audited[0]
         if asked not in criteria:
             return "criterion", Reason("criterion_unknown", {"text": asked, **near(asked, criteria)})
-        if row.kind == "audit":
+        if row.kind != "verdict":
             return None
         why = why_not(row, criteria[row.criterion], self.rubric)
         return None if why is None else ("points", why)

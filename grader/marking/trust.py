@@ -91,6 +91,11 @@ def _log_choose(of: FloatArray, some: FloatArray | float) -> FloatArray:
 # The verdicts that can be checked -----------------------------------------------------------------
 
 
+def order_of(student: str, position: int | None, criterion: str) -> bytes:
+    """Return a criterion's place in the random order, which depends on nothing but names."""
+    return sha256(f"{student}/{position}/{criterion}".encode()).digest()
+
+
 @dataclass(frozen=True, slots=True)
 class Checkable:
     """A verdict that the program settled, and what a person found of it.
@@ -113,7 +118,7 @@ class Checkable:
     @property
     def order(self) -> bytes:
         """Its place in the random order."""
-        return sha256(f"{self.student}/{self.position}/{self.criterion}".encode()).digest()
+        return order_of(self.student, self.position, self.criterion)
 
 
 def said_of(report: ReportDocument, criterion: CriterionDocument) -> SaidDocument | None:

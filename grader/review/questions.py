@@ -23,6 +23,7 @@ from grader.texts.spoken import clause
 Facts = dict[str, Any]
 """An object of JSON."""
 
+SOMEBODY = N_("somebody")
 TEXTS = {
     "left": N_("{open} open, about {minutes} min"),
     "nothing_left": N_("nothing is open"),
@@ -44,9 +45,15 @@ TEXTS = {
     "nothing_to_undo": N_("Nothing was decided in this window."),
     "settles": N_("This settles {count}"),
     "accept_all": N_("Accept {count}"),
+    "change_comment": N_("change for everybody: {text}"),
     "page_saved": N_("Saved. The page counts when the class is brought up to date."),
     "still_open": N_("Still open: {open}"),
     "all_settled": N_("Everything is settled."),
+    "part_settled": N_("Your part is settled. Open in the rest of the class: {open}"),
+    "part": N_("part {count} of {whole}"),
+    "whole_class": N_("the whole class"),
+    "somebody": SOMEBODY,
+    "no_part": N_("The address names no part of this class, so you see all of it. Choose one under “share”."),
     "can_finish": N_(
         "You may export now: open submissions have no grade yet. Or continue with the open ones."
     ),
@@ -55,8 +62,8 @@ TEXTS = {
 """Texts of the script, which fills in the braces."""
 CLASH = N_("%(who)s has decided this in the meantime: %(verdict)s. Yours was not written.")
 TAKEN_BACK = N_("Somebody has taken this decision back in the meantime. Yours was not written.")
-SOMEBODY = N_("somebody")
 CHECKED = N_("decided by %(who)s")
+SECOND = N_("%(who)s marked it a second time: %(verdict)s")
 ASKED = N_("The student asks to look again: %(text)s")
 STALE = N_("%(who)s decided: %(verdict)s; the submission or the criterion has changed since")
 PROPOSED = N_("proposed: %(verdict)s")
@@ -103,6 +110,7 @@ def student_facts(
     return {
         "key": student.key,
         "number": student.number,
+        "place": student.place,
         "label": label_of(student, speaker),
         "score": f"{score_text(report, speaker)} / {speaker.trimmed(report.max_score, 2)}",
         "remark": report.comment,
@@ -135,6 +143,7 @@ def _row(
         "probability": criterion.probability,
         "stake": criterion.max_points if criterion.verdict == OPEN else 0.0,
         "decided": row is not None and criterion.decided is not None,
+        "by": row.by if row is not None else "",
         "asked": request is not None and not request.is_answered(row),
         "seen": mark_of(row),
     }
@@ -143,6 +152,19 @@ def _row(
 def whole_title(title: str, drawn: str) -> Markup:
     """Return a criterion's title, with the name of what was drawn if the title lacks it."""
     return symbols(title if drawn in title else f"{title} {drawn}")
+
+
+def kept_facts(session: Session, speaker: Tongue) -> Iterator[Facts]:
+    """Yield the comments kept for reuse, the commonest first, each with the students who have it."""
+    for rows, keys in session.kept():
+        row, count = rows[0], len({*keys})
+        points = "" if row.points is None else f" · {speaker.trimmed(row.points, 2)}"
+        yield {
+            "criterion": row.criterion, "verdict": row.verdict, "comment": row.comment, "points": row.points,
+            "students": keys,
+            "label": verdict_badge(row.verdict, row.comment + points),
+            "changes": speaker.ngettext("Changes %d student", "Changes %d students", count) % count,
+        }  # fmt: skip
 
 
 def answer_facts(student: Student, name: str, verdict: str, seen: str) -> Facts:
@@ -158,7 +180,11 @@ def question_facts(session: Session, student: Student, name: str, speaker: Tongu
     criterion, standing = student.criterion(name), session.standing()
     title = next(one.title for one in session.batch.rubric.criterion if one.id == name)
     row = _row(student, criterion, standing, title.in_language(speaker.lang))
-    decision = standing.of(student, name)
+    decision, second = standing.of(student, name), standing.of(student, f"second:{name}")
+    why = _why(session, student, criterion, asked=row["asked"], speaker=speaker)
+    if second is not None:
+        verdict = speaker.gettext(VERDICTS[second.audited[1].answer])
+        why = Markup.escape(speaker.gettext(SECOND) % {"who": second.by, "verdict": verdict})
     is_known = criterion.verdict == OPEN and known_probability(criterion) is not None
     proposed = criterion.proposed if is_known else None
     what = speaker.gettext(VERDICTS[proposed]) if proposed else ""
@@ -171,11 +197,13 @@ def question_facts(session: Session, student: Student, name: str, speaker: Tongu
         "proposed": proposed if is_default else None,
         "decided": criterion.verdict if decision and criterion.decided else "",
         "comment": decision.comment if decision else "",
+        "points": decision.points if decision else None,
+        "most": speaker.trimmed(criterion.max_points, 2),
         "numbers": list(_numbers(criterion, speaker)),
         "state": state_of(criterion, decision, said, speaker),
         "brief": said or speaker.gettext(VERDICTS[criterion.verdict]),
         "accept": _accept(criterion, what, speaker),
-        "why": _why(session, student, criterion, asked=row["asked"], speaker=speaker),
+        "why": why,
         "sentence": symbols(session.sentence_if(student, criterion))
         if is_default or criterion.verdict != OPEN
         else "",

@@ -37,6 +37,7 @@ from grader.review.scans import page_of
 from grader.review.session import (
     Answer,
     ChangedError,
+    Kept,
     Said,
     Session,
     Standing,
@@ -137,7 +138,7 @@ class Review:
             "version": session.version,
             "keys": [student.key for student in session.students],
             "students": list(self._students(changed, standing)),
-            "comments": session.comments(),
+            "comments": list(questions.kept_facts(session, self.speaker)),
             "pages": len(session.waiting_pages()),
         }
 
@@ -195,33 +196,41 @@ class Review:
 
     # Decisions ------------------------------------------------------------------------------------
 
-    def decide(self, said: "Answers") -> dict[str, Any]:
-        """Write verdicts on criteria, all of them or none."""
-        since = self.session.version
-        self.session.decide(said.answers, said.by, said.window)
-        return self._facts(since)
+    def after(self, act: Callable[[Any], object]) -> Callable[[Any], dict[str, Any]]:
+        """Return a handler that acts, and returns what has changed by it."""
+
+        def handler(said: Said) -> dict[str, Any]:
+            since = self.session.version
+            act(said)
+            return self._facts(since)
+
+        return handler
 
     def check(self, said: audit.Checked) -> dict[str, Any]:
         """Take a check of a settled verdict."""
         audit.check(self.session, said)
         return audit.audit_facts(self.session, self.speaker)
 
-    def whole(self, said: Whole) -> dict[str, Any]:
-        """Write a comment on a whole submission, and points added."""
-        since = self.session.version
-        self.session.decide_whole(said)
-        return self._facts(since)
+    def second_facts(self, request: Request) -> Response:
+        """Return the next criterion to mark a second time, for whoever asks."""
+        self.session.refresh()
+        by = request.query_params.get("by", "") if self.by is None else self.by
+        share = min(max(_number(request.query_params.get("share", "20")), 1.0), 100.0)
+        return JSONResponse(audit.second_facts(self.session, by, share, self.speaker))
 
-    def node(self, said: "Moved") -> dict[str, Any]:
+    def second(self, said: audit.Marked) -> dict[str, Any]:
+        """Take a second marking."""
+        audit.mark_again(self.session, said)
+        return audit.second_facts(self.session, said.by, said.share, self.speaker)
+
+    def node(self, said: "Moved") -> None:
         """Put a node elsewhere; it snaps to the ink there."""
-        since = self.session.version
         figure = said.node.partition(":")[0]
         at = self.session.snapped(said.student, said.sheet, figure, (said.x, said.y))
         answer = Answer(said.student, f"node:{said.node}", place_text(*at), seen=said.seen)
         self.session.decide([answer], said.by, said.window)
-        return self._facts(since)
 
-    def page(self, said: "OnPage") -> dict[str, Any]:
+    def page(self, said: "OnPage") -> None:
         """Set a page's owner, turn and corners."""
         ref = page_of(self.session.pages, said.file, said.page)
         if ref is None:
@@ -234,7 +243,6 @@ class Review:
         position = None if owner is None else owner.position
         row = Decision("", position, page_criterion(ref), str(decision), by=said.by)
         self.session.decide_page(ref, row, said.seen, said.window)
-        return self._facts(self.session.version)
 
     def undo(self, said: Said) -> dict[str, Any]:
         """Take back the last decision of a window."""
@@ -392,6 +400,7 @@ def application(session: Session, lang: str = "en", token: str = "", by: str | N
         "/audit": review.audit_page,
         "/audit.js": _static("audit.js", "text/javascript"),
         "/api/audit": review.audit_facts,
+        "/api/second": review.second_facts,
         "/api/class": review.class_facts,
         "/api/question": review.question,
         "/api/pages": review.pages,
@@ -405,10 +414,15 @@ def application(session: Session, lang: str = "en", token: str = "", by: str | N
     }
     posts: dict[str, tuple[type[Said], Callable[[Any], dict[str, Any]]]] = {
         "/api/audit": (audit.Checked, review.check),
-        "/api/decide": (Answers, review.decide),
-        "/api/whole": (Whole, review.whole),
-        "/api/node": (Moved, review.node),
-        "/api/page": (OnPage, review.page),
+        "/api/second": (audit.Marked, review.second),
+        "/api/decide": (
+            Answers,
+            review.after(lambda said: session.decide(said.answers, said.by, said.window)),
+        ),
+        "/api/comment": (Kept, review.after(session.change_kept)),
+        "/api/whole": (Whole, review.after(session.decide_whole)),
+        "/api/node": (Moved, review.after(review.node)),
+        "/api/page": (OnPage, review.after(review.page)),
         "/api/undo": (Said, review.undo),
         "/api/finish": (Said, review.finish),
     }
@@ -500,7 +514,8 @@ def refusal(request: Request, review: Review) -> Response | None:
     if token and not _has_token(request, token):
         given = request.query_params.get("token", "")
         if request.url.path == "/" and hmac.compare_digest(given.encode(), token.encode()):
-            response = RedirectResponse("/", 303)
+            query = request.url.remove_query_params("token").query
+            response = RedirectResponse(f"/?{query}" if query else "/", 303)
             response.set_cookie(COOKIE, token, httponly=True, samesite="lax")
             return response
         return _refused(RefusedError(401, "refused", "review_token"), review)

@@ -24,6 +24,7 @@ from grader.documents import (
 from grader.folder.batch import Batch, Graded, Job, graded, pages_read
 from grader.folder.decisions import basis_of, decided, page_basis
 from grader.folder.workers import Pool
+from grader.marking.decided import why_not
 from grader.marking.trust import opened_in, trust_of
 from grader.overlay.scene import Arrow, Ghost, Scene, expected_vector, ghost_of, scene_of
 from grader.pipeline import mark
@@ -33,13 +34,14 @@ from grader.review.doubts import Doubt, doubts_of, figures_read, in_order, readi
 from grader.review.scans import Scans
 from grader.tables.decisions import ClashError, Decision, DecisionFile, Key
 from grader.tables.measurements import StudentSubmission
+from grader.tables.reader import TableError, at
 from grader.texts.spoken import RefusedError
 from reference.construction.graph import Construction
 from reference.errors import PlanmarkError
 
 OPEN = "review"
-MOST_COMMENTS = 30
-"""Comments that are offered again."""
+MOST_COMMENTS = 200
+"""Kept comments that are offered, those of all criteria together."""
 
 
 class ChangedError(PlanmarkError):
@@ -81,6 +83,8 @@ class Student:
     """By criterion."""
     doubts: tuple[int, list[Doubt]] | None = None
     """The open questions, and the version of the student that they are of."""
+    place: int = 0
+    """The person's place in the class, from 0, the same at all positions: a class is shared by it."""
 
     @property
     def key(self) -> str:
@@ -104,6 +108,10 @@ class Said(BaseModel):
     window: str = ""
 
 
+Points = Annotated[float, Field(gt=-1e5, lt=1e5, allow_inf_nan=False)] | None
+"""Points of a criterion; None where the rubric's share counts."""
+
+
 @posted(config=Said.model_config, frozen=True, slots=True)
 class Answer:
     """A person's decision on one criterion.
@@ -121,6 +129,26 @@ class Answer:
     verdict: str
     comment: str = ""
     seen: str = ""
+    points: Points = None
+
+
+class Kept(Said):
+    """A comment kept for reuse, and what it is to be for all who have it.
+
+    Attributes
+    ----------
+    criterion, verdict, points, comment : what decisions have in common that use it
+    students : the keys of those whom the person was shown
+    words, worth : the new comment and points
+    """
+
+    criterion: str
+    verdict: str
+    comment: str
+    points: Points = None
+    students: list[str]
+    words: str = ""
+    worth: Points = None
 
 
 class Whole(Said):
@@ -222,7 +250,10 @@ class Session:
                 Student(number, job, report, job.submission.name, self.version)
                 for number, (job, report) in enumerate(zip(run.jobs, run.results.reports, strict=True))
             ]
+            people = dict.fromkeys(student.report.student_id for student in self.students)
+            places = {one: place for place, one in enumerate(people)}
             for student in self.students:
+                student.place = places[student.report.student_id]
                 if student.report.status == "unreadable":
                     student.report = self._with_questions(student, student.job.submission)
             # What was decided meanwhile is taken in by the next `refresh`.
@@ -274,9 +305,11 @@ class Session:
             for answer in answers:
                 student = self.student(answer.student)
                 if not answer.criterion.startswith("node:"):
-                    student.criterion(answer.criterion.removeprefix("audit:"))
+                    student.criterion(answer.criterion.removeprefix("audit:").removeprefix("second:"))
                 row = self._row(student, answer.criterion, answer.verdict, by, there)
-                wanted.append((replace(row, comment=answer.comment), answer.seen))
+                row = replace(row, comment=answer.comment, points=answer.points)
+                self.check_points(row)
+                wanted.append((row, answer.seen))
             self._write(wanted, there, window, by)
             return self._marked_anew({answer.student for answer in answers})
 
@@ -328,10 +361,50 @@ class Session:
             self._marked_anew(set())
             return fitting, row
 
-    def comments(self) -> list[str]:
-        """Return the comments written so far, the commonest first."""
-        texts = [row.comment for row in self._file.all() if row.kind == "verdict" and row.comment]
-        return sorted(dict.fromkeys(texts), key=lambda text: -texts.count(text))[:MOST_COMMENTS]
+    def kept(self) -> list[tuple[list[Decision], list[str]]]:
+        """Return the comments kept for reuse, the commonest first: the decisions with it, the students' keys.
+
+        Decisions on one criterion with the same verdict, points and words have the same comment.
+        """
+        keys = {(one.report.student_id, one.report.position): one.key for one in self.students}
+        keys = {**{(student, None): key for (student, _), key in keys.items()}, **keys}
+        groups: dict[tuple[object, ...], list[Decision]] = {}
+        for row in self._file.all():
+            if row.kind == "verdict" and row.comment and (row.student_id, row.position) in keys:
+                groups.setdefault(_comment_of(row), []).append(row)
+        common = sorted(groups.values(), key=len, reverse=True)[:MOST_COMMENTS]
+        return [(rows, [keys[row.student_id, row.position] for row in rows]) for rows in common]
+
+    def change_kept(self, said: Kept) -> list[Student]:
+        """Give a kept comment other words or points, in all decisions that have it; return their students.
+
+        Who decided, when, and about what stays: the verdicts are not decided again. Raises as `decide`, and
+        RefusedError where other students have the comment than those that were shown.
+        """
+        with self._lock:
+            there, asked = self.standing(), (said.criterion, said.verdict, said.points, said.comment)
+            same = [
+                rows for rows, keys in self.kept() if (_comment_of(rows[0]), keys) == (asked, said.students)
+            ]
+            if not same:
+                raise RefusedError(409, "comment_changed")
+            changed = [replace(row, comment=said.words, points=said.worth) for row in same[0]]
+            self.check_points(changed[0])
+            self._write(
+                [(row, mark_of(was)) for row, was in zip(changed, same[0], strict=True)],
+                there,
+                said.window,
+                said.by,
+            )
+            return self._marked_anew(set())
+
+    def check_points(self, row: Decision) -> None:
+        """Raise TableError where a row's points contradict its verdict or the rubric."""
+        rubric = self.batch.rubric
+        asked = next((one for one in rubric.criterion if one.id == row.criterion), None)
+        why = None if asked is None else why_not(row, asked, rubric)
+        if why is not None:
+            raise TableError("decision_refused", row.criterion, [at(why, None, "points")])
 
     def refresh(self) -> None:
         """Take over what others wrote into the file in the meantime."""
@@ -457,12 +530,21 @@ class Session:
         }
         return after[criterion.id].feedback if criterion.id in after else criterion.feedback
 
-    def report_if(self, student: Student, answers: Sequence[tuple[str, str]]) -> ReportDocument:
-        """Return the report with these answers, verdicts or places by criterion, added to the decisions."""
+    def report_if(
+        self,
+        student: Student,
+        answers: Sequence[tuple[str, str] | tuple[str, str, float | None]],
+        without: str = "",
+    ) -> ReportDocument:
+        """Return the report with these answers, verdicts or places by criterion, added to the decisions.
+
+        Arguments: an answer may have points; `without` is a criterion whose decisions are left out.
+        """
         with self._lock:
             report = student.report
             said = [Decision(report.student_id, report.position, *answer) for answer in answers]
-            return self._report(student, [*self._file.all(), *said])
+            kept = [row for row in self._file.all() if row.criterion != without]
+            return self._report(student, [*kept, *said])
 
     # Questions ------------------------------------------------------------------------------------
 
@@ -591,6 +673,11 @@ def page_criterion(ref: PageRef) -> str:
 def mark_of(row: Decision | None) -> str:
     """Return a text by which a decision is recognised; empty if there is none."""
     return "" if row is None else f"{row.at} {row.by} {row.verdict} {row.points} {row.comment}"
+
+
+def _comment_of(row: Decision) -> tuple[str, str, float | None, str]:
+    """Return what decisions have in common that use the same comment."""
+    return row.criterion, row.verdict, row.points, row.comment
 
 
 def _said(row: Decision | None) -> str:

@@ -78,7 +78,7 @@ ANSWERS = ("right", "wrong", "unclear")
 
 @dataclass(frozen=True, slots=True)
 class AuditAnswer:
-    """A person's check of a settled verdict: one of `ANSWERS`, and the verdict that was checked."""
+    """A check of a settled verdict, one of `ANSWERS`, or a second person's verdict; and the first verdict."""
 
     answer: str
     said: str
@@ -87,12 +87,12 @@ class AuditAnswer:
         return f"{self.answer}; said={self.said}"
 
 
-def audit_answer(text: str) -> AuditAnswer:
-    """The answer that a row has. Raises TextError."""
+def audit_answer(text: str, known: tuple[str, ...] = ANSWERS) -> AuditAnswer:
+    """The answer that a row has, one of those `known`. Raises TextError."""
     answer, _, rest = (part.strip() for part in text.partition(";"))
     name, _, said = (part.strip() for part in rest.partition("="))
-    if answer not in ANSWERS or name != "said" or not said:
-        raise TextError("audit_unknown", text=short(text), names=ANSWERS)
+    if answer not in known or name != "said" or not said:
+        raise TextError("audit_unknown", text=short(text), names=known)
     return AuditAnswer(answer, said)
 
 

@@ -8,6 +8,7 @@ a semicolon-separated file `points` has a decimal comma. `criterion` says what a
 | an id of the rubric | `full`, `partial`, `none`, `follow_through`, `not_judged` | blank, or as given |
 | `node:FIGURE:NODE` | the node's place, ``x,y`` in millimetres of the sheet | blank |
 | `audit:ID` | ``right; said=full``: whether the settled verdict is right (or `wrong`, `unclear`) | blank |
+| `second:ID` | ``none; said=full``: a second person's verdict, and the first one's | how many more it gives |
 | `page:FILE#N` | ``owner=s03; turn=90; corners=x,y x,y x,y x,y``, at least one of them | blank |
 | `total` | blank | added, or taken away with a minus |
 | `comment` | blank | blank |
@@ -29,6 +30,7 @@ from typing import Literal
 from grader.files import OutputError, guarded, make_folder, sync_folder, unguarded, write_whole
 from grader.records import Reason, Value
 from grader.tables.decision_texts import (
+    ANSWERS,
     LARGEST,
     AuditAnswer,
     PageDecision,
@@ -56,7 +58,7 @@ from reference.errors import PlanmarkError
 FILE_NAME = "decisions.csv"
 COLUMNS = ("student_id", "position", "criterion", "verdict", "points", "comment", "by", "at", "basis")
 VERDICTS = ("full", "partial", "none", "follow_through", "not_judged")
-Kind = Literal["verdict", "audit", "node", "page", "total", "comment"]
+Kind = Literal["verdict", "audit", "second", "node", "page", "total", "comment"]
 Key = tuple[str, int | None, str]
 """Subject of a row: student, position, criterion; of a page the page alone."""
 
@@ -113,7 +115,7 @@ class Decision:
         """The kind of decision, by its criterion."""
         start = self.criterion.partition(":")[0]
         match start:
-            case "audit" | "node" | "page" if ":" in self.criterion:
+            case "audit" | "second" | "node" | "page" if ":" in self.criterion:
                 return start
             case "total" | "comment":
                 return start
@@ -150,8 +152,9 @@ class Decision:
 
     @property
     def audited(self) -> tuple[str, AuditAnswer]:
-        """The criterion whose settled verdict was audited, and the answer. Raises TextError."""
-        return self.criterion.partition(":")[2], audit_answer(self.verdict)
+        """The criterion that was audited or marked a second time, and the answer. Raises TextError."""
+        known = VERDICTS if self.kind == "second" else ANSWERS
+        return self.criterion.partition(":")[2], audit_answer(self.verdict, known)
 
     @property
     def page(self) -> PageDecision:
@@ -306,7 +309,7 @@ def _faults_of_kind(row: Decision) -> Iterator[tuple[str, Reason]]:
                 yield "criterion", Reason("criterion_empty")
             if row.verdict not in VERDICTS:
                 yield "verdict", Reason("verdict_unknown", {"text": short(row.verdict), "names": VERDICTS})
-        case "audit":
+        case "audit" | "second":
             yield from _fault("verdict", lambda: row.audited)
         case "node":
             yield from _fault("criterion", lambda: row.node)

@@ -107,6 +107,8 @@ REFUSALS: dict[str, str] = {
     "criterion_unknown": N_("%(student)s has no criterion %(name)s"),
     "answer_empty": N_("say whose the page is, or turn it, or give its corners"),
     "no_answer": N_("“%(given)s” is no answer"),
+    "second_own": N_("another person must have decided this before you mark it a second time"),
+    "comment_changed": N_("other decisions have this comment by now: look at it again, then change it"),
     "no_number": N_("“%(given)s” is no number that can be used here"),
     "no_whole_number": N_("%(given)s is no whole number"),
     # Around every request

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from urllib.parse import urlencode
 
 import pytest
 import uvicorn
@@ -159,25 +160,26 @@ def chromium():
 class Window:
     """A window of the browser with the review's page in it."""
 
-    def __init__(self, page, address, student=""):
+    def __init__(self, page, address):
         self.page, self.keys, self.screens = page, 0, set()
         self.faults = []
         page.on("pageerror", lambda error: self.faults.append(str(error)))
         page.set_default_timeout(PATIENCE_MS)
-        page.goto(f"{address}?student={student}" if student else address)
+        page.goto(address)
         self.ready()
 
     def ready(self):
         """Wait until a question is there to be answered, or there is none."""
         self.page.wait_for_function(
-            "() => document.body.dataset.shown && !document.body.dataset.busy"
+            "() => (document.body.dataset.shown || !document.getElementById('done').hidden)"
+            " && !document.body.dataset.busy"
             " && (document.body.dataset.ready || document.getElementById('question').hidden)"
         )
         self.screens.add(self.shown)
 
     @property
     def shown(self):
-        return self.page.evaluate("document.body.dataset.shown.split(' ')[0]")
+        return self.page.evaluate("(document.body.dataset.shown || '').split(' ')[0]")
 
     @property
     def open(self):
@@ -205,10 +207,12 @@ def open_window(chromium):
     """Opens windows on a server: each of a person's own, of a size in pixels."""
     contexts, windows = [], []
 
-    def opened(server, width=1280, height=800, student="", **settings):
+    def opened(server, width=1280, height=800, student="", part="", criterion="", **settings):
         context = chromium.new_context(viewport={"width": width, "height": height}, **settings)
         contexts.append(context)
-        windows.append(Window(context.new_page(), server.address, student))
+        asked = {"student": student, "part": part, "criterion": criterion}
+        query = urlencode({name: value for name, value in asked.items() if value})
+        windows.append(Window(context.new_page(), f"{server.address}?{query}"))
         return windows[-1]
 
     yield opened

@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 
 from grader.records import Figure
+from tests.browser.test_serve import violations
 
 pytestmark = pytest.mark.slow
 
@@ -54,7 +55,28 @@ def test_every_key_does_what_the_page_says(open_window, server):
     (row,) = server.decisions().values()
     assert (row.criterion, row.verdict, row.comment) == (criterion, "partial", "look at the arrow 2")
     assert student == "m03"
-    assert page.locator("#comments button", has_text="look at the arrow 2").count() == 1
+
+
+def test_a_comment_is_given_again_by_one_key_and_changed_for_all_who_have_it(open_window, server):
+    window = open_window(server, student="m01")
+    page = window.page
+    page.fill("#comment", "no arrow")
+    page.fill("#points", "1")
+    page.click("#choices [data-key='2']")
+    page.wait_for_selector("body:not([data-busy])")
+    other = open_window(server, student="m02")
+    other.press("5")
+    rows = [(key, row.verdict, row.points, row.comment) for key, row in server.decisions().items()]
+    assert rows == [((student, "v_DC"), "partial", 1.0, "no arrow") for student in ("m01", "m02")]
+    page = open_window(server, 320, 800, student="m04").page
+    page.locator("#comments [aria-label]").first.click()
+    assert page.inner_text("#kept-count") == "Changes 2 students"
+    assert not violations(page)
+    page.fill("#kept-points", "0.5")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#comments :text('0.5')")
+    assert [row.points for row in server.decisions().values()] == [0.5, 0.5]
+    assert page.evaluate("document.documentElement.scrollWidth") <= 320
 
 
 def test_a_class_is_settled_by_mouse_on_a_phone(open_window, server):
@@ -180,6 +202,7 @@ def test_wheel_and_buttons_zoom_into_the_scan(open_window, server):
     assert width() > nearer
     page.click("#whole")
     assert width() > 400.0
+    assert not violations(page)
 
 
 def test_eight_to_a_screen(open_window, server):
@@ -287,6 +310,55 @@ def test_a_comment_on_the_whole_is_kept(open_window, server):
     page.wait_for_selector("#note:visible")
     rows = {row.criterion: row for row in server.decisions().values()}
     assert (rows["comment"].comment, rows["total"].points) == ("drawn with care", 1.5)
+
+
+# A class shared among several people ------------------------------------------------------------------
+
+
+def settled_in(window):
+    """Settle all that a window asks, and return whose questions they were."""
+    seen = set()
+    while not window.is_done:
+        seen.add(window.shown.split("/")[0])
+        window.press("Enter" if window.page.is_enabled("#accept") else "1")
+    return seen
+
+
+def test_a_class_is_shared_by_student_and_all_settle_into_the_same_decisions(open_window, server):
+    windows = [open_window(server, part=f"{share}/3") for share in (1, 2, 3)]
+    asked = sum(window.open for window in windows)
+    for window, name in zip(windows, ("Ana", "Ion", "Maria"), strict=True):
+        window.page.evaluate("name => { document.getElementById('by').value = name; }", name)
+    ana, ion, maria = (settled_in(window) for window in windows)
+    assert len(ana) + len(ion) + len(maria) == len(ana | ion | maria) == SHEETS
+    assert len(server.decisions()) >= asked - 2
+    page = open_window(server).page
+    assert page.get_attribute("#progress", "data-open") == "0"
+    page.click("#share")
+    page.fill("#parts", "3")
+    whole, *parts = page.locator("#share-list tr").all_inner_texts()
+    assert all(name in whole for name in ("Ana", "Ion", "Maria"))
+    assert [part.split("\n")[1].split()[0] for part in parts[:3]] == ["Ana", "Ion", "Maria"]
+
+
+def test_a_part_by_criterion_asks_of_that_alone_and_says_what_is_left(open_window, server):
+    window = open_window(server, 320, 800, criterion="a_DC_t")
+    page, was_open = window.page, window.open
+    assert page.inner_text("#share") == "a_DC_t"
+    settled_in(window)
+    assert {criterion for _, criterion in server.decisions()} == {"a_DC_t"}
+    assert len(server.decisions()) == was_open
+    assert "rest of the class: 3" in page.inner_text("#done-title")
+    page.click("#share")
+    assert not violations(page)
+    assert page.evaluate("document.documentElement.scrollWidth") <= 320
+
+
+@pytest.mark.parametrize("part", [{"part": "4/3"}, {"part": "half"}, {"criterion": "v_Q"}])
+def test_a_part_that_there_is_not_is_told_and_hides_nothing(open_window, server, part):
+    window = open_window(server, **part)
+    assert "no part of this class" in window.page.inner_text("#note")
+    assert window.open > SHEETS
 
 
 # Questions of reading ---------------------------------------------------------------------------------

@@ -1,8 +1,9 @@
 "use strict";
-// The audit: a settled verdict, the drawing it is about, and one key. Nothing is kept here.
+// The audit: a settled verdict, the drawing it is about, and one key. Nothing is kept here. With `?second=20`
+// a fifth of what others decided is marked a second time, blind: one key gives the verdict.
 
 const ANSWER_KEYS = { 1: "right", 2: "wrong", 3: "unclear" };
-const VERDICT_KEYS = { 1: "full", 2: "partial", 3: "none", 4: "follow_through" };
+const second = new URLSearchParams(location.search).get("second");
 const state = { question: null, correcting: null, busy: false, ready: false };
 
 const viewer = new Viewer($("view"), () => {});
@@ -23,20 +24,32 @@ function show(facts) {
   $("done").hidden = Boolean(question);
   $("found").textContent = $("found-last").textContent = facts.found;
   $("none").textContent = facts.none;
-  $("instead").hidden = true;
-  $("answers").hidden = false;
+  $("instead").hidden = !second;
+  $("answers").hidden = Boolean(second);
+  showDiffering(facts.differ || []);
   document.body.dataset.shown = question ? `${question.student}/${question.criterion}` : "";
   if (!question) return;
-  $("who").textContent = stored.get("anonymous", "") === "1" ? `# ${question.number}` : question.label;
+  $("who").textContent = whoOf(question);
   showFacts(question);
+  if (second) { $("instead-text").textContent = question.asks; $("points").value = ""; $("most").textContent = `/ ${question.most}`; }
   $("badge").className = `badge v-${question.said}`;
   $("badge").textContent = question.mark;
   $("asks").textContent = question.asks;
-  for (const tool of document.querySelectorAll(".tools button")) tool.hidden = !question.look;
   if (question.look) viewer.show({ ...question.look, nodes: [] }); else state.ready = true;
 }
 
-const next = async () => show(await call("api/audit"));
+function showDiffering(pairs) {
+  $("differ").hidden = $("to-differ").hidden = !pairs.length;
+  $("differ-list").replaceChildren(...pairs.map((one) => {
+    const item = element("li"), link = element("a", { href: `./#${encodeURIComponent(`${one.student}/${one.criterion}`)}` });
+    link.innerHTML = one.title;
+    item.append(whoOf(one), " ", link, ` ${one.said}`);
+    return item;
+  }));
+}
+
+const whoOf = (one) => (stored.get("anonymous", "") === "1" ? `# ${one.number}` : one.label);
+const next = async () => show(await call(second ? `api/second?${new URLSearchParams({ share: second, by: decider() })}` : "api/audit"));
 
 function check(answer) {
   const question = state.question;
@@ -56,7 +69,17 @@ function check(answer) {
   });
 }
 
+function markAgain(verdict) {
+  const { student, criterion, seen } = state.question, points = verdict === "partial" || verdict === "follow_through" ? $("points").value : "";
+  if (state.ready) busy(async () => {
+    try { show(await call("api/second", { student, criterion, verdict, seen, share: Number(second), points: points === "" ? null : Number(points) })); }
+    catch (error) { await next(); throw error; }
+    tell("");
+  });
+}
+
 function correct(verdict) {
+  if (second) { markAgain(verdict); return; }
   const { student, criterion, seen } = state.correcting;
   busy(async () => {
     await call("api/decide", { answers: [{ student, criterion, verdict, seen }] });
@@ -67,17 +90,17 @@ function correct(verdict) {
 function undo() {
   busy(async () => {
     const done = await call("api/undo", {});
-    tell(done.undone ? "" : texts.undone);
+    tell(done.undone ? "" : texts.nothing_to_undo);
     await next();
   });
 }
 
 document.addEventListener("keydown", (event) => {
-  if (event.ctrlKey || event.metaKey || event.altKey || event.repeat) return;
+  if (event.ctrlKey || event.metaKey || event.altKey || event.repeat || event.target.closest("input")) return;
   const letter = event.code.startsWith("Key") ? event.code.slice(3).toLowerCase() : event.key;
-  if (state.correcting && VERDICT_KEYS[event.key]) correct(VERDICT_KEYS[event.key]);
+  if ((second ? state.question : state.correcting && event.key !== "0") && VERDICT_KEYS[event.key]) correct(VERDICT_KEYS[event.key]);
   else if (state.correcting && event.key === "ArrowRight") busy(next);
-  else if (ANSWER_KEYS[event.key]) check(ANSWER_KEYS[event.key]);
+  else if (!second && ANSWER_KEYS[event.key]) check(ANSWER_KEYS[event.key]);
   else if (letter === "u") undo();
   else if (letter === "f") viewer.whole();
   else if (event.key === " " && !event.target.closest("button, a")) hideMarks();
@@ -90,4 +113,10 @@ $("undo").onclick = undo;
 $("later").onclick = () => busy(next);
 $("hide").onclick = hideMarks;
 $("whole").onclick = () => viewer.whole();
+$("by").value = $("by").readOnly ? document.body.dataset.by : stored.get("by", document.body.dataset.by);
+$("by").onchange = () => { stored.set("by", $("by").value.trim()); busy(next); };
+$("share").value = second || 20;
+$("share").onchange = () => { location.search = `?second=${$("share").value}`; };
+for (const part of document.querySelectorAll(".of-second")) part.hidden = !second;
+for (const part of document.querySelectorAll(".of-audit")) part.hidden = Boolean(second);
 busy(next);

@@ -2,20 +2,56 @@
 // The review page: one question after the other, by keys, mouse or touch. Everything that is decided is sent
 // to the server at once; nothing is kept here but where one is and what is shown.
 
-const VERDICT_KEYS = { 1: "full", 2: "partial", 3: "none", 4: "follow_through", 0: "not_judged" };
 const FIRST_GUESS_S = 6, LONGEST_LOOK_S = 60, LOOKS_COUNTED = 20, POLL_MS = 2500;
-const EIGHT = 8;
+const EIGHT = 8, MOST_KEPT = 12, KEPT_KEYS = "56789", PART_OF_POINTS = ["partial", "follow_through"];
 
 const state = {
   students: new Map(), rows: new Map(), version: -1, mode: "student", list: [], at: 0, question: null, busy: false,
   comments: [], looks: [], shown: performance.now(), tiles: [], tile: 0, fetched: new Map(), page: null,
 };
 
+// The part of the class that this window shows: `?part=2/3` by student, `?criterion=v_B,v_C` by criterion ------
+
+const address = new URLSearchParams(location.search), wholeClass = { criteria: [] };
+const part = { share: /^([1-9]\d*)\/([1-9]\d?)$/.exec(address.get("part") || ""), criteria: (address.get("criterion") || "").split(",").filter(Boolean) };
+
+function isOf(row, { share, criteria }) {
+  const isStudent = !share || state.students.get(row.student).place % share[2] === share[1] - 1;
+  return isStudent && (!criteria.length || [row.criterion, ...(row.covers || [])].some((name) => criteria.includes(name)));
+}
+
+function checkPart() {
+  const known = new Set([...state.rows.values()].map((row) => row.criterion)), isAsked = address.get("part") || address.get("criterion");
+  const isThere = (!address.get("part") || (part.share && Number(part.share[1]) <= Number(part.share[2]))) && part.criteria.every((name) => known.has(name));
+  if (!isThere) { Object.assign(part, { share: null }, wholeClass); advise(texts.no_part); }
+  else if (isAsked) $("share").textContent = partName(part);
+}
+
+function partName({ share, criteria }) {
+  const part = share ? texts.part.replace("{count}", share[1]).replace("{whole}", share[2]) : "";
+  return [part, criteria.join(", ")].filter(Boolean).join(" · ") || texts.whole_class;
+}
+
+/** How far each part is, and who has decided in it. */
+function showShares() {
+  const count = Math.min(Math.max(Number($("parts").value) || 2, 2), 99), rows = [...state.rows.values()];
+  const shares = Array.from({ length: count }, (_, at) => ({ share: ["", at + 1, count], criteria: [] }));
+  const names = [...new Set(rows.filter((row) => isSingle(row) && (isOpen(row) || row.decided)).map((row) => row.criterion))];
+  $("share-list").replaceChildren(...[wholeClass, ...shares, ...names.map((name) => ({ criteria: [name] }))].map((one) => {
+    const own = rows.filter((row) => isOf(row, one)), settled = own.filter((row) => row.decided), by = new Map(), line = element("tr"), name = element("td");
+    for (const row of settled) by.set(row.by || texts.somebody, (by.get(row.by || texts.somebody) || 0) + 1);
+    name.append(element("a", { href: one.share ? `?part=${one.share[1]}/${count}` : one.criteria.length ? `?criterion=${one.criteria}` : "?" }, partName(one)), element("div", { class: "small soft" }, [...by].map((each) => each.join(" ")).join(", ")));
+    line.append(name, ...[own.filter(isOpen).length, settled.length].map((text) => element("td", { class: "number" }, String(text))));
+    return line;
+  }));
+}
+
 // What there is to decide --------------------------------------------------------------------------
 
 const keyOf = (row) => `${row.student}/${row.criterion}`;
 const isOpen = (row) => (row.verdict === "review" && !row.under) || row.asked;
 const isSingle = (row) => !row.kind;
+const isMine = (row) => isOf(row, part);
 const current = () => state.rows.get(state.list[state.at]);
 const nameOf = (student) => ($("anonymous").checked ? `${texts.sheet} ${student.number + 1}` : student.label);
 
@@ -48,7 +84,7 @@ function takeQuestion(asked) {
 
 function ordered() {
   // Where most points are at stake first: students by the sum of theirs, criteria by the sum of the class.
-  const rows = [...state.rows.values()], sums = new Map();
+  const rows = [...state.rows.values()].filter(isMine), sums = new Map();
   const group = state.mode === "student" ? (row) => row.student : (row) => row.criterion;
   for (const row of rows) sums.set(group(row), (sums.get(group(row)) || 0) + (isOpen(row) ? row.stake : 0));
   const inside = state.mode === "student" ? (row) => row.rank ?? 1000 + row.order : (row) => row.probability ?? 0;
@@ -59,11 +95,12 @@ function ordered() {
 function relist(keep) {
   const all = $("all").checked;
   state.list = ordered().filter((row) => all || isOpen(row) || keyOf(row) === keep).map(keyOf);
+  if (state.rows.has(keep) && !state.list.includes(keep)) state.list.unshift(keep);
   state.at = Math.max(0, state.list.indexOf(keep));
 }
 
 function showProgress() {
-  const rows = [...state.rows.values()], open = rows.filter(isOpen).length;
+  const rows = [...state.rows.values()].filter(isMine), open = rows.filter(isOpen).length;
   const settled = rows.filter((row) => row.decided).length;
   const mean = state.looks.length ? state.looks.reduce((a, b) => a + b) / state.looks.length : FIRST_GUESS_S;
   const minutes = Math.ceil((open * mean) / 60);
@@ -128,14 +165,20 @@ async function showQuestion(keepView = false) {
   }));
   $("not-judged").disabled = question.choices.some((choice) => choice.answers.length !== 1 || choice.answers[0].criterion !== question.criterion);
   $("look-note").textContent = question.look && question.look.note ? texts[question.look.note] : "";
-  if (!same) $("comment").value = question.comment;
+  if (!same) { $("comment").value = question.comment; $("points").value = question.points ?? ""; }
+  $("points").disabled = $("not-judged").disabled;
+  $("most").textContent = question.most ? `/ ${question.most}` : "";
   $("score").textContent = student.score;
   $("remark").value = student.remark;
   $("added").value = student.added || "";
-  $("comments").replaceChildren(...state.comments.slice(0, 6).map((text) => {
-    const chip = element("button", { type: "button" }, text);
-    chip.onclick = () => { $("comment").value = text; };
-    return chip;
+  $("comments").replaceChildren(...keptHere().map((kept, index) => {
+    const item = element("span"), chip = element("button", { type: "button", title: `${kept.comment}, ${texts.verdicts[kept.verdict]}` });
+    chip.innerHTML = `${KEPT_KEYS[index] ? `<kbd>${KEPT_KEYS[index]}</kbd> ` : ""}${kept.label}`;
+    chip.onclick = () => useKept(kept);
+    const change = element("button", { type: "button", "aria-label": texts.change_comment.replace("{text}", kept.comment) }, "✎");
+    change.onclick = () => showKept(kept);
+    item.append(chip, change);
+    return item;
   }));
   setReady(!question.look);
   if (question.look) {
@@ -184,13 +227,20 @@ function failed(error) {
 }
 
 function answerOf(question, verdict) {
-  return { student: question.student, criterion: question.criterion, verdict, comment: $("comment").value.trim(), seen: question.seen };
+  return { student: question.student, criterion: question.criterion, verdict, seen: question.seen };
+}
+
+/** An answer with the comment and the points that are written beside it; a verdict of all or nothing has none. */
+function withWords(answer) {
+  const isPart = PART_OF_POINTS.includes(answer.verdict) && !$("points").disabled, points = $("points").value;
+  return {
+    comment: answer.criterion.startsWith("node:") ? "" : $("comment").value.trim(), points: isPart && points !== "" ? Number(points) : null, ...answer,
+  };
 }
 
 function send(answers) {
-  const comment = $("comment").value.trim();
   return busy(async () => {
-    take(await call("api/decide", { answers: answers.map((one) => ({ ...one, comment: one.criterion.startsWith("node:") ? "" : comment })) }));
+    take(await call("api/decide", { answers: answers.map(withWords) }));
     looked(); showProgress(); tell("");
     onward();
   });
@@ -217,13 +267,41 @@ function accept() {
 
 function saveComment() {
   const row = current();
-  if (!row || isOpen(row)) { $("comment").blur(); return; }
+  if (!row || isOpen(row)) { document.activeElement.blur(); return; }
   busy(async () => {
-    take(await call("api/decide", { answers: [answerOf(state.question, row.verdict)] }));
+    take(await call("api/decide", { answers: [withWords(answerOf(state.question, row.verdict))] }));
     advise(texts.saved);
-    $("comment").blur();
+    document.activeElement.blur();
     await showQuestion(true);
   });
+}
+
+// Comments kept for reuse --------------------------------------------------------------------------
+
+/** The comments that were given to the criterion before; none where a question is about more than its verdict. */
+function keptHere() {
+  return $("not-judged").disabled ? [] : state.comments.filter((one) => one.criterion === state.question.criterion).slice(0, MOST_KEPT);
+}
+
+function useKept({ verdict, comment, points }) {
+  if (state.ready) send([{ ...answerOf(state.question, verdict), comment, points }]); else tell(texts.wait);
+}
+
+function showKept(kept) {
+  const isPart = PART_OF_POINTS.includes(kept.verdict), { criterion, verdict, comment, points, students } = kept;
+  $("kept-what").innerHTML = `${state.question.title}: ${kept.label}`;
+  $("kept-words").value = comment;
+  $("kept-points").value = points ?? "";
+  $("kept-points").disabled = !isPart;
+  $("kept-count").textContent = kept.changes;
+  $("kept-list").replaceChildren(...students.map((key) => element("li", {}, nameOf(state.students.get(key)))));
+  $("kept-save").onclick = () => busy(async () => {
+    const worth = isPart && $("kept-points").value !== "" ? Number($("kept-points").value) : null;
+    take(await call("api/comment", { criterion, verdict, comment, points, students, words: $("kept-words").value.trim(), worth }));
+    state.question = null;
+    await refreshScreen();
+  });
+  $("kept").showModal();
 }
 
 function undo() {
@@ -325,7 +403,7 @@ function decideTiles(indices, verdict) {
 
 function sureOnes() {
   const least = Number($("least").value) / 100;
-  return [...state.rows.values()].filter((row) => isOpen(row) && isSingle(row) && row.proposed && row.probability !== null && row.probability >= least);
+  return [...state.rows.values()].filter((row) => isMine(row) && isOpen(row) && isSingle(row) && row.proposed && row.probability !== null && row.probability >= least);
 }
 
 function showSure() {
@@ -449,9 +527,10 @@ function savePage() {
 // Finished -----------------------------------------------------------------------------------------
 
 function showDone() {
-  const open = [...state.rows.values()].filter(isOpen).length;
-  $("done-title").textContent = open ? texts.still_open.replace("{open}", open) : texts.all_settled;
-  $("done-text").textContent = open ? texts.can_finish : texts.now_finish;
+  const all = [...state.rows.values()].filter(isOpen), open = all.filter(isMine).length;
+  const settled = all.length ? texts.part_settled.replace("{open}", all.length) : texts.all_settled;
+  $("done-title").textContent = open ? texts.still_open.replace("{open}", open) : settled;
+  $("done-text").textContent = all.length ? texts.can_finish : texts.now_finish;
 }
 
 function finish() {
@@ -522,10 +601,10 @@ document.addEventListener("keydown", (event) => {
   const field = event.target.closest("input, textarea, select");
   if (field) {
     if (event.key === "Escape") field.blur();
-    else if (event.key === "Enter" && !event.shiftKey && field.id === "comment") { event.preventDefault(); saveComment(); }
+    else if (event.key === "Enter" && !event.shiftKey && ["comment", "points"].includes(field.id)) { event.preventDefault(); saveComment(); }
     return;
   }
-  if (event.ctrlKey || event.metaKey || event.altKey || $("sure").open) return;
+  if (event.ctrlKey || event.metaKey || event.altKey || document.querySelector("dialog[open]")) return;
   const onButton = event.target.closest("button, summary, a") && (event.key === "Enter" || event.key === " ");
   if (onButton || event.repeat) return;
   const asks = !$("question").hidden, eight = !$("eight").hidden;
@@ -540,10 +619,12 @@ document.addEventListener("keydown", (event) => {
   const key = letter.length === 1 ? letter.toLowerCase() : letter, verdict = VERDICT_KEYS[event.key];
   if (!asks && !eight && key !== "u") return;
   const place = asks && state.question && state.question.kind === "node" ? "abc".indexOf(key) : -1;
-  const answers = verdict || key === "Enter" || (place >= 0 && key.length === 1);
+  const kept = asks && key.length === 1 ? keptHere()[KEPT_KEYS.indexOf(key)] : undefined;
+  const answers = verdict || kept || key === "Enter" || (place >= 0 && key.length === 1);
   if (asks && answers && !state.ready) { event.preventDefault(); tell(texts.wait); return; }
   if (verdict && eight) { if (verdict !== "not_judged") decideTiles([state.tile], verdict); }
   else if (verdict) { if (verdict === "not_judged") notJudged(); else choose(Number(event.key) - 1); }
+  else if (kept) useKept(kept);
   else if (place >= 0 && key.length === 1) choose(place);
   else if (acts[key]) acts[key]();
   else return;
@@ -563,6 +644,8 @@ $("wider").onclick = () => viewer.zoom(1.4);
 $("whole").onclick = () => viewer.whole();
 $("accept-shown").onclick = () => decideTiles([...state.tiles.keys()]);
 $("proposals").onclick = () => { $("settings").open = false; showSure(); $("sure").showModal(); };
+$("share").onclick = () => { showShares(); $("shared").showModal(); };
+$("parts").oninput = showShares;
 $("least").oninput = showSure;
 $("sure-accept").onclick = acceptSure;
 $("turn-left").onclick = () => turnPage(90);
@@ -583,13 +666,16 @@ $("anonymous").checked = stored.get("anonymous", "") === "1";
 $("anonymous").onchange = () => { stored.set("anonymous", $("anonymous").checked ? "1" : ""); jumps(); refreshScreen().catch(failed); };
 $("all").onchange = () => refreshScreen().catch(failed);
 $("settings").ontoggle = () => { if ($("settings").open) jumps(); };
-$("jump").onchange = () => {
-  const wanted = $("jump").value;
-  if (!wanted) return;
+function goTo(key) {
   $("all").checked = true; state.mode = "student"; $("settings").open = false;
-  relist([...state.rows.values()].filter((row) => row.student === wanted).map(keyOf)[0]);
+  relist(key);
   showSection("question");
   showQuestion().catch(failed);
+}
+
+$("jump").onchange = () => {
+  const wanted = $("jump").value;
+  if (wanted) goTo([...state.rows.values()].filter((row) => row.student === wanted).map(keyOf)[0]);
 };
 
 async function poll() {
@@ -607,10 +693,12 @@ async function poll() {
 
 (async () => {
   take(await call("api/class"));
-  const wanted = new URLSearchParams(location.search).get("student");
+  checkPart();
+  showProgress();
   relist();
-  const first = state.list.find((key) => state.rows.get(key).student === wanted);
+  const first = state.list.find((key) => state.rows.get(key).student === address.get("student"));
   if (first) state.question = state.rows.get(first);
-  showMode("student");
+  const linked = decodeURIComponent(location.hash.slice(1));
+  if (state.rows.has(linked)) goTo(linked); else showMode("student");
   setTimeout(poll, POLL_MS);
 })().catch(failed);

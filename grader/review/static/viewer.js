@@ -5,6 +5,7 @@
 const $ = (id) => document.getElementById(id);
 const texts = JSON.parse($("texts").textContent);
 const SVG = "http://www.w3.org/2000/svg";
+const VERDICT_KEYS = { 1: "full", 2: "partial", 3: "none", 4: "follow_through", 0: "not_judged" };
 const SETTLE_MS = 160;
 const stored = {
   get: (name, otherwise) => { try { return localStorage.getItem(`planmark-${name}`) ?? otherwise; } catch { return otherwise; } },
@@ -223,6 +224,7 @@ function showFacts(question) {
   $("view").style.display = question.look ? "" : "none";
   $("no-scan").hidden = Boolean(question.look);
   $("no-scan").textContent = texts.no_scan;
+  for (const tool of document.querySelectorAll(".tools button")) tool.hidden = !question.look;
 }
 
 async function busy(work) {

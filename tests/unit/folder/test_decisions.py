@@ -440,7 +440,7 @@ def test_a_wrong_verdict_that_was_checked_opens_those_like_it_and_says_so(folder
 
 def test_a_right_one_changes_no_mark_and_counts_for_what_the_program_still_says(folder):
     before = run(folder)
-    decide(folder, row("audit:v_B", "right; said=full", "s2"))
+    decide(folder, row("audit:v_B", "right; said=full", "s2"), row("second:v_B", "none; said=full", "s2"))
     results = run(folder)
     assert results.moved == []
     assert [one.criteria for one in results.reports] == [one.criteria for one in before.reports]
@@ -460,7 +460,9 @@ def test_an_audit_that_cannot_be_read_is_an_error_with_its_line(folder, verdict)
     path = folder / "decisions.csv"
     path.write_text(
         f"{','.join(COLUMNS)}\ns1,,audit:v_A,{verdict},,,,,\ns1,,audit:v_X,right; said=full,,,,,\n"
+        f"s1,,second:v_A,{verdict},,,,,\n"
     )
     messages = [one.message for one in run(folder).unmatched]
     assert messages[0].startswith("line 2, verdict: ")
     assert messages[1].startswith("line 3, criterion: 'v_X' is not in this rubric")
+    assert messages[2].startswith("line 4, verdict: ")

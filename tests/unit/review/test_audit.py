@@ -1,8 +1,15 @@
 """Settled verdicts are checked one by one; a wrong one opens those like it at once, and can be corrected."""
 
+import json
+
 import pytest
 
-from grader.review.audit import SHORT
+from grader.language import tongue
+from grader.overlay.scene import COLOURS
+from grader.review.audit import LEAST_FOR_AC1, SHORT, agreement
+from grader.review.server import application
+from grader.tables.decisions import VERDICTS
+from tests.unit.review.conftest import Page
 
 
 def checked(page, question, answer, **said):
@@ -100,3 +107,87 @@ def test_the_page_and_its_script_are_there(page):
     assert "audit.js" in page.get("/audit").text
     assert "use strict" in page.get("/audit.js").text
     assert 'href="audit"' in page.get("/").text
+
+
+# A second marking -----------------------------------------------------------------------------------
+
+
+def second(page, by="Ion", share=100):
+    return page.get("/api/second", params={"by": by, "share": share}).json()
+
+
+def marked(page, question, verdict, **said):
+    about = {name: question[name] for name in ("student", "criterion", "seen")}
+    return page.said("/api/second", **{**about, "verdict": verdict, "share": 100, "by": "Ion", **said})
+
+
+def test_a_decision_is_marked_again_by_another_person_who_does_not_see_it(page, session):
+    page.answer("s02", "v_B", "none", comment="turned round")
+    assert second(page, by=" ana")["question"] is None
+    question = second(page)["question"]
+    assert (question["student"], question["criterion"]) == ("s02", "v_B")
+    shown = json.dumps(question, ensure_ascii=False)
+    assert not [told for told in ("Ana", "wrong", "turned round", COLOURS["none"]) if told in shown]
+    assert COLOURS["review"] in question["look"]["marks"]
+    rows = page.rows()
+    told = marked(page, question, "full").json()
+    assert page.rows() == rows
+    row = session._file.all()[-1]
+    assert (row.criterion, row.verdict, row.by) == ("second:v_B", "full; said=none", "Ion")
+    assert row.points == session.student("s02").criterion("v_B").max_points
+    assert told["question"] is None
+    assert told["found"].startswith("Equal verdicts: 0 of 1")
+    (pair,) = told["differ"]
+    assert pair["said"] == "Ana: wrong, Ion: right"
+
+
+def test_a_disagreement_is_settled_by_a_later_decision_and_stays_in_the_figures(page):
+    page.answer("s09", "v_B", "none")
+    marked(page, second(page)["question"], "full")
+    question = page.get("/api/question", params={"student": "s09", "criterion": "v_B"}).json()
+    assert "Ion" in question["why"]
+    page.answer("s09", "v_B", "full")
+    assert second(page)["differ"] == []
+    assert second(page)["found"].startswith("Equal verdicts: 0 of 1")
+
+
+def test_other_points_of_the_same_verdict_are_a_disagreement(page):
+    page.answer("s09", "v_B", "partial", points=1)
+    told = marked(page, second(page)["question"], "partial", points=0.5).json()
+    assert "second minus first: −0.5" in told["found"]
+    assert len(told["differ"]) == 1
+
+
+def test_the_share_is_drawn_alike_for_everybody_and_a_larger_one_has_the_smaller(page):
+    for name in ("v_A", "v_B", "v_D", "v_DC", "a_D"):
+        page.answer("s09", name, "full")
+    assert [second(page, share=share)["short"] for share in (1, 20, 21, 40, 100)] == [1, 1, 2, 2, 5]
+    assert second(page, by="Maria", share=20)["question"] == second(page, share=100)["question"]
+    marked(page, second(page, share=20)["question"], "full")
+    assert second(page, share=20)["question"] is None
+    assert second(page, share=40)["question"]
+
+
+def test_what_is_no_second_marking_is_refused(page, session):
+    page.answer("s09", "v_B", "none")
+    question = second(page)["question"]
+    assert marked(page, question, "full", by="Ana").status_code == 400
+    assert marked(page, question, "perfect").status_code == 400
+    assert marked(page, question, "partial", points=50).status_code == 400
+    assert marked(page, {**question, "criterion": "v_D"}, "full").status_code == 400
+    assert len(session._file.all()) == 1
+
+
+def test_agreement_beyond_chance_is_told_of_enough_criteria():
+    english = tongue("en")
+    same = [("full", "full", 0.0)] * LEAST_FOR_AC1
+    assert agreement(same, english).endswith("(Gwet's AC1): 1.")
+    assert "AC1" not in agreement(same[1:], english)
+    by_chance = [(first, again, None) for first in VERDICTS for again in VERDICTS] * 2
+    assert agreement(by_chance, english).endswith("(Gwet's AC1): 0.")
+
+
+def test_on_a_server_the_account_marks_whoever_the_page_says(session):
+    page = Page(application(session, by="Ana"), base_url="http://127.0.0.1:8321")
+    page.answer("s09", "v_B", "none")
+    assert second(page, by="Ion")["question"] is None

@@ -264,11 +264,76 @@ def test_no_answer_is_refused(page):
         assert page.said("/api/decide", **said).status_code == 400, said
 
 
-def test_a_comment_is_offered_again_the_commonest_first(page):
-    page.answer(ENTERED, "v_D", "full", comment="rare")
-    page.answer(ENTERED, "v_DC", "full", comment="usual")
-    page.answer(ENTERED, "v_A", "full", comment="usual")
-    assert page.get("/api/class").json()["comments"] == ["usual", "rare"]
+# Comments kept for reuse ----------------------------------------------------------------------------
+
+
+def commented(page, *, points=1.5):
+    """Two students have one comment on v_D, one has another; the first is what the page is told of it."""
+    for student in (ENTERED, SCANNED):
+        page.answer(student, "v_D", "partial", comment="no arrow", points=points)
+    page.answer(ENTERED, "v_A", "partial", comment="no arrow")
+    return page.get("/api/class").json()["comments"][0]
+
+
+def changed(page, kept, **said):
+    about = {name: kept[name] for name in ("criterion", "verdict", "comment", "points", "students")}
+    return page.said("/api/comment", **{**about, "words": kept["comment"], "worth": kept["points"], **said})
+
+
+def test_a_comment_is_offered_again_at_its_criterion_the_commonest_first(page):
+    first = commented(page)
+    kept = page.get("/api/class").json()["comments"]
+    assert [(one["criterion"], one["points"], one["students"]) for one in kept] == [
+        ("v_D", 1.5, [ENTERED, SCANNED]),
+        ("v_A", None, [ENTERED]),
+    ]
+    assert (first["verdict"], first["comment"], first["changes"]) == (
+        "partial",
+        "no arrow",
+        "Changes 2 students",
+    )
+
+
+def test_other_points_of_a_comment_count_for_all_who_have_it(page, session):
+    kept = commented(page)
+    before = decided(session)
+    students = changed(page, kept, words="arrow missing", worth=1, by="Ion").json()["students"]
+    assert {one["key"] for one in students} == {ENTERED, SCANNED}
+    for student in (ENTERED, SCANNED):
+        was, now = before[student, "v_D"], decided(session)[student, "v_D"]
+        # The verdict is still that of whoever decided it, about what was handed in then.
+        assert now == replace(was, comment="arrow missing", points=1.0)
+        assert session.student(student).criterion("v_D").points == 1.0
+    assert decided(session)["s09", "v_A"].comment == "no arrow"
+    page.said("/api/undo", window="another")
+    page.said("/api/undo")
+    assert decided(session) == before
+
+
+def test_a_comment_is_not_changed_for_others_than_those_who_were_shown(page, session):
+    kept = commented(page)
+    page.answer(SCANNED, "v_D", "none")
+    refused = changed(page, kept, worth=1)
+    assert refused.status_code == 409
+    assert decided(session)["s09", "v_D"].points == 1.5
+
+
+def test_a_stale_decision_stays_stale_under_a_changed_comment(page, session):
+    DecisionFile(session.batch.decisions_path).add(
+        Decision("s09", None, "v_D", "partial", 1.5, "no arrow", basis="b0.1.2.3")
+    )
+    (kept,) = page.get("/api/class").json()["comments"]
+    assert changed(page, kept, worth=1).status_code == 200
+    row = decided(session)["s09", "v_D"]
+    assert (row.points, row.basis) == (1.0, "b0.1.2.3")
+
+
+def test_points_that_contradict_the_verdict_are_refused_in_words(page, session):
+    assert page.answer(ENTERED, "v_D", "full", points=0.5).status_code == 400
+    assert "v_D" in page.answer(ENTERED, "v_D", "partial", points=50).json()["message"]
+    assert not decided(session)
+    assert changed(page, commented(page), worth=50).status_code == 400
+    assert decided(session)["s09", "v_D"].points == 1.5
 
 
 def test_a_comment_on_the_whole_and_points_added(page, session):
