@@ -79,7 +79,7 @@ def _first_line(paths: list[Path]) -> str:
 
 
 def arrows() -> Arrows:
-    """Which rooms each room imports from."""
+    """The rooms from which each room imports."""
     files = modules()
     found: dict[str, set[str]] = {room.name: set() for room in rooms()}
     for path in files.values():
@@ -107,7 +107,7 @@ def _imported(path: Path, files: Mapping[str, Path]) -> Iterator[str]:
 
 
 def reach(imports: Arrows) -> dict[str, set[str]]:
-    """All rooms that each room comes to by one arrow or more."""
+    """All rooms that each room reaches by one arrow or more."""
     reached = {name: set(others) for name, others in imports.items()}
     for middle in imports:
         for others in reached.values():
@@ -145,7 +145,7 @@ def table() -> str:
 
 
 WIDE, HIGH, GAP_X, GAP_Y, MARGIN = 132, 28, 10, 44, 12
-"""Of a box and between boxes, in pixels."""
+"""Sizes of boxes and gaps between them, in pixels."""
 IN_A_ROW = 8
 FILLS = {"grader": "#eef4fb", "reference": "#eef7ee"}
 
@@ -222,7 +222,7 @@ def ceilings() -> dict[str, int]:
 
 
 def lowered() -> str:
-    """The file of ceilings with those lowered above which there is too much air; a new room has one, too."""
+    """The file of ceilings, with those lowered that are too high; a new room gets one, too."""
     head, _, _ = _text(CEILINGS).partition("[lines]")
     known = ceilings()
     rows = (

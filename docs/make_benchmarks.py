@@ -27,7 +27,7 @@ SHOWN = (
     "Judging: single mistakes",
     "Settling: a class of scans",
 )
-"""How the titles of the page's tables begin."""
+"""The beginnings of the titles of the page's tables."""
 
 
 def main(wanted: list[str]) -> None:

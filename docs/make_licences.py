@@ -16,7 +16,7 @@ PAGE = Path(__file__).resolve().parent / "licences.md"
 EXTRAS = ("", "heic", "web", "cluster", "plots")
 _CLASSIFIER = re.compile(r"License ::(?: OSI Approved ::)? (.+)")
 _LONGEST = 60
-"""Of a licence's name; some packages have the whole text in its place."""
+"""Longest name of a licence; some packages have the whole text there."""
 BOUND = {
     "LGPL": "any program may use it whose users can exchange it for another version: it is installed apart"
     ", as it is. Whoever passes on a changed copy passes on its source, too",

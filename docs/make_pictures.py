@@ -33,9 +33,9 @@ WIDTH_PX = 1100
 WAITING, WRONG = "s02", "s05"
 """A student of whom a part waits for a person, and one with a finished mark and one mistake."""
 SHOWN_PX = {"feedback": 960, "class": 860, "worksheet": 360}
-"""How much of a page a picture shows, from its top."""
+"""Height of a page that a picture shows, from its top."""
 SHOWN_COLUMNS = (0, 1, 2, 5, 6, 10)
-"""Of the worksheet: who, grade, maximum, comment."""
+"""Columns of the worksheet: who, grade, maximum, comment."""
 
 
 def reference_picture() -> None:

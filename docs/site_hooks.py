@@ -1,4 +1,4 @@
-"""What the site has beside the files of this folder: pages that are written when it is built."""
+"""Add pages to the site that are not files of this folder: they are written when it is built."""
 
 import sys
 from pathlib import Path

@@ -70,7 +70,7 @@ class Pupil:
     settings: Settings
     seed: int
     hands_in: frozenset[str] = field(default=frozenset({"scans"}))
-    """Of scans, class pdf, answer sheet, csv, json, nothing."""
+    """Some of: scans, class pdf, answer sheet, csv, json, nothing."""
 
     @property
     def student_id(self) -> str:
@@ -133,7 +133,7 @@ PRESS = [
 
 
 def make_class(assignment: Assignment, pupils: Iterable[Pupil], folder: Path, delimiter: str) -> None:
-    """All files of one class."""
+    """Write all files of one class."""
     folder.mkdir(parents=True, exist_ok=True)
     truths: list[dict[str, Any]] = []
     roster: list[dict[str, Any]] = []
@@ -164,7 +164,7 @@ def make_class(assignment: Assignment, pupils: Iterable[Pupil], folder: Path, de
 
 
 def sheets_of(assignment: Assignment, pupil: Pupil) -> list[SimulatedSheet]:
-    """The student's sheets, on printed paper where the student got some."""
+    """Simulate the student's sheets, on printed paper where the student got some."""
     by_position = assignment.numbers("position") is not None
     variant = assignment.variant(None, pupil.variant) if by_position else assignment.variant(pupil.variant)
     printed = None
@@ -178,7 +178,7 @@ def sheets_of(assignment: Assignment, pupil: Pupil) -> list[SimulatedSheet]:
 
 
 def save(sheets: list[SimulatedSheet], pupil: Pupil, folder: Path) -> None:
-    """The student's scans as files of their own."""
+    """Save the student's scans, one file each."""
     for number, sheet in enumerate(sheets, start=1):
         name = pupil.student_id if len(sheets) == 1 else f"{pupil.student_id}_{number}"
         sheet.save(folder / name)
@@ -186,7 +186,7 @@ def save(sheets: list[SimulatedSheet], pupil: Pupil, folder: Path) -> None:
 
 
 def write_class_pdf(path: Path, sheets: list[SimulatedSheet]) -> None:
-    """One PDF, straight from the copier: every sheet with its blank back."""
+    """Write one PDF as from a copier: every sheet followed by its blank back."""
     rng = np.random.default_rng(5)
     pages = []
     for index, sheet in enumerate(sheets):
@@ -221,13 +221,13 @@ def roster_line(pupil: Pupil, sheets: list[SimulatedSheet]) -> dict[str, Any]:
 
 
 def measured_line(pupil: Pupil, sheets: list[SimulatedSheet]) -> dict[str, Any]:
-    """What the student measured on the drawing, to half a millimetre."""
+    """The student's measurements on the drawing, to half a millimetre."""
     measured = measured_by(sheets, np.random.default_rng([pupil.seed, 9]), spread_mm=0.15)
     return {"student_id": pupil.student_id, **variant_columns(sheets), **scales_of(sheets), **measured}
 
 
 def write_csv(path: Path, lines: list[dict[str, Any]], delimiter: str) -> None:
-    """A table with the columns of all lines; decimal commas where semicolons part them."""
+    """Write a table with the columns of all lines; with semicolons as delimiter, decimal commas."""
     columns = list(dict.fromkeys(name for line in lines for name in line))
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, delimiter=delimiter, lineterminator="\n")
@@ -240,7 +240,7 @@ def write_csv(path: Path, lines: list[dict[str, Any]], delimiter: str) -> None:
 
 
 def write_json(path: Path, line: dict[str, Any]) -> None:
-    """One student's measurements as JSON."""
+    """Write one student's measurements as JSON."""
     taken = {"student_id", "n", "position", *SCALE_UNITS}
     lengths = {name: value for name, value in line.items() if name not in taken and not name.endswith("_deg")}
     directions = {name.removesuffix("_deg"): value for name, value in line.items() if name.endswith("_deg")}
@@ -256,7 +256,7 @@ def write_json(path: Path, line: dict[str, Any]) -> None:
 
 
 def main(folder: Path) -> None:
-    """Both classes."""
+    """Make both classes."""
     make_class(load_assignment("pump"), PUMP, folder / "pump", ",")
     make_class(load_assignment("press"), PRESS, folder / "press", ";")
 

@@ -1,4 +1,4 @@
-"""What drawings and steps are tried on: built-in assignments, and a mechanism of each other kind."""
+"""Cases for tests of drawings and steps: built-in assignments, and a mechanism of each other kind."""
 
 from functools import cache
 

@@ -1,4 +1,4 @@
-"""What is tried: a part of the examples in the README's command, all of them in `.ci/run`."""
+"""The examples of a run: a part of them in the README's command, all of them in `.ci/run`."""
 
 import os
 from collections.abc import Iterable
@@ -13,7 +13,7 @@ PROFILE = os.environ.get("HYPOTHESIS_PROFILE", "quick")
 """`quick`; `full` with all examples; `fresh` with as many that are drawn anew."""
 FULL = PROFILE in {"full", "fresh"}
 SHARE = 5
-"""Of so many examples the README's command tries one: what breaks a law mostly breaks it at once."""
+"""The README's command tries one of this many examples: most faults break a law at once."""
 
 
 def examples(number: int) -> int:

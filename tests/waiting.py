@@ -1,4 +1,4 @@
-"""Waiting for what goes on in another thread or process."""
+"""Wait for events in another thread or process."""
 
 import time
 
@@ -7,7 +7,7 @@ PATIENCE_S = 600.0
 
 
 def until(told):
-    """What `told()` gives as soon as that is something. Raises AssertionError where it never is."""
+    """Wait until `told()` returns something true, and return it. Raises AssertionError if it never does."""
     end = time.monotonic() + PATIENCE_S
     while not (answer := told()):
         assert time.monotonic() < end, "it does not come"

@@ -10,7 +10,7 @@ from reference.construction.graph import Construction, Vector
 from reference.mechanism import Mechanism, Plate
 
 POINTS = {"v": 2.0, "a": 2.0, "n": 2.0, "t": 1.0, "c": 2.0, "r": 1.0}
-"""Of a velocity, of an acceleration, and of its parts."""
+"""Points of a velocity, of an acceleration, and of its parts."""
 SCALES: tuple[Literal["kL", "kv", "ka"], ...] = ("kL", "kv", "ka")
 
 

@@ -1,7 +1,7 @@
 """Simulated students, pens and scanners, with the truth of what was drawn.
 
 ``simulate(assignment, variant, seed, settings)`` gives a student's sheets as images with their
-truth; ``any_settings(seed)`` draws a student of a mixed class by lot. The same seed gives the same
+truth; ``any_settings(seed)`` draws a random student of a mixed class. The same seed gives the same
 drawing whatever the scanner: hand, page, pen and scanner have random streams of their own.
 """
 

@@ -42,7 +42,7 @@ Printed = Mapping[str, PrintedSheet]
 
 @dataclass(frozen=True, slots=True)
 class Desk:
-    """Who draws what on which paper."""
+    """A drawing task, the student's settings and the paper to draw on."""
 
     task: DrawingTask
     settings: Settings
@@ -51,7 +51,7 @@ class Desk:
     seed: int
 
     def fits(self, sheet: DrawnSheet) -> bool:
-        """Whether the figures have room on the sheet, or in its zones."""
+        """Return whether the figures have room on the sheet, or in its zones."""
         if self.printed is None:
             return self._layout(sheet) is not None
         zones = self.printed[sheet.kind].zones
@@ -65,9 +65,9 @@ class Desk:
     def draw_out(
         self, sheet: DrawnSheet, number: tuple[int, int]
     ) -> tuple[SheetSketch, dict[str, Any], page.Frame | None]:
-        """Pen on paper: the sketch, the truth about it, the frame of a plain sheet.
+        """Draw the sheet: the sketch, the truth about it, the frame of a plain sheet.
 
-        Arguments: `number` is the sheet's and how many there are.
+        Arguments: `number` is the sheet's number and the number of sheets.
         """
         rng = np.random.default_rng([self.seed, 2, number[0] - 1])
         writing = any_handwriting(np.random.default_rng([self.seed, 5]))
@@ -116,7 +116,7 @@ class Desk:
         return origins
 
     def _room(self) -> tuple[Box, list[Box]]:
-        """Where figures may go, and what is taken by the title block."""
+        """The area for figures, and the boxes taken by the title block."""
         x, y, w, h = page.FRAMES_MM[self.settings.page.frame]
         wide, high = page.TITLE_MM[self.settings.page.title_block]
         gap = _FRAME_GAP_MM
@@ -128,7 +128,7 @@ class Desk:
     def _abandoned(
         self, sketch: SheetSketch, sheet: DrawnSheet, room: Box, taken: list[Box]
     ) -> list[float] | None:
-        """A plan begun at a wrong place and crossed out; its box where there was room for it."""
+        """Draw a plan at a wrong place and cross it out; return its box, None where it had no room."""
         plan = next((figure for figure in sheet.figures if figure.name != MECHANISM), None)
         if plan is None:
             return None
@@ -163,7 +163,7 @@ class Desk:
     def _figures(
         self, sketch: SheetSketch, sheet: DrawnSheet, origins: Mapping[str, complex]
     ) -> dict[str, dict[str, str]]:
-        """Draw the figures; the vectors that are not drawn, with the reason, by plan."""
+        """Draw the figures; return the vectors that are not drawn, with the reason, by plan."""
         missing = {}
         joints = {f.name: figures.at_origin(f, origins[f.name]) for f in sheet.figures}.get(MECHANISM)
         for figure in sheet.figures:
@@ -178,7 +178,7 @@ class Desk:
         return missing
 
     def _fill_fields(self, sketch: SheetSketch, sheet: DrawnSheet, paper: PrintedSheet) -> dict[str, str]:
-        """The scales and the measured lengths written into the printed boxes; what was written, by box."""
+        """Write the scales and measured lengths into the printed boxes; return the texts by box."""
         task, style = self.task, sketch.page
         texts = {}
         for name, value in task.declared.items():
@@ -210,7 +210,7 @@ def ruler_text(length_mm: float, style: PageStyle, rng: Rng, *, in_cells: bool =
 
 
 def _write_digits(sketch: SheetSketch, text: str, cells: Sequence[Box], name: str) -> None:
-    """A digit in each cell, the last in the last one, each somewhat off its cell's middle."""
+    """Write one digit a cell, right-aligned, each somewhat off its cell's middle."""
     digits = [letter for letter in text if letter.isdigit()][-len(cells) :]
     for digit, (x, y, w, h) in zip(digits, cells[-len(digits) :], strict=True):
         height = min(0.72 * h, 0.95 * w) * float(sketch.rng.uniform(0.85, 1.1))
@@ -219,7 +219,7 @@ def _write_digits(sketch: SheetSketch, text: str, cells: Sequence[Box], name: st
 
 
 def _stacked(drawn: tuple[DrawnFigure, ...], room: Box) -> dict[str, complex]:
-    """Too large for the sheet: each figure in the middle all the same."""
+    """Origins that centre each figure on the sheet, for figures that are too large for it."""
     middle = complex(room[0] + room[2] / 2, -room[1] - room[3] / 2)
     return {figure.name: middle - sum(figures.extent(figure.nodes)) / 2 for figure in drawn}
 

@@ -1,8 +1,8 @@
 """A construction drawn step by step with instruments: each step starts from what is on the paper.
 
-What is to be drawn is data (`reference.construction.graph`): which node comes from which, by what. How a
-person does it stands here. Lengths that must be computed (normal and Coriolis components, sides of similar
-triangles) come from what the ruler says of the lines drawn so far.
+The construction is data (`reference.construction.graph`): each node and the step that gives it. This module
+carries out the steps as a person does. Lengths that must be computed (normal and Coriolis components, sides
+of similar triangles) come from ruler readings of the lines drawn so far.
 """
 
 import math
@@ -63,7 +63,7 @@ def drawn_nodes(
     parameters : scalars, as `reference.construction.graph` names them
     given : nodes that are on the paper already
 
-    Raises ValueError where the drawing closes in none of many tries.
+    Raises ValueError if the drawing does not close in many tries.
     """
     numbers = {name: float(value) for name, value in parameters.items()}
     for _ in range(TRIES):
@@ -80,7 +80,7 @@ def drawn_nodes(
 
 @dataclass(slots=True)
 class _Paper:
-    """What is drawn so far, and what the person knows and holds."""
+    """The drawing so far, with the person's data and instruments."""
 
     known: Mapping[str, float]
     tools: Instruments
@@ -88,7 +88,7 @@ class _Paper:
     guides: dict[str, tuple[complex, complex]] = field(default_factory=dict)
 
     def draw(self, step: Step) -> complex:
-        """Make one node. Raises ValueError where a step leads nowhere."""
+        """Draw one node. Raises ValueError where a step has no solution."""
         tools, nodes = self.tools, self.nodes
         match step:
             case Pole():
@@ -134,11 +134,11 @@ class _Paper:
         return self.tools.dot(complex(x, y) * self._turned()) if x or y else 0j
 
     def _laid_off(self, foot: complex, along: complex, length_mm: float) -> complex:
-        """The end of a length laid off along a line; of no length, the same point."""
+        """The end of a length laid off along a line; for length zero, the same point."""
         return self.tools.dot(self.tools.beside(foot, along) + along * length_mm) if length_mm else foot
 
     def _direction(self, along: Direction) -> complex:
-        """A direction as it comes out on the paper."""
+        """A direction as drawn, with its error."""
         if isinstance(along, Along):
             link = self.nodes[along.head] - self.nodes[along.tail]
             return self.tools.carried(link * self._side(along.side), along.quarters)
@@ -158,7 +158,7 @@ class _Paper:
         return side.sign * self.known[side.parameter] if isinstance(side, VariantSide) else float(side)
 
     def _tangent(self, step: Tangent) -> complex:
-        """Where the line from a point touches a circle."""
+        """The point of tangency of a line from a point to a circle."""
         radius = self.tools.length(self._computed(step.radius))
         reach = self.tools.dot(self.nodes[step.start]) - self.nodes[step.centre]
         beyond = math.sqrt(abs(reach) ** 2 - radius**2)
@@ -193,7 +193,7 @@ class _Paper:
     # Lengths ------------------------------------------------------------------------------------------
 
     def _measured(self, tail: str, head: str) -> float:
-        """What the ruler says of the distance of two nodes."""
+        """The distance of two nodes as read off the ruler."""
         return self.tools.length(abs(self.nodes[head] - self.nodes[tail]))
 
     def _computed(self, length: Length) -> float:
@@ -214,7 +214,7 @@ class _Paper:
                 return self._coriolis(length)
 
     def _coriolis(self, length: Coriolis) -> float:
-        """2 omega v_r: its size by the ruler, its sign by the senses of turning and of sliding."""
+        """2 omega v_r: its magnitude by the ruler, its sign by the senses of rotation and sliding."""
         known, nodes = self.known, self.nodes
         back = 1j**-length.quarters
         slide, turn = ((nodes[head] - nodes[tail]) * back for tail, head in (length.slide, length.turn))

@@ -69,13 +69,13 @@ def _end_of_slot(task: DrawingTask, link: SlottedLink) -> str:
 
 
 def coincident(task: DrawingTask) -> set[str]:
-    """Joints that lie where another does and have no sign or letter of their own."""
+    """Joints that coincide with another and have no symbol or letter of their own."""
     slotted = {g.node for g in task.mechanism.groups if isinstance(g, SlottedLink)}
     return slotted | {guide.coincident for g in task.mechanism.groups for guide in moving_guides(g)}
 
 
 def blocks_of(task: DrawingTask, group: Group) -> Iterator[tuple[str, str, str]]:
-    """Where a block sits on a moving guide, and two joints of that guide."""
+    """The joint of each block on a moving guide, and two joints of that guide."""
     if isinstance(group, SlottedLink):
         yield group.pin, group.foot or group.pivot, _end_of_slot(task, group)
     yield from ((group.node, *guide.base) for guide in moving_guides(group))
@@ -110,7 +110,7 @@ def at_origin(figure: DrawnFigure, origin: complex) -> dict[str, complex]:
 
 
 def draw_mechanism(sketch: SheetSketch, task: DrawingTask, nodes: Nodes, student: Student) -> None:
-    """Links, joints, supports, sliders, letters, and what some people add."""
+    """Draw links, joints, supports, sliders, letters, and extras that some people add."""
     turn = complex(np.exp(1j * np.radians(student.turn_deg)))
     _compass_arcs(sketch, task, nodes)
     for name, tail, head in links_of(task):
@@ -138,7 +138,7 @@ def draw_mechanism(sketch: SheetSketch, task: DrawingTask, nodes: Nodes, student
 
 
 def _sliders(sketch: SheetSketch, task: DrawingTask, nodes: Nodes, turn: complex) -> None:
-    """Blocks: on guides on the ground with their guides, on moving links without."""
+    """Draw blocks: those on fixed guides with their guides, those on moving links without."""
     for node, step in ((step.node, step) for step in task.wrong.construction.figures[MECHANISM]):
         for guide in fixed_guides(step):
             angle = float(task.wrong.parameters[f"angle {guide.guide}"])
@@ -166,7 +166,7 @@ def _link(sketch: SheetSketch, name: str, tail: complex, head: complex) -> None:
 
 
 def _compass_arcs(sketch: SheetSketch, task: DrawingTask, nodes: Nodes) -> None:
-    """The traces of the compass where two arcs met."""
+    """Draw the compass arcs where two of them met."""
     for step in task.wrong.construction.figures[MECHANISM]:
         if isinstance(step, TwoArcs) and sketch.chance(sketch.style.arcs):
             for centre in step.centres:
@@ -191,7 +191,7 @@ def _crank_extras(sketch: SheetSketch, task: DrawingTask, nodes: Nodes) -> None:
 
 
 def _vectors_at_pin(sketch: SheetSketch, task: DrawingTask, nodes: Nodes) -> None:
-    """v_A and a_A drawn at the crank's pin as well."""
+    """Draw v_A and a_A at the crank's pin as well."""
     known, crank = task.wrong.parameters, task.mechanism.driver
     if not isinstance(crank, Crank):
         return
@@ -210,7 +210,7 @@ def _vectors_at_pin(sketch: SheetSketch, task: DrawingTask, nodes: Nodes) -> Non
 
 
 def _altitude(sketch: SheetSketch, task: DrawingTask, nodes: Nodes) -> None:
-    """The right triangle whose altitude gives a normal component, at the first moving link's end."""
+    """Draw the right triangle whose altitude gives a normal component, at the first moving link's end."""
     fixed = task.mechanism.is_ground
     dyads = (g for g in task.mechanism.groups if isinstance(g, Dyad) and not fixed(g.pins[0]))
     dyad = next(dyads, None)
@@ -242,7 +242,7 @@ def _velocity_ends(task: DrawingTask, dyad: Dyad) -> tuple[str, str]:
 def draw_plan(
     sketch: SheetSketch, task: DrawingTask, figure: str, nodes: Nodes, student: Student
 ) -> dict[str, str]:
-    """A plan: construction lines, vectors, letters. Returns the vectors not drawn, each with the reason."""
+    """Draw a plan: construction lines, vectors, letters. Return the vectors not drawn, with reasons."""
     missing = {name: "mistake" for name in task.missing if name in _names(task, figure)}
     _construction_lines(sketch, task, figure, nodes)
     _unnamed_sides(sketch, task, figure, nodes)
@@ -271,7 +271,7 @@ def _left_out(
 
 
 def _is_result(task: DrawingTask, vector: Vector) -> bool:
-    """Whether a vector only joins two nodes that are there without it (pole and c, pole and b')."""
+    """Return whether a vector only joins two nodes drawn before it (pole and c, pole and b')."""
     step = task.wrong.construction.step(vector.head)
     if isinstance(step, TwoLines):
         return vector.tail not in {line.through for line in lines_of(step)}
@@ -299,7 +299,7 @@ def _vector(sketch: SheetSketch, task: DrawingTask, figure: str, vector: Vector,
 
 
 def _construction_lines(sketch: SheetSketch, task: DrawingTask, figure: str, nodes: Nodes) -> None:
-    """Thin lines that run past the points they gave."""
+    """Draw thin lines that run past the points they gave."""
     for step in task.wrong.construction.figures[figure]:
         if not isinstance(step, TwoLines):
             continue
@@ -316,7 +316,7 @@ def _construction_lines(sketch: SheetSketch, task: DrawingTask, figure: str, nod
 
 
 def _construction_dash(sketch: SheetSketch) -> Dash | None:
-    """None for a line drawn through."""
+    """The dash pattern of a construction line; None for a solid one."""
     share = sketch.style.construction_dashed
     if not share or not sketch.chance(share):
         return None
@@ -324,7 +324,7 @@ def _construction_dash(sketch: SheetSketch) -> Dash | None:
 
 
 def draw_helpers(sketch: SheetSketch, task: DrawingTask, mechanism: Nodes, plan: Nodes, count: int) -> None:
-    """Thin lines of no meaning: a link's direction carried over to the plan, a ruler set wrongly."""
+    """Draw thin lines of no meaning: a link's direction carried to the plan, a ruler set wrongly."""
     links = list(links_of(task))
     points = list(plan.values())
     low, high = extent(plan)
@@ -343,7 +343,7 @@ def draw_helpers(sketch: SheetSketch, task: DrawingTask, mechanism: Nodes, plan:
 
 
 def _unnamed_sides(sketch: SheetSketch, task: DrawingTask, figure: str, nodes: Nodes) -> None:
-    """Sides of a similar triangle that no named vector draws."""
+    """Draw the sides of a similar triangle that no named vector draws."""
     drawn = {frozenset((v.tail, v.head)) for v in task.wrong.construction.vectors_of(figure)}
     for step in task.wrong.construction.figures[figure]:
         if isinstance(step, Similar | Divide):

@@ -1,6 +1,6 @@
-"""A stroke alphabet of our own: Latin, Cyrillic, digits and signs as a draughtsman writes them.
+"""A stroke alphabet: Latin, Cyrillic, digits and signs as a draughtsman writes them.
 
-A glyph is strokes parted by ``|``; a stroke is points ``x,y`` in hundredths of the capital height
+A glyph is strokes separated by ``|``; a stroke is points ``x,y`` in hundredths of the capital height
 above the base line; ``~`` marks a curve through its points, otherwise straight lines. A list holds
 the ways in which different people write one letter.
 """

@@ -1,4 +1,4 @@
-"""What people leave on a sheet beside the drawing: helper lines, dimensions, corrections, other figures."""
+"""Extras that people leave on a sheet: helper lines, dimensions, corrections, other figures."""
 
 from collections.abc import Mapping, Sequence
 from typing import get_args
@@ -15,13 +15,13 @@ from samples.simulation.strokes import PenWidth
 
 HABITS: tuple[str, ...] = get_args(Habit)
 _NEARER = 0.45
-"""How far a plan of overlapping figures is moved towards the sketch, as a share of their distance."""
+"""Shift of an overlapping plan towards the sketch, as a share of their distance."""
 _LEAST_MM = 12.0
 """Shorter vectors are not drawn twice, and shorter links have no dimension."""
 
 
 def overlapped(origins: Mapping[str, complex], room: Box) -> dict[str, complex]:
-    """The plans' origins moved towards the sketch's, or the first figure's, on which they then lie."""
+    """Origins with the plans moved so that they overlap the sketch, or the first figure."""
     to = origins.get(MECHANISM, next(iter(origins.values())))
     inside = complex(room[0], -room[1] - room[3]), complex(room[0] + room[2], -room[1])
     moved = {name: at + _NEARER * (to - at) for name, at in origins.items()}
@@ -67,13 +67,13 @@ def add(
 
 
 def _turned(sketch: SheetSketch, line: Segment, low_deg: float, high_deg: float) -> complex:
-    """The end of a line drawn anew from its start in another direction, somewhat longer or shorter."""
+    """The end of a line redrawn from its start in another direction, somewhat longer or shorter."""
     angle = np.radians(sketch.rng.uniform(low_deg, high_deg) * sketch.rng.choice([-1.0, 1.0]))
     return line[0] + (line[1] - line[0]) * complex(np.exp(1j * angle)) * float(sketch.rng.uniform(0.8, 1.2))
 
 
 def _erased(sketch: SheetSketch, lines: Sequence[Segment]) -> None:
-    """Vectors drawn wrongly first and rubbed out: lines and heads still visible."""
+    """Draw wrong vectors that were rubbed out: lines and heads still visible."""
     pen = PenWidth(MAIN_LAYER, 1.3 * sketch.style.line_mm, sketch.rng.uniform(0.12, 0.22), 0.5, 0.06)
     for line in lines:
         if sketch.chance(0.6):
@@ -83,7 +83,7 @@ def _erased(sketch: SheetSketch, lines: Sequence[Segment]) -> None:
 
 
 def _struck(sketch: SheetSketch, line: Segment) -> None:
-    """A wrong vector beside the one that counts, struck through by three or four slashes."""
+    """Draw a wrong vector beside the right one, struck through by three or four slashes."""
     pen, tip = sketch.pen("line", plan=True), _turned(sketch, line, 5.0, 22.0)
     sketch.line(pen, line[0], tip)
     symbols.arrowhead(sketch, pen, line[0], tip, sketch.style.arrow_mm)
@@ -98,7 +98,7 @@ def _struck(sketch: SheetSketch, line: Segment) -> None:
 def _long_helpers(
     sketch: SheetSketch, figure: str, pole: complex, lines: Sequence[Segment], room: Box
 ) -> None:
-    """Thin lines through the pole along two of the vectors' directions, to the edge of the drawing."""
+    """Draw thin lines through the pole along two of the vectors, to the edge of the drawing."""
     for index in sketch.rng.permutation(len(lines))[:2].tolist():
         span = lines[index][1] - lines[index][0]
         along = span / abs(span)
@@ -108,7 +108,7 @@ def _long_helpers(
 
 
 def _to_edge(at: complex, along: complex, room: Box) -> float:
-    """How far it is from a place in a direction to the side of a box."""
+    """The distance from a point in a direction to the side of a box."""
     x, y, w, h = room
     across = ((x + w if along.real > 0 else x) - at.real) / along.real if along.real else np.inf
     down = ((-y if along.imag > 0 else -y - h) - at.imag) / along.imag if along.imag else np.inf
@@ -116,7 +116,7 @@ def _to_edge(at: complex, along: complex, room: Box) -> float:
 
 
 def _dimension(sketch: SheetSketch, line: Segment, middle: complex) -> None:
-    """A dimension line outside of a figure, with its two extension lines, arrowheads and figures."""
+    """Draw a dimension outside a figure: its line, two extension lines, arrowheads and digits."""
     p, q = line
     along = (q - p) / abs(q - p)
     out = 1j * along if ((1j * along).conjugate() * ((p + q) / 2.0 - middle)).real > 0 else -1j * along
@@ -132,7 +132,7 @@ def _dimension(sketch: SheetSketch, line: Segment, middle: complex) -> None:
 
 
 def _section(sketch: SheetSketch, room: Box, taken: list[Box]) -> None:
-    """A hatched cross-section of some part: nothing that was asked for."""
+    """Draw a hatched cross-section of some part, which nobody asked for."""
     wide, high = sketch.rng.uniform(16.0, 40.0), sketch.rng.uniform(10.0, 22.0)
     place = free_place((wide + 4.0, high + 4.0), room, taken, sketch.rng)
     if place is None:
@@ -148,7 +148,7 @@ def _section(sketch: SheetSketch, room: Box, taken: list[Box]) -> None:
 
 
 def _third_figure(sketch: SheetSketch, room: Box, taken: list[Box]) -> None:
-    """A polygon of forces with its arrowheads and letters: a plan, but none of those asked for."""
+    """Draw a force polygon with arrowheads and letters: a plan, but none of those asked for."""
     size = float(sketch.rng.uniform(35.0, 60.0))
     place = free_place((size + 16.0, size + 16.0), room, taken, sketch.rng)
     if place is None:

@@ -1,4 +1,4 @@
-"""What a student draws: the intended construction, mistakes included, drawn step by step with instruments.
+"""The student's drawing: the intended construction with its mistakes, step by step with instruments.
 
 Later steps start from what is on the paper, so that errors and mistakes are followed through.
 """
@@ -30,13 +30,13 @@ Nodes = Mapping[str, complex]
 
 @dataclass(frozen=True, slots=True)
 class DrawingTask:
-    """What one student has to draw.
+    """One student's drawing task, as it should be and with the student's mistakes.
 
     Attributes
     ----------
     right : the drawing without mistakes, at the scales that the student uses
-    wrong : the drawing as the student understands it, mistakes made
-    mistakes : those made
+    wrong : the drawing as the student understands it, with the mistakes
+    mistakes : the mistakes made
     declared : kL, kv, ka as the sheet says
     """
 
@@ -50,7 +50,7 @@ class DrawingTask:
 
     @property
     def used(self) -> dict[str, float]:
-        """The scales that the drawing follows."""
+        """The scales used in the drawing."""
         return {name: float(self.wrong.parameters[name]) for name in ("kL", "kv", "ka")}
 
     @property
@@ -73,7 +73,7 @@ class DrawnFigure:
 
     Attributes
     ----------
-    nodes : as they came out; intended : as a perfect hand would have drawn them, mistakes included
+    nodes : as drawn; intended : as a perfect hand would have drawn them, mistakes included
     """
 
     name: str
@@ -92,7 +92,7 @@ class DrawnSheet:
 def task_of(assignment: Assignment, variant: Variant, student: Student, rng: Rng) -> DrawingTask:
     """The student's task, with mistakes chosen among those that can be made.
 
-    Raises ValueError for a code for which the drawing has no place.
+    Raises ValueError for a code that this drawing does not admit.
     """
     right = _right_drawing(assignment, variant, student)
     occasion = Occasion(assignment, variant, right)
@@ -128,13 +128,13 @@ def _right_drawing(assignment: Assignment, variant: Variant, student: Student) -
 def possible_mistakes(
     assignment: Assignment, variant: Variant, student: Student, codes: Sequence[str] = CODES
 ) -> tuple[str, ...]:
-    """Those of the codes of mistakes for which this student's drawing offers a place."""
+    """The codes of mistakes that this student's drawing admits."""
     occasion = Occasion(assignment, variant, _right_drawing(assignment, variant, student))
     return tuple(code for code in codes if possible(code, occasion))
 
 
 def draw(task: DrawingTask, hand: HandStyle, student: Student, rng: Rng) -> tuple[DrawnSheet, ...]:
-    """The student's sheets.
+    """Draw the student's sheets.
 
     With two sheets the mechanism is drawn anew on the second, and the acceleration plan follows the
     second sketch's directions and the first sheet's velocities. Raises ValueError where a drawing does not

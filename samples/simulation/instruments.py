@@ -1,6 +1,6 @@
 """A person with ruler, set squares, protractor and compasses: how each of them errs.
 
-Three kinds of error, none of which a single normal distribution describes:
+There are three kinds of error; a single normal distribution would not describe them:
 
 - slips: most are small, a few are several times larger (Student's t with four degrees of freedom);
 - habits: one person reads every length off the same edge of the same ruler, and squares every line with the
@@ -26,7 +26,7 @@ HABIT = 0.5
 STRETCH = 0.0007
 """Relative error of a ruler's or of the paper's length, one standard deviation."""
 CARRIED_MM = (40.0, 250.0)
-"""How far set squares slide from a line of the sketch to the plan."""
+"""Usual distances over which set squares slide from a line of the sketch to the plan."""
 SHORTEST_EDGE_MM = 15.0
 """On a shorter line nobody aligns an edge: it is prolonged first."""
 SHARPEST = 0.15
@@ -36,7 +36,7 @@ PROTRACTOR_STEP_DEG = 0.5
 
 @dataclass(slots=True)
 class Instruments:
-    """One person's, for one drawing.
+    """One person's instruments for one drawing.
 
     Attributes
     ----------
@@ -56,16 +56,16 @@ class Instruments:
         self.square_rad = HABIT * math.radians(self.hand.square_deg) * float(self.rng.standard_normal())
 
     def slip(self, size: float) -> float:
-        """One slip of this size."""
+        """A random slip of this size."""
         slip = float(self.rng.standard_t(FREEDOM))
         return size * max(-LARGEST_SLIP, min(LARGEST_SLIP, slip))
 
     def dot(self, at: complex) -> complex:
-        """A point marked by pencil, or pricked by a needle."""
+        """A point as marked by pencil, or pricked by a needle."""
         return at + complex(self.slip(self.hand.mark_mm), self.slip(self.hand.mark_mm))
 
     def length(self, exact_mm: float) -> float:
-        """A length set on or read off the ruler's scale, with its sign; nothing stays nothing."""
+        """A length as set on or read off the ruler, with its sign; zero stays zero."""
         if exact_mm == 0.0:
             return 0.0
         size = abs(exact_mm) * (1.0 + self.stretch) + self.zero_mm + self.slip(self.hand.reading_mm)
@@ -86,8 +86,8 @@ class Instruments:
     def carried(self, link: complex, quarters: int) -> complex:
         """The direction along a drawn line, or across it, carried over to another place with set squares.
 
-        The edge is laid on the line at two points, so a short line is met worse; the farther it is carried,
-        the more it turns; a set square that is not square shows in what is drawn across.
+        The edge is aligned to the line at two points, so a short line gives a larger error; the farther it is
+        carried, the more it turns; an inaccurate set square shows in lines drawn across.
         """
         edge = max(abs(link), SHORTEST_EDGE_MM)
         aligned = (self.slip(self.hand.edge_mm) - self.slip(self.hand.edge_mm)) / edge
@@ -97,7 +97,7 @@ class Instruments:
         return link / abs(link) * 1j**quarters * cmath.rect(1.0, aligned + slid + squared)
 
     def beside(self, foot: complex, along: complex) -> complex:
-        """Where a line that ought to pass through a point does pass."""
+        """A point on the line as drawn, beside the point that it should pass through."""
         return foot + 1j * along * self.slip(self.hand.edge_mm)
 
     def crossing(self, p: complex, u: complex, q: complex, v: complex) -> complex:

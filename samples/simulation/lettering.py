@@ -21,7 +21,7 @@ _SPACE = 0.42
 
 @dataclass(frozen=True, slots=True)
 class Handwriting:
-    """How one person writes.
+    """One person's handwriting.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Handwriting:
 
 
 def any_handwriting(rng: Rng) -> Handwriting:
-    """Somebody's handwriting."""
+    """A random person's handwriting."""
     forms = tuple((letter, int(rng.integers(len(ways)))) for letter, ways in GLYPHS.items() if len(ways) > 1)
     return Handwriting(
         slant=float(rng.choice([0.0, 0.05, 0.15, 0.27, 0.35])),
@@ -73,7 +73,7 @@ class WrittenText:
     signs: tuple[WrittenSign, ...] = ()
 
     def moved(self, by: complex) -> "WrittenText":
-        """The same text elsewhere."""
+        """The same text shifted."""
         strokes = tuple(InkStroke(s.points + by, s.width, s.dark, s.layer) for s in self.strokes)
         signs = tuple(WrittenSign(s.sign, s.low + by, s.high + by) for s in self.signs)
         return WrittenText(strokes, self.low + by, self.high + by, signs)
@@ -114,7 +114,7 @@ def _strokes_of(sign: str, forms: dict[str, int]) -> list[tuple[bool, ComplexArr
 
 
 def write(rng: Rng, pen: PenWidth, text: str, height_mm: float, style: Handwriting) -> WrittenText:
-    """A text whose base line starts at 0."""
+    """Write a text whose base line starts at 0."""
     forms = dict(style.forms)
     at, strokes, signs = 0.0, list[InkStroke](), list[WrittenSign]()
     for letter in _letters(text):

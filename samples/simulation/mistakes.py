@@ -1,9 +1,9 @@
-"""What students do wrong, as changes of the drawing that they intend.
+"""Students' mistakes, as changes of the drawing that they intend.
 
-Written from what is known of students' work, not from what the grader looks for: feet of lines anywhere
-among the points drawn before, perpendiculars to lines that are no links, speeds computed without 2 pi or
+Based on what is known of students' work, not on what the grader looks for: feet of lines anywhere
+among the points drawn before, perpendiculars to lines that are not links, speeds computed without 2 pi or
 without the 60, squares forgotten, digits exchanged, scales rounded otherwise than declared. A mistake has a
-code of the published formats, so that a report can be held against it.
+code of the published formats, so that a report can be compared with it.
 """
 
 import math
@@ -41,7 +41,7 @@ VISIBLE_ERROR = 0.15
 
 @dataclass(frozen=True, slots=True)
 class Intent:
-    """What somebody means to draw: the steps, and the data and scales used."""
+    """The drawing that somebody intends: its steps, and the data and scales used."""
 
     construction: Construction
     parameters: Parameters
@@ -54,10 +54,10 @@ class StudentMistake:
     Attributes
     ----------
     code : one of `CODES`
-    at : the node, vector, scale or figure that it is made at
+    at : the node, vector, scale or figure where it is made
     slot : which of a step's two lines
-    other : what is taken instead: two joints, a node; the two nodes whose letters are exchanged
-    factor : of a length, speed or scale
+    other : the two joints or the node taken instead; the two nodes whose letters are exchanged
+    factor : factor of a length, speed or scale
     quarters : quarter turns of a figure, counter-clockwise
     n, position : another student's variant; parameters : its data
     """
@@ -75,7 +75,7 @@ class StudentMistake:
 
 @dataclass(frozen=True, slots=True)
 class Occasion:
-    """Who draws what: where mistakes can be made."""
+    """A student's right drawing, in which mistakes can be made."""
 
     assignment: Assignment
     variant: Variant
@@ -83,7 +83,7 @@ class Occasion:
 
     @property
     def construction(self) -> Construction:
-        """As it should be drawn."""
+        """The construction as it should be drawn."""
         return self.right.construction
 
     def steps(self, *figures: str) -> Iterator[Step]:
@@ -93,7 +93,7 @@ class Occasion:
 
 
 def possible(code: str, occasion: Occasion) -> list[StudentMistake]:
-    """Every mistake of a kind for which the drawing has a place, and which leaves it on the paper."""
+    """Every mistake of a kind that the drawing admits, and with which it stays on the paper."""
     found = list(_PLACES[code](occasion))
     if code in {"other_variant", "vector_missing", "labels_swapped", "rpm_not_converted"}:
         return found
@@ -101,18 +101,18 @@ def possible(code: str, occasion: Occasion) -> list[StudentMistake]:
 
 
 def fits_paper(drawing: Intent, right: Intent) -> bool:
-    """Whether every node exists and none lies far off the paper."""
+    """Return whether every node exists and none lies far off the paper."""
     nodes = evaluate(drawing.construction, drawing.parameters)
     proper = evaluate(right.construction, right.parameters)
     limit = max(1.6 * max(abs(complex(node)) for node in proper.values()) + 40.0, 220.0)
     return all(np.isfinite(node) and abs(complex(node)) < limit for node in nodes.values())
 
 
-# Where a mistake can be made ----------------------------------------------------------------------
+# Possible mistakes --------------------------------------------------------------------------------
 
 
 def _laid_off_backwards(occasion: Occasion) -> Iterator[StudentMistake]:
-    """The driving link's vector in the wrong sense: the sign of a clockwise crank."""
+    """The driving link's vector reversed: the sign of a clockwise crank."""
     for step in occasion.steps(*PLANS):
         if isinstance(step, Given) and isinstance(step.length, Scaled):
             yield StudentMistake("sense_reversed", step.node)
@@ -167,7 +167,7 @@ def _lines(occasion: Occasion) -> Iterator[tuple[TwoLines, int, Line]]:
 
 
 def _along_for_across(occasion: Occasion) -> Iterator[StudentMistake]:
-    """A line drawn along the link instead of across it; the driving link's vector too."""
+    """A line drawn parallel to the link instead of perpendicular; the driving link's vector too."""
     for step, slot, _ in _lines(occasion):
         yield StudentMistake("parallel_for_perpendicular", step.node, slot)
     for drawn in occasion.steps(*PLANS):
@@ -176,7 +176,7 @@ def _along_for_across(occasion: Occasion) -> Iterator[StudentMistake]:
 
 
 def _across_another_link(occasion: Occasion) -> Iterator[StudentMistake]:
-    """Across a link that shares a joint with the right one, or across the line to the fixed pivot."""
+    """A line perpendicular to another link at the same joint, or to the line to the fixed pivot."""
     construction = occasion.construction
     under = {s.node: s.other for s in occasion.steps(MECHANISM) if isinstance(s, Coincide)}
     pivots = [step.node for step in occasion.steps(MECHANISM) if not step.needs]
@@ -197,7 +197,7 @@ def _joints(occasion: Occasion) -> frozenset[str]:
 
 
 def _through_another_point(occasion: Occasion) -> Iterator[StudentMistake]:
-    """A line drawn through any point of the plan that was there before, the two right feet excepted."""
+    """A line drawn through any earlier point of the plan except the two right ones."""
     for step, slot, line in _lines(occasion):
         right = {one.through for one in (step.first, step.second) if isinstance(one, Line)}
         for before in occasion.steps(occasion.construction.figure_of(step.node)):
@@ -294,9 +294,9 @@ def scalars(parameters: Parameters) -> dict[str, np.ndarray]:
 
 
 def with_mistake(intent: Intent, mistake: StudentMistake) -> Intent:
-    """The drawing as somebody intends it who makes this mistake; later steps follow from it.
+    """The intended drawing with this mistake in it; later steps follow from it.
 
-    Exchanged letters change nothing that is drawn. Raises ValueError where there is no place for the mistake.
+    Exchanged letters change nothing that is drawn. Raises ValueError if the mistake cannot be made.
     """
     construction, known = intent.construction, intent.parameters
     match mistake.code:
@@ -319,7 +319,7 @@ def with_mistake(intent: Intent, mistake: StudentMistake) -> Intent:
 
 
 def _at_another_speed(construction: Construction, known: Parameters, factor: float) -> dict[str, np.ndarray]:
-    """The driving link's computed values, and the scales that are proportional to them: the plans stay."""
+    """Data with the driving link's values and the scales proportional to them changed: the plans stay."""
     powers = {"kv": 1, "ka": 2}
     for steps in construction.figures.values():
         for step in steps:
@@ -330,7 +330,7 @@ def _at_another_speed(construction: Construction, known: Parameters, factor: flo
 
 
 def _done_wrongly(construction: Construction, mistake: StudentMistake) -> Step:
-    """The step of a node as it is done. Raises ValueError where it cannot be done so."""
+    """A node's step with the mistake in it. Raises ValueError where it cannot be made."""
     step = construction.step(mistake.at)
     match mistake.code, step:
         case (("sense_reversed" | "normal_reversed"), Given()):
@@ -372,7 +372,7 @@ def _quarters(along: Direction, quarters: int) -> Direction:
 
 
 def _turned(construction: Construction, figure: str, quarters: int) -> Construction:
-    """A plan drawn on the sheet turned by quarters, each of its lines alike."""
+    """The construction with every line of a plan turned by the same quarters."""
 
     def turned(step: Step) -> Step:
         match step:
@@ -386,7 +386,7 @@ def _turned(construction: Construction, figure: str, quarters: int) -> Construct
     figures = dict(construction.figures)
     figures[figure] = tuple(turned(step) for step in figures[figure])
     if figure == VELOCITY:
-        # A Coriolis component is computed with the plan before one's eyes: it comes out as it should.
+        # A student computes a Coriolis component while looking at the plan, and so gets it right.
         figures[ACCELERATION] = tuple(_seen_turned(step, quarters) for step in figures[ACCELERATION])
     return replace(construction, figures=figures)
 

@@ -1,4 +1,4 @@
-"""A mixed class: hands, habits, pens, pages and scanners drawn by lot."""
+"""A mixed class: hands, habits, pens, pages and scanners drawn at random."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -35,15 +35,15 @@ def any_settings(
     work: tuple[Assignment, Variant] | None = None,
     hardship: float = 1.0,
 ) -> Settings:
-    """Somebody of a mixed class: hand, habits, pen, page and scanner drawn by lot from the seed.
+    """Random settings of a mixed class: hand, habits, pen, page and scanner, by the seed.
 
     Arguments
     ---------
     device, dpi : fixed where given
     mistakes : mean number of mistakes
-    work : what is to be drawn; only mistakes are made then for which it offers a place. Without it any
-        code may come, and `simulate` refuses one that cannot be made
-    hardship : multiplies the chances of what makes a sheet hard to read (`HARDSHIPS`), 0 for none
+    work : the drawing; if given, only mistakes that it admits are chosen. Without it any code may be
+        chosen, and `simulate` refuses one that cannot be made
+    hardship : multiplies the chances of things that make a sheet hard to read (`HARDSHIPS`), 0 for none
     """
     rng = np.random.default_rng([seed, 7])
     hand = (CAREFUL, TYPICAL, SLOPPY)[rng.choice(3, p=[0.35, 0.45, 0.2])]
@@ -51,7 +51,7 @@ def any_settings(
     codes = CODES if work is None or not mistakes else possible_mistakes(*work, Student())
     student = any_student(rng, mistakes, codes)
     if work is not None and student.mistakes:
-        # At this student's own scales a mistake may lead off the paper.
+        # At this student's own scales a mistake may put a node off the paper.
         able = possible_mistakes(*work, student, student.mistakes)
         student = replace(student, mistakes=able)
     settings = Settings(hand, student, any_pen(rng, hand), page, any_scan(rng, device, dpi))
@@ -64,14 +64,14 @@ HARDSHIPS: Mapping[str, float] = {
     "letters on lines": 0.2, "stains": 0.06, "sharp folds": 0.08, "strong show-through": 0.05,
     "squared paper": 0.03,
 }  # fmt: skip
-"""What makes a sheet hard to read, each with its share of students; several may meet."""
+"""Things that make a sheet hard to read, each with its share of students; several may occur together."""
 
 
 def with_hardships(settings: Settings, rng: Rng, times: float = 1.0) -> Settings:
-    """Settings with hardships by lot, at `times` their usual chances."""
+    """Settings with random hardships, at `times` their usual chances."""
     student, pen, page, scan = settings.student, settings.pen, settings.page, settings.scan
     met = {name for name, share in HARDSHIPS.items() if rng.random() < times * share}
-    # The lots below are always drawn, so that one hardship does not change another's.
+    # All random numbers below are always drawn, so that one hardship does not change another.
     size = dict(zip(sorted(HARDSHIPS), rng.uniform(0.0, 1.0, len(HARDSHIPS)).tolist(), strict=True))
     return Settings(
         settings.hand, _harder_student(student, met, size), _harder_pen(pen, met, size),
@@ -126,7 +126,7 @@ _BLUE: Colour = (30, 50, 140)
 
 
 def any_student(rng: Rng, mistakes: float, possible: Sequence[str] = CODES) -> Student:
-    """Somebody's choices; mistakes are taken from the possible ones."""
+    """A random student's choices; mistakes are taken from the possible ones."""
     count = min(2, int(rng.poisson(mistakes)))
     codes = rng.choice(np.array(possible), size=count, replace=False)
     return Student(
@@ -156,7 +156,7 @@ PENS: dict[str, PenStyle] = {
 
 
 def any_pen(rng: Rng, hand: HandStyle) -> PenStyle:
-    """Somebody's pens and way of finishing a drawing."""
+    """A random student's pens and way of finishing a drawing."""
     kind = rng.choice(list(PENS), p=[0.24, 0.2, 0.22, 0.1, 0.1, 0.09, 0.05])
     style = PENS[str(kind)]
     free = rng.random() < 0.15
@@ -184,7 +184,7 @@ def any_pen(rng: Rng, hand: HandStyle) -> PenStyle:
 
 
 def any_page(rng: Rng) -> PageStyle:
-    """Somebody's page."""
+    """A random page."""
     language = rng.choice(["ro", "ru", "en"], p=[0.5, 0.3, 0.2])
     return PageStyle(
         frame=rng.choice(["iso", "gost", "none"], p=[0.5, 0.35, 0.15]),
@@ -204,7 +204,7 @@ def any_page(rng: Rng) -> PageStyle:
 
 
 def any_scan(rng: Rng, device: Device | None = None, dpi: float | None = None) -> Scan:
-    """Some scanner, copier or phone with its faults."""
+    """A random scanner, copier or phone with its faults."""
     device = device or rng.choice(["flatbed", "copier", "phone"], p=[0.65, 0.15, 0.2])
     resolution = dpi or float(rng.choice([150.0, 200.0, 300.0, 400.0], p=[0.2, 0.25, 0.45, 0.1]))
     tag = {0: None, 1: 72.0, 2: resolution * 0.5}.get(int(rng.integers(0, 14)), resolution)

@@ -1,4 +1,4 @@
-"""A sheet of A3: frame, title block, where the figures go, captions and working."""
+"""A sheet of A3: frame, title block, layout of the figures, captions and calculations."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -33,7 +33,7 @@ class Frame:
 
 
 def print_squares(sketch: SheetSketch) -> None:
-    """The fine lines of squared paper, a little askew to its edges, turned and bent as the page says."""
+    """Print the fine lines of squared paper, skewed, turned and bent as the page says."""
     style = sketch.page
     pitch = style.squared_mm
     if pitch <= 0.0:
@@ -54,13 +54,13 @@ def print_squares(sketch: SheetSketch) -> None:
 
 
 def _bend(points: ComplexArray, by_mm: float) -> ComplexArray:
-    """How far paper that a copier drew in unevenly, or a lens bent, has moved its points."""
+    """Displacements of points on paper fed unevenly by a copier, or distorted by a lens."""
     x, y = points.real / PAPER_MM[0], points.imag / PAPER_MM[1]
     return np.asarray(by_mm * (np.sin(4.1 * y + 0.7 * x) + 1j * np.sin(3.7 * x - 1.1 * y + 0.5)))
 
 
 def draw_frame(sketch: SheetSketch) -> Frame:
-    """The frame, ruled by hand with small errors, or printed exactly."""
+    """Draw the frame, ruled by hand with small errors, or printed exactly."""
     style = sketch.page
     if style.frame == "none":
         return Frame("none", "nobody", None)
@@ -78,7 +78,7 @@ def draw_frame(sketch: SheetSketch) -> Frame:
 
 
 def title_block(sketch: SheetSketch, rows: list[list[str]], corner: complex) -> Box | None:
-    """A title block whose lower right corner is the frame's; its box in sheet millimetres, y down."""
+    """Draw a title block in the frame's lower right corner; its box in sheet millimetres, y down."""
     kind = sketch.page.title_block
     if kind == "none":
         return None
@@ -105,7 +105,7 @@ def title_block(sketch: SheetSketch, rows: list[list[str]], corner: complex) -> 
 
 
 def _form_columns(sketch: SheetSketch, low: complex, high: float, x1: float) -> None:
-    """The narrow columns of signatures at the left of a form."""
+    """Draw the narrow columns of signatures at the left of a form."""
     thin = sketch.pen("print" if sketch.page.frame_by == "print" else "thin")
     thick = sketch.pen("print" if sketch.page.frame_by == "print" else "line")
     for x in (low.real + 7.0, low.real + 17.0, low.real + 40.0, x1):
@@ -176,7 +176,7 @@ def _size(figure: DrawnFigure) -> float:
 
 
 def overlap(one: Box, other: Box) -> bool:
-    """Whether two boxes share area."""
+    """Return whether two boxes share area."""
     return (
         one[0] < other[0] + other[2]
         and other[0] < one[0] + one[2]
@@ -188,7 +188,7 @@ def overlap(one: Box, other: Box) -> bool:
 def place_in_zones(
     figures: tuple[DrawnFigure, ...], zones: Mapping[str, Box], rng: Rng
 ) -> dict[str, complex]:
-    """Origins of the figures inside the zones of a printed sheet, about their middles."""
+    """Origins of the figures near the middles of a printed sheet's zones."""
     origins = {}
     for figure in figures:
         x, y, w, h = zones[figure.name]
@@ -204,7 +204,7 @@ def place_in_zones(
 def write_caption(
     sketch: SheetSketch, task: DrawingTask, figure: str, nodes: Mapping[str, complex], written: dict[str, str]
 ) -> None:
-    """The figure's caption above it (or below), with its scale where the student writes it there."""
+    """Write the figure's caption above it (or below), with its scale if the student writes it there."""
     low, high = extent(nodes)
     lines = wording.caption(figure, task, sketch.page, sketch.rng, written)
     height = 0.95 * sketch.page.letter_mm
@@ -216,7 +216,7 @@ def write_caption(
 
 
 def write_block(sketch: SheetSketch, lines: list[str], room: Box, taken: list[Box]) -> None:
-    """Working written where there is room for it, or not at all."""
+    """Write calculations where there is room for them, or not at all."""
     if not lines:
         return
     height = 0.8 * sketch.page.letter_mm

@@ -1,7 +1,7 @@
-"""Strokes to pixels: the ink's coverage of each pixel, straight on the grid of the final image.
+"""Strokes to pixels: the ink's coverage of each pixel, computed on the final image's grid.
 
 A stroke is cut into short capsules; a pixel's coverage follows from the distance of its centre to
-the capsule's axis, so that a stroke lies where it was drawn to about a thousandth of a pixel.
+the capsule's axis, so that a stroke's position is exact to about a thousandth of a pixel.
 Pixel coordinates: the centre of the top left pixel is (0, 0), x right, y down.
 """
 
@@ -21,7 +21,7 @@ _BATCH = 4_000_000
 
 
 def render(strokes: Sequence[InkStroke], mapping: Mapping, shape: tuple[int, int]) -> GreyImage:
-    """Coverage times darkness, 0 .. 255, where strokes overlap the stronger one.
+    """Coverage times darkness, 0 .. 255; where strokes overlap, the larger value.
 
     Arguments: `mapping` takes sheet millimetres to pixels, `shape` is (height, width).
     """

@@ -1,8 +1,8 @@
 """A drawn sheet as a scanner, a copier or a phone sees it: light, paper, ink, noise.
 
-Ink is rendered on the final pixel grid (`raster`), so that nothing is resampled afterwards; what is
-blurred is blurred symmetrically. Faults of the paper (grain, dust, folds, smudges) are made at a
-lower resolution where their sharpness does not matter.
+Ink is rendered on the final pixel grid (`raster`), so that nothing is resampled afterwards; blurs
+are symmetric. Faults of the paper (grain, dust, folds, smudges) are made at a lower resolution
+where their sharpness does not matter.
 """
 
 from collections.abc import Mapping, Sequence
@@ -68,7 +68,7 @@ class Background:
 
 @dataclass(frozen=True, slots=True)
 class DrawnPaper:
-    """What lies on the glass: strokes, the pens that made them, and what was printed before."""
+    """A sheet on the glass: its strokes, the pens that made them, and the print below them."""
 
     strokes: Sequence[InkStroke]
     pens: PenStyle
@@ -137,7 +137,7 @@ def _inks(paper: DrawnPaper, view: PaperView, rng: Rng) -> list[tuple[Float32Arr
 
 
 def _grain(cover: Float32Array, amount: float, px_per_mm: float, rng: Rng) -> None:
-    """Graphite catches on the paper's tooth: speckle of about a tenth of a millimetre, in place."""
+    """Add the speckle of graphite on rough paper, about a tenth of a millimetre, in place."""
     side = 512
     tile = rng.standard_normal((side, side)).astype(np.float32)
     sigma = max(0.4, 0.06 * px_per_mm)
@@ -151,7 +151,7 @@ def _grain(cover: Float32Array, amount: float, px_per_mm: float, rng: Rng) -> No
 
 
 def _smear(cover: Float32Array, amount: float, px_per_mm: float, rng: Rng) -> None:
-    """Soft lead carried along by the side of the hand: a faint trail to one side of every stroke."""
+    """Add soft lead smeared by the hand: a faint trail to one side of every stroke, in place."""
     small = np.asarray(cv2.resize(cover, None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA))
     reach = max(2, round(rng.uniform(1.5, 4.0) * px_per_mm / 4.0))
     trail = np.zeros((2 * reach + 1, 2 * reach + 1), np.float32)
@@ -183,7 +183,7 @@ def _printed(background: Background, view: PaperView) -> Float32Array:
 
 
 def _through_lens(page: GreyImage, pitch: FloatArray, view: PaperView) -> Float32Array:
-    """The page's brightness looked up for every pixel, some rows at a time."""
+    """The page's brightness looked up for every pixel, in blocks of rows."""
     height, width = view.size
     result = np.empty(view.size, np.float32)
     for top in range(0, height, 256):
@@ -196,7 +196,7 @@ def _through_lens(page: GreyImage, pitch: FloatArray, view: PaperView) -> Float3
 
 
 def _show_through(strokes: Sequence[InkStroke], view: PaperView, scan: Scan) -> Float32Array | None:
-    """Another drawing on the back, faint, mirrored and blurred."""
+    """The drawing on the back showing through: faint, mirrored and blurred."""
     if scan.show_through <= 0.0:
         return None
     back = [
@@ -331,7 +331,7 @@ def _dust(scan: Scan, size: tuple[int, int], rng: Rng) -> list[_Speck]:
 
 
 def _one_bit(image: GreyImage, scan: Scan, rng: Rng) -> GreyImage:
-    """A copier's threshold, with a ragged edge and pepper; or tones by error diffusion, paper to white."""
+    """One bit by a copier's threshold, with ragged edges and pepper; or by error diffusion."""
     if scan.dithered:
         white = np.float32(255.0 / (0.93 * _of(scan.paper, None)))
         bright = np.clip(image.astype(np.float32) * white, 0.0, 255.0).astype(np.uint8)

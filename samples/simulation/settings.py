@@ -1,4 +1,4 @@
-"""What can be set about a simulated student, pen and scanner."""
+"""Settings of a simulated student, pen and scanner."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -9,7 +9,7 @@ Box = tuple[float, float, float, float]
 Habit = Literal[
     "erased", "struck", "long helpers", "dimensions", "hatched sections", "third figure", "overlapping"
 ]
-"""What a person leaves on a sheet beside the drawing (`samples.simulation.habits`)."""
+"""An extra that a person leaves on a sheet beside the drawing (`samples.simulation.habits`)."""
 MECHANISM, VELOCITY, ACCELERATION = "mechanism", "velocity_plan", "acceleration_plan"
 PLANS = (VELOCITY, ACCELERATION)
 """The figures of a drawing, by the names of the published formats."""
@@ -17,16 +17,16 @@ PLANS = (VELOCITY, ACCELERATION)
 
 @dataclass(frozen=True, slots=True)
 class HandStyle:
-    """How large one person's slips are (`samples.simulation.instruments`); they propagate.
+    """The size of one person's slips (`samples.simulation.instruments`); they propagate.
 
     Attributes
     ----------
-    edge_mm : of a ruler's edge beside each point that it should pass through
-    square_deg : of a set square for every 100 mm that a direction is carried, and of a protractor
-    reading_mm : of a length set on or read off a scale
-    graduation_mm : to which lengths are read, 0 for exactly
-    mark_mm : of a pencil's dot or a needle's prick, along x and along y
-    redraw_mm : of a stroke's end about the node that it joins
+    edge_mm : slip of a ruler's edge beside each point that it should pass through
+    square_deg : slip of a set square for every 100 mm that a direction is carried, and of a protractor
+    reading_mm : slip of a length set on or read off a scale
+    graduation_mm : step to which lengths are read, 0 for exactly
+    mark_mm : slip of a pencil's dot or a needle's prick, along x and along y
+    redraw_mm : slip of a stroke's end about the node that it joins
     """
 
     edge_mm: float = 0.15
@@ -46,23 +46,23 @@ SLOPPY = HandStyle(0.4, 0.45, 0.4, 1.0, 0.2, 0.35)
 
 @dataclass(frozen=True, slots=True)
 class Student:
-    """What this student chooses.
+    """One student's choices and habits.
 
     Attributes
     ----------
     crank_mm : drawn length of the crank; None as the assignment proposes
-    shrunk : of a sketch without a crank, its size as a multiple of the proposed one
+    shrunk : size of a sketch without a crank, as a multiple of the proposed one
     kv_ratio, ka_ratio : scales used, as a multiple of the assignment's rule
     similarity : third points of plates by similar triangles; None as the assignment says
     turn_deg : how far the sketch of the mechanism is turned
-    mistakes : codes of mistakes to make, each at a step chosen by lot among those that admit it
+    mistakes : codes of mistakes to make, each at a random step among those that admit it
     sheets : 1 for all figures on one sheet, 2 for velocities and accelerations apart
     vectors_on_mechanism : v_A and a_A drawn at the crank's pin as well
     altitude : right-triangle construction of a normal component on the mechanism
     omitted : share of the pole-to-point vectors that are not drawn out
     abandoned : a figure begun and crossed out; with `abandoned_whole` drawn to its end before
     helpers : thin lines of no meaning: directions carried over from the sketch, rulers set wrongly
-    habits : what else is left on a plain sheet; ``overlapping`` figures lie on each other
+    habits : other extras on a plain sheet; ``overlapping`` figures lie on each other
     """
 
     crank_mm: float | None = None
@@ -91,11 +91,11 @@ class PenStyle:
     line_mm, thin_mm : mean width of finished and of construction lines
     dark, thin_dark : share of light that they take
     pressure, wobble_mm, grain : unevenness along a stroke, across it, and of its surface
-    plan_colour : another colour for vectors, None for the same pen
+    plan_colour : colour for vectors, None for the same pen
     overrun_mm : mean length by which construction lines run past the points they gave
     arrow_half_deg : mean angle between an arrowhead's barb and the vector
-    construction_lines, node_circles, node_dots, erased, doubled, arcs : shares of the chances to draw
-        such a thing
+    construction_lines, node_circles, node_dots, erased, doubled, arcs : probability of drawing each
+        such thing
     construction_dashed : share of construction lines that are dashed or chain lines
     ghost_dark : share of light that a badly erased line still takes
     smear : soft lead rubbed along by the hand: share of light beside strokes, 0 for none
@@ -167,17 +167,17 @@ class PageStyle:
 
 @dataclass(frozen=True, slots=True)
 class Scan:
-    """How the sheet is made a file.
+    """The scanner, copier or phone that turns the sheet into a file.
 
     Attributes
     ----------
     device : ``flatbed``, ``copier`` (one bit) or ``phone``
-    dpi : resolution; for a phone only what it comes to on average
+    dpi : resolution; for a phone the average
     quarter_turns : how often the stored image is turned counter-clockwise
-    skew_deg, shift_mm : standard deviations of how the sheet lies
-    stretch : unequal scale, standard deviation of x and y against the dpi
+    skew_deg, shift_mm : standard deviations of the sheet's angle and position
+    stretch : standard deviation of the relative scale errors of x and y
     copy_scale : a copier's enlargement of the drawing
-    dpi_tag : what the file says; None for nothing
+    dpi_tag : resolution stated in the file; None for none
     jpeg_tables : the coarse tables of a program that saves for the web, in place of the quality
     streaks : faint lines along the whole image from dirt on the glass
     crease : how sharp a fold is, 1 for a usual one
@@ -185,7 +185,7 @@ class Scan:
     sharpen : a scanner's unsharp mask, the share of an edge that is added to it
     dithered : one bit by error diffusion, not by a threshold
     curl_mm : how far a photographed sheet's bow moves its middle against a flat one
-    levels : brightness that an office scanner makes black, and that it makes white: faint ink is paper then
+    levels : brightness that an office scanner maps to black, and to white: faint ink turns into paper
     cropped_mm : how much its automatic cropping takes off each edge, on average
     """
 
@@ -226,7 +226,7 @@ class Scan:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Everything about one student's work, save what is left to the seed."""
+    """All settings of one student's work; the rest is random, by the seed."""
 
     hand: HandStyle = TYPICAL
     student: Student = field(default_factory=Student)

@@ -1,4 +1,4 @@
-"""A sheet of paper while it is being drawn on: strokes, letters, and what a truth must remember."""
+"""A sheet of paper while it is being drawn on: strokes, letters, and data for the truth."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -28,7 +28,7 @@ class WrittenLabel:
 
 @dataclass(slots=True)
 class SheetSketch:
-    """Everything drawn on one side of one sheet so far.
+    """All that is drawn on one side of one sheet so far.
 
     Attributes
     ----------
@@ -65,26 +65,26 @@ class SheetSketch:
                 return PenWidth(MAIN_LAYER, 0.8 * style.line_mm, 0.92 * style.dark, style.pressure, 0.0)
 
     def line(self, pen: PenWidth, p: complex, q: complex, dash: Dash | None = None) -> None:
-        """A straight stroke exactly from p to q (its wobble apart)."""
+        """Draw a straight stroke from p to q, exact but for its wobble."""
         if abs(q - p) < 0.05:
             return
         stroke = straight(self.rng, pen, p, q)
         self.strokes.extend([stroke] if dash is None else dashed(self.rng, stroke, dash))
 
     def curve(self, pen: PenWidth, points: ComplexArray, dash: Dash | None = None) -> None:
-        """A stroke through points."""
+        """Draw a stroke through points."""
         stroke = inked(self.rng, pen, points)
         self.strokes.extend([stroke] if dash is None else dashed(self.rng, stroke, dash))
 
     def redrawn(self, p: complex, q: complex) -> Segment:
-        """Where the stroke that ought to join two points really runs: its ends miss them a little."""
+        """The ends of a stroke that should join two points: they miss them a little."""
         miss = self.hand.redraw_mm * (self.rng.standard_normal(2) + 1j * self.rng.standard_normal(2)) / 1.4
         along = (q - p) / max(abs(q - p), 1e-9)
         short = self.rng.normal(0.0, 0.6 * self.hand.redraw_mm, 2)
         return p + complex(miss[0]) - along * short[0], q + complex(miss[1]) + along * short[1]
 
     def chance(self, share: float) -> bool:
-        """Whether it happens this time."""
+        """Return True with this probability."""
         return bool(self.rng.random() < share)
 
     # Writing ----------------------------------------------------------------------------------
@@ -111,7 +111,7 @@ class SheetSketch:
         self.labels.append(WrittenLabel(text, names, placed.low, placed.high, placed.signs))
 
     def _room(self) -> Callable[[complex], float]:
-        """How far the nearest ink is, with a person's carelessness; a letter's width is enough."""
+        """A function that gives the distance to the nearest ink, at most a letter's width, with noise."""
         ink = np.concatenate([stroke.points for stroke in self.strokes[-400:]] or [np.array([1e6 + 0j])])
 
         def room(centre: complex) -> float:

@@ -1,4 +1,4 @@
-"""A pen's stroke, and how a hand wavers along it.
+"""A pen's stroke, and the hand's wobble along it.
 
 Positions are complex sheet millimetres, x - i y (y up).
 """
@@ -21,7 +21,7 @@ _WAVE_MM = (18.0, 90.0)
 
 @dataclass(frozen=True, slots=True)
 class PenWidth:
-    """What the student holds.
+    """A pen: its width, darkness and unevenness.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ def inked(rng: Rng, pen: PenWidth, points: ComplexArray) -> InkStroke:
 
 
 def dashed(rng: Rng, stroke: InkStroke, dash: Dash) -> list[InkStroke]:
-    """The stroke cut into dashes (and dots) of unequal length."""
+    """Cut a stroke into dashes (and dots) of unequal length."""
     along = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(stroke.points)))])
     return [_cut(stroke, along, low, high) for low, high in _spans(rng, float(along[-1]), dash)]
 

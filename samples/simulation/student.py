@@ -93,7 +93,7 @@ def write_pdf(path: Path, pages: Iterable[tuple[Pixels, float, int]], quality: i
 
 
 def write_truth(path: Path, truths: Sequence[dict[str, Any]]) -> None:
-    """JSON lines, a sheet each."""
+    """Write JSON lines, one per sheet."""
     lines = [json.dumps(truth, ensure_ascii=False, sort_keys=True) for truth in truths]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
@@ -104,7 +104,7 @@ _SHRINK = (1.0, 0.9, 0.8, 0.66, 0.5, 0.4)
 
 @dataclass(frozen=True, slots=True)
 class SimulatedSheet:
-    """One page: its stored image, and the truth of it as JSON-like data."""
+    """One page: its stored image, and its truth as JSON-like data."""
 
     image: NDArray[np.uint8]
     truth: dict[str, Any]
@@ -118,7 +118,7 @@ class SimulatedSheet:
     def save(self, path: Path) -> Path:
         """Write the file (its ending set by the scan's container); the truth then names it.
 
-        A phone's picture says by EXIF how it is to be turned.
+        A phone's picture states its orientation in EXIF.
         """
         target = path.with_name(path.name + self.suffix)
         scan = self.settings.scan
@@ -139,7 +139,7 @@ def simulate(
     student_id: str = "s01",
     printed: Printed | None = None,
 ) -> list[SimulatedSheet]:
-    """A student's sheets, in the order of drawing.
+    """Simulate a student's sheets, in the order of drawing.
 
     Arguments: `printed` gives answer sheets by kind of page (``all``, ``velocity``,
     ``acceleration``), drawn on instead of plain paper. Raises ValueError where a mistake asked for
@@ -158,7 +158,7 @@ def drawn_by(
     student_id: str = "s01",
     printed: Printed | None = None,
 ) -> tuple[Desk, tuple[DrawnSheet, ...]]:
-    """The same student's desk and figures before anything is inked, as `simulate` takes them on."""
+    """The student's desk and figures before they are inked, as `simulate` uses them."""
     chosen = settings or Settings()
     if printed is not None:
         chosen = replace(chosen, student=replace(chosen.student, sheets=1 if "all" in printed else 2))
@@ -173,7 +173,7 @@ def drawn_by(
 
 
 def _with_crank(assignment: Assignment, variant: Variant, settings: Settings, share: float) -> Settings:
-    """The settings with a share of the crank's wished length: people choose a scale that fits the paper."""
+    """The settings with a share of the crank's proposed length, to fit the paper."""
     if share == 1.0:
         return settings
     driver = assignment.mechanism([variant]).driver
@@ -185,7 +185,7 @@ def _with_crank(assignment: Assignment, variant: Variant, settings: Settings, sh
 
 
 def _split(sheet: DrawnSheet) -> list[DrawnSheet]:
-    """The mechanism with the velocity plan, the acceleration plan apart."""
+    """Split a sheet in two: mechanism and velocity plan, acceleration plan."""
     if sheet.kind != "all":
         return [sheet]
     first = tuple(f for f in sheet.figures if f.name in {MECHANISM, VELOCITY})
@@ -194,7 +194,7 @@ def _split(sheet: DrawnSheet) -> list[DrawnSheet]:
 
 
 def _scanned(desk: Desk, sheet: DrawnSheet, number: tuple[int, int]) -> SimulatedSheet:
-    """The sheet drawn out and laid on the glass."""
+    """Draw the sheet and scan it."""
     settings = desk.settings
     sketch, told, frame = desk.draw_out(sheet, number)
     rng = np.random.default_rng([desk.seed, 3, number[0]])
@@ -210,7 +210,7 @@ def _scanned(desk: Desk, sheet: DrawnSheet, number: tuple[int, int]) -> Simulate
 def measured_by(
     sheets: Sequence[SimulatedSheet], rng: Rng, spread_mm: float = 0.2, step_mm: float = 0.5
 ) -> dict[str, float]:
-    """What the student's ruler and protractor say: lengths in mm by vector, ``NAME_deg`` directions."""
+    """Readings of the student's ruler and protractor: lengths in mm by vector, ``NAME_deg`` directions."""
     measured: dict[str, float] = {}
     plans = [figure for sheet in sheets for figure in sheet.truth["figures"].values()]
     for name, vector in (item for plan in plans for item in plan.get("vectors", {}).items()):

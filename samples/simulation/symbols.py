@@ -9,7 +9,7 @@ JOINT_RADIUS_MM = 1.3
 
 
 def arrowhead(sketch: SheetSketch, pen: PenWidth, tail: complex, tip: complex, size_mm: float) -> None:
-    """An arrowhead at `tip`, as this person makes them; shrunk on short vectors, none on tiny ones."""
+    """Draw an arrowhead at `tip` in this person's way; smaller on short vectors, none on tiny ones."""
     length = abs(tip - tail)
     kind = sketch.style.arrow
     if kind == "none" or length < 1.5:
@@ -35,7 +35,7 @@ def arrowhead(sketch: SheetSketch, pen: PenWidth, tail: complex, tip: complex, s
 
 
 def circle(sketch: SheetSketch, centre: complex, radius_mm: float, pen: PenWidth) -> None:
-    """A circle, by compass or by hand: nearly closed."""
+    """Draw a circle, by compass or by hand: nearly closed."""
     rng = sketch.rng
     sweep = 2 * np.pi + rng.normal(0.0, 0.15)
     points = arc(centre, radius_mm, rng.uniform(0, 2 * np.pi), sweep)
@@ -44,14 +44,14 @@ def circle(sketch: SheetSketch, centre: complex, radius_mm: float, pen: PenWidth
 
 
 def dot(sketch: SheetSketch, centre: complex, radius_mm: float) -> None:
-    """A point pressed or turned into the paper."""
+    """Draw a dot."""
     pen = sketch.pen("line", plan=True)
     fine = PenWidth(pen.layer, 0.7 * radius_mm, pen.dark, pen.pressure, 0.0)
     sketch.curve(fine, arc(centre, 0.55 * radius_mm, sketch.rng.uniform(0, 2 * np.pi), 4 * np.pi))
 
 
 def hatching(sketch: SheetSketch, p: complex, q: complex, depth_mm: float, gap_mm: float = 1.6) -> None:
-    """Short slanted strokes to the right of the line from p to q (below, when it runs to the right)."""
+    """Draw short slanted strokes to the right of the line from p to q (below, if it runs rightwards)."""
     length = abs(q - p)
     along = (q - p) / max(length, 1e-9)
     pen = sketch.pen("thin")
@@ -64,7 +64,7 @@ def hatching(sketch: SheetSketch, p: complex, q: complex, depth_mm: float, gap_m
 
 
 def support(sketch: SheetSketch, at: complex, turn: complex) -> None:
-    """A fixed pivot, standing the way that `turn` (a unit vector along the ground) says."""
+    """Draw a fixed pivot; `turn` is a unit vector along the ground."""
     pen = sketch.pen("line")
     wide, high = sketch.rng.uniform(3.2, 4.6), sketch.rng.uniform(4.5, 6.5)
     circle(sketch, at, JOINT_RADIUS_MM, pen)
@@ -86,7 +86,7 @@ def support(sketch: SheetSketch, at: complex, turn: complex) -> None:
 
 
 def slider(sketch: SheetSketch, at: complex, along: complex) -> None:
-    """A sliding block on a guide: a rectangle, the guide's centre line, ground below or on both sides."""
+    """Draw a slider on a guide: a rectangle, the guide's centre line, ground below or on both sides."""
     pen, thin = sketch.pen("line"), sketch.pen("thin")
     high = block(sketch, at, along)
     reach = sketch.rng.uniform(14.0, 26.0)
@@ -100,7 +100,7 @@ def slider(sketch: SheetSketch, at: complex, along: complex) -> None:
 
 
 def block(sketch: SheetSketch, at: complex, along: complex) -> float:
-    """A sliding block; half its height."""
+    """Draw a sliding block; return half its height."""
     pen = sketch.pen("line")
     wide, high = sketch.rng.uniform(4.5, 7.5), sketch.rng.uniform(2.4, 3.8)
     corners = [at + along * complex(sx * wide, sy * high) for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
@@ -112,7 +112,7 @@ def block(sketch: SheetSketch, at: complex, along: complex) -> float:
 def turning_arrow(
     sketch: SheetSketch, centre: complex, start_rad: float, radius_mm: float, sense: float
 ) -> None:
-    """A curved arrow about a pivot, with the letter omega."""
+    """Draw a curved arrow about a pivot, with the letter omega."""
     pen = sketch.pen("text")
     points = arc(centre, radius_mm, start_rad, np.sign(sense) * sketch.rng.uniform(0.9, 1.5))
     sketch.curve(pen, points)
@@ -123,7 +123,7 @@ def turning_arrow(
 
 
 def cross_out(sketch: SheetSketch, low: complex, high: complex) -> None:
-    """Two or three long strokes through something that does not count."""
+    """Draw two or three long strokes through something that does not count."""
     pen = sketch.pen("line")
     rng = sketch.rng
     for p, q in ((low, high), (complex(low.real, high.imag), complex(high.real, low.imag))):
@@ -132,7 +132,7 @@ def cross_out(sketch: SheetSketch, low: complex, high: complex) -> None:
 
 
 def inside_hatching(sketch: SheetSketch, corners: tuple[complex, complex, complex], gap_mm: float) -> None:
-    """Parallel thin lines across a triangular plate."""
+    """Draw parallel thin lines across a triangular plate."""
     points = np.array(corners)
     lean = complex(np.exp(1j * sketch.rng.uniform(0.5, 1.2)))
     height = (points * np.conj(lean)).imag

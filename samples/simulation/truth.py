@@ -1,9 +1,9 @@
-"""What was really drawn on a sheet, as one JSON object.
+"""The truth of a sheet's drawing, as one JSON object.
 
 Positions are sheet millimetres from the top left corner, x right, y down; directions are degrees
-counter-clockwise from +x. `nodes` are where the construction's points came out under this hand;
-a stroke may miss them by the redraw error (`line_mm`). `intended` is what a perfect hand would
-have drawn with the same mistakes: what follow-through should expect.
+counter-clockwise from +x. `nodes` are the construction's points as this hand drew them; a stroke
+may miss them by the redraw error (`line_mm`). `intended` is the drawing of a perfect hand with the
+same mistakes: follow-through should expect it.
 """
 
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ SCHEMA_VERSION = 1
 
 
 def xy(at: complex) -> list[float]:
-    """A place as written: x, y down, 0.1 um."""
+    """A point as written to the file: x, y down, to 0.1 um."""
     return [round(at.real, 4), round(-at.imag, 4)]
 
 
@@ -43,7 +43,7 @@ def drawing_truth(
     origins: Mapping[str, complex],
     missing: Mapping[str, Mapping[str, str]],
 ) -> dict[str, Any]:
-    """What is on the paper, whatever the scanner does to it."""
+    """The truth of the drawing on the paper, independent of the scanner."""
     figures = {
         figure.name: _figure(task, figure, sketch, origins[figure.name], missing.get(figure.name, {}))
         for figure in sheet.figures
@@ -116,7 +116,7 @@ def _figure(
 
 
 def scan_truth(view: PaperView, frame: Frame | None, settings: Settings) -> dict[str, Any]:
-    """Where the paper lies among the pixels."""
+    """The paper's position in the image."""
     grid = np.array([[x, y] for y in (10.0, 102.0, 194.0, 286.0) for x in np.linspace(10.0, 410.0, 6)])
     pixels = view.to_px(grid)
     lens = {"k1": view.k1, "centre": view.centre.tolist(), "r": view.radius} if view.k1 else None

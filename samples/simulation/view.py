@@ -1,4 +1,4 @@
-"""Where a sheet's millimetres fall among the pixels of a scanner or a phone.
+"""The map from a sheet's millimetres to the pixels of a scanner or a phone.
 
 Pixels are those of the stored image; the centre of its top left pixel is (0, 0). With a lens the
 homography gives undistorted pixels u; the stored pixel p satisfies u = c + (p - c)(1 + k1 |p - c|^2 / r^2)
@@ -27,10 +27,10 @@ class PaperView:
     ----------
     homography : (3, 3) sheet mm, y down, to (undistorted) pixels
     size : height and width of the stored image
-    k1 : of the lens, 0 for none
+    k1 : the lens's distortion, 0 for none
     turns : quarter turns counter-clockwise by which the stored image is turned
     paper_mm : the sheet's outline x0, y0, x1, y1 in its own millimetres
-    curl_mm : a bow across the sheet, on top of the homography: its middle lies so far higher
+    curl_mm : a bow across the sheet, on top of the homography: the shift of its middle, upwards
     """
 
     homography: FloatArray
@@ -71,7 +71,7 @@ class PaperView:
         return np.asarray(flat + self._bow(flat))
 
     def _bow(self, xy_mm: FloatArray) -> FloatArray:
-        """How far the sheet's bow lifts its points, mm along y."""
+        """Shifts of points by the sheet's bow, mm along y."""
         lift = self.curl_mm * np.sin(np.pi * np.clip(xy_mm[:, 0] / PAPER_MM[0], 0.0, 1.0))
         return np.column_stack([np.zeros_like(lift), lift])
 
@@ -92,7 +92,7 @@ def projected(homography: FloatArray, xy: FloatArray) -> FloatArray:
 
 
 def view_of(scan: Scan, rng: Rng) -> PaperView:
-    """How this scanner or phone sees the sheet."""
+    """The view of the sheet by this scanner or phone."""
     upright, size = _phone(scan, rng) if scan.device == "phone" else _glass(scan, rng)
     homography = upright
     for _ in range(scan.quarter_turns % 4):
@@ -107,7 +107,7 @@ def view_of(scan: Scan, rng: Rng) -> PaperView:
 
 
 def _glass(scan: Scan, rng: Rng) -> tuple[FloatArray, tuple[int, int]]:
-    """A flatbed's or copier's glass: skewed, shifted, unequal scales."""
+    """The homography and image size of a flatbed or copier: skewed, shifted, unequal scales."""
     pitch = scan.dpi / 25.4
     extra = rng.choice([0.0, 0.0, 6.0, 12.0]) if scan.shift_mm > 0 else 0.0
     w, h = PAPER_MM[0] + extra, PAPER_MM[1] + 0.7 * extra
@@ -127,7 +127,7 @@ def _glass(scan: Scan, rng: Rng) -> tuple[FloatArray, tuple[int, int]]:
 
 
 def _phone(scan: Scan, rng: Rng) -> tuple[FloatArray, tuple[int, int]]:
-    """A phone held over the sheet: tilted a little, the sheet nearly filling the picture."""
+    """The homography and image size of a phone: tilted a little, the sheet nearly filling the picture."""
     width, height = (round(side * scan.dpi / _PHONE_DPI) for side in _PHONE_PX)
     axis, tilt = rng.uniform(0, 2 * np.pi), np.radians(scan.tilt_deg)
     roll = np.radians(np.clip(rng.normal(0.0, scan.skew_deg), -6.0, 6.0))

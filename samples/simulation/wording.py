@@ -1,4 +1,4 @@
-"""What students write: captions, title block, scales, calculations, in three languages."""
+"""Texts that students write: captions, title block, scales, calculations, in three languages."""
 
 from collections.abc import Mapping
 
@@ -48,12 +48,12 @@ def number(value: float, page: PageStyle, digits: int = 4) -> str:
 
 
 def declared_texts(scales: Mapping[str, float]) -> dict[str, str]:
-    """Scales as they are entered, to the last digit."""
+    """Scales as they are entered, with all digits."""
     return {name: f"{value!r} {SCALE_UNITS[name]}" for name, value in scales.items()}
 
 
 def scale_text(name: str, value: float, task: DrawingTask, page: PageStyle, rng: Rng) -> str:
-    """A declared scale as it is written on the sheet."""
+    """A declared scale as written on the sheet."""
     known = task.assignment.file.names.get(name, name)
     symbol = f"{known[0]}_{known[1:]}"
     ratio = 1.0 / (value * 1000.0)
@@ -66,7 +66,7 @@ def scale_text(name: str, value: float, task: DrawingTask, page: PageStyle, rng:
 
 
 def caption(figure: str, task: DrawingTask, page: PageStyle, rng: Rng, written: dict[str, str]) -> list[str]:
-    """The lines written above a figure; scales written go into `written`."""
+    """The lines written above a figure; adds the scales in them to `written`."""
     choices = CAPTIONS[page.language][figure]
     lines = [choices[rng.integers(len(choices))]] if page.captions else []
     if page.scales_written in {"captions", "both"}:
@@ -78,7 +78,7 @@ def caption(figure: str, task: DrawingTask, page: PageStyle, rng: Rng, written: 
 
 
 def title_rows(task: DrawingTask, page: PageStyle, rng: Rng, written: dict[str, str]) -> list[list[str]]:
-    """The cells of the title block, row by row; scales written go into `written`."""
+    """The cells of the title block, row by row; adds the scales in them to `written`."""
     words = WORDS[page.language]
     who = task.variant.n if task.variant.n is not None else task.variant.position
     title = task.assignment.file.title
@@ -102,7 +102,7 @@ def plain(text: str) -> str:
 
 
 def calculations(task: DrawingTask, page: PageStyle, nodes: Mapping[str, complex]) -> list[str]:
-    """A few lines of working, with this student's own numbers."""
+    """A few lines of calculations, with this student's own numbers."""
     known, crank = task.wrong.parameters, task.mechanism.driver
     lines = []
     if isinstance(crank, Crank):

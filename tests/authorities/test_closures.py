@@ -1,4 +1,4 @@
-"""Other roads to the same motion: loops closed by Newton's method in many digits, and textbook formulas."""
+"""The same motion by other methods: loops closed by Newton's method in many digits, textbook formulas."""
 
 import math
 
@@ -14,7 +14,7 @@ from reference.kinematics.motion import move
 DIGITS = 40
 NEWTON_STEPS = 10
 DOUBLE_PRECISION = 1e-12
-"""Of the largest velocity or acceleration; the mechanisms here are well conditioned."""
+"""Share of the largest velocity or acceleration; the mechanisms here are well conditioned."""
 OMEGA, EPSILON = 3.0, -7.0
 CRANK = {"pivot": "A", "pin": "B", "length": 0.15, "angle_deg": 70, "omega": OMEGA, "epsilon": EPSILON}
 B3 = {"type": "RPR", "node": "B3", "pin": "B", "pivot": "C", "link": "3"}
@@ -136,7 +136,7 @@ def start_of_the_third(motion):
 
 
 def closed(loops, start):
-    """Newton's method from a start near enough, its slopes from differences: real unknowns, complex loops."""
+    """Solve loops by Newton's method with derivatives from differences: real unknowns, complex loops."""
 
     def parts(unknowns):
         return mp.matrix([part for loop in loops(unknowns) for part in (loop.real, loop.imag)])

@@ -228,7 +228,7 @@ def four_bar(spans, angle_deg, omega, epsilon=0.0) -> Motion:
 
 
 def magnitudes(told: dict) -> dict[str, float]:
-    """What the books measure on their plans, from the exact motion."""
+    """The values that the books measure on their plans, from the exact motion."""
     if "r" in told or "l" in told:
         motion = slider_crank(told)
         return {

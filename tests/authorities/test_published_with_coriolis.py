@@ -45,7 +45,7 @@ class Solved:
         return complex(self.motion.position[about][0]) if kind == "r" else self.vector(name)
 
     def size(self, name: str) -> float:
-        """Of the figure that a value is measured in: of a plan its longest vector."""
+        """The size of the figure in which a value is measured: of a plan its longest vector."""
         kind = name.strip("|")[0]
         if kind == "r":
             return max(float(np.abs(place)[0]) for place in self.motion.position.values())

@@ -1,8 +1,8 @@
-"""What books measured on their own drawn plans, entered as a student's work: graded as the good work it is.
+"""Values that books measured on their own drawn plans get the marks of good work when entered.
 
-The books print values, not millimetres, so each plan is taken to stand in print at the size of a book's
-figure: there everything gets full marks. Half as large again, where the same values are farther off in
-millimetres, nothing is marked as wrong and no mistake is named.
+The books print values, not millimetres, so each plan is assumed to have the size of a book's figure: then
+everything gets full marks. At one and a half times that size, with larger errors in millimetres, nothing
+is marked as wrong and no mistake is named.
 """
 
 import cmath
@@ -35,7 +35,7 @@ NAMES = {
     "w_P2B": "omega_2", "alpha_rod": "epsilon_3", "alpha_QR": "epsilon_3", "alpha_AB": "epsilon_3",
     "alpha_RS": "epsilon_2", "alpha_P2B": "epsilon_2",
 }  # fmt: skip
-"""Of the books' values, as the plans' names are here."""
+"""Our names of vectors and rates, by the names of the books' values."""
 
 
 def assignment_of(mechanism: dict, kv: float = 1.0, ka: float = 1.0) -> Assignment:

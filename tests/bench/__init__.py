@@ -1,1 +1,1 @@
-"""Run time against error: the solver, the construction and the reading of sheets, measured."""
+"""Benchmarks of run time and error: the solver, the construction and the reading of sheets."""

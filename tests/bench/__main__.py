@@ -1,4 +1,4 @@
-"""The benchmarks of a checkout: `python -m tests.bench --help`."""
+"""Run a checkout's benchmarks: `python -m tests.bench --help`."""
 
 import argparse
 import sys
@@ -20,11 +20,11 @@ from tests.bench.reading_tally import paper_tables, reading_tables
 from tests.bench.solver import measure_solver, solver_tables
 
 STUDENTS, STUDENTS_QUICK = 6, 1
-"""Of each scene of the reading."""
+"""Students of each scene of the reading."""
 SETTLING, SETTLING_QUICK = 50, 1
 """Students of each kind of sheet."""
 ROWS, ROWS_QUICK = 1000, 50
-"""Of a class's measurements."""
+"""Rows of a class's measurements."""
 
 
 def _reading(students: int | None, quick: bool) -> Iterable[Table]:
@@ -64,7 +64,7 @@ PARTS: Mapping[str, Callable[[int | None, bool], Iterable[Table]]] = {
     "judging": _judging,
     "settling": _settling,
 }
-"""What is measured, by its name: from the number of students, and whether a few cases are enough."""
+"""Measurements by name: functions of the number of students, and whether a few cases are enough."""
 USUAL = ("solver", "reading", "curve", "lines", "judging")
 
 

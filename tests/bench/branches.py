@@ -1,9 +1,9 @@
-"""Wrong branches counted in many random mechanisms, near singular positions and far.
+"""Counts of wrong branches in many random mechanisms, near singular positions and far from them.
 
-Four-bars and slider-cranks for all; slotted links for ours as well.
+All solvers get four-bars and slider-cranks; ours gets slotted links as well.
 
-A tenth of the cases lies nearer than 0.1 to a singular position, down to 1e-14. On which side a solver
-puts the group's node is told by the node's distance from the line of symmetry of both assemblies.
+A tenth of the cases lies nearer than 0.1 to a singular position, down to 1e-14. The assembly that a solver
+found is told by the signed distance of the group's node from the line of symmetry of both assemblies.
 """
 
 import math
@@ -26,7 +26,7 @@ SEED = 7
 
 @dataclass(frozen=True, slots=True)
 class BranchRow:
-    """What became of so many random cases with one solver."""
+    """Counts of one solver's outcomes in random cases."""
 
     solver: str
     cases: int
@@ -36,13 +36,13 @@ class BranchRow:
 
 
 def count_branches(*, quick: bool = False) -> Iterator[BranchRow]:
-    """Ours in many cases, then scipy's `fsolve` in fewer: it takes hundreds of times as long."""
+    """Count ours in many cases, then scipy's `fsolve` in fewer: it takes hundreds of times as long."""
     yield count_ours(quick=quick)
     yield count_peer(quick=quick)
 
 
 def count_ours(*, quick: bool = False) -> BranchRow:
-    """By the closed form, on arrays."""
+    """Count the outcomes of the closed form, on arrays."""
     count = CASES_QUICK if quick else CASES
     wrong = refused = silent = 0
     for mechanism in _all_kinds(count):
@@ -58,7 +58,7 @@ def count_ours(*, quick: bool = False) -> BranchRow:
 
 
 def count_peer(*, quick: bool = False) -> BranchRow:
-    """By scipy, each case a mechanism of its own."""
+    """Count scipy's outcomes, each case a mechanism of its own."""
     count = PEER_CASES_QUICK if quick else PEER_CASES
     tally = dict.fromkeys(("wrong", "refused", "silent"), 0)
     for mechanism in _both_kinds(count):
@@ -73,7 +73,7 @@ def count_peer(*, quick: bool = False) -> BranchRow:
 
 
 def _outcome(mechanism: Mechanism, start: Places) -> str | None:
-    """What went wrong; None where nothing did."""
+    """The kind of failure (refused, silent or wrong); None if the answer is right."""
     try:
         answer = Fsolve(mechanism).solve(0, start)()
     except NoAnswerError:
@@ -86,7 +86,7 @@ def _outcome(mechanism: Mechanism, start: Places) -> str | None:
 
 
 def _side_share(mechanism: Mechanism, at: Mapping[str, ComplexArray]) -> FloatArray:
-    """The node's distance from the line of symmetry over what it must be: 1 right, -1 mirrored."""
+    """The node's signed distance from the line of symmetry over the right one: 1 right, -1 mirrored."""
     group = mechanism.groups[0]
     if isinstance(group, Dyad):
         p, q = (at[pin] for pin in group.pins)
@@ -170,7 +170,7 @@ def _slider_cranks(rng: np.random.Generator, count: int) -> Mechanism:
 
 
 def _slotted_links(rng: np.random.Generator, count: int) -> Mechanism:
-    """With offset, the pin ahead of the pivot or behind; a further point shows which way the link lies."""
+    """Slotted links with offset, the pin ahead of the pivot or behind; another point shows the direction."""
     crank, pin = _crank(rng, count)
     offset = rng.uniform(0.2, 1.0, count)
     distance = offset * (1.0 + 2.0 * _shares(rng, count))

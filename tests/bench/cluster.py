@@ -1,9 +1,9 @@
-"""Where grading on a cluster stops scaling: what a sheet costs the client and the scheduler, by measurement.
+"""Measure the cost of a sheet for client and scheduler: it limits how grading on a cluster scales.
 
 ``python -m tests.bench.cluster [--sheets 60] [--seconds 0.5] [--workers 1 2 4]`` starts a scheduler and
-workers as the page on clusters says. A call sleeps for a sheet's time and writes as much as a sheet leaves
-behind, so that not the processors of this machine are measured but the way there and back. From processor
-times per sheet follow the rates at which client, scheduler and network are full.
+workers as the page on clusters says. A call sleeps for a sheet's time and writes as many bytes as a sheet
+does, so that the communication is measured and not this machine's processors. Processor times per sheet
+give the rates at which client, scheduler and network are saturated.
 """
 
 import argparse
@@ -26,11 +26,11 @@ from grader.folder.workers import Limits
 
 ROOT = Path(__file__).resolve().parents[2]
 SHEET_BYTES = 1_200_000
-"""Of a sheet of the samples: scan as cached 650 kB, pages for the student 550 kB."""
+"""Data of one sample sheet: cached scan 650 kB, pages for the student 550 kB."""
 NETWORK_BYTES_S = 110e6
 """Gigabit Ethernet, less its headers."""
 REAL_SHEET_S = 1.8
-"""Of one process and one sheet of the samples on a machine with nothing else to do, all stages."""
+"""Time of all stages for one sample sheet, by one process on an otherwise idle machine."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class Run:
 
 
 def sheet(out: Path, number: int, seconds: float, size: int) -> int:
-    """What stands for a sheet: takes so long, and writes so many bytes."""
+    """Stand in for grading a sheet: sleep for its time, and write as many bytes."""
     time.sleep(seconds)
     write_whole(out / f"{number}.bin", secrets.token_bytes(size))
     return number
@@ -95,7 +95,7 @@ def _measured(workers: int, sheets: int, seconds: float, port: int) -> Run:
 
 
 def report(runs: Sequence[Run], seconds: float) -> str:
-    """The measurements as a table, and the rates at which each part is full."""
+    """The measurements as a table, and the rates at which each part is saturated."""
     lines = ["workers  sheets/min  of perfect  client ms/sheet  scheduler ms/sheet"]
     for run in runs:
         rate = run.sheets / run.seconds
@@ -107,7 +107,7 @@ def report(runs: Sequence[Run], seconds: float) -> str:
         sum(run.client_s for run in runs) / sheets,
         sum(run.scheduler_s for run in runs) / sheets,
     )
-    # A cached page goes to the worker that marks it, too.
+    # A cached page is also sent to the worker that marks it.
     network = 1.5 * SHEET_BYTES / NETWORK_BYTES_S
     lines.append("full at, sheets/s (and workers that do so many):")
     for name, cost in (("client", client), ("scheduler", scheduler), ("gigabit network", network)):

@@ -1,10 +1,10 @@
-"""How well points are read on sheets that departments gave away (`planmark collect`).
+"""Measure how well points are read on sheets that departments donated (`planmark collect`).
 
     python -m tests.bench --collected F.zip [--assignment FILE]
 
-Each page is read again from its pixels; what was drawn is known by the decisions of those who gave it. Points
-that nobody but the program vouches for are counted apart: they tell how stable a reading is, not how right.
-Points whose verdict a person found wrong have no known place, and are left out.
+Each page is read again from its pixels; the truth is known from the donors' decisions. Points that only the
+program confirmed are counted apart: they show how stable a reading is, not how right. Points whose verdict
+a person found wrong have no known position, and are left out.
 """
 
 import json
@@ -34,7 +34,7 @@ KINDS = (("by a person", ("moved", "audited", "decided")), ("by the program alon
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A point of a figure: who vouches for it, how far from there it was read, how sure the reading is.
+    """A point of a figure: who confirmed it, the error of its reading, and the reading's confidence.
 
     `off_mm` is None where it was not read.
     """
@@ -45,12 +45,12 @@ class Point:
 
     @property
     def is_misread(self) -> bool:
-        """Whether it is asserted to be where it is not."""
+        """True if it was read with confidence at a wrong place."""
         return self.off_mm is not None and self.confidence >= SURELY and self.off_mm > WITHIN_MM[-1]
 
 
 def points_of(file: Path, assignment: str | None = None) -> Iterator[Point]:
-    """The points of all pages; `assignment` is a file in the place of the one that is named."""
+    """The points of all pages; `assignment` is a file to use instead of the one named in them."""
     with zipfile.ZipFile(file) as archive:
         for line in archive.read("truth.jsonl").decode().splitlines():
             row = json.loads(line)
@@ -89,7 +89,7 @@ def sheet_of(row: dict[str, Any]) -> Sheet:
 
 
 def collected_table(points: Sequence[Point]) -> Table:
-    """What share of the points is read, and how well."""
+    """The shares of the points that are read, within which errors, and with confidence."""
     heads = ("known", "points", "read", *(f"within {mm} mm" for mm in WITHIN_MM), "asserted", "misread")
     rows = []
     for kind, names in KINDS:

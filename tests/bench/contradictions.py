@@ -1,8 +1,8 @@
-"""Where reports contradict themselves: sentence, measured, expected, tolerance, points and score.
+"""Find contradictions within reports: sentence, measured, expected, tolerance, points and score.
 
     python -m tests.bench.contradictions OUT/results.json ...
 
-Reads what `planmark grade --lang en` wrote (the sentences are held against the numbers in English) and
+Reads the results of `planmark grade --lang en` (only English sentences are compared with the numbers) and
 prints each contradiction with its student and criterion. The exit status is 1 where there are any.
 """
 
@@ -17,7 +17,7 @@ from grader.feedback.numbers import parts_of
 SLACK = 1e-5
 """Excess over a tolerance or over points by rounding."""
 ROUNDING = 0.06
-"""Of a number with one decimal, told and shown."""
+"""Largest difference of two numbers that are rounded to one decimal."""
 OPPOSITE_DEG = 150.0
 DOUBTS = re.compile(r"too close to|too little certainty|a person must look|an instructor will")
 NOT_READ = re.compile(r"could not be read|Nothing was handed in|is not required")
@@ -34,7 +34,7 @@ TURN = re.compile(r"turned ([\d.]+)°")
 
 
 def contradictions(report: ReportDocument) -> Iterator[str]:
-    """What a report says that its own numbers deny."""
+    """The contradictions in a report, each with its criterion."""
     for criterion in report.criteria:
         for what in (*_of_verdict(criterion), *_of_sentence(criterion), *_of_proposal(criterion)):
             yield f"{criterion.id}: {what}"
@@ -43,7 +43,7 @@ def contradictions(report: ReportDocument) -> Iterator[str]:
 
 
 def _offs(criterion: CriterionDocument) -> dict[str, float]:
-    """How far measured and expected are apart, in length, direction and value, where both are there."""
+    """Differences of measured and expected length, direction and value, where both are there."""
     offs = {}
     for name in ("length_mm", "direction_deg", "value"):
         one, other = getattr(criterion.measured, name), getattr(criterion.expected, name)
@@ -54,7 +54,7 @@ def _offs(criterion: CriterionDocument) -> dict[str, float]:
 
 
 def _beyond(criterion: CriterionDocument) -> list[str]:
-    """What is beyond the tolerance shown; a direction that is not judged is not."""
+    """The quantities beyond the tolerance shown, except a direction that is not judged."""
     is_short = "too_short_to_judge" in criterion.reasons
     return [
         name
@@ -65,7 +65,7 @@ def _beyond(criterion: CriterionDocument) -> list[str]:
 
 
 def _of_verdict(criterion: CriterionDocument) -> Iterator[str]:
-    """Verdict against tolerance and points."""
+    """Contradictions of a verdict with tolerance and points."""
     verdict, points = criterion.verdict, criterion.points
     beyond = _beyond(criterion)
     is_lenient = criterion.decided is not None or COUNTED & set(criterion.reasons)
@@ -85,7 +85,7 @@ def _of_verdict(criterion: CriterionDocument) -> Iterator[str]:
 
 
 def _of_sentence(criterion: CriterionDocument) -> Iterator[str]:
-    """Sentence against numbers and verdict."""
+    """Contradictions of a sentence with numbers and verdict."""
     said = criterion.feedback
     if not said:
         yield "nothing is said"
@@ -109,7 +109,7 @@ def _of_sentence(criterion: CriterionDocument) -> Iterator[str]:
 
 
 def _of_proposal(criterion: CriterionDocument) -> Iterator[str]:
-    """What is proposed against the sentence and the numbers beside it."""
+    """Contradictions of a proposed verdict with the sentence and the numbers beside it."""
     said, proposed = criterion.feedback, criterion.proposed
     if criterion.verdict != "review" or proposed is None:
         return
@@ -124,7 +124,7 @@ def _of_proposal(criterion: CriterionDocument) -> Iterator[str]:
 
 
 def _of_mistakes(report: ReportDocument) -> Iterator[str]:
-    """Mistakes against the verdicts that they explain."""
+    """Contradictions of mistakes with the verdicts that they explain."""
     verdicts = {criterion.id: criterion.verdict for criterion in report.criteria}
     for mistake in report.mistakes:
         explained = {verdicts[name] for name in mistake.explains if name in verdicts}
@@ -133,7 +133,7 @@ def _of_mistakes(report: ReportDocument) -> Iterator[str]:
 
 
 def _of_score(report: ReportDocument) -> Iterator[str]:
-    """The score against the sum of the rows."""
+    """Contradictions of the score with the sum of the rows."""
     parts = parts_of(report)
     if not parts:
         return
@@ -147,7 +147,7 @@ def _of_score(report: ReportDocument) -> Iterator[str]:
 
 
 def main(paths: list[str]) -> int:
-    """Print what contradicts itself; the exit status."""
+    """Print the contradictions; return the exit status."""
     found = 0
     for path in paths:
         results = ResultsDocument.model_validate_json(Path(path).read_bytes())

@@ -1,15 +1,15 @@
-"""Drawings that follow another student's data: how many are told, and how many honest ones are accused.
+"""Drawings that follow another student's data: how many are found, and how many honest ones are accused.
 
 ::
 
     python -m tests.bench.copying --students 300
     python -m tests.bench.copying --students 0 --scans 40 --kept FOLDER
 
-simulated students enter measurements: each draws with another variant's data, the whole or one plan, and
-hands it in under the own name with the own scales, the other's or none; as many honest ones draw rightly or
-with mistakes. With `--scans`, sheets drawn with another variant's data are read under the own number, and as
-many under the one that they were drawn with (some 5 s each; readings are kept in the folder). The first seeds
-were used to set the constants of `grader.given_data`; the rest measure.
+Simulated students enter measurements: each draws all or one plan with another variant's data, and hands it
+in under the student's own name with the own scales, the other's or none; as many honest students draw rightly
+or with mistakes. With `--scans`, sheets drawn with another variant's data are read under the student's own
+number, and as many under the number that they were drawn with (some 5 s each; readings are kept in the
+folder). The first seeds were used to set the constants of `grader.given_data`; the others are for measuring.
 """
 
 import argparse
@@ -51,14 +51,14 @@ HOWS: tuple[How, ...] = get_args(How)
 SOURCES: tuple[Source, ...] = ("directions", "lengths", "nodes")
 OWNERS = frozenset({"other_variant", "data_misread"})
 TURNED = 0.1
-"""Of sketches are turned on their sheets."""
+"""Share of sketches that are turned on their sheets."""
 LEAST_APART = 3
-"""Variants of nearer numbers may draw the same: they are counted apart."""
+"""Variants with closer numbers may have the same drawing: they are counted separately."""
 
 
 @dataclass(frozen=True, slots=True)
 class Copied:
-    """One submission and what was made of it."""
+    """One submission and the program's result."""
 
     key: StudentKey
     source: Source
@@ -69,15 +69,15 @@ class Copied:
 
 @dataclass(frozen=True, slots=True)
 class Said:
-    """What was made of one submission.
+    """The program's result for one submission.
 
     Attributes
     ----------
-    is_named : other data are named as a mistake
-    is_asked : a person is asked whether the data are others
-    has_number : the number whose data they are is among those named or asked for
+    is_named : another variant's data are named as a mistake
+    is_asked : a person is asked whether the data are another variant's
+    has_number : the number that the data belong to is among those named or asked about
     waits : it is not marked without a person
-    share : of the points, that it may get
+    share : share of the points that it may get
     """
 
     is_named: bool
@@ -88,7 +88,7 @@ class Said:
 
 
 def work_of(key: StudentKey, assignment: Assignment, variant: Variant, turn: float) -> StudentWork:
-    """The right drawing of a variant by the student of a key, with a sketch turned by some degrees."""
+    """The right drawing of a variant by a key's student, with the sketch turned by some degrees."""
     lot = key.lot("copied")
     pages = {page.kind for page in assignment.file.page}
     habits = Student(sheets=1 if "all" in pages else 2, turn_deg=turn)
@@ -101,7 +101,7 @@ def work_of(key: StudentKey, assignment: Assignment, variant: Variant, turn: flo
 
 
 def copied(key: StudentKey, source: Source, how: How) -> tuple[Task, Submission, Variant]:
-    """The task of a student, what was handed in, and the variant whose data (part of) it follows."""
+    """A student's task and submission, and the variant whose data all or part of it follows."""
     assignment, rubric = assignment_named(key.assignment)
     variants, lot = assignment.variants(), key.lot("pair")
     own, other = (variants[int(index)] for index in lot.choice(len(variants), 2, replace=False))
@@ -118,7 +118,7 @@ def copied(key: StudentKey, source: Source, how: How) -> tuple[Task, Submission,
 
 
 def _merged(mine: Submission, theirs: Submission, plan: str) -> Submission:
-    """The own submission with another's plan in it."""
+    """A student's submission with another's plan in it."""
 
     def with_plan(one: Reading, other: Reading) -> Reading:
         if plan not in one.figures or plan not in other.figures:
@@ -132,14 +132,14 @@ def _merged(mine: Submission, theirs: Submission, plan: str) -> Submission:
 
 
 def judged_copy(key: StudentKey, source: Source, how: How) -> Copied:
-    """A copied submission, judged."""
+    """Judge a copied submission."""
     task, handed_in, other = copied(key, source, how)
     judgement = judge(task, handed_in)
     return Copied(key, source, how, _apart(task.variant, other), _said(judgement, other))
 
 
 def _apart(one: Variant, other: Variant) -> int:
-    """How far the numbers and positions of two variants are from each other."""
+    """The distance of two variants: the sum of the differences of number and position."""
     return abs((one.n or 0) - (other.n or 0)) + abs((one.position or 0) - (other.position or 0))
 
 
@@ -160,13 +160,13 @@ def _said(judgement: Judgement, other: Variant | None) -> Said:
 
 
 def _number(whose: str) -> str:
-    """The number and position in what a question says."""
+    """The number and position named in a question."""
     said = dict(one.split(" = ") for one in whose.split(", "))
     return f"{said.get('n')}, {said.get('position')}"
 
 
 def honest(key: StudentKey, source: Source) -> Copied | None:
-    """A submission by the own data, judged; None where no such drawing comes about."""
+    """Judge a submission that follows the student's own data; None if it cannot be drawn."""
     try:
         work = student(key)
     except ValueError:
@@ -198,7 +198,7 @@ class ReadCopy:
 
 
 def read_copy(kind: str, seed: int, kept: Path | None, *, honest: bool) -> ReadCopy | None:
-    """A sheet read, from the folder `kept` where it has it; None where no such drawing comes about."""
+    """Read a sheet, or take its reading from the folder `kept`; None if it cannot be drawn."""
     path = None if kept is None else kept / f"{kind}-{seed}-{'honest' if honest else 'copied'}.pkl"
     return stored(path, partial(_read_copy, kind, seed, honest=honest))
 
@@ -224,7 +224,7 @@ def _read_copy(kind: str, seed: int, *, honest: bool) -> ReadCopy | None:
 
 
 def judged_scan(kind: str, read: ReadCopy) -> Copied:
-    """Sheets that were read, judged under the own number."""
+    """Judge sheets that were read under the student's own number."""
     assignment, rubric = assignment_named(read.key.assignment)
     task = task_of(assignment, rubric, read.own)
     drawn = tuple(one for one in read.readings if one.figures)
@@ -238,7 +238,7 @@ def judged_scan(kind: str, read: ReadCopy) -> Copied:
 
 
 def tables(submissions: Sequence[Copied]) -> Iterator[Table]:
-    """Copies told, by how and by source; honest submissions accused, by hand."""
+    """Copies found, by kind and source; honest submissions accused, by hand."""
     copies = [one for one in submissions if one.how != "honest"]
     groups = {f"{source}, {how}": [one for one in copies if (one.source, one.how) == (source, how)]
               for source in SOURCES for how in HOWS}  # fmt: skip
@@ -289,7 +289,7 @@ KINDS: tuple[Kind, ...] = ("right", "single", "pair")
 
 
 def measure(students: int, first: int = FIRST_SEED) -> Iterator[Copied]:
-    """So many copies, and as many honest submissions."""
+    """Judge this many copies, and as many honest submissions."""
     for seed in range(first, first + students):
         name = ASSIGNMENTS[seed % len(ASSIGNMENTS)]
         hand = list(HANDS)[seed // len(ASSIGNMENTS) % len(HANDS)]
@@ -304,7 +304,7 @@ def measure(students: int, first: int = FIRST_SEED) -> Iterator[Copied]:
 
 
 def measure_scans(students: int, first: int, kept: Path | None) -> Iterator[Copied]:
-    """So many copied sheets, and as many under the number that they were drawn with."""
+    """Judge this many copied sheets, and as many under the number that they were drawn with."""
     for seed in range(first, first + students):
         kind = list(SCANS)[seed % len(SCANS)]
         for is_honest in (False, True):
@@ -314,7 +314,7 @@ def measure_scans(students: int, first: int, kept: Path | None) -> Iterator[Copi
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """The benchmark as text."""
+    """Run the benchmark and print its tables."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0] if __doc__ else "")
     parser.add_argument("--students", type=int, default=100)
     parser.add_argument("--scans", type=int, default=0, help="copied sheets, and as many honest ones")

@@ -1,4 +1,4 @@
-"""What moves between two checkouts: every report of the same submissions, field by field.
+"""Differences between two checkouts: every report of the same submissions, compared field by field.
 
     python -m tests.bench.frozen CHECKOUT_BEFORE [CHECKOUT_AFTER] [--sheets DIR] [--out DIR] [--students N]
                                  [--marks]
@@ -12,7 +12,7 @@ Both checkouts (the second is this one by default) grade
 
 Reports are compared without times and version, numbers to 1e-9 of their size. Every difference is printed
 with its path in the report; the exit status is 0 where there is none. With `--marks` only the verdicts that
-moved are printed, by their reason, and for simulated students whether they are nearer to what was due.
+changed are printed, by their reason, and for simulated students whether they are nearer to the verdicts due.
 """
 
 import argparse
@@ -36,7 +36,7 @@ from tests.bench.judging_truth import charged_once, verdicts_due
 ROOT = Path(__file__).resolve().parents[2]
 ASSIGNMENTS = ("pump", "press", "engine", "shaper", "piston", "pump-collinear", "pump-230")
 STUDENTS = 24
-"""Of each kind, hand and assignment: 2,016 in all."""
+"""Number for each kind, hand and assignment: 2,016 in all."""
 VOLATILE = frozenset({"timing_ms", "schema_version"})
 """Fields that may differ between two runs of the same program."""
 RELATIVE = 1e-9
@@ -52,7 +52,7 @@ Difference = tuple[str, Any, Any]
 
 
 def write_students(folder: Path, count: int) -> None:
-    """A folder for each assignment with its simulated students' measurements in ``class.csv``."""
+    """Write a folder for each assignment with its simulated students' measurements in ``class.csv``."""
     for assignment in ASSIGNMENTS:
         rows = [row for row in _rows(assignment, count) if row]
         names = list(dict.fromkeys(name for row in rows for name in row))
@@ -64,7 +64,7 @@ def write_students(folder: Path, count: int) -> None:
 
 
 def _rows(assignment: str, count: int) -> Iterator[dict[str, object]]:
-    """A line for each student; nothing for one of whom no drawing comes about."""
+    """A line for each student, except those that cannot be drawn."""
     for hand in HANDS:
         for kind in KINDS:
             for seed in range(count):
@@ -77,7 +77,7 @@ def _rows(assignment: str, count: int) -> Iterator[dict[str, object]]:
 
 
 def submissions(students: Path, sheets: Path | None) -> Iterator[tuple[str, Path, str]]:
-    """What is graded: name, folder, assignment."""
+    """All that is graded: name, folder, assignment."""
     for assignment in ("pump", "press"):
         yield f"samples-{assignment}", ROOT / "samples" / assignment, assignment
     for folder in sorted(sheets.iterdir()) if sheets else ():
@@ -89,7 +89,7 @@ def submissions(students: Path, sheets: Path | None) -> Iterator[tuple[str, Path
 
 
 def grade(checkout: Path, folder: Path, assignment: str, out: Path) -> None:
-    """Grade a folder with a checkout's program. Raises RuntimeError where it refuses to."""
+    """Grade a folder with a checkout's program. Raises RuntimeError if the program fails."""
     command = [sys.executable, "-m", "grader", "grade", str(folder), "--assignment", assignment]
     surroundings = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(checkout)}
     done = subprocess.run(  # noqa: S603 - this project's own program
@@ -104,7 +104,7 @@ def grade(checkout: Path, folder: Path, assignment: str, out: Path) -> None:
 
 
 def differences(before: object, after: object, path: str = "$") -> Iterator[Difference]:
-    """Every place at which two JSON documents differ."""
+    """Every path at which two JSON documents differ."""
     match before, after:
         case dict(), dict():
             for name in sorted((before.keys() | after.keys()) - VOLATILE):
@@ -126,7 +126,7 @@ def differences(before: object, after: object, path: str = "$") -> Iterator[Diff
 
 
 def compare(before: Path, after: Path) -> tuple[int, int]:
-    """Print how the reports below two folders differ; how many are the same, and of how many."""
+    """Print the differences of the reports below two folders; return the number of equal ones and of all."""
     names = {path.relative_to(root) for root in (before, after) for path in root.rglob("report.json")}
     same = 0
     for name in sorted(names):
@@ -146,11 +146,11 @@ def compare(before: Path, after: Path) -> tuple[int, int]:
 # Marks that moved ---------------------------------------------------------------------------------
 
 FALSE, OPEN, ALLOWED = 0, 1, 2
-"""How good a verdict is: wrong, left to a person or not judged, as due."""
+"""Grades of a verdict: wrong; left to a person or not judged; as due."""
 
 
 def print_moved_marks(before: Path, after: Path) -> None:
-    """Every verdict that moved, counted by the reason it has now; those for the worse with their place."""
+    """Print the verdicts that changed, counted by their new reason; those for the worse one by one."""
     counts: Counter[tuple[str, ...]] = Counter()
     worse = []
     for path in sorted(after.rglob("report.json")):
@@ -180,7 +180,7 @@ def print_moved_marks(before: Path, after: Path) -> None:
 
 
 def _due(name: Path, said: dict[str, str]) -> tuple[str, dict[str, Due]]:
-    """The kind of a student and what is due by criterion; nothing of scans, whose truth is not here."""
+    """A student's kind and the verdicts due by criterion; empty for scans, whose truth is not known."""
     folder, student_id = name.parts[0], name.parts[1]
     if not folder.startswith("students-"):
         return "scan", {}
@@ -201,7 +201,7 @@ def _goodness(due: Due, verdict: str) -> int:
 
 
 def main() -> int:
-    """Grade with both checkouts and compare; the exit status."""
+    """Grade with both checkouts and compare; return the exit status."""
     parser = argparse.ArgumentParser(description="What moves between two checkouts.")
     parser.add_argument("before", type=Path)
     parser.add_argument("after", type=Path, nargs="?", default=ROOT)

@@ -1,10 +1,10 @@
-"""What perfect parts would bring: sheets read with tips or strokes given from the truth.
+"""The gain from perfect parts: sheets read with tips or strokes given from the truth.
 
     python -m tests.bench.given_truth [--scene plain --scene press ...] [--students 12] [--first 1]
 
 Each row is the same sheets read by today's program with one part replaced: *tips*, both ends of every vector
-along the strokes found; *strokes*, every drawn vector a stroke of its own, amid what else was found; *both*.
-Where a perfect part brings most, the next work is.
+along the strokes found; *strokes*, every drawn vector a stroke of its own, beside the others found; *both*.
+The part with the largest gain is the one to improve next.
 """
 
 import argparse
@@ -37,7 +37,7 @@ GOOD = 0.2
 
 @dataclass(frozen=True, slots=True)
 class TruePage:
-    """A page with its plans as drawn, vectors (k, 2, 2) in millimetres as read, y down."""
+    """A page with its plans as drawn, and vectors (k, 2, 2) in millimetres as read, y down."""
 
     page: ScannedPage
     figures: Mapping[str, TrueFigure]
@@ -45,7 +45,7 @@ class TruePage:
 
 
 def measured(work: SceneWork, pages: Sequence[TruePage], part: str) -> list[list[Judged]]:
-    """What is read on a student's pages, a list for each, with a part given."""
+    """Read a student's pages with a part given; a list of judged vectors for each page."""
     given = [PARTS[part](page) for page in pages]
     read = read_pages(given, work.assignment, work.variant, work.declared, work.rubric.vectors)
     return [
@@ -55,7 +55,7 @@ def measured(work: SceneWork, pages: Sequence[TruePage], part: str) -> list[list
 
 
 def opened(work: SceneWork) -> list[TruePage]:
-    """A student's sheets as scanned, beside what is on them."""
+    """A student's sheets as scanned, with their truth."""
     construction = construction_of(work.assignment.mechanism([work.variant]))
     found = []
     with tempfile.TemporaryDirectory() as folder:
@@ -67,7 +67,7 @@ def opened(work: SceneWork) -> list[TruePage]:
 
 
 def true_page(page: ScannedPage, truth: Mapping[str, Any], figures: Mapping[str, TrueFigure]) -> TruePage:
-    """A page beside what is on it."""
+    """A page with its truth."""
     strokes = [one.stroke for figure in figures.values() for one in figure.vectors.values() if one.stroke]
     if page.sheet is None or page.image is None or not strokes:
         return TruePage(page, figures, np.zeros((0, 2, 2)))
@@ -79,7 +79,7 @@ def true_page(page: ScannedPage, truth: Mapping[str, Any], figures: Mapping[str,
 
 
 def with_tips(true: TruePage) -> ScannedPage:
-    """Both ends of every vector, along each stroke that lies on it."""
+    """The page with both ends of every vector as tips, along each stroke that lies on it."""
     ink = true.page.ink
     if ink is None:
         return true.page
@@ -96,7 +96,7 @@ def with_tips(true: TruePage) -> ScannedPage:
 
 
 def with_strokes(true: TruePage) -> ScannedPage:
-    """Every vector as a stroke of its own, in place of those found along it."""
+    """The page with every vector as a stroke of its own, instead of those found along it."""
     ink = true.page.ink
     if ink is None or not len(true.vectors):
         return true.page
@@ -115,7 +115,7 @@ def with_strokes(true: TruePage) -> ScannedPage:
         )
         for field in fields(Strokes)
     }
-    # Ink goes on half a pen's width beyond a vector's ends.
+    # Ink extends half a pen's width beyond a vector's ends.
     size, unit = lengths_and_directions(drawn)
     cap = np.minimum(like["width"] / 2.0, size / 4.0)[:, None] * unit
     new = Strokes(**{**like, "ends": drawn + np.stack([-cap, cap], axis=1)})
@@ -131,12 +131,12 @@ def with_strokes(true: TruePage) -> ScannedPage:
 
 
 def with_both(true: TruePage) -> ScannedPage:
-    """Strokes, and tips along them."""
+    """The page with strokes from the truth, and tips along them."""
     return with_tips(replace(true, page=with_strokes(true)))
 
 
 def along(stroke: FloatArray, vector: FloatArray) -> tuple[float, float] | None:
-    """Where a vector's tail and head lie along a stroke, mm, if it lies on it."""
+    """The positions of a vector's tail and head along a stroke, mm; None if it is not on the stroke."""
     size, length = (float(np.hypot(*(line[1] - line[0]))) for line in (vector, stroke))
     if size < LEAST_MM or length < LEAST_MM:
         return None

@@ -1,6 +1,6 @@
-"""Judging measured on simulated classes whose truth is known: verdicts, mistakes named, time.
+"""Measure judging on simulated classes whose truth is known: verdicts, mistakes named, time.
 
-Who draws what stands in `judging_students`, what is due in `judging_truth`. One case again, told in full::
+The students are made in `judging_students`, the verdicts due in `judging_truth`. To show one case in full::
 
     python -m tests.bench.judging --case pump typical single 17
 """
@@ -44,7 +44,7 @@ MANY = 40
 
 
 def measure_class(rows: int, assignment: str = "pump") -> ClassTime:
-    """Half of the class draw rightly, half with a mistake; measured with ruler and protractor."""
+    """Time a class measured with ruler and protractor, half of it right, half with a mistake."""
     task, rubric = assignment_named(assignment)
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
@@ -61,7 +61,7 @@ def measure_class(rows: int, assignment: str = "pump") -> ClassTime:
 
 
 def _judge_all(path: Path, assignment: Assignment, rubric: RubricFile) -> None:
-    """The file read and every line of it judged, nothing written."""
+    """Read the file and judge every line of it, without writing."""
     for line in read_measurements(path, names_of(assignment)):
         variant = assignment.variant(line.n, line.position)
         handed_in = Submission(measured=line.reading, values=line.values, declared=line.scales)
@@ -85,13 +85,13 @@ def _write(path: Path, assignment: str, rows: int) -> None:
 
 
 STUDENTS: Mapping[Kind, int] = {"right": 96, "single": 48, "pair": 48, "slip": 12}
-"""Of each kind for an assignment and a hand: 2,016 right drawings in all."""
+"""Number of each kind for an assignment and a hand: 2,016 right drawings in all."""
 QUICK = 4
-"""In a quick run so many of each kind."""
+"""Number of each kind in a quick run."""
 
 
 def judged(key: StudentKey, times: Times | None = None, sources: Sequence[Source] = SOURCES) -> list[Result]:
-    """One student's work judged from each source, against what was due. Raises ValueError for no such one."""
+    """Judge a student's work from each source against the truth. Raises ValueError if it cannot be drawn."""
     work = student(key)
     noted = times if times is not None else Times()
     start = time.process_time()
@@ -115,7 +115,7 @@ def measure_judging(
     quick: bool = False,
     assignments: Sequence[str] = ASSIGNMENTS,
 ) -> JudgingFigures:
-    """Students of each assignment, hand and kind, judged.
+    """Judge students of each assignment, hand and kind.
 
     Arguments: `students` of each kind for an assignment and a hand, by default `STUDENTS`.
     """
@@ -124,14 +124,14 @@ def measure_judging(
     for name, hand in product(assignments, HANDS):
         for kind, count in (dict.fromkeys(KINDS, few) if few else STUDENTS).items():
             for seed in range(1, count + 1):
-                # Of some students no drawing comes about.
+                # Some students cannot be drawn.
                 with suppress(ValueError):
                     figures.results += judged(StudentKey(name, hand, kind, seed), figures.times)
     return figures
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """The benchmark, or one case of it, as text."""
+    """Print the benchmark, or one case of it."""
     parser = argparse.ArgumentParser(description="Judging measured on simulated classes.")
     parser.add_argument("--case", nargs=4, metavar=("ASSIGNMENT", "HAND", "KIND", "SEED"))
     parser.add_argument("--quick", action="store_true")
@@ -166,7 +166,7 @@ def _in_full(key: StudentKey) -> Iterator[str]:
 
 
 def _short(quantity: Quantity) -> str:
-    """What a criterion was measured as, or should be."""
+    """A measured or expected quantity as text."""
     if quantity.length_mm is None:
         return "-" if quantity.value is None else f"{quantity.value:.4g}"
     turn = "" if quantity.direction_deg is None else f" at {quantity.direction_deg:.1f}"

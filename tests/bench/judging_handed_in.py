@@ -1,10 +1,10 @@
-"""How a simulated student's drawing reaches the judge without pictures, and what can be seen of it.
+"""A simulated student's drawing as handed in without pictures, and the part of it that can be seen.
 
 The same drawing is handed in three ways: as a perfect reader would read it (`nodes`), as its owner would
 measure it with ruler and protractor (`directions`), and with the ruler alone (`lengths`). Some hand in values
-computed from it: each follows from the own drawn length, at the scale declared and the real length of the
-link, its sense from the own drawing, rounded to three digits. So it is due its marks whatever was drawn
-before, but for a slip: a right drawing's one value off by a factor.
+computed from it: each follows from the student's own drawn length, the declared scale and the link's real
+length, its sense from the own drawing, rounded to three digits. So it deserves its points whatever was drawn
+before, except for a slip: one value of a right drawing wrong by a factor.
 """
 
 import cmath
@@ -52,13 +52,13 @@ SHORT = 1.5
 
 @dataclass(frozen=True, slots=True)
 class Visible:
-    """What the judge can see: the vectors and links, and whether their directions are known."""
+    """The vectors and links that the judge can see, and whether their directions are known."""
 
     directed: Mapping[str, bool]
 
     @classmethod
     def of(cls, handed_in: Submission, links: Mapping[str, tuple[str, str]]) -> "Visible":
-        """From what was handed in; a link is seen where both of its joints are."""
+        """Make it from a submission; a link is seen if both of its joints are."""
         readings = [*handed_in.readings, *([handed_in.measured] if handed_in.measured else [])]
         joints = {
             joint for one in readings if MECHANISM in one.figures for joint in one.figures[MECHANISM].nodes
@@ -73,7 +73,7 @@ class Visible:
 
 
 def off(drawn: complex, due: complex, tolerance: ToleranceTable, *, directed: bool) -> float:
-    """How far a vector is from another, in the rubric's plain tolerances; infinite where there is none."""
+    """The distance of two vectors in the rubric's plain tolerances; infinite if one is missing."""
     if not cmath.isfinite(due) or not cmath.isfinite(drawn):
         return math.inf
     allowed = max(tolerance.length_mm, tolerance.length_relative * abs(due))
@@ -86,7 +86,7 @@ def off(drawn: complex, due: complex, tolerance: ToleranceTable, *, directed: bo
 
 
 SHARE = 0.4
-"""Of students hand in angular quantities."""
+"""Share of students who hand in angular quantities."""
 RULER_MM = 0.2
 DIGITS = 3
 FACTORS = (0.1, 10.0, 0.5, 2.0, -1.0)
@@ -98,13 +98,13 @@ LEAST_SINE = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Computed:
-    """What one student computed.
+    """The values that one student computed.
 
     Attributes
     ----------
     values : as handed in, SI, by vector or angular quantity
-    right : as they follow from the own drawing
-    slip : the one computed wrongly, None without one
+    right : as they follow from the student's own drawing
+    slip : the value computed wrongly, None if there is none
     """
 
     values: Mapping[str, float] = field(default_factory=dict)
@@ -114,7 +114,7 @@ class Computed:
 
 
 def computed(work: StudentWork) -> Computed:
-    """The values of one student; most have none."""
+    """The values that a student computed; most computed none."""
     lot = work.key.lot("values")
     has_slip = work.key.kind == "slip"
     if (lot.random() >= SHARE and not has_slip) or any(work.swaps()):
@@ -137,7 +137,7 @@ def _rounded(value: float) -> float:
 
 
 def _vector(work: StudentWork, name: str) -> str:
-    """The vector that a value comes from."""
+    """The vector from which a value is computed."""
     rates = work.construction.rates
     return rates[name].vector if name in rates else name
 
@@ -164,14 +164,14 @@ def _link(work: StudentWork, rate: AngularRate) -> complex:
 
 
 def across(work: StudentWork, rate: AngularRate) -> float:
-    """The sine from a rate's link, as sketched, to its vector, as drawn: its sign is the sense."""
+    """The sine of the angle from a rate's sketched link to its drawn vector; its sign is the sense."""
     link, drawn = _link(work, rate), _drawn(work, rate.vector)
     size = abs(link) * abs(drawn)
     return (link.conjugate() * drawn).imag / size if size else 0.0
 
 
 def length_of(drawing: Intent, rate: AngularRate, sketched_m: float) -> float:
-    """The real length of a rate's link: given, or as on the sketch to the point of a slotted link."""
+    """The real length of a rate's link: as given, else as measured on the sketch."""
     given = drawing.parameters.get(rate.length)
     return sketched_m if given is None else float(given)
 
@@ -192,7 +192,7 @@ def _drawn(work: StudentWork, name: str) -> complex:
 
 
 def exact_rates(work: StudentWork) -> dict[str, tuple[float, float]]:
-    """Of each angular quantity its exact value, and what a millimetre of its vector is worth."""
+    """Each angular quantity's exact value, and its change for a millimetre of its vector."""
     drawing = work.task.right
     nodes = evaluate(drawing.construction, drawing.parameters)
     found = {}
@@ -210,7 +210,7 @@ def exact_rates(work: StudentWork) -> dict[str, tuple[float, float]]:
 def rate_due(
     work: StudentWork, source: Source, criterion: CriterionTable, handed_in: Computed, visible: Visible
 ) -> Due:
-    """Of a value rightly computed from the own drawing."""
+    """The verdict due to a value rightly computed from the student's own drawing."""
     name = criterion.name
     if source not in SOURCES or name not in handed_in.values:
         return "absent"
@@ -221,14 +221,14 @@ def rate_due(
     if apart <= PLAIN:
         return "right"
     rate = work.construction.rates[name]
-    # A sense that came out the other way cannot be told from lengths, nor without the own sketch; nothing
-    # can of a vector that was not seen, or of one that runs along the link instead of across.
+    # A reversed sense cannot be found from lengths, nor without the student's own sketch; nothing can be
+    # found for a vector that was not seen, or that is parallel to the link instead of perpendicular.
     codes = {one.code for one in work.task.mistakes}
     sketch_seen = source in ON_SHEETS or not codes & {"other_assembly", "other_variant"}
     knows_sense = visible.directed.get(rate.vector, False) and sketch_seen
     is_told = rate.vector in visible.directed and (knows_sense or value * exact > 0.0)
     is_told &= abs(across(work, rate)) > LEAST_SINE and (rate.length in _lengths(work) or sketch_seen)
-    # Speeds taken for rev/min are in these values though the drawing does not show them.
+    # Speeds mistaken for rev/min affect these values though the drawing does not show them.
     is_told &= work.declares or "rpm_not_converted" not in codes
     if not is_told or abs(value) / per_mm < SHORT * tolerance.least_mm:
         return "either"
@@ -236,7 +236,7 @@ def rate_due(
 
 
 def _lengths(work: StudentWork) -> set[str]:
-    """Lengths that are given, and the same in the data that the student took."""
+    """The lengths that are given and equal in the data that the student took."""
     right, taken = (one.parameters for one in (work.task.right, work.task.wrong))
     return {name for name, value in right.items() if name in taken and float(value) == float(taken[name])}
 
@@ -253,7 +253,7 @@ PAPER = {MECHANISM: 100 - 90j, VELOCITY_PLAN: 300 - 90j, ACCELERATION_PLAN: 200 
 
 
 def submission(work: StudentWork, source: Source) -> Submission:
-    """The student's work as it is handed in, without pictures."""
+    """The student's work as handed in, without pictures."""
     declared = declared_texts(work.task.declared) if work.declares else {}
     values, lot = computed(work).values, work.key.lot(source)
     if source == "nodes":
@@ -338,7 +338,7 @@ def _measured(work: StudentWork, lot: np.random.Generator, *, with_turn: bool) -
 
 
 def measured_line(key: StudentKey, *, with_directions: bool) -> dict[str, object]:
-    """What one student enters into a table of measurements. Raises ValueError where there is no such one."""
+    """A student's line in a table of measurements. Raises ValueError if the drawing cannot be made."""
     work = student(key)
     handed_in = submission(work, "directions" if with_directions else "lengths")
     line: dict[str, object] = {"n": work.variant.n, "position": work.variant.position, **handed_in.declared}

@@ -1,8 +1,8 @@
-"""Which mistakes a fair judge should name, and whether what it names was made.
+"""Find the mistakes that a fair judge should name, and check that those it names were made.
 
-A mistake is *visible* where the drawing without it, by a perfect hand, differs in some observed vector by
-more than 2.5 tolerances (or in a declared scale, or in a vector that is not there); below that it need
-not be named, and naming it is no false accusation. In lengths alone only lengths count.
+A mistake is *visible* if the drawing without it, by a perfect hand, differs in some observed vector by
+more than 2.5 tolerances (or in a declared scale, or in a missing vector); below that it need not be
+named, and naming it is no false accusation. With lengths alone only lengths count.
 """
 
 import math
@@ -22,10 +22,10 @@ ALIKE_MM = 0.3
 
 @dataclass(frozen=True, slots=True)
 class Made:
-    """One mistake that was made, and whether it can be named from what is seen.
+    """One mistake that was made, and its size in the vectors that are seen.
 
-    `shows` is how far the drawing without it is off, in tolerances, at most; infinite where it shows
-    otherwise (a declared scale, a vector that is not there).
+    `shows` is the largest deviation of the drawing without it, in tolerances; infinite if the mistake
+    shows in another way (a declared scale, a missing vector).
     """
 
     mistake: StudentMistake
@@ -33,18 +33,18 @@ class Made:
 
     @property
     def visible(self) -> bool:
-        """Whether it is to be named."""
+        """True if it should be named."""
         return self.shows > CLEAR
 
 
 def mistakes_due(work: StudentWork, source: Source, visible: Visible) -> list[Made]:
-    """The mistakes made, the first in order of construction first."""
+    """The mistakes made, in order of construction."""
     order = sorted(work.task.mistakes, key=lambda one: _place(work.construction, one))
     return [Made(one, _shows(work, source, visible, one)) for one in order]
 
 
 def _place(construction: Construction, mistake: StudentMistake) -> int:
-    """Where in the construction a mistake is made, as a number that grows along it."""
+    """The index of the construction's step where a mistake is made; -1 for data and kL."""
     nodes = [step.node for step in construction.steps]
     match mistake.code, mistake.at:
         case "other_variant", _:
@@ -81,7 +81,7 @@ def _shows(work: StudentWork, source: Source, visible: Visible, mistake: Student
 def as_handed_in(
     work: StudentWork, source: Source, mistakes: Sequence[Mistake | StudentMistake]
 ) -> dict[str, complex]:
-    """Vectors by a perfect hand with these mistakes in them, as this source tells them."""
+    """Vectors by a perfect hand with these mistakes in them, as this source gives them."""
     if work.by_letters(source):
         mistakes = [one for one in mistakes if one.code != "labels_swapped"]
     return vectors_of(work.task.right, mistakes)
@@ -90,7 +90,7 @@ def as_handed_in(
 def _try(
     work: StudentWork, source: Source, mistakes: Sequence[Mistake | StudentMistake]
 ) -> dict[str, complex]:
-    """The same; nothing where they cannot all be made."""
+    """Return `as_handed_in`; empty if the mistakes cannot all be made."""
     try:
         return as_handed_in(work, source, mistakes)
     except (KeyError, ValueError):  # a plate's image by similarity has no normal components
@@ -100,7 +100,7 @@ def _try(
 def _most_apart(
     work: StudentWork, visible: Visible, one: Mapping[str, complex], other: Mapping[str, complex]
 ) -> float:
-    """How far two drawings are apart in what is seen, in tolerances."""
+    """The largest difference of two drawings in the vectors seen, in tolerances."""
     return max(
         (
             off(one[name], other[name], work.rubric.tolerance, directed=directed)
@@ -112,7 +112,7 @@ def _most_apart(
 
 
 def is_named(work: StudentWork, source: Source, visible: Visible, made: StudentMistake, named: Named) -> bool:
-    """Whether a report names this mistake, or one that gives the same drawing as seen."""
+    """Return whether a report names this mistake, or one that gives the same drawing as seen."""
     if is_same(made, named):
         return True
     if {made.code, named.code} & {"vector_missing", "rpm_not_converted"}:
@@ -136,5 +136,5 @@ def _is_alike(visible: Visible, one: Mapping[str, complex], other: Mapping[str, 
 
 
 def first_of(made: Iterable[Made]) -> StudentMistake | None:
-    """The first mistake that is to be named."""
+    """The first mistake that should be named."""
     return next((one.mistake for one in made if one.visible), None)

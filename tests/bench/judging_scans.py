@@ -1,7 +1,7 @@
-"""Simulated students' scans, read once and kept, to be judged as often as one likes.
+"""Simulated students' scans, read once and stored, so that they can be judged many times.
 
-Kinds of sheets are those that reach an instructor: flatbed scans of plain and printed sheets, 1-bit copies,
-photos; sloppy hands apart. Half of the drawings are right, a third have one mistake, the others two.
+The kinds of sheets are those that instructors get: flatbed scans of plain and printed sheets, 1-bit copies,
+photos, and sloppy hands. Half of the drawings are right, a third have one mistake, the others two.
 """
 
 import pickle
@@ -42,7 +42,7 @@ KIND_SHARES: Mapping[Kind, float] = {"right": 0.5, "single": 0.35, "pair": 0.15}
 
 @dataclass(frozen=True, slots=True)
 class SheetKind:
-    """How a class's sheets came to be files."""
+    """A kind of sheet: device, resolution, paper and hands."""
 
     title: str
     device: Device = "flatbed"
@@ -71,9 +71,9 @@ class ReadWork:
 
 
 def read_works(kind: str, seeds: Sequence[int], kept: Path | None = None) -> Iterator[ReadWork]:
-    """Students of a kind of sheets, each drawn, scanned and read; from the folder `kept` where it has them.
+    """Students of a kind of sheets, each drawn, scanned and read, or taken from the folder `kept`.
 
-    A student whose mistakes cannot be drawn is left out.
+    Students whose mistakes cannot be drawn are left out.
     """
     for seed in seeds:
         path = None if kept is None else kept / f"{kind}-{seed}.pkl"
@@ -86,7 +86,7 @@ Read = TypeVar("Read")
 
 
 def stored(path: Path | None, read: Callable[[], Read | None]) -> Read | None:
-    """What a file has; what `read` gives, written there, where it is not there; None where that is none."""
+    """Load a result from a file; if there is no file, call `read` and store its result unless it is None."""
     if path is not None and path.exists():
         return pickle.loads(path.read_bytes())  # type: ignore[no-any-return]  # noqa: S301 - written below
     found = read()
@@ -116,7 +116,7 @@ def _student(kind: str, seed: int) -> tuple[StudentKey, np.random.Generator]:
 def drawn_on(
     kind: SheetKind, key: StudentKey, lot: np.random.Generator
 ) -> tuple[StudentWork, list[SimulatedSheet]] | None:
-    """What a student drew, and the pages of it; None where no such drawing comes about in many tries."""
+    """Draw a student's work and its pages; None if it cannot be drawn in many tries."""
     assignment, rubric = assignment_named(key.assignment)
     variants = assignment.variants()
     variant = variants[int(lot.integers(len(variants)))]
@@ -158,9 +158,9 @@ ON_LINE_MM, STEPS = 0.6, 50
 
 
 def _lies_under_lines(figure: Mapping[str, Any], vector: Vector) -> bool:
-    """Whether other lines of a plan, as thick as vectors, lie along a vector that is not drawn out.
+    """Return whether other lines of a plan, as thick as vectors, cover a vector that is not drawn.
 
-    Nobody who sees the sheet could tell that it is not drawn.
+    On the sheet nobody could see that it is not drawn.
     """
     lines = [one["line_mm"] for one in figure["vectors"].values()] + [*figure["sides"].values()]
     ends = np.array([[complex(*p), complex(*q)] for p, q in filter(None, lines)]).reshape(-1, 2)

@@ -1,9 +1,9 @@
-"""Simulated students without pictures: the mechanisms, who drew what, and the same drawn by a perfect hand.
+"""Simulated students without pictures: mechanisms, drawings, and the same drawn by a perfect hand.
 
 A student follows from a `StudentKey` and is the same in every run: the variant, the scales, a turned sketch,
-vectors not drawn out, the mistakes and the hand's errors. Two mechanisms have what the built-in assignments
-do not: a plate inside a six-bar of two dyads, a slider on a guide beside the crank's pivot with a dyad hung
-on its rod. Their rubrics are those that `planmark new` would write.
+vectors not drawn, the mistakes and the hand's errors. Two mechanisms add structures that the built-in
+assignments lack: a plate inside a six-bar of two dyads; an offset slider with a dyad attached to its rod.
+Their rubrics are those that `planmark new` would write.
 """
 
 import tomllib
@@ -132,9 +132,9 @@ SCALES = ("kL", "kv", "ka")
 
 
 def with_mistakes(right: Intent, mistakes: Sequence[Mistake | StudentMistake]) -> Intent:
-    """The drawing as somebody intends it who makes these mistakes; letters swapped are only written so.
+    """The intended drawing with these mistakes in it; swapped letters change no node.
 
-    A student's mistakes are made as the simulation makes them, one that a report names as the program does.
+    A student's mistakes are made by the simulation's rules, those named in a report by the program's.
     Raises ValueError where a mistake cannot be made.
     """
     drawing = right
@@ -149,7 +149,7 @@ def with_mistakes(right: Intent, mistakes: Sequence[Mistake | StudentMistake]) -
 
 
 def vectors_of(right: Intent, mistakes: Sequence[Mistake | StudentMistake]) -> dict[str, complex]:
-    """Every vector and link, mm, under the names written beside them. Raises ValueError as above."""
+    """Every vector and link, mm, by the letters at its ends. Raises ValueError as above."""
     drawing = with_mistakes(right, mistakes)
     nodes = evaluate(drawing.construction, drawing.parameters)
     swaps = [(one.other[0], one.other[1]) for one in mistakes if one.code == "labels_swapped"]
@@ -160,7 +160,7 @@ def vectors_of(right: Intent, mistakes: Sequence[Mistake | StudentMistake]) -> d
 
 
 def relabelled(nodes: Mapping[str, complex], swaps: Sequence[tuple[str, str]]) -> dict[str, complex]:
-    """Nodes under the names that stand beside them."""
+    """Nodes by the letters written beside them."""
     named = dict(nodes)
     for first, second in swaps:
         if first in named and second in named:
@@ -168,12 +168,12 @@ def relabelled(nodes: Mapping[str, complex], swaps: Sequence[tuple[str, str]]) -
     return named
 
 
-# What a report names ------------------------------------------------------------------------------
+# Mistakes named in a report -----------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """Whose drawing it is."""
+    """The variant that a student was asked to draw, and its right drawing."""
 
     assignment: Assignment
     variant: Variant
@@ -181,9 +181,9 @@ class Asked:
 
 
 def meant(asked: Asked, named: Named) -> Iterator[Mistake]:
-    """What a mistake named in a report may mean: itself, in whichever line of its step it was made.
+    """The mistakes that one named in a report may stand for: itself, in either line of its step.
 
-    A factor may be given from either side.
+    A factor may also be given as its inverse.
     """
     mistake, construction = named.mistake, asked.right.construction
     right = Drawing(construction, asked.right.parameters)
@@ -212,7 +212,7 @@ def _other_variant(asked: Asked, named: Mistake) -> Iterator[Mistake]:
 
 
 def is_same(made: StudentMistake, named: Named) -> bool:
-    """Whether a report names this mistake: its code and its place."""
+    """Return whether a report names this mistake, by code and place."""
     if made.code != named.code:
         return False
     match made.code:
@@ -240,7 +240,7 @@ _TRIES = 60
 
 @dataclass(frozen=True, slots=True)
 class StudentKey:
-    """Which student: the same key gives the same drawing."""
+    """The key of a student: the same key gives the same drawing."""
 
     assignment: str
     hand: str
@@ -248,7 +248,7 @@ class StudentKey:
     seed: int
 
     def lot(self, purpose: str) -> np.random.Generator:
-        """Chance for one purpose, apart from all others."""
+        """A random generator for one purpose, independent of all others."""
         told = f"{self.assignment}/{self.hand}/{self.kind}/{purpose}"
         return np.random.default_rng([self.seed, zlib.crc32(told.encode())])
 
@@ -258,15 +258,15 @@ class StudentKey:
 
 @dataclass(frozen=True, slots=True)
 class StudentWork:
-    """What one student drew.
+    """One student's drawing, with the task.
 
     Attributes
     ----------
-    task : with the drawing as it should be and as it was understood
-    sheets : what the hand made of it
+    task : the drawing as it should be and as the student understood it
+    sheets : the figures as drawn by hand
     declares : whether the scales are declared
-    letters : whether swapped letters are seen as letters, the nodes read by their lines
-    left_out : vectors that are not drawn, by mistake or as they need not be
+    letters : whether swapped letters are read as letters, and nodes by their lines
+    left_out : vectors that are not drawn, by mistake or because they need not be
     """
 
     key: StudentKey
@@ -289,7 +289,7 @@ class StudentWork:
         return self.task.right.construction
 
     def own(self, figure: str) -> dict[str, complex]:
-        """The student's own nodes as they are when a plan is drawn: its sheet's sketch, the velocities."""
+        """The student's own nodes that a plan depends on: those of its sheet's sketch, and the velocities."""
         sheet = self.sheets[-1] if figure == ACCELERATION_PLAN else self.sheets[0]
         nodes: dict[str, complex] = {}
         for one in (self.sheets[0], sheet):
@@ -298,22 +298,22 @@ class StudentWork:
         return nodes
 
     def swaps(self) -> list[tuple[str, str]]:
-        """Pairs of nodes with each other's letter."""
+        """Pairs of nodes whose letters are swapped."""
         return [(one.other[0], one.other[1]) for one in self.task.mistakes if one.code == "labels_swapped"]
 
     def named(self, nodes: Mapping[str, complex], source: Source) -> dict[str, complex]:
-        """The nodes under the names by which they are handed in."""
+        """The nodes by the names under which they are handed in."""
         return dict(nodes) if self.by_letters(source) else relabelled(nodes, self.swaps())
 
     def by_letters(self, source: Source) -> bool:
-        """Whether swapped letters are told as such, beside nodes named by their lines."""
+        """Return whether swapped letters are handed in as letters, and nodes named by their lines."""
         return source in ON_SHEETS and self.letters
 
 
 def student(key: StudentKey) -> StudentWork:
     """The student of a key.
 
-    Raises ValueError where no drawing of this kind comes about in many tries.
+    Raises ValueError if no drawing of this kind can be made in many tries.
     """
     assignment, rubric = assignment_named(key.assignment)
     variants = assignment.variants()
@@ -345,7 +345,7 @@ def _habits(key: StudentKey, assignment: Assignment, lot: np.random.Generator) -
     ratios = [float(lot.choice([0.8, 1.25])) if own else 1.0 for _ in range(2)]
     has_crank = assignment.mechanism_file.crank is not None
     codes = codes_of(key, lot)
-    # A sketch drawn wrongly about a single pivot would not tell how far it is turned.
+    # From a wrong sketch with a single pivot nobody could tell by how much it is turned.
     tells = len(assignment.mechanism_file.ground) > 1 or not {"other_variant", "other_assembly"} & set(codes)
     # Nobody turns a sketch by a degree or two on purpose.
     turn = float(lot.uniform(5.0, 25.0) * lot.choice([-1, 1])) if tells and lot.random() < 0.3 else 0.0
@@ -357,7 +357,7 @@ def _habits(key: StudentKey, assignment: Assignment, lot: np.random.Generator) -
 
 
 def codes_of(key: StudentKey, lot: np.random.Generator) -> tuple[str, ...]:
-    """Codes of the mistakes to make; another student's data come before what is done with them."""
+    """Codes of the mistakes to make; another student's data come first, as the others follow from them."""
     if key.kind in {"right", "slip"}:
         return ()
     turn = CODES[(key.seed + zlib.crc32(f"{key.assignment} {key.hand}".encode())) % len(CODES)]
@@ -369,7 +369,7 @@ def codes_of(key: StudentKey, lot: np.random.Generator) -> tuple[str, ...]:
 
 
 def is_hidden(task: DrawingTask) -> bool:
-    """Whether one of two mistakes hides the other: at one line of one step, or both in a scale."""
+    """Return whether one of two mistakes hides the other: at the same line, or both in a scale."""
     places = [(one.at, one.slot) for one in task.mistakes]
     in_scales = {"scale_wrong", "rpm_not_converted"} <= {one.code for one in task.mistakes}
     return len(set(places)) < len(places) or in_scales

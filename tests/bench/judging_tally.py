@@ -1,4 +1,4 @@
-"""What judging came to, student by student, summed up, and as tables."""
+"""Results of judging: for each student, summed up, and as tables."""
 
 import math
 from collections import Counter
@@ -21,7 +21,7 @@ CHARGED, CREDITED = frozenset({"none", "partial"}), frozenset({"full", "follow_t
 
 @dataclass(frozen=True, slots=True)
 class MarkedCriterion:
-    """One criterion: what was due, what the judge said."""
+    """One criterion: the verdict due and the judge's verdict."""
 
     criterion: str
     due: Due
@@ -29,30 +29,30 @@ class MarkedCriterion:
 
     @property
     def counts(self) -> bool:
-        """Whether there was anything to judge."""
+        """True if there was anything to judge."""
         return self.due != "absent" and self.verdict != "not_judged"
 
     @property
     def is_false_charge(self) -> bool:
-        """Charged although right or following."""
+        """True if it was charged although right or following."""
         return self.due in {"right", "follows"} and self.verdict in CHARGED
 
     @property
     def is_false_credit(self) -> bool:
-        """Credited although clearly wrong."""
+        """True if it was credited although clearly wrong."""
         return self.due == "wrong" and self.verdict in CREDITED
 
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """One submission judged, and held against what was due.
+    """One submission's judgement, compared with the truth.
 
     Attributes
     ----------
-    first : the first mistake that is to be named, None without one
+    first : the first mistake that should be named, None if there is none
     named : it was named; `surest` as the surest, `among_rivals` only as a rival of one named
-    not_made : what was named and not made
-    unpunished : something visible was done wrongly, cost nothing and goes to nobody
+    not_made : mistakes that were named and not made
+    unpunished : a visible mistake cost no points and is not referred to a person
     """
 
     key: StudentKey
@@ -69,7 +69,7 @@ class Result:
 
     @property
     def is_clean(self) -> bool:
-        """Whether there is nothing to look into."""
+        """True if nothing went wrong in judging."""
         missed = self.first is not None and not self.named
         return not (
             missed or self.not_made or any(m.is_false_charge or m.is_false_credit for m in self.criteria)
@@ -90,7 +90,7 @@ class Result:
 
 
 def told(mistake: StudentMistake) -> str:
-    """A mistake made, in one line."""
+    """A mistake as one line of text."""
     usual = StudentMistake(mistake.code, mistake.at)
     details = ("slot", "other", "factor", "quarters", "n", "position")
     differ = [
@@ -106,7 +106,7 @@ def _named(mistake: NamedMistake) -> str:
 
 
 def result_of(work: StudentWork, source: Source, handed_in: Submission, judgement: Judgement) -> Result:
-    """A judgement held against the truth."""
+    """Compare a judgement with the truth."""
     visible = Visible.of(handed_in, work.construction.links)
     due = verdicts_due(work, source, visible)
     said = {one.criterion: one.verdict for one in judgement.outcomes}
@@ -132,7 +132,7 @@ def result_of(work: StudentWork, source: Source, handed_in: Submission, judgemen
         for mistake, is_first in zip(judgement.mistakes, told_first, strict=False)
         if not is_first
         and not any(names(mistake, one.mistake) for one in made)
-        # An entry that somebody leaves blank is missing, whatever the reason.
+        # A blank entry counts as missing, whatever the reason.
         and not (mistake.code == "vector_missing" and mistake.at not in visible.directed)
     ]
     charged = any(one.verdict in CHARGED | {"review"} for one in judgement.outcomes)
@@ -149,7 +149,7 @@ def result_of(work: StudentWork, source: Source, handed_in: Submission, judgemen
 
 @dataclass(slots=True)
 class Times:
-    """Processor milliseconds of one judgement each; of making the task apart."""
+    """Processor milliseconds of each judgement; of making the task, separately."""
 
     right: list[float] = field(default_factory=list)
     wrong: list[float] = field(default_factory=list)
@@ -162,8 +162,8 @@ class ClassTime:
 
     Attributes
     ----------
-    judging_s : of the processor, to read the file and judge every line
-    processor_s, wall_s : for all that `planmark grade` does with it, to pages and results written
+    judging_s : processor time to read the file and judge every line
+    processor_s, wall_s : for all that `planmark grade` does with it, pages and results included
     """
 
     assignment: str
@@ -176,19 +176,19 @@ class ClassTime:
 
 @dataclass(slots=True)
 class Count:
-    """So many of so many."""
+    """A number of hits out of a number of cases."""
 
     hits: int = 0
     of: int = 0
 
     def add(self, hit: bool) -> None:
-        """One more."""
+        """Count one more case."""
         self.hits += hit
         self.of += 1
 
     @property
     def share(self) -> float | None:
-        """None of nothing."""
+        """The share of hits; None without cases."""
         return self.hits / self.of if self.of else None
 
 
@@ -200,8 +200,8 @@ class JudgingTally:
     ----------
     false_charges, false_credits : of the criteria due to be credited, and due to be charged
     reviews : of criteria judged
-    followed : credit given for what follows from a mistake
-    missed : criteria off by the hand alone that were charged
+    followed : credit given for vectors that follow from a mistake
+    missed : criteria off by drafting errors alone that were charged
     blank : criteria with nothing to judge by that go to a person
     named, surest, rivals : of drawings with a mistake to be named
     accused : of right drawings; misnamed : of wrong ones, with a mistake named that was not made
@@ -224,7 +224,7 @@ class JudgingTally:
     instead: Counter[tuple[str, str]] = field(default_factory=Counter)
 
     def add(self, result: Result) -> None:
-        """One more submission."""
+        """Count one more submission."""
         self.students += 1
         for one in result.criteria:
             self._add_criterion(one)
@@ -267,7 +267,7 @@ def summed(results: Iterable[Result], by: Sequence[str]) -> dict[tuple[str, ...]
 
 
 def where(result: Result, by: Sequence[str]) -> tuple[str, ...]:
-    """Where a result is counted."""
+    """The key under which a result is counted."""
     return tuple(result.source if name == "source" else str(getattr(result.key, name)) for name in by)
 
 
@@ -281,16 +281,16 @@ class JudgingFigures:
 
     @property
     def failures(self) -> list[Result]:
-        """All that went wrong, to be looked into one by one."""
+        """All results in which something went wrong."""
         return [result for result in self.results if not result.is_clean]
 
 
 PLACE = ("source", "hand")
-"""What the rows of the tables are told apart by."""
+"""The fields by which the rows of the tables differ."""
 
 
 def judging_tables(figures: JudgingFigures) -> Iterator[Table]:
-    """Verdicts, mistakes named, codes, times."""
+    """Tables of verdicts, mistakes named, codes, times."""
     results = figures.results
     yield _verdicts(results)
     yield _names(results)
@@ -326,7 +326,7 @@ def _verdicts(results: Sequence[Result]) -> Table:
 
 
 def _names(results: Sequence[Result]) -> Table:
-    """Singles, pairs and slips beside each other; in brackets what is named only as a rival of another."""
+    """Single mistakes, pairs and slips side by side; in brackets those named only as a rival of another."""
     heads = [
         *PLACE, "one mistake", "the first of two", "as the surest of two", "a slip in computing",
         "wrong names: one mistake", "two", "right drawings accused",
@@ -368,7 +368,7 @@ def _code(tally: JudgingTally, code: str) -> str:
 
 
 def _instead(results: Sequence[Result]) -> Table:
-    """What was named and not made, of single mistakes and right drawings."""
+    """Mistakes named and not made, in drawings with one mistake and right ones."""
     rows = [
         [source, made, named, str(count)]
         for (source, kind), tally in summed(results, ("source", "kind")).items()

@@ -1,43 +1,43 @@
-"""What a fair judge should find: the verdict due to each criterion.
+"""The verdicts that a fair judge should give: one for each criterion.
 
-Truth goes by intent, held against the student's own earlier nodes. Of each vector there are three
-forms: as its step rightly makes it from the student's own nodes before it (*due*), as the mistaken
-step makes it from the same nodes (*made*), and as it is in the exact plan at the scales that the
-drawing follows (*exact*). They are compared by the rubric's plain tolerances, without any widening:
+The truth follows from the intent and the student's own earlier nodes. Each vector has three forms:
+as its right step makes it from the student's own earlier nodes (*due*), as the mistaken step makes
+it from the same nodes (*made*), and as it is in the exact plan at the scales that the drawing
+follows (*exact*). They are compared by the rubric's plain tolerances, without any widening:
 
-- *wrong*: made is off due by more than 2.5 tolerances. It is to be charged: ``none`` or ``partial``. Of
-  several vectors that show one mistake where it was made, one is enough (`charged_once`).
-- *right*, or *follows* where due is off the exact by more than 2.5 tolerances: made is within one
-  tolerance of due. It is to be credited, as full or as following.
-- *either*: between the two; what was wrongly made and came out nearly right; what follows from a mistake so
-  far that next to nothing is left of it (the rubric's guard against trivial follow-through); the
-  first vectors that show a mistake which no criterion shows where it was made.
-- *missed*: rightly meant, and off by more than the plain tolerance by the hand alone. Either verdict is
-  accepted, and counted apart: a wider tolerance where a construction is ill-conditioned credits it.
+- *wrong*: made differs from due by more than 2.5 tolerances. It must be charged: ``none`` or ``partial``.
+  If several vectors show one mistake where it was made, one charge is enough (`charged_once`).
+- *right*: made is within one tolerance of due; *follows*: the same, and due differs from exact by more
+  than 2.5 tolerances. It must be credited, as full or as following.
+- *either*: between the two; a wrong step that came out nearly right; a vector of which a mistake leaves
+  next to nothing (the rubric's guard against trivial follow-through); the first vectors that show a
+  mistake which no criterion shows where it was made.
+- *missed*: rightly meant, but drafting errors alone exceed the plain tolerance. Either verdict is accepted,
+  and counted separately: a wider tolerance where a construction is ill-conditioned credits it.
 
 By code:
 
 - `sense_reversed`, `normal_reversed`, `normal_missing`, `normal_from_absolute`, `arithmetic`,
   `parallel_for_perpendicular`, `wrong_link`, `wrong_intersection`, `image_mirrored`: the vectors that
-  end in the node of the changed step, as above; what is drawn from it follows.
-- `other_variant`: the crank as sketched, where the sketch is seen and asked for; else the driving link's
-  first vector, held against the exact plan. Its other vectors are either (the same mistake again), all
-  else is by the student's own nodes, where only data that differ (lengths, guides) make a step wrong.
-  Where the driving link's speed differs too, a declared scale looks wrong instead: then either.
-- `other_assembly`: the links of the joint that lies on the wrong side. Where no criterion asks for them,
+  end in the node of the changed step, as above; everything drawn from it follows.
+- `other_variant`: the crank as sketched, if the sketch is seen and asked for; else the driving link's
+  first vector, compared with the exact plan. Its other vectors are either (the same mistake again); the
+  rest is judged by the student's own nodes, so only data that differ (lengths, guides) make a step wrong.
+  If the driving link's speed differs too, a declared scale looks wrong instead: then either.
+- `other_assembly`: the links of the joint that lies on the wrong side. If no criterion asks for them,
   or no sketch is seen, either verdict for the vectors of the first node that shows it; the rest follows.
 - `figure_rotated`: the driving link's vector of that plan; the rest is drawn rightly in the turned plan.
-- `scale_wrong`: the criterion of the scale where one was declared, or in its place the driving link's
-  vector; all else is right by the scale that it follows. Undeclared it may be the student's choice:
-  either for the driving link's vector of that plan, and nothing that must be named.
+- `scale_wrong`: the criterion of the scale if one was declared, or instead the driving link's vector; all
+  else is right by the scale that it follows. An undeclared scale may be the student's choice: either
+  for the driving link's vector of that plan, and no mistake must be named.
 - `rpm_not_converted`: velocities and scales are both too large, so the drawing is right: the declared
   kv is wrong, ka either (the same mistake again). Undeclared, nothing shows.
-- `vector_missing`: nothing to judge; to credit it in full is wrong where it is not optional.
-- angular quantities, computed from the own drawing (`tests.bench.judging_handed_in`): right or following,
-  whatever was drawn; either where what was handed in does not tell the sense. A *slip* in computing one
-  value is wrong there and nowhere else.
-- `labels_swapped`: the vectors that begin or end in the two nodes, as named against as they should be;
-  either where they follow from the nodes as named, and where the letters themselves are told beside
+- `vector_missing`: nothing to judge; crediting it in full is wrong unless it is optional.
+- angular quantities, computed from the student's own drawing (`tests.bench.judging_handed_in`): right or
+  following, whatever was drawn; either if the submission does not show the sense. A *slip* in computing
+  one value is wrong there and nowhere else.
+- `labels_swapped`: the vectors that begin or end in the two nodes, as named compared with as they should
+  be; either if they follow from the nodes as named, or if the letters are handed in separately, with
   nodes named by their lines.
 """
 
@@ -65,10 +65,10 @@ class Forms:
 
     Attributes
     ----------
-    named : as it is handed in, under the names that stand beside its ends
+    named : as handed in, by the letters written beside its ends
     drawn : as the hand drew it
-    due : as its step rightly makes it from the student's own nodes before it
-    due_as_named : the same from the nodes under the names that stand beside them
+    due : as its right step makes it from the student's own earlier nodes
+    due_as_named : the same from the nodes by the letters written beside them
     made : as the mistaken step makes it from the same nodes
     exact, declared : by the exact plan, at the scales that the drawing follows, and at those declared
     """
@@ -89,21 +89,21 @@ def ends_of(construction: Construction) -> dict[str, Ends]:
 
 
 def is_driven(construction: Construction, node: str) -> bool:
-    """Whether a node of a plan is laid off from the data alone: the driving link's."""
+    """Return whether a node of a plan is laid off from the data alone: the driving link's."""
     step = construction.step(node)
     is_of_plan = node not in {one.node for one in construction.figures["mechanism"]}
     return is_of_plan and isinstance(step, Given) and isinstance(step.length, Scaled)
 
 
 def cranks_of(construction: Construction) -> set[str]:
-    """Links that the data alone give: the crank."""
+    """Links given by the data alone: the crank."""
     made = {step.node for step in construction.figures["mechanism"] if isinstance(step, Given)}
     return {name for name, (_, head) in construction.links.items() if head in made}
 
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """One student's drawing beside the ones that it is held against."""
+    """One student's drawing, and the right ones that it is compared with."""
 
     work: StudentWork
     source: Source
@@ -112,7 +112,7 @@ class Held:
 
     @classmethod
     def of(cls, work: StudentWork, source: Source) -> "Held":
-        """At the scales that the drawing follows; what follows is turned where its plan is turned."""
+        """Make them at the scales that the drawing follows; a turned plan stays turned."""
         right = _at_scales_followed(work.task.right, work.task.mistakes)
         following = right
         for mistake in work.task.mistakes:
@@ -121,7 +121,7 @@ class Held:
         return cls(work, source, right, following)
 
     def links(self) -> dict[str, tuple[Forms, ...]]:
-        """Every link, as often as the sketch was drawn."""
+        """Every link, once for each sketch drawn."""
         sketches = [
             figure.nodes
             for sheet in self.work.sheets
@@ -169,9 +169,9 @@ class Held:
 
 
 def _at_scales_followed(right: Intent, mistakes: Sequence[StudentMistake]) -> Intent:
-    """The right drawing at the scales that the student's follows.
+    """The right drawing at the scales that the student's drawing follows.
 
-    Of rev/min taken for rad/s the drawing knows nothing: its speeds and its scales are both too large.
+    Rev/min mistaken for rad/s do not change the drawing: its speeds and its scales are both too large.
     """
     for mistake in mistakes:
         if mistake.code == "scale_wrong" and mistake.at in SCALES:
@@ -180,14 +180,14 @@ def _at_scales_followed(right: Intent, mistakes: Sequence[StudentMistake]) -> In
 
 
 def _head(drawing: Intent, own: Mapping[str, complex], head: str) -> complex:
-    """A node as a drawing makes it from the student's own nodes before it."""
+    """A node as a drawing makes it from the student's own earlier nodes."""
     nodes = {name: np.asarray(place) for name, place in own.items()}
     with np.errstate(invalid="ignore", divide="ignore"):
         return complex(drawing.construction.step(head).place(View(nodes, drawing.parameters)))
 
 
 def verdicts_due(work: StudentWork, source: Source, visible: Visible) -> dict[str, Due]:
-    """What is due to each criterion of the rubric, by its id."""
+    """The verdict due to each criterion of the rubric, by its id."""
     held = Held.of(work, source)
     drawn = _Drawn(work, source, visible)
     drawn.judge(held.links())
@@ -209,10 +209,10 @@ def verdicts_due(work: StudentWork, source: Source, visible: Visible) -> dict[st
 
 
 def charged_once(work: StudentWork, due: Mapping[str, Due], said: Mapping[str, str]) -> dict[str, Due]:
-    """The verdicts due, where a mistake is charged at one of several criteria that show it.
+    """The verdicts due, with each mistake charged at only one of the criteria that show it.
 
-    A wrong line moves its node, and all vectors that end there; letters exchanged touch several vectors: one
-    of them pays. A plan at a wrong scale is as well charged at the driving link's vector, from which the rest
+    A wrong line moves its node, and all vectors that end there; exchanged letters affect several vectors: one
+    is charged. A plan at a wrong scale may also be charged at the driving link's vector, from which the rest
     follows.
 
     Arguments: `said` is the judge's verdict by criterion.
@@ -244,7 +244,7 @@ def charged_once(work: StudentWork, due: Mapping[str, Due], said: Mapping[str, s
 
 
 def _scale_due(work: StudentWork, source: Source, name: str, by_vector: Mapping[str, Due]) -> Due:
-    """Of a declared scale; missed where the hand was off in what the scale is told by."""
+    """The verdict due to a declared scale; missed if drafting errors spoilt the length that shows it."""
     if not work.declares:
         return "absent"
     codes = {one.code for one in work.task.mistakes}
@@ -262,7 +262,7 @@ def _scale_due(work: StudentWork, source: Source, name: str, by_vector: Mapping[
 
 
 def _is_yardstick_off(work: StudentWork) -> bool:
-    """Whether the crank, or the first link where a slider drives, is off on one of the sketches."""
+    """Return whether the crank, or the first link where a slider drives, is off on one of the sketches."""
     right = evaluate(work.construction, work.task.right.parameters)
     tail, head = _yardstick(work.construction)
     sketches = [figure.nodes for sheet in work.sheets for figure in sheet.figures if tail in figure.nodes]
@@ -274,7 +274,7 @@ def _is_yardstick_off(work: StudentWork) -> bool:
 
 
 def _yardstick(construction: Construction) -> tuple[str, str]:
-    """The joints between which the scale of lengths is read off."""
+    """The two joints whose distance shows the scale of lengths."""
     for step in construction.figures["mechanism"]:
         match step:
             case Given(start=start, node=node):
@@ -289,7 +289,7 @@ def _between(nodes: Mapping[str, ComplexArray], vector: Vector) -> complex:
 
 
 def _scales_of_another(work: StudentWork) -> set[str]:
-    """Scales at which another student's driving link looks as if only the scale was wrong."""
+    """Scales that alone seem wrong when another student's driving link is drawn."""
     if not any(one.code == "other_variant" for one in work.task.mistakes):
         return set()
     right, tolerance = work.task.right, work.rubric.tolerance
@@ -304,7 +304,7 @@ def _scales_of_another(work: StudentWork) -> set[str]:
 
 @dataclass(frozen=True, slots=True)
 class _Drawn:
-    """What is due to each vector and link that was drawn, and how far it is moved from the exact one.
+    """The verdict due to each vector and link drawn, and its distance from the exact one.
 
     Attributes
     ----------
@@ -318,7 +318,7 @@ class _Drawn:
     moved: dict[str, float] = field(default_factory=dict)
 
     def judge(self, forms: Mapping[str, tuple[Forms, ...]], *, data_charged: bool = False) -> None:
-        """Every criterion of these names; two sketches of which only one is missed by hand are missed."""
+        """Judge every criterion of these names; if one of two sketches is missed, so is the criterion."""
         for criterion in self.work.rubric.criterion:
             name = criterion.name
             if name not in forms or name not in self.visible.directed:
@@ -361,7 +361,7 @@ class _Drawn:
         return "follows" if moved > CLEAR else "right"
 
     def open_first_shown(self, mistake: StudentMistake) -> None:
-        """Where a mistake does not show at its own node: either verdict up to the first that shows it."""
+        """Allow either verdict up to the first node that shows the mistake, if its own node does not."""
         construction = self.work.construction
         node = _node_of(construction, mistake)
         if node is None or self._shows_where_made(mistake, node):
@@ -379,7 +379,7 @@ class _Drawn:
                 return
 
     def _shows_where_made(self, mistake: StudentMistake, node: str) -> bool:
-        """Whether it is charged at its own node; another student's data at the driving link's vectors."""
+        """Return whether it is charged at its own node, or for another student's data at the driving link."""
         ends = ends_of(self.work.construction)
         if any(one == "wrong" and ends[name][1] == node for name, one in self.due.items()):
             return True
@@ -393,7 +393,7 @@ def _touches_swap(work: StudentWork, name: str) -> bool:
 
 
 def _is_charged_before(work: StudentWork, name: str, *, data_charged: bool) -> bool:
-    """Of another student's data: charged at the crank, the driving link's first vector, or at its scale."""
+    """Return whether another student's data are charged before: at the crank, the first vector or a scale."""
     vectors = work.construction.vectors
     of_another = any(one.code == "other_variant" for one in work.task.mistakes)
     if not of_another or name not in vectors or not is_driven(work.construction, vectors[name].head):
@@ -404,7 +404,7 @@ def _is_charged_before(work: StudentWork, name: str, *, data_charged: bool) -> b
 
 
 def _is_scale_unknown(work: StudentWork, name: str) -> bool:
-    """The driving link's vector, drawn at a scale that nobody declared and the rule does not give."""
+    """Return whether it is the driving link's vector at a scale neither declared nor given by the rule."""
     wrong = {one.at for one in work.task.mistakes if one.code == "scale_wrong"}
     vector = work.construction.vectors.get(name)
     if vector is None or work.declares or vector.scale not in wrong:

@@ -1,8 +1,8 @@
 """Letters read on simulated sheets: `python -m tests.bench.letters --students 10`.
 
-A letter of a node is the first sign of what is written beside it. It is read where the likeliest sign of
-the box over its middle is its own. A box is wrong where it says, with more than 0.9, a sign that does not
-stand there. The simulation's alphabet is none of the fonts that the detector has learnt from.
+A node's letter is the first sign of the text beside it. It counts as read if the likeliest sign of the box
+over its middle is the right one. A box is wrong if it names, with more than 0.9, a sign that is not there.
+The simulation's alphabet is not among the fonts that the detector was trained on.
 """
 
 import argparse
@@ -48,13 +48,13 @@ ABOUT_MM = 8.0
 
 @dataclass(slots=True)
 class LettersTally:
-    """What was read of the letters of nodes on some sheets.
+    """Counts of nodes' letters read on some sheets.
 
     Attributes
     ----------
     nodes, read : letters of nodes, and those of them that were read
-    said : boxes about nodes that say a sign with more than 0.9
-    wrong, stray : of those, the ones on another sign, and on none
+    said : boxes near nodes that name a sign with more than 0.9
+    wrong, stray : those of them on another sign, and on none
     ms : processor time of a sheet
     """
 
@@ -75,7 +75,7 @@ class LettersTally:
         near = np.hypot(*np.moveaxis(places[:, None] - at, 2, 0)).min(axis=1) < ABOUT_MM
         over = _over(places, np.array([sign[1:] for sign in signs]).reshape(-1, 4))
         columns = np.array([letters.column.get(sign[0], -1) for sign in signs])
-        # Of boxes on the same ink the one that is likeliest a sign counts, as where names are read.
+        # Among boxes on the same ink the one likeliest to be a sign counts, as when names are read.
         likeliest = letters.probability.argmax(axis=1)
         sign_at_all = 1.0 - letters.probability[:, letters.column[""]]
         for sign in first:
@@ -97,12 +97,12 @@ class LettersTally:
 
 @dataclass(slots=True)
 class SwapsTally:
-    """Pairs of letters of plans, each once as they are and once exchanged.
+    """Counts of pairs of letters in plans, each pair once as it is and once exchanged.
 
     Attributes
     ----------
-    right, falsely : pairs as they should be, and those told as swapped
-    pairs, found : pairs exchanged, and those told as just these
+    right, falsely : pairs as they should be, and those reported as swapped
+    pairs, found : pairs exchanged, and those of them reported
     """
 
     right: int = 0
@@ -111,7 +111,7 @@ class SwapsTally:
     found: int = 0
 
     def add(self, truth: Mapping[str, Any], letters: Letters, work: SceneWork) -> None:
-        """Count one sheet: names of its true nodes are exchanged instead of its letters."""
+        """Count one sheet; the names of its true nodes are exchanged instead of its letters."""
         construction = construction_of(work.assignment.mechanism([work.variant]))
         at = {
             figure: {name: complex(x, -y) for name, (x, y) in drawn["nodes"].items()}
@@ -138,20 +138,20 @@ class SwapsTally:
 
 
 def _over(places: FloatArray, boxes: FloatArray) -> np.ndarray:
-    """(k, m) whether a place lies in a box (left, top, right, bottom) or beside it."""
+    """(k, m) True where a point lies in a box (left, top, right, bottom) or close to it."""
     low, high = boxes[:, :2] - NEAR_MM, boxes[:, 2:] + NEAR_MM
     return np.asarray(((places[:, None] > low) & (places[:, None] < high)).all(axis=2))
 
 
 def in_true_mm(letters: Letters, sheet: Sheet, truth: Mapping[str, Any]) -> Letters:
-    """The letters with their boxes where they lie on the true sheet."""
+    """The letters with their boxes in millimetres of the true sheet."""
     low, far = letters.box_mm[:, :2], letters.box_mm[:, :2] + letters.box_mm[:, 2:]
     low, far = (true_places(truth, mapped(sheet.mm_to_px, corner)) for corner in (low, far))
     return replace(letters, box_mm=np.concatenate([low, far - low], axis=1))
 
 
 def measured(name: str, students: int, first_seed: int) -> tuple[LettersTally, SwapsTally]:
-    """A scene's letters, read, and its letters exchanged."""
+    """Read a scene's letters, and the same with letters exchanged."""
     tally, swaps = LettersTally(), SwapsTally()
     for work in works(scene_named(name), students, first_seed):
         with tempfile.TemporaryDirectory() as folder:

@@ -42,7 +42,7 @@ _INK = 0.85
 
 @dataclass(frozen=True, slots=True)
 class LineSheet:
-    """An image and where its strokes lie.
+    """An image and its true strokes.
 
     Attributes
     ----------
@@ -58,12 +58,12 @@ class LineSheet:
 
     @property
     def page(self) -> Page:
-        """As intake gives it."""
+        """The image as a page from intake."""
         return Page("generated", 1, self.grey)
 
     @property
     def sheet(self) -> Sheet:
-        """Registered without error: what is measured is the lines alone."""
+        """The page registered without error, so that only the lines are measured."""
         return Sheet(
             mm_to_px=self.view.homography, page_mm=(420.0, 297.0), method="markers",
             px_per_mm=self.view.px_per_mm, rotation_deg=0.0, residual_mm=0.0, scale_se=0.0,
@@ -113,13 +113,13 @@ class LinesFigures:
 
 
 def measure_lines(*, quick: bool = False) -> LinesFigures:
-    """Each resolution, and vertices on noiseless strokes."""
+    """Measure each resolution, and vertices on noiseless strokes."""
     resolutions = RESOLUTIONS_QUICK_DPI if quick else RESOLUTIONS_DPI
     return LinesFigures(tuple(measure_resolution(dpi) for dpi in resolutions), measure_noiseless())
 
 
 def measure_resolution(dpi: float) -> LinesRow:
-    """A sheet of pencil strokes at a resolution; the first run only warms up."""
+    """Measure a sheet of pencil strokes at a resolution; the first run only warms up."""
     sheet = pencil_sheet(dpi)
     strokes_of(sheet)
     start = time.process_time()
@@ -142,7 +142,7 @@ def measure_resolution(dpi: float) -> LinesRow:
 
 
 def strokes_of(sheet: LineSheet) -> ComplexArray:
-    """The ink stage as it is, with circles, arrowheads, marks and the ink map: (n, 2) ends, mm, y up."""
+    """Run the whole ink stage with circles, arrowheads, marks and ink map; (n, 2) ends, mm, y up."""
     ink = find_ink(sheet.page, sheet.sheet)
     ends = np.zeros((0, 2, 2)) if isinstance(ink, Unread) else ink.strokes.ends
     return np.asarray(ends[..., 0] - 1j * ends[..., 1])
@@ -178,7 +178,7 @@ def _pair(errors: Sequence[float]) -> Pair | None:
 
 
 def measure_noiseless(seed: int = 1) -> Noiseless:
-    """Our strokes on ideal polygons: the vertices are where the lines of neighbouring sides meet."""
+    """Measure our strokes on ideal polygons; the vertices are intersections of neighbouring sides."""
     sheet, joints = noiseless_sheet(seed)
     strokes = strokes_of(sheet)
     lines = [_longest(true, strokes) for true in sheet.true]
@@ -202,7 +202,7 @@ def _longest(true: Segment, found: ComplexArray) -> ComplexArray | None:
 
 
 def _meeting(one: ComplexArray, other: ComplexArray) -> complex:
-    """Where two lines meet."""
+    """The intersection of two lines."""
     u, v = one[1] - one[0], other[1] - other[0]
     share = ((other[0] - one[0]) * np.conj(v)).imag / (u * np.conj(v)).imag
     return complex(one[0] + share * u)
@@ -240,7 +240,7 @@ def _scattered(rng: Rng, count: int) -> list[Segment]:
 
 
 def _close(one: Segment, other: Segment) -> bool:
-    """Whether two segments run side by side, or one goes on where the other ends."""
+    """Return whether two segments run side by side, or one continues the other."""
     span, turn = one[1] - one[0], abs(np.sin(np.angle((one[1] - one[0]) / (other[1] - other[0]))))
     if turn > _APART_RAD:
         return False

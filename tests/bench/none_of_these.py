@@ -1,9 +1,9 @@
-"""Explanations held against "none of these": random sheets, slips of units, and the confidence shown.
+"""Benchmark of "none of these" as an explanation: random sheets, slips of units, confidence shown.
 
     python -m tests.bench.none_of_these [--sheets N] [--students N] [--first SEED]
 
 - Random sheets: vectors at random and random closed polygons, with directions and without, over the
-  mechanisms of `judging_students`; how many carry a mistake named with 0.9 and more, how many are said to
+  mechanisms of `judging_students`: how many get a mistake named with 0.9 or more, how many are said to
   fit nothing.
 - Slips of units: right drawings and drawings with one mistake, entered in radians, clockwise, from another
   axis, in centimetres and metres, with kv and ka exchanged, with values in other units.
@@ -41,7 +41,7 @@ TENTHS = 10
 
 @dataclass(slots=True)
 class RandomSheets:
-    """Random sheets of one kind: those with a name at `SURE`, and those said to fit nothing."""
+    """Random sheets of one kind: those with a mistake named at `SURE`, and those said to fit nothing."""
 
     named: Count = field(default_factory=Count)
     unfit: Count = field(default_factory=Count)
@@ -49,7 +49,7 @@ class RandomSheets:
 
 
 def random_sheets(first: int, count: int) -> dict[tuple[str, str], RandomSheets]:
-    """So many seeds of every kind and mechanism; every other one declares its scales."""
+    """Judge sheets of every kind and mechanism; every other one declares its scales."""
     found: dict[tuple[str, str], RandomSheets] = {}
     for name in ASSIGNMENTS:
         assignment, rubric = assignment_named(name)
@@ -155,7 +155,7 @@ def _handed_in(work: StudentWork, slip: str, source: str) -> Submission | None:
 
 
 def unit_slips(first: int, count: int) -> dict[tuple[str, str, str], Count]:
-    """By slip, kind of student and source, how many are named rightly, with no other slip of units."""
+    """Counts of slips named rightly, with no other slip of units, by slip, kind of student and source."""
     found: dict[tuple[str, str, str], Count] = {}
     for key in (
         StudentKey(name, hand, kind, seed)
@@ -184,7 +184,7 @@ def unit_slips(first: int, count: int) -> dict[tuple[str, str, str], Count]:
 
 
 def calibration(first: int, count: int) -> list[Count]:
-    """Of the mistakes named with a confidence in each tenth, how many were made; the last one is from 0.9."""
+    """Counts of named mistakes that were made, by tenths of confidence; the last one is from 0.9."""
     found = [Count() for _ in range(TENTHS)]
     for result in _judged(first, count):
         for one in result.mistakes:
@@ -208,7 +208,7 @@ def _judged(first: int, count: int) -> Iterator[Result]:
 
 
 def tables(first: int, sheets: int, students: int) -> Iterator[Table]:
-    """Everything as tables."""
+    """Measure, and give everything as tables."""
     rows = [
         [*kind, _of(one.named), _of(one.unfit), ", ".join(f"{code} {n}" for code, n in one.codes.items())]
         for kind, one in random_sheets(first, sheets).items()
@@ -229,7 +229,7 @@ def _of(count: Count) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """All of it, as text."""
+    """Print all tables."""
     parser = argparse.ArgumentParser(description="Explanations held against none of these.")
     parser.add_argument("--sheets", type=int, default=36, help="random sheets of a kind and mechanism")
     parser.add_argument("--students", type=int, default=8, help="of a kind, mechanism and hand")

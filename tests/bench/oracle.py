@@ -1,8 +1,8 @@
-"""The exact motion of a mechanism in 50 digits, by nothing that the closed forms use.
+"""The exact motion of a mechanism in 50 digits, computed without the closed forms.
 
-Places solve the closure equations, the lengths of links and the lines of guides, by mpmath's `findroot` at
-any time; velocities and accelerations are `diff` of these places by time. A group's side is given by the
-place near which the root is sought, which the law of cosines gives. A mechanism's doubles are taken as exact.
+Positions solve the closure equations (lengths of links, lines of guides) by mpmath's `findroot` at any time;
+velocities and accelerations are their derivatives by `diff`. A group's assembly is set by the starting point
+of the root search, which the law of cosines gives. A mechanism's doubles are taken as exact.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -42,7 +42,7 @@ AXIS = "axis of "
 class ExactMotion:
     """Places, velocities and accelerations by joint, SI, as mpmath's complex numbers.
 
-    Raises ArithmeticError where the variant does not assemble.
+    Raises ArithmeticError if the variant cannot be assembled.
     """
 
     def __init__(self, mechanism: Mechanism, index: int = 0) -> None:
@@ -82,7 +82,7 @@ class ExactMotion:
             return complex(share if vector.part in "nc" else whole - share)
 
     def rate(self, vector: Vector) -> float:
-        """The angular velocity or acceleration of the link that a vector turns."""
+        """The angular velocity or acceleration of the link that a vector belongs to."""
         tail, head = vector.link or ("", "")
         return float(self.turning(head, tail)[0 if vector.name.startswith("v") else 1])
 
@@ -115,7 +115,7 @@ class ExactMotion:
         return self._known[key]
 
     def _constant(self, name: str, value: Any) -> Any:
-        """A constant of a rigid link: its value at time 0, whatever it would be later."""
+        """A constant of a rigid link, computed once, at time 0."""
         return self._fixed.setdefault(name, value)
 
     def _assemble(self, group: Group, at: dict[str, Any]) -> None:
@@ -152,7 +152,7 @@ class ExactMotion:
             at[guide.coincident], at[AXIS + guide.coincident] = foot + ratio * along, along
 
     def _turn_slot(self, group: SlottedLink, at: dict[str, Any]) -> None:
-        """The guide's direction e: |e| = 1 and e x (pin - pivot) = offset."""
+        """Solve for the guide's direction e: |e| = 1 and e x (pin - pivot) = offset."""
         arm, offset = at[group.pin] - at[group.pivot], group.offset_m
         reach = group.side * _half(abs(arm), offset)
         equations = [_link(mpf(0), mpf(1)), lambda e: _cross(e, arm) - offset]
@@ -175,7 +175,7 @@ def _driven(driver: Driver, at: Mapping[str, Any], time: Any) -> Any:
 
 
 def _root(equations: Sequence[Equation], start: Any) -> Any:
-    """The point that keeps both equations, near the place given."""
+    """The point that satisfies both equations, near the starting point."""
     try:
         x, y = mp.findroot(lambda x, y: [each(mpc(x, y)) for each in equations], (start.real, start.imag))
     except ValueError as error:

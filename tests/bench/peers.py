@@ -1,8 +1,8 @@
 """scipy's `fsolve`, which solves any mechanism of four-bars and slider-cranks as a user would ask it to.
 
 It solves the closure equations with their Jacobian, then two linear systems for velocities and accelerations.
-It takes a starting place and not a side: it gets that of a sketch in which each dyad and rod is opened a
-little further than it is (`sketch`), so that the nearer of two assemblies is the one meant.
+It takes a starting point and not an assembly: it gets the points of a sketch in which each dyad and rod is
+opened a little further (`sketch`), so that the nearer of two assemblies is the one meant.
 """
 
 import cmath
@@ -35,7 +35,7 @@ def one_of(record: Any, index: int, number: Callable[[Any], Any]) -> Any:
 
 
 def stacked(records: Sequence[Any]) -> Any:
-    """Records alike but for their numbers, of one variant each, as one record of many variants."""
+    """Records that differ only in their numbers, of one variant each, as one record of many variants."""
     first = records[0]
     match first:
         case np.ndarray():
@@ -52,20 +52,20 @@ def stacked(records: Sequence[Any]) -> Any:
 
 FSOLVE = "scipy fsolve"
 OPENED = 0.05
-"""How far a sketch opens a group: this share of its link's length."""
+"""A sketch opens a group by this share of its link's length."""
 
 Places = Mapping[str, complex]
 
 
 class NoAnswerError(Exception):
-    """The solver says that it has no answer, and why."""
+    """Raised if the solver reports that it has no answer, with the reason."""
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What a solver gives for one variant, by joint, SI; nan where it gives no number.
+    """A solver's result for one variant, by joint, SI; nan where it gives no number.
 
-    `predicted_error` where it tells one, relative to the largest of each plan.
+    `predicted_error`, if it gives one, is relative to the largest of each plan.
     """
 
     position: Places
@@ -75,7 +75,7 @@ class Answer:
 
 
 def answer_of(motion: Motion, index: int) -> Answer:
-    """The closed form's, of one variant."""
+    """The closed form's answer for one variant."""
 
     def read(rates: Mapping[str, ComplexArray]) -> Places:
         return {joint: complex(values[index]) for joint, values in rates.items()}
@@ -112,7 +112,7 @@ class Rod:
 
 @dataclass(frozen=True, slots=True)
 class Plain:
-    """A mechanism in Python's own numbers, as a user of other programs would have it: metres, radians.
+    """A mechanism in plain Python numbers, as a user of other programs would have it: metres, radians.
 
     The lengths are the same in all variants; the crank's angle, speed and acceleration are by variant.
     """
@@ -127,12 +127,12 @@ class Plain:
     groups: tuple[Triangle | Rod, ...]
 
     def arm(self, index: int) -> complex:
-        """From the crank's pivot to its pin."""
+        """The vector from the crank's pivot to its pin."""
         return cmath.rect(self.length, self.angle[index])
 
 
 def plain_of(mechanism: Mechanism) -> Plain:
-    """Raises NoAnswerError for groups that have no such form."""
+    """The plain form of a mechanism. Raises NoAnswerError for groups that have none."""
     crank = mechanism.crank
     angle, omega, epsilon = np.broadcast_arrays(crank.angle_rad, crank.omega, crank.epsilon)
     return Plain(
@@ -159,7 +159,7 @@ def _plain_group(group: object) -> Triangle | Rod:
 
 
 def sketch(mechanism: Mechanism, position: Mapping[str, ComplexArray]) -> dict[str, ComplexArray]:
-    """Where the joints are in a sketch that shows plainly on which side each group lies."""
+    """Positions of the joints in a sketch that clearly shows each group's assembly."""
     told = dict(position)
     for group in mechanism.groups:
         if isinstance(group, Dyad):
@@ -175,7 +175,7 @@ def sketch(mechanism: Mechanism, position: Mapping[str, ComplexArray]) -> dict[s
 
 
 class Fsolve:
-    """Unknown are the nodes' coordinates: (N - P).(N - P) = l^2 for a link, u x (N - G) = 0 for a guide."""
+    """Solve for the nodes' coordinates: (N - P).(N - P) = l^2 for a link, u x (N - G) = 0 for a guide."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         plain = self.plain = plain_of(mechanism)
@@ -217,7 +217,7 @@ class Fsolve:
         return {name: complex(values[2 * k], values[2 * k + 1]) for k, name in enumerate(self.names)}
 
     def solve(self, index: int, start: Places) -> Callable[[], Answer]:
-        """The place from the sketch on; velocities and accelerations from the differentiated equations."""
+        """Solve for positions from the sketch; velocities and accelerations by differentiated equations."""
         plain, pin = self.plain, self.plain.pin
         arm, omega, epsilon = plain.arm(index), plain.omega[index], plain.epsilon[index]
         self.known[pin] = plain.ground[plain.pivot] + arm
@@ -236,7 +236,7 @@ class Fsolve:
         return lambda: Answer(at, moved, pushed)
 
     def _pull(self, at: Places, known: Places, speeds: Places | None = None) -> Any:
-        """What the known joints' rates ask of the unknown ones; `speeds` for the second derivative."""
+        """The right-hand side from the known joints' rates; with `speeds`, of the second derivative."""
         told = np.zeros(len(self.rows))
         for row, (node, pin, _) in enumerate(self.rows):
             if pin is None:

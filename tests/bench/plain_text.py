@@ -1,4 +1,4 @@
-"""Tables as text that reads well in a terminal and in Markdown."""
+"""Tables as text, readable in a terminal and as Markdown."""
 
 from collections.abc import Iterable, Iterator, Sequence
 

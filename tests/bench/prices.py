@@ -1,10 +1,10 @@
-"""The price of one mistake: the share of the maximum that it costs, by kind.
+"""Measure the price of one mistake: the share of the maximum that it costs, by kind.
 
     python -m tests.bench.prices [--students N] [--first SEED]
 
 Simulated students of seven assignments, careful and typical hands, each with exactly one mistake. The loss
-is that of the expected score. A right drawing by the same hands stands in the first row, for what drafting
-errors cost. `docs/marking.md` holds the table.
+is that of the expected score. The first row, a right drawing by the same hands, shows the price of drafting
+errors. The table is in `docs/marking.md`.
 """
 
 import argparse
@@ -20,13 +20,13 @@ from tests.bench.judging_students import ASSIGNMENTS, SOURCES, Source, StudentKe
 
 HANDS = ("careful", "typical")
 STUDENTS = 32
-"""Of each assignment and hand: every kind of mistake is made at least twice."""
+"""Number for each assignment and hand: every kind of mistake is made at least twice."""
 
 Losses = Mapping[tuple[str, Source], Sequence[float]]
 
 
 def losses(students: int, first: int = 1) -> Losses:
-    """The lost shares of the maximum, by the mistake's code (none: a right drawing) and by source."""
+    """Lost shares of the maximum, by the mistake's code (none: a right drawing) and by source."""
     found: dict[tuple[str, Source], list[float]] = defaultdict(list)
     for key in _keys(students, first):
         try:

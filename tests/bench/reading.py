@@ -1,6 +1,6 @@
-"""Reading measured on simulated sheets whose truth is known, scene by scene.
+"""Measure reading on simulated sheets whose truth is known, scene by scene.
 
-What counts as right, and what as a silent misread, stands in `tests.bench.reading_truth`.
+`tests.bench.reading_truth` defines right readings and silent misreads.
 """
 
 import tempfile
@@ -43,7 +43,7 @@ SCENES_QUICK = ("plain", "printed")
 def measure_reading(
     students: int, scenes: Sequence[ReadingScene] = SCENES, *, quick: bool = False
 ) -> Iterator[SceneRow]:
-    """A row per scene, the same students in each run; a quick one has few scenes and no memory."""
+    """A row per scene, the same students in each run; a quick run has few scenes and no memory."""
     for scene in scenes:
         if not quick or scene.name in SCENES_QUICK:
             yield measure_scene(scene, students, memory=not quick)
@@ -57,7 +57,7 @@ def measure_scene(
     memory: bool = True,
     narrowed: bool = False,
 ) -> SceneRow:
-    """Every student of a scene simulated, read and held against the truth; peak memory of the first.
+    """Simulate and read every student of a scene, and compare with the truth; peak memory of the first.
 
     Arguments: `narrowed` to the zones of the figures that the rubric asks for, as a class is graded.
     """
@@ -88,7 +88,7 @@ def _read_one(tally: ReadingTally, work: SceneWork, paths: Sequence[Path], *, na
 
 
 def _marking_ms(work: SceneWork, pages: Sequence[ScannedPage], out: Path) -> dict[str, float]:
-    """What judging, the pictures and the student's page take for each sheet, by the clock."""
+    """Milliseconds of judging, pictures and the student's page for each sheet, by the clock."""
     refs = tuple(page.ref for page in pages)
     submission = StudentSubmission("s01", work.variant, refs, work.declared)
     clock = [time.perf_counter()]
@@ -109,7 +109,7 @@ def _marking_ms(work: SceneWork, pages: Sequence[ScannedPage], out: Path) -> dic
 
 
 def read_all(pages: Sequence[ScannedPage], work: SceneWork) -> tuple[list[ScannedPage], bool]:
-    """A student's pages with what is read on them; nothing, and True, where the reader breaks down."""
+    """A student's pages as read; an empty list, and True, if the reader breaks down."""
     try:
         wanted = work.rubric.vectors
         return read_pages(pages, work.assignment, work.variant, work.declared, wanted), False
@@ -125,12 +125,12 @@ RESOLUTIONS_QUICK = (150,)
 
 @dataclass(frozen=True, slots=True)
 class CurveRow:
-    """A kind of sheet at one resolution, in one way.
+    """A kind of sheet at one resolution, with one setting.
 
     Attributes
     ----------
-    way : which shortcut is left out, or that none is
-    row : the figures of its sheets
+    way : the shortcut that is left out, if any
+    row : the results for its sheets
     """
 
     way: str
@@ -139,7 +139,7 @@ class CurveRow:
 
 
 def _every_stroke() -> AbstractContextManager[object]:
-    """No stroke is left out as too far off when poses of figures are weighed."""
+    """Keep even the farthest strokes when poses of figures are weighed."""
     return patch.object(expected, "FARTHEST_SQUARED", 1500.0)
 
 
@@ -149,11 +149,11 @@ WAYS: Sequence[tuple[str, str, bool, Callable[[], AbstractContextManager[object]
     ("answer sheet, zones asked for", "printed", True, nullcontext),
     ("answer sheet, all of it", "printed", False, nullcontext),
 )
-"""What the curves are called, their scene, whether it is narrowed to zones, and what is switched."""
+"""Each curve's title, its scene, whether reading is limited to zones, and the setting changed."""
 
 
 def measure_curve(students: int, *, quick: bool = False) -> Iterator[CurveRow]:
-    """Each kind of sheet in each way at each resolution, the same students."""
+    """Measure each kind of sheet with each setting at each resolution, the same students."""
     for way, scene, narrowed, switched in WAYS:
         for dpi in RESOLUTIONS_QUICK if quick else RESOLUTIONS:
             at = replace(scene_named(scene), dpi=float(dpi))

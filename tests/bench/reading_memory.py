@@ -2,7 +2,7 @@
 
     python -m tests.bench.reading_memory ASSIGNMENT N POSITION FILE...
 
-prints megabytes; N and POSITION are `-` where the assignment has none.
+prints megabytes; N and POSITION are `-` if the assignment has none.
 """
 
 import resource
@@ -27,7 +27,7 @@ def peak_mb(assignment: str, variant: Variant, paths: Sequence[Path]) -> float |
 
 
 def _own_peak_mb() -> float:
-    """Of this process since its program began; `ru_maxrss` would count what its parent had as well."""
+    """This process's peak since its program began; `ru_maxrss` would include its parent's."""
     status = Path("/proc/self/status")
     if status.exists():
         line = next(line for line in status.read_text().splitlines() if line.startswith("VmHWM"))

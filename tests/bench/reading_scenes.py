@@ -1,6 +1,6 @@
-"""Scenes in which reading is measured: who drew what on which paper, and how it became a file.
+"""Scenes in which reading is measured: the student, the drawing, the paper and the scanner.
 
-And pages on which the drawing asked for is not: nothing is to be read into them.
+Foreign pages too, without the drawing asked for: nothing should be read on them.
 """
 
 import tempfile
@@ -52,12 +52,12 @@ class ReadingScene:
 
     Attributes
     ----------
-    hands : drawn by lot for each student
-    mistakes : mean number of mistakes; with `wrong` one at least
-    dpi : None as it comes
+    hands : one is chosen at random for each student
+    mistakes : mean number of mistakes; with `wrong` at least one
+    dpi : None for a random one
     printed : drawn on the printed answer sheet
-    hardship : how much more often than usual sheets are hard to read
-    changed : what the scene changes of somebody's settings
+    hardship : factor of the usual chance that a sheet is hard to read
+    changed : the scene's change of a student's settings
     """
 
     name: str
@@ -91,24 +91,24 @@ SCENES = (
 
 
 def _left(*habits: Habit) -> Callable[[Settings], Settings]:
-    """Somebody who leaves this on the sheet."""
+    """A student who leaves these extras on the sheet."""
     return lambda own: replace(own, student=replace(own.student, habits=habits))
 
 
 def _drawn(**pen: Any) -> Callable[[Settings], Settings]:
-    """Somebody with another pen."""
+    """A student with another pen."""
     return lambda own: replace(own, pen=replace(own.pen, **pen))
 
 
 def _seen(**scan: Any) -> Callable[[Settings], Settings]:
-    """Somebody with another scanner."""
+    """A student with another scanner."""
     return lambda own: replace(own, scan=replace(own.scan, **scan))
 
 
 def _on(
     pitch_mm: float, colour: Colour, mode: Literal["grey", "colour"], **squares: float
 ) -> Callable[[Settings], Settings]:
-    """Somebody who draws on squared paper, its lines further described as in `PageStyle`."""
+    """A student who draws on squared paper, its lines further described as in `PageStyle`."""
 
     def changed(own: Settings) -> Settings:
         told: dict[str, Any] = {f"squares_{name}": value for name, value in squares.items()}
@@ -127,7 +127,7 @@ def _in_pencil(on: Callable[[Settings], Settings]) -> Callable[[Settings], Setti
 
 
 def _faint(own: Settings) -> Settings:
-    """A hard pencil, of which a copier loses half."""
+    """A hard pencil, half of which a copier loses."""
     pen = replace(own.pen, line_mm=0.35, thin_mm=0.2, dark=0.36, thin_dark=0.2, grain=0.4, colour=_LEAD)
     return replace(own, pen=replace(pen, plan_colour=None))
 
@@ -138,7 +138,7 @@ def _worn(own: Settings) -> Settings:
 
 
 def _office(**scan: Any) -> Callable[[Settings], Settings]:
-    """Somebody at an office scanner: paper made white, faint lines thin and dotted, 200 dpi, coarse JPEG."""
+    """An office scanner: paper made white, faint lines thin and dotted, 200 dpi, coarse JPEG."""
     usual: dict[str, Any] = {"mode": "grey", "container": "jpg", "jpeg_quality": 75}
     usual |= {"dpi_tag": 200.0, "levels": (50.0, 215.0)}
     return _seen(**(usual | scan))
@@ -191,7 +191,7 @@ PAPER_SCENES = tuple(
 
 @dataclass(frozen=True, slots=True)
 class SceneWork:
-    """One student's sheets and what is known about them without looking."""
+    """One student's sheets, with their assignment, variant and rubric."""
 
     scene: ReadingScene
     seed: int
@@ -207,12 +207,12 @@ class SceneWork:
 
 
 def scene_named(name: str) -> ReadingScene:
-    """One of the scenes. Raises KeyError."""
+    """The scene of this name. Raises KeyError."""
     return {scene.name: scene for scene in (*SCENES, *PAPER_SCENES)}[name]
 
 
 def works(scene: ReadingScene, students: int, first_seed: int = 1) -> Iterator[SceneWork]:
-    """So many students of a scene; the same seeds give the same sheets."""
+    """Students of a scene; the same seeds give the same sheets."""
     for seed in range(first_seed, first_seed + students):
         yield work(scene, seed)
 
@@ -236,7 +236,7 @@ def task_named(name: str) -> tuple[Assignment, RubricFile]:
 
 
 def _settings(scene: ReadingScene, assignment: Assignment, variant: Variant, seed: int) -> Settings:
-    """Somebody of the scene, drawn by lot; for wrong drawings somebody who makes a mistake."""
+    """A random student's settings for the scene; for wrong drawings, of one who makes a mistake."""
     lot = np.random.default_rng([seed, 9])
     hand = scene.hands[int(lot.integers(len(scene.hands)))]
     for again in range(_TRIES):
@@ -250,7 +250,7 @@ def _settings(scene: ReadingScene, assignment: Assignment, variant: Variant, see
 
 
 def answer_sheets(assignment: Assignment, variant: Variant) -> Mapping[str, PrintedSheet]:
-    """The answer sheet that this student is given."""
+    """The answer sheet given to this student."""
     row = RosterRow("s01", "", n=variant.n, position=variant.position)
     sheets = make_sheets(assignment, [row])
     return printed_sheets(sheets.pdf, sheets.layout)
@@ -260,18 +260,18 @@ PAGES, PAGES_QUICK = 2, 1
 READ_AS = ("pump", "press")
 OTHERS = ("press", "engine", "shaper", "piston")
 BREAKDOWNS = (ArithmeticError, LookupError, ValueError)
-"""What the reader must never raise; where it does, the page counts as one on which it broke down."""
+"""Errors that the reader must never raise; a page with one counts as a breakdown."""
 _FIRST_SEED = 700
 
 
 @dataclass(frozen=True, slots=True)
 class ForeignRow:
-    """A kind of foreign page: how many, and what was read into them.
+    """A kind of foreign page: the number of pages, and of vectors read on them.
 
     Attributes
     ----------
     readings : each page is read as several assignments
-    vectors, confident : reported, and reported with confidence
+    vectors, confident : those reported, and those reported with confidence
     failed : readings in which the reader broke down
     """
 
@@ -283,7 +283,7 @@ class ForeignRow:
 
 
 def measure_foreign(*, quick: bool = False) -> Iterator[ForeignRow]:
-    """Every kind of foreign page; a quick run reads one of each as one assignment, and few kinds."""
+    """Measure every kind of foreign page; a quick run reads one each of a few kinds, as one assignment."""
     pages, names = (PAGES_QUICK, READ_AS[:1]) if quick else (PAGES, READ_AS)
     seeds = range(_FIRST_SEED, _FIRST_SEED + pages)
     for kind, draw in _WRITTEN.items():
@@ -307,7 +307,7 @@ def foreign_tables(rows: Sequence[ForeignRow]) -> Iterator[Table]:
 
 
 def _row(kind: str, pages: Sequence[tuple[SimulatedSheet, Sequence[str]]]) -> ForeignRow:
-    """Each page read as each of the assignments named."""
+    """Read each page as each of the assignments."""
     row = ForeignRow(kind, 0, 0, 0)
     with tempfile.TemporaryDirectory() as folder:
         for number, (sheet, names) in enumerate(pages):
@@ -319,7 +319,7 @@ def _row(kind: str, pages: Sequence[tuple[SimulatedSheet, Sequence[str]]]) -> Fo
 
 
 def _counted(row: ForeignRow, found: Sequence[float] | None) -> ForeignRow:
-    """One reading more, by the confidences of what was reported; None where the reader broke down."""
+    """Add one reading by the confidences of its vectors; None if the reader broke down."""
     sure = sum(confidence >= SURE for confidence in found or ())
     return ForeignRow(
         row.kind, row.readings + 1, row.vectors + len(found or ()), row.confident + sure,
@@ -328,7 +328,7 @@ def _counted(row: ForeignRow, found: Sequence[float] | None) -> ForeignRow:
 
 
 def _confidences(page: ScannedPage, name: str, number: int) -> list[float] | None:
-    """Of everything that is reported of a page when it is read as some student's of an assignment."""
+    """Confidences of the vectors reported when a page is read as an assignment; None if that breaks down."""
     assignment, rubric = task_named(name)
     variants = assignment.variants()
     try:
@@ -340,7 +340,7 @@ def _confidences(page: ScannedPage, name: str, number: int) -> list[float] | Non
 
 
 def _drawing(name: str, seed: int) -> list[SimulatedSheet]:
-    """Somebody's work for another assignment."""
+    """A student's work for another assignment."""
     assignment, _ = task_named(name)
     variants = assignment.variants()
     variant = variants[seed % len(variants)]
@@ -349,7 +349,7 @@ def _drawing(name: str, seed: int) -> list[SimulatedSheet]:
 
 
 def _empty_form(seed: int) -> SimulatedSheet:
-    """A printed answer sheet as it was handed out."""
+    """A printed answer sheet as handed out."""
     assignment, _ = task_named(READ_AS[0])
     printed = answer_sheets(assignment, assignment.variants()[0])
     return _page(lambda _: None, seed, next(iter(printed.values())).background)
@@ -358,7 +358,7 @@ def _empty_form(seed: int) -> SimulatedSheet:
 def _page(
     draw: Callable[[SheetSketch], None], seed: int, background: Background | None = None
 ) -> SimulatedSheet:
-    """A page written on and scanned."""
+    """Draw a page and scan it."""
     rng = np.random.default_rng([seed, 11])
     settings = any_settings(seed, device="flatbed", dpi=300.0, mistakes=0.0)
     settings = replace(settings, scan=replace(settings.scan, dpi_tag=300.0))
@@ -374,11 +374,11 @@ def _scanned(sketch: SheetSketch, settings: Settings, background: Background | N
     return SimulatedSheet(image, {}, settings)
 
 
-# What stands on them ---------------------------------------------------------------------------------
+# Contents of the pages -------------------------------------------------------------------------------
 
 
 def _text(sketch: SheetSketch) -> None:
-    """A page of notes inside a frame."""
+    """Draw a page of notes inside a frame."""
     draw_frame(sketch)
     words = [word for texts in CAPTIONS.values() for kinds in texts.values() for word in kinds]
     words += [word for told in WORDS.values() for word in told.values()]
@@ -393,7 +393,7 @@ def _text(sketch: SheetSketch) -> None:
 
 
 def _table(sketch: SheetSketch) -> None:
-    """A ruled table with numbers in its cells."""
+    """Draw a ruled table with numbers in its cells."""
     draw_frame(sketch)
     x, y, w, h = FRAMES_MM["iso"]
     columns = np.linspace(x + 15.0, x + w - 15.0, int(sketch.rng.integers(6, 12)))
@@ -409,13 +409,13 @@ def _table(sketch: SheetSketch) -> None:
 
 
 def _squares(sketch: SheetSketch) -> None:
-    """Squared paper with nothing on it."""
+    """Draw empty squared paper."""
     sketch.page = replace(sketch.page, squared_mm=5.0)
     print_squares(sketch)
 
 
 def _curves(sketch: SheetSketch) -> None:
-    """Diagrams of curves over time, with axes: another part of the same course."""
+    """Draw diagrams of curves over time, with axes: another part of the same course."""
     draw_frame(sketch)
     pen = sketch.pen("line")
     for left in (40.0, 235.0):

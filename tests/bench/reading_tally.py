@@ -1,8 +1,8 @@
-"""What reading came to on the sheets of one scene, counted sheet by sheet, and as tables.
+"""Results of reading a scene, counted sheet by sheet, and as tables.
 
-A standard error is right where |error| / se is below 1 in 68.3 % and below 1.96 in 95 % of cases; the robust
-root mean square (1.4826 times the median of |error| / se) is then 1. A confidence is right where of all that
-is reported at it the same share is right.
+A standard error is right if |error| / se is below 1 in 68.3 % and below 1.96 in 95 % of cases; the robust
+root mean square (1.4826 times the median of |error| / se) is then 1. A confidence is right if it equals the
+share of right readings among all reported with it.
 """
 
 import statistics
@@ -45,7 +45,7 @@ class ErrorSpread:
 
 @dataclass(frozen=True, slots=True)
 class Bin:
-    """What was reported at a confidence from `low` to below `high`, and the share within 0.5 mm."""
+    """Readings with a confidence from `low` to below `high`, and the share within 0.5 mm."""
 
     low: float
     high: float
@@ -55,7 +55,7 @@ class Bin:
 
 
 def calibration(reported: Sequence[tuple[float, float]]) -> list[Bin]:
-    """Of (confidence, error in mm): how often each confidence was right."""
+    """Bins of (confidence, error in mm), each with the share that was right."""
     values = np.array(reported, dtype=float).reshape(-1, 2)
     found = []
     for low, high in BINS:
@@ -67,7 +67,7 @@ def calibration(reported: Sequence[tuple[float, float]]) -> list[Bin]:
 
 
 def whitened(error: complex, cov: FloatArray) -> list[float]:
-    """A place's error along the two principal axes of its covariance, in standard errors."""
+    """A position's error along the two principal axes of its covariance, in standard errors."""
     variances, axes = np.linalg.eigh(cov)
     along = np.array([error.real, error.imag]) @ axes
     return [float(x) for x in along / np.sqrt(np.maximum(variances, 1e-12))]
@@ -83,19 +83,19 @@ class Honesty:
 
 
 STAGES = ("decode", "sheet", "ink", "reading", "judging", "picture", "page")
-"""Of a page, from its file to the student's page; the test for blankness is in the sum alone."""
+"""Stages of a page, from its file to the student's page; the blankness test is only in the sum."""
 UPRIGHT_DEG = 45.0
 SCALE_SHARE = 0.01
 
 
 @dataclass(slots=True)
 class ReadingTally:
-    """What was seen so far.
+    """Counts of all pages so far.
 
     Attributes
     ----------
-    judged : of every sheet, its asked vectors
-    node_errors_mm : of confidently read nodes of the plans
+    judged : the vectors asked for, by sheet
+    node_errors_mm : errors of confidently read nodes of the plans
     joint_errors_mm : the same for the sketch's joints
     node_ratios : errors of nodes along principal axes, in standard errors
     """
@@ -113,7 +113,7 @@ class ReadingTally:
     processor_ms: list[float] = field(default_factory=list)
 
     def add_times(self, timing_ms: Mapping[str, float], share: float, spent_ms: float) -> None:
-        """One page's times: stages by the clock, of which this share was the processor's own."""
+        """Add one page's times: stages by the clock, and the processor's share of them."""
         for stage in STAGES:
             self.times_ms[stage].append(share * timing_ms.get(stage, 0.0))
         self.processor_ms.append(spent_ms)
@@ -122,7 +122,7 @@ class ReadingTally:
         self, truth: Mapping[str, Any], figures: Mapping[str, TrueFigure], wanted: Sequence[str],
         seen: ScannedPage, reading: Reading,
     ) -> None:  # fmt: skip
-        """One page with what was read on it."""
+        """Add one page with its reading."""
         self.judged.append(list(each_vector(figures, wanted, reading.figures)))
         if seen.sheet is None or seen.image is None:
             self.refused += 1
@@ -139,7 +139,7 @@ class ReadingTally:
     def _add_nodes(
         self, drawn: Mapping[str, Any], found: Figure, on_paper: OnPaper, *, is_plan: bool
     ) -> None:
-        """The confidently read nodes of a plan, or joints of the sketch, by their places on the paper."""
+        """Add the confidently read nodes of a plan, or joints of the sketch, by position on the paper."""
         nodes = {name: complex(x, -y) for name, (x, y) in drawn["nodes"].items()}
         sure = [n for n in nodes if n in found.nodes and found.nodes[n].confidence >= SURE]
         if not sure:
@@ -161,15 +161,15 @@ class SceneRow:
     Attributes
     ----------
     refused, failed : pages refused; students at whose sheets the reader broke down
-    sheets_right : share of sheets on which every asked vector of 5 mm or more is right and nothing is
-        silently misread
+    sheets_right : share of sheets on which every asked vector of 5 mm or more is right, without any
+        silent misread
     vectors, right, confident, doubtful, unread : asked vectors of 5 mm and more: how many, and shares
-    right_and_confident : what needs no person and is right
-    short, short_right : the shorter ones
-    misreads, confidently : silent misreads, out of how many reported with confidence
+    right_and_confident : share that is right and needs no person
+    short, short_right : the same for shorter vectors
+    misreads, confidently : silent misreads, and the vectors reported with confidence
     node_mm, joint_mm : median and p95 of confidently read nodes, see `ReadingTally`
-    times_ms, processor_ms : medians per page of processor time, by stage and in all
-    peak_mb : of a process of its own that reads one student's sheets
+    times_ms, processor_ms : medians per page of processor time, by stage and in total
+    peak_mb : peak memory of a process that reads one student's sheets
     """
 
     scene: str
@@ -200,7 +200,7 @@ class SceneRow:
 
 
 def row_of(scene: str, title: str, tally: ReadingTally, peak_mb: float | None) -> SceneRow:
-    """A scene's figures from what was counted."""
+    """A scene's figures from its counts."""
     everything = [one for sheet in tally.judged for one in sheet]
     drawn = [one for one in everything if not one.true.missing]
     long, short = ([one for one in drawn if one.short is is_short] for is_short in (False, True))
@@ -235,7 +235,7 @@ def row_of(scene: str, title: str, tally: ReadingTally, peak_mb: float | None) -
 
 
 def honesty_of(tally: ReadingTally) -> Honesty:
-    """Spreads of what was read with confidence, and how often each confidence was right."""
+    """Spreads of confident readings, and the share of right ones by confidence."""
     everything = [one for sheet in tally.judged for one in sheet if one.reported and one.counts]
     sure = [one for one in everything if one.sure and not one.true.missing and one.se_mm > 0.0]
     return Honesty(
@@ -269,7 +269,7 @@ Column = tuple[str, Callable[[SceneRow], str]]
 
 
 def reading_tables(reading: Sequence[SceneRow]) -> Iterator[Table]:
-    """All tables of the scenes, where any was measured."""
+    """All tables of the scenes, if any was measured."""
     if reading:
         yield _table("Reading: sheets and vectors", reading, _VECTORS)
         yield _table("Reading: error of confidently read nodes, mm (median / p95)", reading, _NODES)
@@ -281,7 +281,7 @@ def reading_tables(reading: Sequence[SceneRow]) -> Iterator[Table]:
 
 
 def paper_tables(reading: Sequence[SceneRow]) -> Iterator[Table]:
-    """The rows of scenes of paper and habits: one short table."""
+    """The scenes of paper and habits as one short table."""
     yield _table("Reading: paper, habits and copies, each by itself", reading, _PAPER)
 
 
@@ -290,12 +290,12 @@ def _table(title: str, rows: Sequence[SceneRow], columns: Sequence[Column]) -> T
 
 
 def percent(share: float | None) -> str:
-    """A share in per cent, where there is one."""
+    """A share in per cent, or a dash for None."""
     return NOTHING if share is None else f"{100 * share:.0f} %"
 
 
 def pair(errors: tuple[float | None, float | None]) -> str:
-    """Median and p95, where there are any."""
+    """Median and p95 as text, or a dash for None."""
     return NOTHING if errors[0] is None else f"{errors[0]:.3f} / {errors[1]:.3f}"
 
 
@@ -357,7 +357,7 @@ _TIMES: Sequence[Column] = (
 
 
 def _confidence(reading: Sequence[SceneRow]) -> Table:
-    """All scenes together: a bin of one scene is too small."""
+    """Confidences of all scenes together: a bin of one scene is too small."""
     lines = []
     for bins in zip(*(row.honesty.confidence for row in reading), strict=True):
         count = sum(one.count for one in bins)

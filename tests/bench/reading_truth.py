@@ -1,17 +1,17 @@
-"""What was drawn, and how far a reading is from it: the rules by which a reading is judged.
+"""The truth of a drawing, and the rules by which a reading is judged.
 
-*Right*: the length within 0.3 mm of what was drawn, and the direction within 0.3 degrees or the end
-within 0.3 mm across. What was drawn is either the two nodes or the stroke between them, whichever is
+*Right*: the length is within 0.3 mm of the drawing, and the direction within 0.3 degrees or the end
+within 0.3 mm across. The drawing is either the two nodes or the stroke between them, whichever is
 nearer: a hand's stroke may miss the nodes that it joins, and no reader can know which was meant.
 
-*Silent misread*: reported with confidence above 0.9 and wrong by more than 1 mm, which a wrong name
-is too. A vector that was **not** drawn is misread where it is reported with that confidence, with one
-exception: where real geometry stands in its place. Both nodes then exist, the reading is within 1 mm
-of what lies between them, and either they coincide (a vector of true length zero) or strokes of the
-same figure cover the way from one to the other (a vector on the same line as a longer one, the side
-of a similar triangle, a construction line that was not drawn over). Then the picture alone cannot
-say whether it was drawn as well, its value is that of the student's own nodes, and it counts neither
-for nor against. A vector that was left out and lies on bare paper stays a misread.
+*Silent misread*: reported with confidence above 0.9 and wrong by more than 1 mm; a wrong name counts
+as well. A vector that was **not** drawn is misread if it is reported with that confidence, with one
+exception: real geometry in its place. Then both nodes exist, the reading is within 1 mm of the vector
+between them, and either they coincide (a vector of true length zero) or strokes of the same figure
+cover the whole distance (a vector on the same line as a longer one, the side of a similar triangle,
+a construction line that was not drawn over). In that case the picture alone cannot show whether the
+vector was drawn, its value is that of the student's own nodes, and it counts neither for nor against.
+A vector that was left out and would lie on bare paper is a misread.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -30,11 +30,11 @@ _FAR_MM = (60 - 60j, 360 - 60j, 60 - 240j)
 
 
 class OnPaper:
-    """Sheet millimetres as read, to the true millimetres of the paper.
+    """The map from sheet millimetres as read to the true millimetres of the paper.
 
-    A hand-ruled frame or a paper's edge gives the sheet's millimetres another origin than the truth's.
-    So a place is followed to its pixel and from there by the truth's own map: what is left is the error
-    of the reading, not that of the origin. Scale and turn are told apart.
+    With a hand-ruled frame or a paper's edge the sheet's millimetres have another origin than the truth's.
+    So a point is mapped to its pixel and from there by the truth's own map: the difference is the error
+    of the reading, not that of the origin. Errors of scale and turn are reported separately.
     """
 
     def __init__(self, truth: Mapping[str, Any], sheet: Sheet, shape: tuple[int, ...]) -> None:
@@ -58,7 +58,7 @@ class OnPaper:
         return np.asarray(lifted[:, :2] / lifted[:, 2:])
 
     def back(self, true: ComplexArray) -> ComplexArray:
-        """Places in truth as they would be read: by the affine map that undoes this one best."""
+        """True points as they would be read: by the affine map that best inverts this one."""
         grid = np.array([complex(x, -y) for x in (20, 150, 280, 400) for y in (20, 110, 200, 280)])
         there = self(grid)
         columns = np.column_stack([there, np.conj(there), np.ones(len(there))])
@@ -113,7 +113,7 @@ class TrueVector:
     ends : its two nodes, None where one of them is not on the sheet
     stroke : the stroke as ruled, None where it is not drawn (or not noted)
     missing : why it is not drawn, empty where it is
-    covered : of one not drawn: whether real geometry stands in its place
+    covered : it is not drawn, and real geometry is in its place
     """
 
     name: str
@@ -125,12 +125,12 @@ class TrueVector:
 
     @property
     def ways(self) -> list[complex]:
-        """Node to node, and along the stroke."""
+        """The vector from node to node, and that along the stroke."""
         return [head - tail for tail, head in filter(None, (self.ends, self.stroke))]
 
     @property
     def length_mm(self) -> float:
-        """Node to node."""
+        """Distance of the nodes, else length of the stroke."""
         return abs(self.ways[0]) if self.ways else 0.0
 
 
@@ -146,14 +146,14 @@ class TrueFigure:
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """One vector held against the truth.
+    """One vector compared with the truth.
 
     Attributes
     ----------
-    counts : False for one that is neither drawn nor reported, and where real geometry stands in
-    error_mm : distance of its end from the true end, starts laid on one another; infinite if unread
-    node_error_mm : of its length, against the nodes; None if unread
-    confidence : 0 where it is unread
+    counts : False if it is neither drawn nor reported, or if real geometry is in its place
+    error_mm : distance of its end from the true end with both starts aligned; infinite if unread
+    node_error_mm : error of its length against the nodes; None if unread
+    confidence : 0 if it is unread
     """
 
     true: TrueVector
@@ -167,17 +167,17 @@ class Judged:
 
     @property
     def short(self) -> bool:
-        """Whether it is counted apart."""
+        """True if it is too short to count with the others."""
         return self.true.length_mm < LEAST_MM
 
     @property
     def sure(self) -> bool:
-        """Whether it would be marked without a person."""
+        """True if it would be marked without a person."""
         return self.confidence >= SURE
 
     @property
     def misread(self) -> bool:
-        """Whether it is a silent misread."""
+        """True if it is a silent misread."""
         return self.counts and self.confidence > SURE and self.error_mm > MISREAD_MM
 
 
@@ -223,7 +223,7 @@ def _segment(line: Sequence[Sequence[float]]) -> Segment:
 
 
 def _stands_in(ends: Segment, strokes: Sequence[Segment]) -> bool:
-    """Whether the ends coincide, or strokes along the way between them cover it."""
+    """Return whether the ends coincide, or strokes cover the distance between them."""
     tail, head = ends
     length = abs(head - tail)
     if length < _ZERO_MM:
@@ -240,12 +240,12 @@ def _stands_in(ends: Segment, strokes: Sequence[Segment]) -> bool:
 
 
 def judged(true: TrueVector, found: ReadVector | None) -> Judged:
-    """One vector's reading held against what was drawn."""
+    """Compare one vector's reading with the truth."""
     if found is None or found.length_mm is None:
         return Judged(true, counts=not true.missing)
     read = found.length_mm * complex(np.exp(1j * np.radians(found.direction_deg or 0.0)))
     if not true.ways:
-        # Nothing of it is on the sheet: all of what was read is too much.
+        # The vector is not on the sheet: its whole reading is an error.
         return Judged(true, reported=True, error_mm=abs(read), se_mm=found.se_mm, confidence=found.confidence)
     error = min(abs(read - way) for way in true.ways)
     stands_in = true.covered and error <= MISREAD_MM
@@ -273,7 +273,7 @@ def _is_right(read: complex, way: complex) -> bool:
 def each_vector(
     figures: Mapping[str, TrueFigure], wanted: Sequence[str], read: Mapping[str, Figure]
 ) -> Iterator[Judged]:
-    """Every vector asked for on a sheet; `read` has the figures of a reading by name."""
+    """Judge every vector asked for on a sheet; `read` has the figures of a reading by name."""
     for name, figure in figures.items():
         found = read.get(name)
         for vector in figure.vectors.values():

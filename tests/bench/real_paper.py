@@ -1,11 +1,11 @@
-"""Real drawings: what is found of segments, arrow tips and circles whose places were read by eye.
+"""Measure how many segments, arrow tips and circles, located by eye, are found on real drawings.
 
     python -m tests.bench.real_paper FOLDER...
 
 A folder holds pictures, and for some of them a `truth-*.json` in pixels: `segments` with ends `a` and `b`,
-and what each end is: `o` the centre of a joint's circle, `>` an arrow's tip, `.` a dot, `-` a plain end. They
-are no sheets of an assignment: the map to millimetres is given by the resolution, and the ink is found in
-all of the page.
+and the kind of each end: `o` the centre of a joint's circle, `>` an arrow's tip, `.` a dot, `-` a plain end.
+They are not sheets of an assignment: the resolution gives the map to millimetres, and ink is sought on the
+whole page.
 """
 
 import json
@@ -29,20 +29,20 @@ from reference.drawing.canvas import MM_PER_INCH
 from tests.bench.plain_text import NOTHING, Table, as_text
 
 OFF_MM, FREEHAND_MM = 0.6, 2.0
-"""How far a stroke may lie beside a segment: lines of a ruler, and drawn without one."""
+"""Largest distance of a stroke from its segment: for ruled lines, and for freehand ones."""
 END_MM, WHOLE = 3.5, 0.85
 """A segment is found whole by one stroke that reaches this near to both its ends, since lines stop at joints'
 circles; drawn freehand, by strokes that cover so much of it."""
 TIP_MM, CIRCLE_MM = 1.0, 0.5
 SURE = 0.5
-"""Of a tip, and of a letter."""
+"""Least probability of a tip, and of a letter."""
 DEFAULT_DPI = 300.0
 PICTURES = (".png", ".jpg")
 
 
 @dataclass(slots=True)
 class PageFigures:
-    """What was found on one picture, and of how much; lengths in mm, time in processor seconds."""
+    """Counts of items on one picture and of those found; lengths in mm, time in processor seconds."""
 
     name: str
     strokes: int = 0
@@ -68,7 +68,7 @@ def measure(folder: Path) -> list[PageFigures]:
 
 
 def measure_page(path: Path, truth: Mapping[str, Any] | None) -> PageFigures:
-    """The ink of one picture held against what was read by eye; without a truth, what there is of it."""
+    """Compare the ink of one picture with the truth read by eye; without a truth, count what is found."""
     start = time.process_time()
     page = page_of(path, 1)
     stated = page.dpi[0] if page.dpi and page.dpi[0] >= UNSET_DPI else DEFAULT_DPI
@@ -127,7 +127,7 @@ def _count(row: PageFigures, ink: Ink, truth: Mapping[str, Any], px_per_mm: floa
 
 
 def _axes(strokes: FloatArray, ends: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """(n, 2) places along and across a segment of the strokes' ends, and its length."""
+    """(n, 2) positions of strokes' ends along and across a segment, and its length."""
     (length,), (u,) = lengths_and_directions(ends[None])
     relative = strokes - ends[0]
     along = relative @ u
@@ -136,7 +136,7 @@ def _axes(strokes: FloatArray, ends: FloatArray) -> tuple[FloatArray, FloatArray
 
 
 def _head(ink: Ink, on: BoolArray, ends: FloatArray, end: int) -> tuple[float, float]:
-    """How far the likeliest head towards an end, on the strokes `on`, is from it, mm, and its probability."""
+    """The distance (mm) from an end of the likeliest head on the strokes `on`, and its probability."""
     strokes = ink.strokes.ends[ink.tips.stroke]
     _, u = lengths_and_directions(strokes)
     forward = (u @ (ends[1] - ends[0]) > 0) == (end == 1)
@@ -154,7 +154,7 @@ HEADS = (
 
 
 def table(title: str, rows: list[PageFigures]) -> Table:
-    """The figures, a line each and their sum."""
+    """The figures of each picture, and their sum."""
     return title, HEADS, [_cells(row) for row in [*rows, _total(rows)]]
 
 

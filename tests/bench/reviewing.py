@@ -1,19 +1,19 @@
-"""A review walked through without a person: how much is asked, and what pressing Enter alone comes to.
+"""Measure a review without a person: the number of questions, and the totals if one only presses Enter.
 
 ::
 
     python -m tests.bench.reviewing --seeds 1001 1100 --kept FOLDER
 
-Sheets of simulated students, read once (`judging_scans`), are reviewed twice. *Enter* takes each default, and
-the first choice where there is none. *Truth* answers by what was drawn: of places the one where the node
-lies, else it is dragged there; of verdicts the one that a perfect reading of the same drawing gives. The
-total of that perfect reading is what is due, of both reviews.
+Sheets of simulated students, read once (`judging_scans`), are reviewed twice. *Enter* takes each default, or
+the first choice if there is none. *Truth* answers by the true drawing: it chooses the point where the node
+lies, or drags it there, and the verdict that a perfect reading of the same drawing gives. The total of that
+perfect reading is the one due in both reviews.
 
-A perfect reader is sure of what it sees, and measures as well as the program does: a rubric's rule for what
-the error of reading leaves open decides alike. It sees two nodes in one point as a vector of length zero,
-where a point is due. What it does not judge, an honest person does not judge either; where that is because a
-point is due and drawn, to credit it is right, too. A vector along which other lines lie is on the sheet
-(`judging_scans`). Totals are the rubric's, with what is not judged left out, not sums of points.
+A perfect reader is sure of what it sees, and measures as accurately as the program: so a rubric's rule for
+reading errors decides alike. It sees two nodes in one point as a vector of length zero, where a point is
+due. A criterion that it does not judge is not judged by an honest person either; if the reason is that a
+point is due and drawn, crediting it is right, too. A vector covered by other lines counts as drawn
+(`judging_scans`). Totals are the rubric's, without criteria that are not judged; they are not sums of points.
 """
 
 import argparse
@@ -46,7 +46,7 @@ CREDITED, CHARGED = {"full", "follow_through"}, {"none", "partial"}
 
 @dataclass(frozen=True, slots=True)
 class Answered:
-    """One answer that was offered with a probability, and whether it is right."""
+    """One answer that was offered, its probability, and whether it is right."""
 
     kind: str
     probability: float
@@ -63,12 +63,12 @@ class Review:
     rows: list[Decision] = field(default_factory=list)
 
     def report(self) -> ReportDocument:
-        """The report with what is decided so far."""
+        """The report with the decisions so far."""
         task, student = self.task, replace(self.student, decided=tuple(self.rows))
         return mark(student, self.pages, task.assignment, task.rubric)[0]
 
     def answer(self, rows: Sequence[tuple[str, str]]) -> None:
-        """Decide; a row on the same criterion replaces the one before."""
+        """Add decisions; a row on the same criterion replaces the one before."""
         said = {name for name, _ in rows}
         self.rows = [one for one in self.rows if one.criterion not in said]
         self.rows += [Decision("s", None, name, verdict) for name, verdict in rows]
@@ -76,9 +76,9 @@ class Review:
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """What was drawn: verdicts and total by a perfect reading, nodes on the sheet (complex mm) by figure.
+    """The truth: verdicts and total of a perfect reading, nodes on the sheet (complex mm) by figure.
 
-    `points` are the criteria of vectors that are due as a point, and drawn as one: they are not judged.
+    `points` are the criteria of vectors that should be a point, and are drawn as one: they are not judged.
     """
 
     verdicts: Mapping[str, str]
@@ -88,7 +88,7 @@ class Truth:
 
 
 def truth_of(read: ReadWork, task: Task, student: StudentSubmission) -> Truth:
-    """What a perfect reader would have found on a student's sheets."""
+    """The truth that a perfect reader would find on a student's sheets."""
     perfect = submission(replace(read.work, left_out=_left_out(read.work, task)), "nodes")
     sure = (
         replace(one, figures={name: _sure(drawn, _errors(read, name)) for name, drawn in one.figures.items()})
@@ -107,7 +107,7 @@ def truth_of(read: ReadWork, task: Task, student: StudentSubmission) -> Truth:
 
 
 def _left_out(work: StudentWork, task: Task) -> frozenset[str]:
-    """The vectors that are not drawn; not those that are due as a point, and drawn as one."""
+    """The vectors that are not drawn, except those that should be a point, and are drawn as one."""
     scales = {name: float(one) for name, one in work.task.declared.items()}
 
     def is_point(name: str) -> bool:
@@ -123,7 +123,7 @@ def _left_out(work: StudentWork, task: Task) -> frozenset[str]:
 
 
 def _errors(read: ReadWork, name: str) -> Figure:
-    """A figure as the program read it, whose standard errors are those of the perfect reader, too."""
+    """A figure as the program read it; the perfect reader gets its standard errors."""
     return next((one.figures[name] for one in read.readings if name in one.figures), Figure({}, {}))
 
 
@@ -143,7 +143,7 @@ def _with_errors(drawn: ReadVector, errors: ReadVector) -> ReadVector:
 
 
 def _on_sheets(read: ReadWork) -> dict[tuple[str, str], complex]:
-    """Where nodes were drawn on their sheets: the drawing laid onto the nodes that were surely read."""
+    """True positions of the nodes on their sheets: the drawing fitted to the nodes read with confidence."""
     found: dict[tuple[str, str], complex] = {}
     for reading in read.readings:
         for name, figure in reading.figures.items():
@@ -157,7 +157,7 @@ def _on_sheets(read: ReadWork) -> dict[tuple[str, str], complex]:
 
 
 def _laid_onto(own: Sequence[complex], read: Sequence[ReadNode]) -> tuple[complex, complex]:
-    """The turn (unit) and shift that lay a drawing onto its reading; nodes read in doubt hardly count."""
+    """The turn (unit) and shift that fit a drawing to its reading; doubtful nodes hardly count."""
     drawn, at = np.array(own), np.array([one.at for one in read])
     weights = np.array([max(one.confidence, 0.01) ** 8 for one in read])
     for _ in range(8):
@@ -173,9 +173,9 @@ def _laid_onto(own: Sequence[complex], read: Sequence[ReadNode]) -> tuple[comple
 
 
 def walked(review: Review, truth: Truth | None) -> tuple[int, list[Answered], float]:
-    """Questions asked, what was offered, and the total that the review comes to.
+    """Walk through a review; the number of questions, the answers offered, and the final total.
 
-    Arguments: `truth` answers where it is given; else Enter does.
+    Arguments: `truth` answers if it is given; else Enter does.
     """
     asked, offered = 0, list[Answered]()
     report = review.report()
@@ -196,7 +196,7 @@ def walked(review: Review, truth: Truth | None) -> tuple[int, list[Answered], fl
 
 
 def _right(question, truth: Truth) -> list[tuple[str, str]]:  # type: ignore[no-untyped-def]
-    """The rows that an honest person writes."""
+    """The rows that an honest person would write."""
     if question.kind == "owner":
         return [(name, truth.verdicts[name]) for name in question.criteria]
     if question.kind == "node":
@@ -213,7 +213,7 @@ def _right(question, truth: Truth) -> list[tuple[str, str]]:  # type: ignore[no-
 
 
 def _is_same(choice, right: Sequence[tuple[str, str]], truth: Truth) -> bool:  # type: ignore[no-untyped-def]
-    """Whether a choice says what is right: the same place, or credit where credit is due."""
+    """Return whether a choice is right: the right point, or credit where credit is due."""
     if choice.at is not None:
         return list(choice.rows) == list(right)
     due = dict(right)
@@ -226,7 +226,7 @@ def _is_same(choice, right: Sequence[tuple[str, str]], truth: Truth) -> bool:  #
 
 
 def _total(review: Review, report: ReportDocument) -> float:
-    """The score, with what still waits as it is proposed."""
+    """The score, with open verdicts taken as proposed."""
     waiting = [(one.id, one.proposed or "none") for one in report.criteria if one.verdict == "review"]
     if waiting:
         review.answer(waiting)
@@ -239,7 +239,7 @@ def _total(review: Review, report: ReportDocument) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Walked:
-    """One student: questions by Enter and by truth, how far the totals of both are from what is due."""
+    """One student: questions by Enter and by truth, and the differences of both totals from the due one."""
 
     asked: int
     honest: int
@@ -249,7 +249,7 @@ class Walked:
 
 
 def reviewed(read: ReadWork) -> Walked | None:
-    """One student's sheets reviewed; None where nothing was read, or the data are another student's."""
+    """Review a student's sheets; None if nothing was read, or the data are another student's."""
     drawn = [one for one in read.readings if one.figures]
     if not drawn or any(one.code == "other_variant" for one in read.work.task.mistakes):
         return None
@@ -264,7 +264,7 @@ def reviewed(read: ReadWork) -> Walked | None:
 
 
 def tables(students: Sequence[Walked]) -> Iterator[Table]:
-    """How much was asked, how far the totals are off, and how often what was offered was right."""
+    """Tables of questions asked, errors of the totals, and shares of offered answers that were right."""
     due, honest = [one.off for one in students], [one.honest_off for one in students]
     apart = [one.off - one.honest_off for one in students]
     heads = [

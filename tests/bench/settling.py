@@ -1,11 +1,11 @@
-"""How many sheets of a scanned class are finished, and how many of the settled verdicts are wrong.
+"""Count the sheets of a scanned class that are finished, and the settled verdicts that are wrong.
 
 ::
 
     python -m tests.bench.settling --students 300 --kept FOLDER
 
 reads the scans of 300 simulated students of each kind of sheet (some 5 s each; kept in the folder), judges
-them, and holds every verdict against what was due (`judging_truth`). Verdicts have a probability: the
+them, and compares every verdict with the one due (`judging_truth`). Verdicts have a probability: the
 second table shows how often those of each probability are right.
 """
 
@@ -40,7 +40,7 @@ class Verdict:
 
     Attributes
     ----------
-    is_right : None where either verdict is fair
+    is_right : None if either verdict is fair
     """
 
     is_settled: bool
@@ -52,7 +52,7 @@ class Verdict:
 
 @dataclass(frozen=True, slots=True)
 class Marked:
-    """One student's sheets judged."""
+    """One student's sheets, judged."""
 
     kind: str
     hand: str
@@ -63,7 +63,7 @@ class Marked:
 
     @property
     def waiting(self) -> int:
-        """How many verdicts wait for a person."""
+        """The number of verdicts that wait for a person."""
         return sum(not one.is_settled for one in self.verdicts)
 
     @property
@@ -73,12 +73,12 @@ class Marked:
 
     @property
     def is_finished(self) -> bool:
-        """Whether nobody need look."""
+        """True if nobody needs to look at it."""
         return self.was_read and not self.waiting
 
 
 def marked(read: ReadWork) -> Marked:
-    """A student's sheets judged and held against the truth."""
+    """Judge a student's sheets and compare with the truth."""
     work, drawn = read.work, tuple(one for one in read.readings if one.figures)
     of_another = any(one.code == "other_variant" for one in work.task.mistakes)
     about = read.kind, work.key.hand, work.key.kind == "right", of_another
@@ -92,7 +92,7 @@ def marked(read: ReadWork) -> Marked:
 
 
 def _due(read: ReadWork, judgement: Judgement) -> dict[str, Due]:
-    """What is due to all that was drawn, read or not; a vector left out by mistake is wrong."""
+    """The verdicts due to the whole drawing, read or not; a vector left out by mistake is wrong."""
     work = read.work
     names = {*work.construction.vectors, *work.construction.links} - work.left_out
     said = {one.criterion: one.verdict for one in judgement.outcomes}
@@ -121,7 +121,7 @@ HEADS = (
 
 
 def tables(students: Sequence[Marked]) -> Iterator[Table]:
-    """Finished sheets and wrong verdicts; then the probabilities against what was right."""
+    """Tables of finished sheets and wrong verdicts; then of probabilities and shares that were right."""
     groups = {
         sheets.title: [one for one in students if one.kind == kind] for kind, sheets in SHEET_KINDS.items()
     }
@@ -159,7 +159,7 @@ def _row(title: str, students: Sequence[Marked]) -> list[str]:
 
 
 def _fair(students: Iterable[Marked]) -> list[Verdict]:
-    """The verdicts of which only one would be fair."""
+    """The verdicts where only one would be fair."""
     return [one for student in students for one in student.verdicts if one.is_right is not None]
 
 
@@ -181,7 +181,7 @@ def _marked_seed(kept: Path | None, task: tuple[str, int]) -> list[Marked]:
 
 
 def measure(students: int, kinds: Sequence[str], kept: Path | None, jobs: int) -> list[Marked]:
-    """So many students of each kind, read and judged in some processes."""
+    """Read and judge students of each kind, in several processes."""
     tasks = [(kind, seed) for seed in range(FIRST_SEED, FIRST_SEED + students) for kind in kinds]
     with ProcessPoolExecutor(jobs) as pool:
         found = pool.map(partial(_marked_seed, kept), tasks, chunksize=4)

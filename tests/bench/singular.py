@@ -1,8 +1,8 @@
 """Random mechanisms at a given distance from each kind of singular position.
 
 The distance `delta` is relative: of a length to the one at which the group is flat, of an angle (rad)
-to the one at which lines are parallel. Doubles cannot hold every distance, so each case is drawn near
-the one asked for and its own distance is told exactly, from its doubles.
+to the one at which lines are parallel. Doubles cannot represent every distance, so each case is made
+near the distance asked for, and its actual distance is computed exactly from its doubles.
 """
 
 from collections.abc import Callable, Mapping
@@ -48,9 +48,9 @@ class Kind:
 
     Attributes
     ----------
-    smooth : the motion itself is smooth through the position: nothing need be lost there
+    smooth : the motion itself is smooth through the position: no accuracy need be lost there
     draw : a random case at about the distance given
-    plain : made of what others know too (four-bars and slider-cranks)
+    plain : made of groups that others know too (four-bars and slider-cranks)
     """
 
     id: str
@@ -84,7 +84,7 @@ def _mechanism(crank: Crank, ground: Mapping[str, complex], *groups: Group) -> M
 
 
 def _pin(crank: Crank) -> complex:
-    """The crank's pin, near enough to place the rest by."""
+    """The crank's pin, rounded, to place the rest."""
     return complex(crank.length_m[0] * np.exp(1j * crank.angle_rad[0]))
 
 
@@ -97,7 +97,7 @@ def _exact(z: complex) -> Any:
 
 
 def _carried(crank: Crank, rng: np.random.Generator, *, by_plate: bool) -> tuple[tuple[Plate, ...], str, Any]:
-    """Groups, and the joint that the singular group hangs on, with its exact place: the pin, or a plate's."""
+    """Groups, and the joint that carries the singular group (the pin, or a plate's), with its exact place."""
     if not by_plate:
         with mp.workdps(DIGITS):
             return (), crank.pin, _exact_pin(crank)
@@ -122,7 +122,7 @@ def _dyad(first: float, second: float, side: int, pin: str = "A") -> Dyad:
 def _flat_dyad(rng: np.random.Generator, delta: float, *, stretched: bool, by_plate: bool = False) -> Case:
     """A four-bar whose dyad is nearly in line: |A O2| = (l1 + l2)(1 - delta), |l1 - l2|(1 + delta).
 
-    `by_plate`: it hangs on a point of the crank instead of the crank's pin.
+    `by_plate`: it is attached to a point of the crank instead of the crank's pin.
     """
     crank = _crank(rng.uniform(0.2, 1.0), rng.uniform(-np.pi, np.pi), rng)
     first = rng.uniform(0.5, 2.0)

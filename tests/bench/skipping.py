@@ -1,11 +1,11 @@
-"""What is not done twice, or not at all: the same verdicts in less time.
+"""Measure the time saved by not repeating work: the verdicts must stay the same.
 
     python -m tests.bench.skipping [--students N] [--seed S]
 
 A class on printed sheets of `pump`, a page for the velocities and one for the accelerations, is
-graded; then again after each kind of change; last a node is moved in the review, and the marks that follow
-are waited for. Processor seconds of the whole run; every
-row says whether its reports are those of a run that skips nothing.
+graded; then again after each kind of change; last a node is moved in the review, until its new marks are
+there. Each row has the processor seconds of the whole run, and says whether its reports equal those of a
+run that skips nothing.
 """
 
 import argparse
@@ -34,7 +34,7 @@ MOVES = 5
 
 
 def draw(folder: Path, student: str, n: int, seed: int) -> str:
-    """One student's scans; the line of the roster."""
+    """Draw one student's scans; return the line of the roster."""
     made = make_sheets(PUMP, [RosterRow(student, "", n)])
     settings = any_settings(seed, device="flatbed", dpi=300.0, mistakes=0.3)
     sheets = simulate(
@@ -49,7 +49,7 @@ def draw(folder: Path, student: str, n: int, seed: int) -> str:
 
 
 def timed(folder: Path, out: Path, rubric, lines) -> tuple[list, float]:
-    """The reports, without what the clock says, and the processor's seconds."""
+    """Grade; the reports without times, and the processor's seconds."""
     (folder / "roster.csv").write_text("\n".join([HEAD, *lines]) + "\n")
     start = time.process_time()
     results = grade(Batch(PUMP, rubric, folder, out), lambda *_: None, Inline())
@@ -62,13 +62,13 @@ def _verdicts(report) -> tuple:
 
 
 def with_wider_tolerance(rubric):
-    """The rubric of a teacher who thought again."""
+    """The rubric with wider tolerances."""
     table = rubric.tolerance.model_copy(update={"length_mm": 1.5, "direction_deg": 2.0})
     return rubric.model_copy(update={"tolerance": table})
 
 
 def shares(one: list, other: list) -> str:
-    """Whether the verdicts are the same; of numbers, how far apart at most."""
+    """The comparison of two runs as text: same verdicts or not, largest difference of lengths."""
     if one == other:
         return "yes"
     verdicts = [[[c[:3] for c in told] for *_, told in reports] for reports in (one, other)]
@@ -78,7 +78,7 @@ def shares(one: list, other: list) -> str:
 
 
 def moved_node(batch: Batch) -> tuple[list, float]:
-    """The reports after a node was moved in the review of a class that is graded, and the seconds for it."""
+    """Move a node in the review of a graded class; the reports after it, and the seconds it took."""
     session = Session(batch, Inline())
     session.bring_up_to_date(lambda *_: None)
     student = session.students[0]

@@ -1,4 +1,4 @@
-"""All that is measured of the solver, and its tables: speed, errors, stability near singular positions."""
+"""The solver's measurements and their tables: speed, errors, stability near singular positions."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ class SolverFigures:
 
 
 def measure_solver(*, quick: bool = False) -> SolverFigures:
-    """All of it."""
+    """Measure speed, errors, stability and branches."""
     return SolverFigures(
         tuple(measure_speed(quick=quick)),
         tuple(measure_errors()),
@@ -58,7 +58,7 @@ def measure_solver(*, quick: bool = False) -> SolverFigures:
 
 
 def measure_errors() -> Iterator[ErrorRow]:
-    """Every variant of every built-in assignment."""
+    """Measure the errors of every variant of every built-in assignment."""
     for name in built_in():
         yield _errors(load_assignment(name))
 
@@ -95,7 +95,7 @@ def _largest(ours: Sequence[NDArray[Any]], exact: NDArray[Any]) -> float:
 
 
 OUTCOMES = {"wrong": "wrong", "refused": "refused", "silent": "nan", "beyond": "beyond"}
-"""What is counted of each solver's outcomes, and the word for it in the tables."""
+"""The outcomes that are counted for each solver, and their words in the tables."""
 
 
 def solver_tables(solver: SolverFigures) -> Iterator[Table]:
@@ -127,7 +127,7 @@ def _time(row: SpeedRow, ours: SpeedRow, count: int) -> str:
 
 
 def _digits(number: float, digits: int) -> str:
-    """So many digits at least, never as a power of ten."""
+    """A number with at least this many digits, never as a power of ten."""
     return f"{number:.0f}" if number >= 10.0 ** (digits - 1) else f"{number:.{digits}g}"
 
 
@@ -145,7 +145,7 @@ def _error_table(rows: Iterable[ErrorRow]) -> Table:
 
 
 def _summary(rows: Iterable[StabilityRow]) -> Table:
-    """Over all distances: the largest error of ours, and what every solver failed at."""
+    """A table over all distances: our largest error, and every solver's failures."""
     lines, solvers = [], [OURS]
     for _, group in groupby(rows, key=lambda row: row.kind):
         told = list(group)
@@ -171,7 +171,7 @@ def _branches(rows: Iterable[BranchRow]) -> Table:
 
 
 def _units(error: float) -> str:
-    """An error in its unit; a thousandth of a rounding is none."""
+    """An error in its unit; less than a thousandth of a rounding counts as zero."""
     return "0" if error < 1e-3 else f"{error:.2g}"
 
 

@@ -1,7 +1,7 @@
-"""Run time per variant, side by side with another solver, with the error of each beside it.
+"""Measure run time per variant and errors, side by side with another solver.
 
-All solve the same mechanism, the pump (four-bar, plate, rod and slider), at so many crank angles between
-those of its first and its last variant. Building a mechanism is no part of the time, for none.
+All solve the same mechanism, the pump (four-bar, plate, rod and slider), at crank angles between those of
+its first and its last variant. The time to build a mechanism is not counted for any of them.
 """
 
 import statistics
@@ -34,7 +34,7 @@ Key = TypeVar("Key", bound=Hashable)
 
 
 def medians_us(runs: Mapping[Key, Callable[[], object]], rounds: int) -> dict[Key, float]:
-    """Median microseconds of each run over so many rounds; a round takes each run once.
+    """Median microseconds of each run over these rounds; a round takes each run once.
 
     The clock is the thread's own processor time: other work on the machine does not count.
     """
@@ -48,7 +48,7 @@ def medians_us(runs: Mapping[Key, Callable[[], object]], rounds: int) -> dict[Ke
 
 
 def _once(run: Callable[[], object]) -> float:
-    """The first run warms up, the second is timed."""
+    """Time the second of two runs; the first one warms up."""
     run()
     return max(_mean(run, 1), 1e-9)
 
@@ -87,7 +87,7 @@ class SpeedRow:
 
 @dataclass(frozen=True, slots=True)
 class _Entry:
-    """What is to be timed for one row: by batch size, a run and how many variants it solves."""
+    """The runs to time for one row: by batch size, a run and its number of variants."""
 
     solver: str
     version: str | None
@@ -96,7 +96,7 @@ class _Entry:
 
 
 def measure_speed(*, quick: bool = False, batches: Sequence[int] = BATCHES) -> Iterator[SpeedRow]:
-    """Ours by each road, then scipy: positions, velocities and accelerations."""
+    """Measure each of our methods, then scipy: positions, velocities and accelerations."""
     bench = _Bench(load_assignment(ASSIGNMENT), batches)
     entries = list(bench.entries())
     runs = {(row, count): run for row, one in enumerate(entries) for count, (run, _) in one.runs.items()}
@@ -122,12 +122,12 @@ class _Bench:
         yield self._fsolve()
 
     def _closed_form(self) -> _Entry:
-        """All variants of a batch by one call."""
+        """The closed form: all variants of a batch by one call."""
         runs = {count: (partial(move, one), count) for count, one in self.mechanisms.items()}
         return _Entry("closed form", None, runs, _answers(move(self.reference)))
 
     def _construction(self) -> _Entry:
-        """The steps of mechanism and plans, evaluated."""
+        """The construction: the steps of mechanism and plans, evaluated."""
         runs, scale = {}, np.asarray(0.01)
         for count, one in self.mechanisms.items():
             run = partial(evaluate, construction_of(one), parameters_of(one, scale, scale, scale))
@@ -135,7 +135,7 @@ class _Bench:
         return _Entry("construction", None, runs)
 
     def _fsolve(self) -> _Entry:
-        """One variant after another."""
+        """Scipy: one variant after another."""
         solver, starts = Fsolve(self.reference), _starts(self.reference)
         answers = [solver.solve(index, start)() for index, start in enumerate(starts)]
         runs = {}
@@ -146,7 +146,7 @@ class _Bench:
         return _Entry(FSOLVE, version("scipy"), runs, answers)
 
     def row(self, entry: _Entry, us: Mapping[int, float]) -> SpeedRow:
-        """What was measured of an entry."""
+        """An entry's measurements as a row."""
         velocity = acceleration = None
         if entry.answers:
             pairs = list(zip(entry.answers, self.truth, strict=True))
@@ -156,7 +156,7 @@ class _Bench:
 
 
 def spread(assignment: Assignment, count: int) -> Mechanism:
-    """The assignment's mechanism at so many crank angles between those of its first and last variant."""
+    """The assignment's mechanism at this many crank angles between its first and last variant."""
     variants = assignment.variants()
     known = assignment.values(variants)
 
@@ -175,7 +175,7 @@ def _rounded(motion: ExactMotion) -> Answer:
 
 
 def _starts(mechanism: Mechanism) -> list[Places]:
-    """By variant, where the joints are in a sketch."""
+    """Positions of the joints in a sketch, by variant."""
     drawn = sketch(mechanism, move(mechanism, accelerations=False).position)
     count = drawn[mechanism.driver.pin].size
     return [{joint: complex(at[index]) for joint, at in drawn.items()} for index in range(count)]

@@ -1,10 +1,10 @@
-"""Errors near singular positions, in units of what the position itself costs; wrong branches; silent NaN.
+"""Measure errors near singular positions in units of the unavoidable error; wrong branches; silent NaN.
 
 At a relative distance delta from a singular position an error of one rounding, eps, in the data moves
 the velocities by about eps/delta of the largest: no solver in double precision that takes its
 data as known to eps does better. Here the doubles are taken as exact, and the truth is the exact motion
-for exactly these doubles, in 50 digits (`oracle`): errors are told in units of eps/delta. Where the
-motion is smooth through the position nothing need be lost, and errors are told in units of eps.
+for exactly these doubles, in 50 digits (`oracle`): errors are given in units of eps/delta. Where the
+motion is smooth through the position no accuracy need be lost, and errors are given in units of eps.
 """
 
 import math
@@ -31,7 +31,7 @@ SEED = 20
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """The exact motion of one case, rounded once, and where its mirrored assembly lies."""
+    """The exact motion of one case, rounded once, and the positions of its mirrored assembly."""
 
     position: Mapping[str, complex]
     velocity: Mapping[str, complex]
@@ -41,13 +41,13 @@ class Truth:
 
 @dataclass(slots=True)
 class Outcomes:
-    """What one solver made of the cases at one distance from one kind of singular position.
+    """One solver's results at one distance from one kind of singular position.
 
     Attributes
     ----------
     velocity, acceleration : errors of the answers on the right branch, in units of eps/delta (eps for a
         smooth kind)
-    wrong, refused, silent : answers on the mirrored branch; no answer, and said so; nan
+    wrong, refused, silent : answers on the mirrored branch; reported failures; nan
     beyond : answers whose error is larger than the solver predicts, and than one rounding
     """
 
@@ -60,13 +60,13 @@ class Outcomes:
 
     @property
     def worst(self) -> float | None:
-        """The largest error; None where there is no such answer."""
+        """The largest error; None without such answers."""
         return max([*self.velocity, *self.acceleration], default=None)
 
 
 @dataclass(frozen=True, slots=True)
 class StabilityRow:
-    """Each solver, by its name, at one distance from one kind of singular position."""
+    """The outcomes by solver at one distance from one kind of singular position."""
 
     kind: str
     title: str
@@ -76,7 +76,7 @@ class StabilityRow:
 
 
 def measure_stability(*, quick: bool = False, kinds: Sequence[Kind] = KINDS) -> Iterator[StabilityRow]:
-    """Each kind at each distance; the same random cases for every solver."""
+    """Measure each kind at each distance; the same random cases for every solver."""
     count = CASES_QUICK if quick else CASES
     for kind in kinds:
         rng = np.random.default_rng([SEED, *kind.id.encode()])
@@ -124,7 +124,7 @@ def _rounded(exact: Mapping[str, Any]) -> dict[str, complex]:
 
 
 def _by_numbers(mechanism: Mechanism) -> Answer | None:
-    """One variant by itself; None where it is refused."""
+    """Solve one variant by itself; None if it is refused."""
     try:
         return answer_of(move(mechanism), 0)
     except MechanismError:
@@ -132,7 +132,7 @@ def _by_numbers(mechanism: Mechanism) -> Answer | None:
 
 
 def _all_at_once(motion: Motion) -> list[Answer | None]:
-    """Every case's; None where it is refused."""
+    """The answer of every case; None if it is refused."""
     told = np.isfinite(motion.predicted_error)
     return [answer_of(motion, index) if told[index] else None for index in range(told.size)]
 
@@ -165,7 +165,7 @@ def _count(outcomes: Outcomes, answer: Answer | None, truth: Truth, unit: float)
 
 
 def is_mirrored(found: Mapping[str, complex], truth: Truth) -> bool:
-    """Whether some joint lies plainly towards its mirrored place: beyond a quarter of the way."""
+    """Return whether some joint lies more than three quarters of the way to its mirrored position."""
     if truth.mirrored is None:
         return False
     for joint, right in truth.position.items():

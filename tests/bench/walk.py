@@ -1,8 +1,8 @@
-"""The walk of one scanned sheet through the program, from `grade` to ``feedback.html``.
+"""Trace one scanned sheet through the program, from `grade` to ``feedback.html``.
 
     python -m tests.bench.walk [--list]
 
-A sample sheet is graded in this process, without workers, while every call is observed. Printed are
+A sample sheet is graded in this process, without workers, while every call is observed. The output lists
 
 - the modules of which a function ran (what runs on import does not count), and the arrows between them;
 - the kinds of record (dataclasses and pydantic models of the packages) that crossed from room to room as an
@@ -42,7 +42,7 @@ class Walk:
     records: dict[tuple[str, str], set[type]] = field(default_factory=lambda: defaultdict(set))
 
     def observe(self, frame: FrameType, event: str, result: object) -> None:
-        """One event of `sys.setprofile`."""
+        """Record one event of `sys.setprofile`."""
         module, code = our_module(frame), frame.f_code
         if event not in {"call", "return"} or not module or code.co_name == "<module>":
             return
@@ -56,7 +56,7 @@ class Walk:
             self.records[calling, module].update(records_in(values))
 
     def kinds(self, *, by_pipeline: bool) -> set[type]:
-        """Records that cross from room to room, or those in calls of the pipeline."""
+        """Kinds of record that cross from room to room, or are in calls of the pipeline."""
         where = {name: room_of(path) for name, path in modules().items()}
         found: set[type] = set()
         for (caller, called), kinds in self.records.items():
@@ -66,7 +66,7 @@ class Walk:
 
 
 def our_module(frame: FrameType) -> str:
-    """The packages' module that a frame runs in, or nothing."""
+    """The packages' module that a frame runs in; empty if it is another."""
     name = str(frame.f_globals.get("__name__", ""))
     return name if name.partition(".")[0] in PACKAGES else ""
 
@@ -83,15 +83,15 @@ def records_in(value: object) -> Iterator[type]:
 
 
 class InProcess:
-    """Runs calls here, in the place of worker processes."""
+    """Runs calls in this process instead of workers."""
 
     def run(self, function: Callable[..., Any], calls: Iterable[Any], *_: object) -> Iterator[Any]:
-        """Each call's result with its index."""
+        """Run the calls; each result with its index."""
         return ((index, function(*call)) for index, call in enumerate(calls))
 
 
 def walk_of_a_sheet(folder: Path) -> Walk:
-    """Grade the sample sheet into a folder. Raises FileNotFoundError where no feedback comes of it."""
+    """Grade the sample sheet into a folder. Raises FileNotFoundError if there is no feedback."""
     handed_in, out, walk = folder / "in", folder / "out", Walk()
     handed_in.mkdir()
     shutil.copy(ROOT / "samples" / "pump" / SHEET, handed_in)

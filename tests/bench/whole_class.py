@@ -1,13 +1,13 @@
-"""A whole class, graded as a user does: time and memory; with hostile files, killed and interrupted.
+"""Grade a whole class as a user does: time and memory; with hostile files, killed and interrupted.
 
     OMP_NUM_THREADS=1 python -m tests.bench.whole_class sheets --count 200 --jobs 1 2
     OMP_NUM_THREADS=1 python -m tests.bench.whole_class hostile [--checkout OTHER]
 
-Both grade bundled samples under many ids. `sheets`: 5 % of it broken; sheets a minute with each number of
-processes, memory of the parent and of all processes along the run, and the same for a run in which nothing
-has changed. `hostile`: some hostile files among 40 good submissions, held against the same class without
-them: the reports of the good ones byte for byte but times, peak memory of all processes together, time of
-the run. `--checkout` times another checkout on the good files in the same run.
+Both grade bundled samples under many ids. `sheets`: 5 % of the files are broken; sheets a minute for each
+number of processes, memory of the parent and of all processes along the run, and the same for a second run
+with nothing changed. `hostile`: some hostile files among 40 good submissions, compared with the same class
+without them: reports of the good ones byte for byte (except times), peak memory of all processes, time of
+the run. `--checkout` also times another checkout on the good files.
 """
 
 import argparse
@@ -54,7 +54,7 @@ def negative() -> bytes:
 
 
 def noise() -> bytes:
-    """A3 at 300 dpi of grey noise: no drawing, and strokes everywhere."""
+    """An A3 page of grey noise at 300 dpi: no drawing, and strokes everywhere."""
     grey = np.random.default_rng(1).integers(0, 256, (3508, 4961), np.uint8)
     return cv2.imencode(".jpg", grey)[1].tobytes()
 
@@ -83,9 +83,9 @@ NO_FILES = {
 
 
 def make_class(folder: Path, count: int, *, broken: bool, others: Sequence[str] = ()) -> None:
-    """A folder of so many submissions and their roster, with `others` of other files in it.
+    """Make a folder of submissions and their roster, with the files `others` in it.
 
-    Scans differ in bytes that are no picture, as no two files that people hand in are the same.
+    Scans differ in bytes that do not change the picture, as no two files that people hand in are equal.
     """
     folder.mkdir(parents=True)
     lines = ["student_id,name,n"]
@@ -108,7 +108,7 @@ def make_class(folder: Path, count: int, *, broken: bool, others: Sequence[str] 
 
 
 def _marked(data: bytes, mark: bytes) -> bytes:
-    """An image with a remark that no decoder shows."""
+    """An image with a comment that no decoder shows."""
     if data.startswith(b"\xff\xd8"):
         return data[:2] + b"\xff\xfe" + (len(mark) + 2).to_bytes(2, "big") + mark + data[2:]
     return data + mark
@@ -116,13 +116,13 @@ def _marked(data: bytes, mark: bytes) -> bytes:
 
 @dataclass
 class Run:
-    """A run of the program.
+    """Time and memory of one run of the program.
 
     Attributes
     ----------
-    seconds : of the run, or from the signal to the end of all processes
+    seconds : time of the run, or from the signal to the end of all processes
     parent_mb : memory of the main process, by seconds from the start
-    peak_mb : of all processes together
+    peak_mb : peak memory of all processes together
     """
 
     seconds: float = 0.0
@@ -130,7 +130,7 @@ class Run:
     peak_mb: float = 0.0
 
     def sample(self, process: subprocess.Popen, passed: float) -> list[psutil.Process]:
-        """The workers that live; memory is noted."""
+        """Record memory; return the live workers."""
         workers, memory = [], 0.0
         with contextlib.suppress(psutil.NoSuchProcess):
             main = psutil.Process(process.pid)
@@ -154,7 +154,7 @@ class Run:
 
 def run(folder: Path, out: Path, jobs: int, *, checkout: Path = ROOT, kill_workers: bool = False,
         end_after: int = 0, sent: int = signal.SIGKILL) -> Run:  # fmt: skip
-    """Grade, killing workers at random, or ending the main process once `end_after` reports are there."""
+    """Grade; kill workers at random, or end the main process once there are `end_after` reports."""
     call = [sys.executable, "-m", "grader", "grade", str(folder), "--assignment", "pump", "--out", str(out)]
     start, found = time.monotonic(), Run()
     dice, next_kill = random.Random(3), 8.0
@@ -204,7 +204,7 @@ def reports(out: Path) -> dict[str, str]:
 
 
 def same(first: Mapping[str, str], second: Mapping[str, str]) -> str:
-    """How many good submissions have the same report."""
+    """The number of good submissions with the same report, as text."""
     good = [student for student in first if student.startswith("g")]
     return f"{sum(first[student] == second.get(student) for student in good)} of {GOOD} as without"
 

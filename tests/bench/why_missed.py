@@ -1,9 +1,9 @@
-"""Why vectors are not read, scene by scene, with a picture of each.
+"""Report why vectors are not read, scene by scene, with a picture of each.
 
     python -m tests.bench.why_missed [--scene plain --scene press ...] [--students 12]
     python -m tests.bench.why_missed --shared ../shared/sheets/pump-clean [--pictures /tmp/missed]
 
-Of every asked vector that is drawn and not both right and confident, the first that holds:
+For each vector asked for and drawn, unless right and confident, the first cause that applies is given:
 
     sheet    the page was refused, or its scale or turn is off
     ink      no stroke was found along it (60 % of its length within 0.3 mm of a found stroke)
@@ -12,8 +12,8 @@ Of every asked vector that is drawn and not both right and confident, the first 
     place    its own stroke was taken, but a node or an end is off
     doubt    right, but with a confidence below 0.9
 
-and apart from these every silent misread. In a close-up the truth is green (its stroke thick, from
-node to node thin), what was read is red, strokes found are blue.
+Silent misreads are listed separately. In a close-up the truth is green (its stroke thick, from node
+to node thin), the reading is red, strokes found are blue.
 """
 
 import argparse
@@ -57,7 +57,7 @@ END_MM, END_PX_PER_MM = 4.0, 60.0
 
 @dataclass
 class StudentPages:
-    """One student's pages, whatever made them."""
+    """One student's pages, simulated or shared, with their truth."""
 
     name: str
     assignment: Assignment
@@ -96,7 +96,7 @@ def from_folder(folder: Path, students: int | None) -> Iterator[StudentPages]:
 
 
 def found_along(true: Segment, strokes: np.ndarray) -> float:
-    """The share of a segment that found strokes (n, 2) run along within `RIGHT_MM`."""
+    """The share of a segment covered within `RIGHT_MM` by the strokes found (n, 2)."""
     tail, head = true
     length = abs(head - tail)
     if length == 0.0 or not len(strokes):
@@ -119,7 +119,7 @@ def found_along(true: Segment, strokes: np.ndarray) -> float:
 
 @dataclass
 class Miss:
-    """A vector not right, or not confident, and why."""
+    """A vector that is not right, or not confident, and the cause."""
 
     student: str
     page: int
@@ -143,7 +143,7 @@ def cause_of(one: Judged, read: Segment | None, strokes: np.ndarray, plan_is_off
 
 
 def is_off(figure: TrueFigure, found: Figure | None, on_paper: OnPaper) -> bool:
-    """Whether most of a plan's nodes are not where they were drawn."""
+    """Return whether most of a plan's nodes were read at wrong places."""
     if found is None:
         return True
     common = [name for name in figure.nodes if name in found.nodes]
@@ -155,14 +155,14 @@ def is_off(figure: TrueFigure, found: Figure | None, on_paper: OnPaper) -> bool:
 
 
 def paper_of(truth: dict[str, Any], seen: ScannedPage) -> OnPaper | None:
-    """Where things lie on the paper; None where the page was refused."""
+    """The map from the reading to the paper; None if the page was refused."""
     if seen.sheet is None or seen.image is None or seen.ink is None:
         return None
     return OnPaper(truth, seen.sheet, seen.image.grey.shape)
 
 
 def fault_of(on_paper: OnPaper) -> str:
-    """What is wrong with scale or turn; empty where they are good."""
+    """The fault of scale or turn; empty if they are good."""
     scale, turn = on_paper.scale_and_turn()
     if np.all(np.abs(scale) <= OFF_SCALE) and np.all(np.abs(turn) <= OFF_TURN_DEG):
         return ""
@@ -173,7 +173,7 @@ def fault_of(on_paper: OnPaper) -> str:
 
 
 def sheet_fault(seen: ScannedPage, on_paper: OnPaper | None) -> str:
-    """Why the page's millimetres cannot be used; empty where they can."""
+    """The reason why the page's millimetres cannot be used; empty if they can."""
     if on_paper is not None:
         return fault_of(on_paper)
     return "; ".join(message(problem) for problem in seen.problems) or "no sheet"
@@ -182,7 +182,7 @@ def sheet_fault(seen: ScannedPage, on_paper: OnPaper | None) -> str:
 def misses_of(
     student: StudentPages, seen: ScannedPage, reading: Reading, truth: dict[str, Any]
 ) -> Iterator[tuple]:
-    """Every asked vector of a page: how it fared, and the miss, if it is one."""
+    """Every vector asked for on a page: its judgement, and the miss, if it is one."""
     construction = construction_of(student.assignment.mechanism([student.variant]))
     on_paper = paper_of(truth, seen)
     strokes = np.empty((0, 2), complex)
@@ -212,7 +212,7 @@ def misses_of(
 
 
 def close_up(miss: Miss, seen: ScannedPage, truth: dict[str, Any], path: Path) -> None:
-    """The miss as a whole, and below it the surroundings of its two ends."""
+    """Draw the miss as a whole, and below it the surroundings of its two ends."""
     on_paper = OnPaper(truth, seen.sheet, seen.image.grey.shape)
     segments = [*filter(None, (miss.judged.true.ends, miss.judged.true.stroke, miss.read))]
     places = on_paper.back(np.array(segments).ravel())
@@ -231,7 +231,7 @@ def close_up(miss: Miss, seen: ScannedPage, truth: dict[str, Any], path: Path) -
 def panel(
     miss: Miss, seen: ScannedPage, on_paper: OnPaper, box: tuple[complex, complex, float]
 ) -> np.ndarray:
-    """A box of the sheet (low and high corner as read, px/mm) with truth, reading and found strokes."""
+    """A box of the sheet (low and high corner as read, px/mm) with truth, reading and strokes found."""
     low, high, scale = box
     size = round((high - low).real * scale), round((high - low).imag * scale)
     window = np.array([[1 / scale, 0, low.real], [0, 1 / scale, -high.imag], [0, 0, 1.0]])

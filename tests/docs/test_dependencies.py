@@ -1,4 +1,4 @@
-"""What planmark stands on: declared where it is imported, its licences on a page, its versions held."""
+"""Dependencies are declared where they are imported, their licences are on a page, their versions pinned."""
 
 import ast
 import importlib.metadata

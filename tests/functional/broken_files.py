@@ -269,13 +269,13 @@ CASES = [
 ]  # fmt: skip
 
 KINDS = {M: "mechanism", A: "assignment", R: "rubric"}
-"""How findings of `lint` call the files."""
+"""The names of the files in findings of `lint`."""
 _FINDING = re.compile(r"(fault|warning|hint)\b.*")
 
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """What a command said of a case: its exit status, and the lines of its message."""
+    """A command's answer to a case: its exit status, and the lines of its message."""
 
     case: Case
     status: int
@@ -296,7 +296,7 @@ class Told:
 
 
 def _problems(results: dict[str, Any]) -> list[str]:
-    """What stands in the results, each with its file."""
+    """The problems in the results, each with its file."""
     reports = [results, *results["reports"], *results["unmatched"]]
     problems = [one for report in reports for one in report.get("problems", ())]
     return [f"{one['file'] or 'class'}: {one['message']}" for one in problems]

@@ -257,7 +257,7 @@ def test_an_encoding_without_our_letters_stops_nothing(course, arguments, encodi
 
 
 def interrupted(process, begins):
-    """What a command still says when it is interrupted as soon as it has begun its work."""
+    """The lines that a command still prints when interrupted as soon as it has begun its work."""
     assert process.stderr.readline().startswith(begins)
     os.killpg(process.pid, signal.SIGINT)
     _, err = process.communicate(timeout=PATIENCE_S)

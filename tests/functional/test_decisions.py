@@ -112,7 +112,7 @@ def the_class(tmp_path, planmark):
 
 
 def all_stand(found):
-    """Whether every decision of the test is applied."""
+    """Return whether every decision of the test is applied."""
     page = found.report("s07")["reading"]["sheets"]
     return (
         found.results["stale"] == []

@@ -65,7 +65,7 @@ def desk(tmp_path, monkeypatch):
 
 
 def api_answers(folder):
-    """What Graph answers for the rubric, and it, Classroom and Open edX for the submissions."""
+    """Write the answers of Graph for the rubric, and of Graph, Classroom and Open edX for the submissions."""
     qualities = [
         {"qualityId": one["id"], "description": {"content": one["description"]}}
         for one in criteria("description", "points", "q")

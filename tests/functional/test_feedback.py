@@ -1,4 +1,4 @@
-"""What students get back: levels, ghosts and print, as an instructor asks for them, and a student at home."""
+"""Feedback for students: levels, ghosts and print, as an instructor asks for them, and a student at home."""
 
 import json
 import re

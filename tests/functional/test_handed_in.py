@@ -1,4 +1,4 @@
-"""What was handed in is told as it is: nobody is missing whose file is there, no source silently wins."""
+"""Submissions are reported as they are: nobody whose file is there is missing, no source silently wins."""
 
 import json
 

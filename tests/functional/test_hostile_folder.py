@@ -28,7 +28,7 @@ REFUSED = {
     "s24_\\n\\x1b[2J\\u202e.jpg": "file_type_unsupported",
     "s25_Петров_1.jpg": "file_type_unsupported",
 }
-"""What is wrong with each file, under its owner's name."""
+"""The fault of each file, by its owner's name."""
 NOBODYS = "bad\udcff\udcfename.jpg"
 """As an archive from a system with another alphabet unpacks it."""
 

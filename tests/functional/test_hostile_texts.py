@@ -33,7 +33,7 @@ WRITES = re.compile(r"csv\.writer\(|from grader\.tables\.reader import[^.]*\bwri
 
 
 class Page(HTMLParser):
-    """What a page would run, fetch or lead to."""
+    """Everything that a page would run, fetch or lead to."""
 
     def __init__(self, text):
         super().__init__()

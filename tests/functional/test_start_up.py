@@ -1,4 +1,4 @@
-"""What a command imports: no heavy library for work that is not asked for. mpmath refines dead points."""
+"""Commands import no heavy library for work that is not asked for. mpmath refines dead points."""
 
 import json
 import subprocess
@@ -126,7 +126,7 @@ for module in pkgutil.walk_packages(grader.scan.__path__, "grader.scan."):
 print(*sys.modules)
 """
 SCANNED = "documents files printed.layout records scan tables.scale_text"
-"""What of the program a scan may rest on: of what is printed, where it stands, not how it is written."""
+"""Modules that a scan may import: of the printed sheets their layout alone, not the code that prints them."""
 
 
 def test_the_scanner_loads_where_things_are_printed_and_not_the_pdf_writer():

@@ -68,7 +68,7 @@ _WORDS = (
 
 @dataclass
 class Findings:
-    """What a batch of inputs brought about: answers with an example of each, and failures."""
+    """The results of a batch of inputs: answers with an example of each, and failures."""
 
     answers: dict[str, bytes] = field(default_factory=dict)
     failures: list[tuple[str, bytes]] = field(default_factory=list)
@@ -78,7 +78,7 @@ class Findings:
 
 
 def enter(door: str, data: bytes) -> str:
-    """Hand one file in; a short name of what came of it. Raises what the door does not catch."""
+    """Hand one file in; a short name of the result. Raises any error that the door does not catch."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / _name(door, data)
         path.write_bytes(data)
@@ -184,7 +184,7 @@ def _worksheet(path: Path) -> str:
 
 
 def _gradebook(path: Path) -> str:
-    """For each platform, as an instructor would try it."""
+    """Fill in a gradebook for each platform, as an instructor would."""
     answers = []
     for to in LAYOUTS:
         item = "Plan 1" if "item" in KINDS[to, "grades"].used else ""
@@ -199,7 +199,7 @@ def _gradebook(path: Path) -> str:
 
 
 def _results(path: Path) -> str:
-    """Read by the next run, and exported to every platform."""
+    """Read results as the next run does, and export them to every platform."""
     before = earlier(path, "pump")
     read, answers = read_results(path.parent), [str(len(before or ()))]
     for to, what in KINDS:
@@ -295,7 +295,7 @@ def try_files(door: str, files: Sequence[bytes]) -> Findings:
 
 
 def corpus(door: str) -> list[bytes]:
-    """What earlier runs found."""
+    """The files found by earlier runs."""
     return [path.read_bytes() for path in sorted((CORPUS / door).glob("*")) if path.is_file()]
 
 

@@ -1,4 +1,4 @@
-"""What once broke a door, and what was made to: each is taken or refused within the limits of a worker."""
+"""Files that once broke a door, or were made to break it, are taken or refused within a worker's limits."""
 
 import inspect
 import json

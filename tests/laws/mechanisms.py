@@ -27,7 +27,7 @@ KINDS = (
     "plate", "point on line", "slot point",
 )  # fmt: skip
 LEAST_SINE = 0.25
-"""Of the angle on which a group's accuracy hangs; nearer to a singular position is another matter."""
+"""Least sine of the angle that a group's accuracy depends on; other tests go nearer to singularities."""
 LEAST_SPAN, FARTHEST = 0.2, 6.0
 TRIES = 60
 NAMES = "ABCDEFGHIJKLMPQRSTUVW"

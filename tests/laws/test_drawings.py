@@ -27,7 +27,7 @@ FIGURES = ["mechanism", "velocity_plan", "acceleration_plan"]
 CLEARANCE_MM = 1e-6
 """Letters are placed clear of strokes by far more; no stroke passes under one by more than rounding."""
 CROWDED = 0.01
-"""Of a sheet with hundreds of letters, one in a hundred may find no free place; of fewer, none."""
+"""On a sheet with hundreds of letters one in a hundred may find no free place; with fewer, none."""
 
 
 def assignment_of(mechanism):

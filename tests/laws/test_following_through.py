@@ -1,4 +1,4 @@
-"""What follows rightly from a mistake is credited, and the mistake costs; pairs of mistakes too."""
+"""Vectors that follow rightly from a mistake are credited, and the mistake costs; pairs of mistakes too."""
 
 import contextlib
 from collections import Counter
@@ -42,14 +42,14 @@ def mistakes_of(task):
 
 
 def is_trivial(task, nodes, vector):
-    """Next to nothing is left of it, so that nothing can be credited for it."""
+    """Return whether next to nothing is left of a vector, so that it cannot be credited."""
     right, own = drawn_nodes(task), nodes
     sizes = [abs(places[vector.head] - places[vector.tail]) for places in (own, right)]
     return sizes[0] < max(1.3 * task.rubric.least_followed_share * sizes[1], task.rubric.tolerance.least_mm)
 
 
 def is_hidden(task, nodes, wrong):
-    """Whether lengths alone show nothing where a mistake was made: it costs where it shows first."""
+    """Return whether lengths alone do not show a mistake at its node: it costs where it shows first."""
     right = drawn_nodes(task)
     for vector in task.construction.vectors.values():
         if vector.head in wrong:
@@ -60,7 +60,7 @@ def is_hidden(task, nodes, wrong):
 
 
 def followed(task, mistakes, hand, lot, source):
-    """Of the vectors that follow from mistakes, which are credited or wait for a person."""
+    """For each vector that follows from mistakes, whether it is credited or waits for a person."""
     found = list(_followed(task, mistakes, hand, lot, source))
     nodes = drawn_nodes(task, mistakes=mistakes)
     if source == "lengths" and False in found and is_hidden(task, nodes, {one.at for one in mistakes}):
@@ -82,7 +82,7 @@ def _followed(task, mistakes, hand, lot, source):
 
 
 def is_clear(task, mistake):
-    """Whether a vector that ends where the mistake was made is clearly off."""
+    """Return whether a vector that ends at the mistake's node is clearly off."""
     right, wrong = drawn_nodes(task), drawn_nodes(task, mistakes=(mistake,))
     table = task.rubric.tolerance
     for vector in task.construction.vectors.values():

@@ -1,4 +1,4 @@
-"""What holds for every submission, however odd."""
+"""Laws that hold for every submission, however odd."""
 
 import json
 

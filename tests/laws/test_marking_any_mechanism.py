@@ -22,7 +22,7 @@ from tests.hands import drawn_nodes, measured, sheet
 from tests.laws.mechanisms import authored
 
 LARGEST_MM = 120.0
-"""Of a plan's longest vector as drawn."""
+"""Length of a plan's longest vector as drawn."""
 FEW = 25
 
 

@@ -10,7 +10,7 @@ from reference.construction.mistakes import Drawing, affected, commit, single_mi
 from reference.mechanism import Mechanism
 
 MOVED = 1e-9
-"""Of the drawing's size."""
+"""Share of the drawing's size."""
 TRIED = 12
 
 

@@ -17,7 +17,7 @@ from tests.examples import examples, sample, slow
 from tests.hands import changed, drawn_nodes, measured, sheet, task_for
 
 WITHIN, BEYOND = 0.9, 1.1
-"""Of a tolerance."""
+"""Shares of a tolerance."""
 NO_HAND = HandTable(sigmas=0.0)
 """Tolerances as they stand, widened for nobody's hand."""
 SAMPLE = 40

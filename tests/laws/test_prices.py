@@ -1,4 +1,4 @@
-"""What a mistake costs: each of two once, wherever it stands in the rubric, blank as much as zero."""
+"""The price of a mistake: each of two costs once, anywhere in the rubric; blank costs as much as zero."""
 
 import numpy as np
 from hypothesis import assume, given, settings
@@ -40,7 +40,7 @@ def nodes_with(task, *mistakes):
 
 
 def is_clear(task, mistake, nodes):
-    """Whether a mistake moves its node far from where its step leads, and its vectors are long."""
+    """Return whether a mistake moves its node far from its right place, and its vectors are long."""
     view = View({name: np.asarray(place) for name, place in nodes.items()}, task.parameters)
     step = task.construction.step(mistake.at)
     right, wrong = (
@@ -74,7 +74,7 @@ def loss(task, *mistakes, open_ones=0.5):
 
 
 def is_turned_plan(task, nodes):
-    """Whether two mistakes together draw what one does: a plan that is turned as a whole."""
+    """Return whether two mistakes together draw the same as one: a plan turned as a whole."""
     right = drawn_nodes(task)
     return any(
         all(abs(nodes[step.node] - 1j**quarters * right[step.node]) < SAME_MM for step in steps)

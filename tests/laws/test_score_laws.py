@@ -1,4 +1,4 @@
-"""What holds for every score."""
+"""Laws that hold for every score."""
 
 import cmath
 import json

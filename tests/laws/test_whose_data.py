@@ -1,4 +1,4 @@
-"""Whose data a drawing follows: what may be chosen freely does not change the answer."""
+"""The data that a drawing follows are found whatever a student may choose freely."""
 
 from dataclasses import replace
 from typing import NamedTuple

@@ -31,7 +31,7 @@ CROSSING = 0.5
 SHORT_CRANK_DEG = 3.0
 """The crank of 1885 is 33 pixels long: a pixel is 1.7 degrees."""
 NEAR_PX = 18.0
-"""How far a letter's middle is printed from its node."""
+"""Largest distance of a printed letter's middle from its node."""
 SHARE = 0.05
 """An engraver's error of where x divides bc."""
 

@@ -6,7 +6,7 @@ from tests.bench.real_paper import measure
 from tests.samples.test_foreign_images import REAL
 
 SEGMENTS, TIPS, CIRCLES = 34, 6, 12
-"""Of 37, 12 and 18; small heads drawn over printed dots go with these."""
+"""Floors out of 37, 12 and 18; small heads drawn over printed dots are removed with the dots."""
 
 
 @pytest.mark.skipif(not REAL.is_dir(), reason="the real images are not here")

@@ -1,4 +1,4 @@
-"""What people leave beside a drawing is seen and leaves the true vectors; so do paper and scanners."""
+"""Habits, paper and scanners show on the sheet, and the true vectors stay as they were."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ SMALL = Scan(dpi=45.0, noise=0.0, tint_grain=0.0, dust=0)
 
 
 class Only:
-    """A lot that gives one hardship and no other."""
+    """A random generator that gives one hardship and no other."""
 
     def __init__(self, name):
         self.drawn = iter([0.0 if one == name else 1.0 for one in HARDSHIPS])

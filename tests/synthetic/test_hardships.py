@@ -1,4 +1,4 @@
-"""How often hardships come, and that a class makes only mistakes that its mechanism offers."""
+"""Hardships have their frequencies, and a class makes only mistakes that its mechanism admits."""
 
 from dataclasses import replace
 

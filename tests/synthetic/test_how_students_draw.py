@@ -93,7 +93,7 @@ def test_lines_that_cross_sharply_are_marked_badly_along_both():
 
 
 def test_the_codes_are_those_of_the_published_formats():
-    entered = {"units"}  # not drawn: a slip in what is entered
+    entered = {"units"}  # not drawn: a slip in the numbers entered
     of_the_data = {"data_misread"}  # another crank angle, drawn in tests/unit/given_data
     assert set(CODES) == set(operators.CODES) - entered - of_the_data
 

@@ -1,4 +1,4 @@
-"""Simulated sheets as files: what the door of the program reads back is what was made."""
+"""Simulated sheets as files: the program's intake reads back what was made."""
 
 from dataclasses import replace
 

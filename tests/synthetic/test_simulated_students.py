@@ -68,7 +68,7 @@ def test_every_mistake_is_drawn_and_told(code):
 
 
 def told(sheets):
-    """What differs when a mistake is made: vectors, letters written, or scales."""
+    """The things that a mistake can change: vectors, letters written, or scales."""
     vectors = {n: (v["length_mm"], v["direction_deg"]) for n, v in vectors_of(sheets).items()}
     letters = sorted(label["names"] + label["text"] for sheet in sheets for label in sheet.truth["labels"])
     return vectors, letters, sheets[0].truth["scales"]["declared"]

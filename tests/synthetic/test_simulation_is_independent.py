@@ -1,7 +1,7 @@
 """The simulation does not share the grader's model of a hand and of mistakes.
 
-What a student draws is data of the exact plan (steps, vectors, lengths). How a student draws it and what goes
-wrong is the simulation's own, so that the benchmarks measure the grader against another model than its own.
+The content of a drawing is data of the exact plan (steps, vectors, lengths). The simulation has its own model
+of drafting and of mistakes, so that benchmarks measure the grader against another model than the grader's.
 """
 
 import ast

@@ -1,4 +1,4 @@
-"""The renderer is held against the truth it writes: ink's centre of mass across a stroke."""
+"""The renderer agrees with the truth it writes: the ink's centre of mass across a stroke."""
 
 import numpy as np
 import pytest
@@ -10,12 +10,12 @@ from samples.simulation.strokes import PenWidth, straight
 from samples.simulation.view import PaperView
 
 pytestmark = pytest.mark.slow
-RENDER_ERROR_MM = 0.01  # what sampling by whole pixels leaves of a centre of mass at 150 dpi
+RENDER_ERROR_MM = 0.01  # error of a centre of mass at 150 dpi from sampling by whole pixels
 SCAN_ERROR_MM = 0.02
 
 
 def along_and_across(image, p_px, q_px):
-    """Each pixel's place along the line p q, as a share of its length, and off it, in pixels."""
+    """Each pixel's position along the line p q, as a share of its length, and offset from it, in pixels."""
     length = np.hypot(*(q_px - p_px))
     along = (q_px - p_px) / length
     rows, columns = np.indices(image.shape)
@@ -67,7 +67,7 @@ def test_a_scanned_vector_lies_where_truth_says(scan):
     high = np.ceil(np.maximum(p, q)).astype(int) + 20
     window = 255 - image[low[1] : high[1], low[0] : high[0]]
     window = np.where(window > 60, window, 0)
-    # Letters and neighbours beside the stroke are kept out by a narrow band.
+    # The band is narrow, to exclude letters and neighbours beside the stroke.
     error = narrow_error_mm(window, p - low, q - low, sheet.truth["px_per_mm"])
     assert error < SCAN_ERROR_MM
 

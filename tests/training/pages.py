@@ -1,4 +1,4 @@
-"""Simulated students' sheets to learn from, of any assignment, hand, pen and scanner; command line."""
+"""Simulated students' sheets for training, of any assignment, hand, pen and scanner; command line."""
 
 import argparse
 import tempfile
@@ -19,7 +19,7 @@ RESOLUTIONS_DPI = (150.0, 200.0, 300.0, 300.0, 300.0, 400.0)
 
 
 def simulated_pages(seed: int) -> Iterator[tuple[ScannedPage, dict[str, Any]]]:
-    """One student's pages as opened, with the truth; those that were refused are left out."""
+    """One student's pages as opened, with their truth; refused ones are left out."""
     assignment = load_assignment(ASSIGNMENTS[seed % len(ASSIGNMENTS)])
     variants = assignment.variants()
     variant = variants[(seed * 7) % len(variants)]
@@ -28,7 +28,7 @@ def simulated_pages(seed: int) -> Iterator[tuple[ScannedPage, dict[str, Any]]]:
     settings = any_settings(seed, device=device, dpi=dpi, work=(assignment, variant))
     try:
         sheets = simulate(assignment, variant, seed, settings)
-    except ValueError as cannot:  # a mistake drawn by lot that has no place in this variant
+    except ValueError as cannot:  # a random mistake that this variant does not admit
         print(seed, cannot)
         return
     for sheet in sheets:

@@ -31,7 +31,7 @@ KINDS = {
 }
 """By kind of file: its door, and how such a file begins."""
 EXAMPLES = 25
-"""Of each kind in a run: the whole takes a few seconds."""
+"""Files of each kind in a run: all of them take a few seconds."""
 
 
 @cache

@@ -1,4 +1,4 @@
-"""What is known of a named mistake: the names by which reports and sentences use it."""
+"""The details of a named mistake have the names that reports and sentences use."""
 
 import pytest
 

@@ -8,7 +8,7 @@
     python -m tests.training.letters.detector check CHECK
 
 FOLDER holds the packages that `train.py` names. The detector says for each cell of four pixels whether a
-sign's middle lies there, and how far its borders are. The other network names what stands in the box.
+sign's middle lies there, and the distances of its borders. The other network names the sign in the box.
 """
 
 import argparse
@@ -124,7 +124,7 @@ def stored_as(network, out: Path, side: int) -> None:
 
 
 def network_of(nn):
-    """The network: three strides, then residual layers; their field is 11 mm wide, four answers a place."""
+    """The network: three strides, then residual layers; their field is 11 mm wide, four outputs a cell."""
     import torch  # noqa: PLC0415
 
     class Network(nn.Module):
@@ -152,7 +152,7 @@ def network_of(nn):
 
 
 def targets(labels: list[np.ndarray]) -> list[np.ndarray]:
-    """For each cell: nearness to a middle, whether it is one, its borders, and their weight."""
+    """The targets of each cell: nearness to a middle, whether it is one, its borders, and their weight."""
     near, at, weight = np.zeros((3, len(labels), CELLS, CELLS), np.float32)
     border = np.zeros((len(labels), 4, CELLS, CELLS), np.float32)
     middle = CELL_PX * np.arange(CELLS) + (CELL_PX - 1) / 2.0
@@ -174,9 +174,9 @@ def targets(labels: list[np.ndarray]) -> list[np.ndarray]:
 
 
 def found_in(data: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Crops of what the detector finds in windows, its log odds, what stands there, how many are missed.
+    """Crops found by the detector in windows, their log odds, the true signs, the number missed.
 
-    What stands there is the sign's number, `len(DETECTED)` where none does.
+    A true sign is given by its number, `len(DETECTED)` if there is none.
     """
     stored = np.load(data)
     first = np.searchsorted(stored["owner"], np.arange(len(stored["pictures"]) + 1))
@@ -206,7 +206,7 @@ def found_in(data: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
 
 
 def train_signs(paths: list[Path], steps: int, out: Path, start: Path | None) -> None:
-    """Fit the network that names what the detector finds, and store it."""
+    """Fit the network that names the detector's crops, and store it."""
     import torch  # noqa: PLC0415 - not needed for drawing windows
     from torch import nn  # noqa: PLC0415
     from torch.nn import functional  # noqa: PLC0415
@@ -217,7 +217,7 @@ def train_signs(paths: list[Path], steps: int, out: Path, start: Path | None) ->
     pictures = np.concatenate([one[0] for one in found])
     signs = np.concatenate([one[2] for one in found])
     print(len(signs), "places,", (signs < len(DETECTED)).sum(), "signs", flush=True)
-    # No sign is everywhere; rare signs come more often than they are written.
+    # "No sign" is frequent; rare signs are drawn more often than they are written.
     weight = np.bincount(signs, minlength=len(DETECTED) + 1)[signs] ** -0.5
     cumulated = np.cumsum(weight) / weight.sum()
     network = signs_network_of(nn)
@@ -245,7 +245,7 @@ def train_signs(paths: list[Path], steps: int, out: Path, start: Path | None) ->
 
 
 def _varied(pictures: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """(n, 1, 32, 32) the same a little moved, larger or smaller, turned, and paler or darker."""
+    """(n, 1, 32, 32) the pictures slightly moved, scaled, turned, and paler or darker."""
     count = len(pictures)
     result = np.empty((count, 1, letters.CROP_PX, letters.CROP_PX), np.float32)
     middle = (letters.CROP_PX - 1) / 2.0
@@ -270,7 +270,7 @@ def signs_network_of(nn):
 
 
 def calibrated(data: Path) -> None:
-    """Print how sure the two are to be in fonts left out, and how right they are then."""
+    """Print the confidence that both networks should have in fonts left out, and their accuracy then."""
     pictures, odds, truth, missed = found_in(data)
     scores = letters.answers("signs", pictures).astype(np.float64)
     is_sign = truth < len(DETECTED)
@@ -302,7 +302,7 @@ def calibrated(data: Path) -> None:
 
 
 def main() -> None:
-    """Draw windows, or learn."""
+    """Draw windows, train a network, or check both."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     acts = parser.add_subparsers(dest="act", required=True)
     drawing = acts.add_parser("windows")

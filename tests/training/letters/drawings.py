@@ -1,8 +1,8 @@
-"""Windows of drawings with letters on them, for the detector: line work of our own, and simulated sheets.
+"""Windows of drawings with letters, to train the detector: random line work, and simulated sheets.
 
 A window is a piece of the ink map, 96 x 96 pixels at 6 a millimetre, with the boxes of the signs on it.
-The letters are those of handwriting fonts; what they stand on is drawn here at random, or is a simulated
-sheet drawn without its letters.
+The letters are those of handwriting fonts; the background is drawn here at random, or is a simulated
+sheet without its letters.
 """
 
 import tempfile
@@ -52,7 +52,7 @@ class Window:
     places: list[np.ndarray] = field(default_factory=list)
 
     def add(self, layer: np.ndarray, left: int = 0, top: int = 0) -> None:
-        """Ink over ink: the stronger one is seen."""
+        """Add ink; where it overlaps other ink, the darker one counts."""
         high, wide = layer.shape
         x, y = max(left, 0), max(top, 0)
         right, low = min(left + wide, _SIDE), min(top + high, _SIDE)
@@ -76,12 +76,12 @@ class Alphabet:
             self.digits.setdefault(glyph.sign, []).append(glyph)
 
     def hand(self, rng: np.random.Generator) -> dict[str, list[Glyph]]:
-        """The signs of one hand; its digits are a person's at times."""
+        """The signs of one hand; its digits are sometimes a real person's."""
         own = self.families[rng.integers(len(self.families))]
         return own | self.digits if self.digits and rng.random() < 0.25 else own
 
 
-# What is written ----------------------------------------------------------------------------------
+# Writing ------------------------------------------------------------------------------------------
 
 
 def text_of(rng: np.random.Generator) -> list[tuple[str, float, float]]:
@@ -141,7 +141,7 @@ def _shape(glyph: Glyph, rng: np.random.Generator, hand: dict[str, float]) -> np
 
 
 def hand_of(rng: np.random.Generator, capital_mm: float) -> dict[str, float]:
-    """How somebody writes here."""
+    """A random style of writing: size, pen, slant, proportions, darkness."""
     scale = capital_mm * _UNIT / _CAPITAL_PX
     # The pen is 0.2 to 0.7 mm, whatever the size of the letters.
     pen = rng.uniform(0.2, 0.65) * _UNIT / scale
@@ -281,7 +281,7 @@ def _circle(window: Window, at: np.ndarray, radius_mm: float, width_mm: float, d
 
 
 def _node(window: Window, at: np.ndarray, rng: np.random.Generator, pen: tuple[float, float]) -> None:
-    """A point where lines end or cross, with arrowheads, a dot or a circle."""
+    """Draw a point where lines end or cross, with arrowheads, a dot or a circle."""
     window.places.append(at)
     circle = rng.uniform(0.4, 1.5) if rng.random() < 0.3 else 0.0
     for _ in range(rng.integers(1, 5)):
@@ -310,7 +310,7 @@ def _node(window: Window, at: np.ndarray, rng: np.random.Generator, pen: tuple[f
 
 
 def _other(window: Window, rng: np.random.Generator, pen: tuple[float, float]) -> None:
-    """Hatching, blocks, supports, arcs, right angles, ticks, scrawls."""
+    """Draw hatching, blocks, supports, arcs, right angles, ticks, scrawls."""
     kinds = (_hatching, _block, _support, _arc, _right_angle, _ticks, _scrawl, _parallels)
     kinds[rng.integers(len(kinds))](window, _place(rng), rng, pen)
 
@@ -372,7 +372,7 @@ def _parallels(window: Window, at: np.ndarray, rng: np.random.Generator, pen: tu
         _line(window, middle - 300 * _unit(angle), middle + 300 * _unit(angle), rng, pen)
 
 
-# How it is scanned --------------------------------------------------------------------------------
+# Scanning -----------------------------------------------------------------------------------------
 
 
 def scanned(ink: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -404,7 +404,7 @@ Labels = np.ndarray
 
 
 def own_window(alphabet: Alphabet, rng: np.random.Generator) -> tuple[np.ndarray, Labels]:
-    """A window of line work of our own."""
+    """A window of random line work."""
     window, pen = Window(), (rng.uniform(0.2, 0.8), rng.uniform(0.45, 1.0))
     for _ in range(rng.integers(0, 4)):
         _node(window, _place(rng), rng, pen)
@@ -456,7 +456,7 @@ def backgrounds(seeds: Sequence[int]) -> Iterator[tuple[np.ndarray, np.ndarray]]
         try:
             with mock.patch("samples.simulation.sketch.write", _unwritten):
                 sheets = simulate(assignment, variants[(7 * seed) % len(variants)], seed, settings)
-        except ValueError:  # a mistake drawn by lot that has no place in this variant
+        except ValueError:  # a random mistake that this variant does not admit
             continue
         for sheet in sheets:
             with tempfile.TemporaryDirectory() as place:

@@ -1,4 +1,4 @@
-"""Signs as pictures: from handwriting fonts' files, and real digits."""
+"""Pictures of signs: from files of handwriting fonts, and real digits."""
 
 import json
 from collections.abc import Iterator
@@ -36,7 +36,7 @@ class Glyph:
     ----------
     sign : its class
     picture : uint8, 255 = ink, cut to the ink
-    bones : the same size, the middle lines of its strokes, to be written with any pen; None for
+    bones : the middle lines of its strokes, of the same size, to be written with any pen; None for
         pictures too small to have any
     """
 
@@ -46,12 +46,12 @@ class Glyph:
 
 
 def texts_of() -> dict[str, str]:
-    """Class of each text that is drawn: the signs themselves and those that look like them."""
+    """The class of each text drawn: signs, and texts that look like them."""
     return {sign: sign for sign in SIGNS if sign != JUNK} | TWINS
 
 
 def font_files(folder: Path) -> list[Path]:
-    """The upright files of one font family in its package, usual weight and bold, all its alphabets."""
+    """The upright files of a font family in its package, regular and bold, all alphabets."""
     found = [path for path in sorted(folder.glob("files/*.woff")) if "-normal" in path.name]
     weights = {path.name.rsplit("-", 2)[-2] for path in found}
     usual = "400" if "400" in weights else min(weights)

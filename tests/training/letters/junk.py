@@ -1,4 +1,4 @@
-"""What is no sign: pieces of strokes, crossings, arrowheads, arcs, hatching, letters run together."""
+"""Pictures that are not signs: pieces of strokes, crossings, arrowheads, arcs, hatching, joined letters."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,7 @@ _SIDE = 64
 
 
 def junk(glyphs: Sequence[Glyph], rng: np.random.Generator) -> tuple[np.ndarray, tuple[int, int]] | None:
-    """((28, 28) picture, (width, height) of its crop), None where no ink was left."""
+    """((28, 28) picture, (width, height) of its crop), None if no ink is left."""
     lot = rng.random()
     if lot < 0.22:
         return _run_together(glyphs, rng)

@@ -16,15 +16,15 @@ _SMALL = {".": 4.5, "'": 12.0, "-": 14.0, "=": 18.0, ":": 20.0}
 
 @dataclass(frozen=True, slots=True)
 class Trouble:
-    """How hard a scan makes it.
+    """The difficulty of a scan.
 
     Attributes
     ----------
     least_px : longer side of the smallest signs
-    wobble : of the hand, share of the sign's size
+    wobble : wobble of the hand, as a share of the sign's size
     touched : probability that strokes touched the sign or were taken out of it
-    grain : most of the ink that the paper's grain takes away
-    blur_px, noise : most of either
+    grain : largest share of ink taken away by the paper's grain
+    blur_px, noise : largest value of each
     copied : probability of hard compression or of one bit
     """
 
@@ -85,7 +85,7 @@ def _written(glyph: Glyph, rng: np.random.Generator, most_wobble: float) -> np.n
 
 
 def _beside_strokes(picture: np.ndarray, side: float, rng: np.random.Generator) -> np.ndarray:
-    """Pieces of strokes that touch the sign, and gaps where a stroke through it was taken away."""
+    """The sign with pieces of strokes that touch it, and gaps where a stroke through it was removed."""
     high, wide = picture.shape
     pen = max(1, round(rng.uniform(0.06, 0.16) * side))
     if rng.random() < 0.6:
@@ -107,7 +107,7 @@ def _px(point: np.ndarray) -> tuple[int, int]:
 
 
 def on_glass(picture: np.ndarray, rng: np.random.Generator, trouble: Trouble = HARD) -> np.ndarray:
-    """Contrast as the scanner sees it: blurred, paler, noisy, sometimes compressed or of one bit."""
+    """The contrast as scanned: blurred, paler, noisy, sometimes compressed or of one bit."""
     sigma = rng.uniform(0.3, trouble.blur_px)
     soft = cv2.GaussianBlur(picture, (0, 0), sigma) * rng.uniform(0.35, 1.0)
     if rng.random() < 0.5 * (trouble.grain > 0.0):
@@ -128,7 +128,7 @@ def on_glass(picture: np.ndarray, rng: np.random.Generator, trouble: Trouble = H
 
 
 def as_segmented(contrast: np.ndarray) -> tuple[np.ndarray, tuple[int, int]] | None:
-    """The picture of what is cut out by its ink, as at run time."""
+    """The picture cut out around its ink, as at run time."""
     mask = (contrast > 0.5 * cv2.GaussianBlur(contrast, (3, 3), 0).max()).astype(np.uint8)
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if len(rows) == 0:

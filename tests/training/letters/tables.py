@@ -1,4 +1,4 @@
-"""The recogniser's figures as tables."""
+"""Tables of the recogniser's figures."""
 
 import sys
 from collections.abc import Mapping

@@ -31,7 +31,7 @@ def pictures(
     rng: np.random.Generator,
     troubles: tuple[Trouble, ...] = (CLEAR, HARD),
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(n, 28, 28) pictures, (n, 2) sizes of their crops, (n,) classes: signs alike often, then junk."""
+    """(n, 28, 28) pictures, (n, 2) sizes of their crops, (n,) classes: signs equally often, then junk."""
     by_sign: dict[str, list[Glyph]] = {}
     for glyph in glyphs:
         by_sign.setdefault(glyph.sign, []).append(glyph)
@@ -53,7 +53,7 @@ def pictures(
 
 
 def fitted(x: np.ndarray, y: np.ndarray, rounds: int) -> MLPClassifier:
-    """The network, trained."""
+    """Train the network."""
     network = MLPClassifier(
         HIDDEN, alpha=3e-4, batch_size=256, learning_rate_init=1.5e-3, max_iter=rounds, random_state=SEED,
         early_stopping=False, n_iter_no_change=rounds, verbose=True,
@@ -62,7 +62,7 @@ def fitted(x: np.ndarray, y: np.ndarray, rounds: int) -> MLPClassifier:
 
 
 def model_of(network: MLPClassifier, mean: np.ndarray, spread: np.ndarray, cooling: float) -> Model:
-    """The network as arrays: the features' scaling taken into its first layer."""
+    """The network as arrays, with the features' scaling included in its first layer."""
     weights = [layer.astype(np.float64) for layer in network.coefs_]
     biases = [layer.astype(np.float64) for layer in network.intercepts_]
     biases[0] = biases[0] - (mean / spread) @ weights[0]
@@ -75,14 +75,14 @@ def model_of(network: MLPClassifier, mean: np.ndarray, spread: np.ndarray, cooli
 
 
 def trained(data: tuple[np.ndarray, np.ndarray, np.ndarray], rounds: int, cooling: float = 1.0) -> Model:
-    """A model from pictures, sizes and classes."""
+    """Train a model from pictures, sizes and classes."""
     x, y = features(data[0], data[1]).astype(np.float64), data[2]
     mean, spread = x.mean(axis=0), np.maximum(x.std(axis=0), 0.02)
     return model_of(fitted(((x - mean) / spread).astype(np.float32), y, rounds), mean, spread, cooling)
 
 
 def best_cooling(model: Model, data: tuple[np.ndarray, np.ndarray, np.ndarray]) -> float:
-    """By how much the network's certainty is to be tempered, so that fonts left out are likeliest."""
+    """The factor on the network's scores for which the fonts left out are likeliest."""
     scores = model.scores(features(data[0], data[1]))
     losses = {}
     for cooling in np.linspace(0.2, 1.5, 66):

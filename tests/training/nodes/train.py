@@ -1,13 +1,13 @@
-"""Trains the network that tells where nodes lie by the ink about them (`grader/scan/strokes/nodes.py`).
+"""Train the network that locates nodes by the ink around them (`grader/scan/strokes/nodes.py`).
 
     pip install torch onnx
     python -m tests.training.nodes.train sheets FOLDER --first 0 --last 300
     python -m tests.training.nodes.train network FOLDER --steps 12000 --out grader/scan/strokes/nodes.onnx
 
-A window is cut about each node of a simulated plan, turned by lot, somewhat beside the node as a reading is;
-in it stand the ink and the plan's vectors as far as they would be known. The network tells a mixture of
-Student's distributions (six degrees of freedom) of where the node is, one for each cell, and how likely it is
-nowhere near.
+A window is cut around each node of a simulated plan, turned at random, a little beside the node as a reading
+would be; it holds the ink and the plan's vectors as far as they would be known. The network gives a mixture
+of Student's distributions (six degrees of freedom) of the node's position, one for each cell, and the
+probability that the node is not in the window.
 """
 
 import json
@@ -29,9 +29,9 @@ ONE_NODE_MM = 0.45
 """Ends of vectors nearer than this are at one node."""
 BATCH = 64
 OFF_MM, OTHERS_MM = (0.7, 1.3, 2.0), (0.25, 0.5, 0.5)
-"""How far from the node a window's middle lies at most, and the standard error of the plan's other nodes."""
+"""Largest distance of a window's middle from its node, and standard error of the plan's other nodes."""
 SHARES = (0.25, 0.35, 0.22, 0.18)
-"""Of these three, and of windows without their node."""
+"""Shares of these three, and of windows without their node."""
 NOWHERE_MM = (2.6, 9.0)
 BARE = 0.25
 """Share of windows without their node that have no ink at all."""
@@ -39,11 +39,11 @@ OUTLIERS = 0.005
 DEGREES = 6.0
 
 
-# What is learnt from ------------------------------------------------------------------------------
+# Training data ------------------------------------------------------------------------------------
 
 
 def keep(folder: Path, seed: int) -> None:
-    """One simulated student's ink maps, and the vectors drawn on them, mm of the sheet as registered."""
+    """Store a simulated student's ink maps, and the vectors drawn on them, in mm of the registered sheet."""
     for number, (page, truth) in enumerate(simulated_pages(seed)):
         back = OnPaper(truth, page.sheet, page.image.grey.shape).back
         drawn = [
@@ -68,7 +68,7 @@ class Drawn:
 
 
 def sheets_in(folder: Path) -> list[Drawn]:
-    """Every sheet of a folder with a vector."""
+    """Every sheet of a folder that has a vector."""
     found = []
     for path in sorted(folder.glob("*.json")):
         lines = np.array(json.loads(path.read_text(encoding="utf-8"))["vectors"]).reshape(-1, 2, 2)
@@ -85,7 +85,7 @@ def sheets_in(folder: Path) -> list[Drawn]:
 
 
 def _joined(pairs: np.ndarray, count: int) -> np.ndarray:
-    """(count,) the same number for whatever pairs join."""
+    """(count,) group numbers: the same for all that pairs connect."""
     group = np.arange(count)
     for first, second in pairs:
         group[group == group[second]] = group[first]
@@ -93,7 +93,7 @@ def _joined(pairs: np.ndarray, count: int) -> np.ndarray:
 
 
 def sample(sheet: Drawn, rng: np.random.Generator) -> tuple[np.ndarray, complex, bool]:
-    """((4, 48, 48) a window, its node relative to its middle, mm, x - i y, whether that is nowhere near)."""
+    """((4, 48, 48) window, node relative to its middle in mm, x - i y, whether the node is outside)."""
     node, kind = int(rng.integers(len(sheet.at))), int(rng.choice(4, p=SHARES))
     nowhere = kind == len(OFF_MM)
     others = OTHERS_MM[min(kind, len(OTHERS_MM) - 1)]
@@ -113,7 +113,7 @@ def sample(sheet: Drawn, rng: np.random.Generator) -> tuple[np.ndarray, complex,
 
 
 def _other_pen(ink: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Ink drawn and scanned otherwise: darker, noisier, blurred, or clipped."""
+    """Ink as drawn and scanned in another way: darker, noisier, blurred, or clipped."""
     ink = ink * np.float32(rng.uniform(0.6, 1.5))
     if rng.random() < 0.3:
         ink = ink + rng.normal(size=ink.shape).astype(np.float32) * rng.uniform(0.0, 0.06)
@@ -124,11 +124,11 @@ def _other_pen(ink: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return np.clip(ink, 0.0, 1.2)
 
 
-# Learning -----------------------------------------------------------------------------------------
+# Training -----------------------------------------------------------------------------------------
 
 
 class Network(nn.Module):
-    """Two halvings, then layers that look farther and farther; a cell tells log odds, place and width."""
+    """Two halvings, then layers of growing reach; each cell gives log odds, position and width."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -140,7 +140,7 @@ class Network(nn.Module):
         self.cells, self.nowhere = nn.Conv2d(32, 4, 1), nn.Linear(32, 1)
 
     def forward(self, window: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """(b, 4, 12, 12) of the cells, and (b, 1) log odds that the node is nowhere near."""
+        """(b, 4, 12, 12) outputs of the cells, and (b, 1) log odds that the node is outside."""
         x = self.near(window)
         for layer in self.far:
             x = x + torch.relu(layer(x))
@@ -150,7 +150,7 @@ class Network(nn.Module):
 def loss_of(
     cells: torch.Tensor, nowhere: torch.Tensor, off: torch.Tensor, away: torch.Tensor
 ) -> torch.Tensor:
-    """Negative log density of the places `off` (b, 2), or of being nowhere near where `away`."""
+    """Negative log density of the positions `off` (b, 2), or of being outside where `away`."""
     odds = torch.cat([cells[:, 0].flatten(1), nowhere], 1).log_softmax(1)
     middles = (torch.arange(CELLS) + 0.5) * (2.0 * HALF_MM / CELLS) - HALF_MM
     width = torch.clamp(cells[:, 3] + USUAL, NARROWEST, WIDEST)

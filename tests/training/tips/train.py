@@ -1,4 +1,4 @@
-"""Trains the network that finds the ends of vectors along strokes (`grader/scan/strokes/ends.py`).
+"""Train the network that finds the ends of vectors along strokes (`grader/scan/strokes/ends.py`).
 
     pip install torch onnx
     python -m tests.training.tips.train sheets FOLDER --first 0 --last 300
@@ -20,18 +20,18 @@ from grader.scan.strokes.ends import BEYOND_MM, CELL, HALF, KINDS, LEAST_MM, STE
 from tests.training.pages import run, simulated_pages
 
 OFF_MM, FAR_OFF_MM, TILT = 0.5, 0.9, 0.16
-"""How far a drawn vector may lie off the stroke that was found for it, at its nearer and its farther end."""
+"""Largest distances of a drawn vector's nearer and farther end from the stroke found for it."""
 LINK_MM = 1.2
 SPREAD_MM = 0.25
 WINDOW = 144
 BATCH = 48
 
 
-# What is learnt from ------------------------------------------------------------------------------
+# Training data ------------------------------------------------------------------------------------
 
 
 def keep(folder: Path, seed: int) -> None:
-    """One simulated student's strokes as bands, with the ends of the vectors drawn along each."""
+    """Store a simulated student's strokes as bands, with the ends of the vectors drawn along each."""
     for number, (seen, truth) in enumerate(simulated_pages(seed)):
         strokes = seen.ink.strokes
         long = np.hypot(*(strokes.ends[:, 1] - strokes.ends[:, 0]).T) >= LEAST_MM
@@ -50,7 +50,7 @@ def keep(folder: Path, seed: int) -> None:
 
 
 def _drawn(figures: dict) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Vectors (2, 2) mm as drawn, and lines between all joints of the sketch, whose ends are not learnt."""
+    """Vectors (2, 2) mm as drawn, and lines between all joints of the sketch, whose ends are ignored."""
     vectors = [
         np.array(vector["line_mm"])
         for figure in figures.values()
@@ -63,7 +63,7 @@ def _drawn(figures: dict) -> tuple[list[np.ndarray], list[np.ndarray]]:
 
 
 def _axes(stroke: np.ndarray, line: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Places of a line's ends along and across a stroke, and the stroke's length."""
+    """Positions of a line's ends along and across a stroke, and the stroke's length."""
     length = float(np.hypot(*(stroke[1] - stroke[0])))
     u = (stroke[1] - stroke[0]) / length
     relative = line - stroke[0]
@@ -92,7 +92,7 @@ def _runs_along(stroke: np.ndarray, link: np.ndarray) -> bool:
     return bool(np.abs(off).max() < LINK_MM and min(along.max(), length) - max(along.min(), 0.0) > 1.0)
 
 
-# Learning -----------------------------------------------------------------------------------------
+# Training -----------------------------------------------------------------------------------------
 
 
 def train(folder: Path, steps: int, out: Path) -> None:
@@ -147,7 +147,7 @@ def train(folder: Path, steps: int, out: Path) -> None:
 def _loss(
     told: torch.Tensor, near: torch.Tensor, at: torch.Tensor, off: torch.Tensor, known: torch.Tensor
 ) -> torch.Tensor:
-    """Focal loss of the cells' log odds, and the absolute error of the places near a tip."""
+    """Focal loss of the cells' log odds, and the absolute error of the positions near a tip."""
     odds = told[:, :KINDS]
     sure = torch.sigmoid(odds)
     seen = -(functional.logsigmoid(odds) * (1.0 - sure) ** 2 * at).sum()
@@ -157,7 +157,7 @@ def _loss(
 
 
 def _batch(pool: list, rng: np.random.Generator) -> list[np.ndarray]:
-    """Windows of bands, mirrored and dimmed by lot, and what is to be told of them."""
+    """Windows of bands, mirrored and dimmed at random, and their targets."""
     cells = np.arange(WINDOW // CELL) * CELL * STEP_MM
     ink = np.zeros((BATCH, 1, 2 * HALF + 1, WINDOW), np.float32)
     near, at, off, known = np.zeros((4, BATCH, KINDS, WINDOW // CELL), np.float32)

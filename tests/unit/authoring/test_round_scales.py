@@ -126,7 +126,7 @@ WIDE, HIGH = FRAME_MM[2], FRAME_MM[3]
 
 
 def fits(boxes: list[tuple[float, float]]) -> bool:
-    """Whether boxes with margins fit the frame: in a row, in a column, or one beside two."""
+    """Return whether boxes with margins fit the frame: in a row, in a column, or one beside two."""
     padded = [(wide + 2 * MARGIN_MM, high + 2 * MARGIN_MM) for wide, high in boxes]
     arrangements = [
         (sum(wide for wide, _ in padded), max(high for _, high in padded)),

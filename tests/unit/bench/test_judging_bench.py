@@ -1,4 +1,4 @@
-"""The benchmark of judging: who drew what, what is due to it, and how it is counted."""
+"""The benchmark of judging: drawings, verdicts due, and counting."""
 
 from dataclasses import replace
 
@@ -59,7 +59,7 @@ def drawn(name, *mistakes, n=None, position=None, declares=True, letters=False, 
 
 
 def due(work, source="nodes"):
-    """What is due to each criterion, and the mistakes."""
+    """The verdicts due to each criterion, the mistakes due, and the vectors seen."""
     seen = Visible.of(submission(work, source), work.construction.links)
     return verdicts_due(work, source, seen), mistakes_due(work, source, seen), seen
 

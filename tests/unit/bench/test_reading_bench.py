@@ -37,7 +37,7 @@ DRAWN = TrueVector("v_B", VELOCITY_PLAN, ENDS, STROKE)
 OFFSET_MM = 0.01
 """The median distance of strokes from where they were drawn is 0.003 mm at 100 dpi."""
 VERTEX_MM = 0.003
-"""What the intersections of ideal strokes are to keep."""
+"""Largest error of the intersections of ideal strokes."""
 PLACE_MM = 1e-3
 IDEAL = Noiseless(4, 0, 0.001, 0.002, 0.003)
 

@@ -1,4 +1,4 @@
-"""How the benchmark of settling counts."""
+"""The benchmark of settling counts rightly."""
 
 from tests.bench.settling import Marked, Verdict, tables
 

@@ -197,7 +197,7 @@ def test_what_a_careful_hand_may_miss_beyond_that_goes_to_a_person():
 
 
 BEYOND, WITHIN = 0.06, -0.06
-"""Of a limit, by less than 1.645 standard errors of 0.1 mm."""
+"""Distances from a limit, less than 1.645 standard errors of 0.1 mm."""
 
 
 @pytest.mark.parametrize(
@@ -687,7 +687,7 @@ def test_scan_and_measurement_of_different_verdicts_go_to_a_person():
 
 
 def searches(task, reading):
-    """How often a comparison asks for a search."""
+    """The number of times that a comparison asks for a search."""
     asked = []
 
     def explain(*case):

@@ -1,4 +1,4 @@
-"""Which scale counts as declared, where boxes, roster and drawing agree or do not."""
+"""The scale that counts as declared if boxes, roster and drawing agree or do not."""
 
 import numpy as np
 import pytest

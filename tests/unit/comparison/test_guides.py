@@ -23,7 +23,7 @@ SHAPER = task_for("shaper", 7)
 PISTON = task_for("piston", 5)
 PUMP = task_for("pump", 7)
 LONGER = 1.25
-"""How much longer a vector is made: far beyond its tolerance."""
+"""Factor by which a vector is made longer: far beyond its tolerance."""
 ROUNDING = 1e-9
 ASTRAY_RAD = 0.1
 """By which a crank is drawn in a wrong position."""

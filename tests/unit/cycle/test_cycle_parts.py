@@ -100,7 +100,7 @@ def test_an_engine_off_its_guide_returns_quicker():
 
 
 def test_a_scotch_yoke_goes_and_returns_alike():
-    """Of yokes and crossed guides: the pin's height above the pivot, r sin(phi), 2 r from end to end."""
+    """Yokes and crossed guides: the pin's height above the pivot is r sin(phi), 2 r from end to end."""
     engine = load_assignment("engine").mechanism([load_assignment("engine").variant(1)])
     upright = FixedGuide(np.zeros(1, complex), np.array([np.pi / 2]))
     yoke = Yoke("B", "A", np.zeros(1), upright)

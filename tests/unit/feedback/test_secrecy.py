@@ -1,4 +1,4 @@
-"""What a student may not see yet is nowhere: not in the page, the picture, or its description."""
+"""Things that a student may not see yet are nowhere: not in the page, the picture, or its description."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""What a student is told: mistakes first, each where it is seen, and what waits with its reason."""
+"""The student's page: mistakes first, each where it is seen, and open criteria with their reasons."""
 
 import re
 from dataclasses import replace

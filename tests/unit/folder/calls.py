@@ -1,4 +1,4 @@
-"""What the workers of the tests do."""
+"""Calls that the tests give to workers."""
 
 import ctypes
 import os

@@ -1,4 +1,4 @@
-"""What is sent to workers elsewhere and what comes back: paths, files, images of folders."""
+"""Data sent to remote workers and received from them: paths, files, images of folders."""
 
 import pickle
 from pathlib import Path

@@ -30,7 +30,7 @@ ID = "grupa12_popescu"
 
 
 SIGNED_PX = (1775, 690)
-"""Where somebody has signed the scan of s02, inside its sketch."""
+"""The place of a signature on the scan of s02, inside its sketch."""
 
 
 def silent(*_progress):

@@ -1,4 +1,4 @@
-"""What people decided is applied to a class, survives what it is not about, and is out of date otherwise."""
+"""Decisions are applied to a class, survive changes of other things, and are out of date otherwise."""
 
 import json
 from dataclasses import replace
@@ -230,7 +230,7 @@ def test_the_file_may_lie_elsewhere_and_is_no_submission(folder):
 
 
 def based(folder, decision):
-    """The decision as the program writes it, with what it is about."""
+    """The decision as the program writes it, with its basis."""
     run_ = graded(Batch(PUMP, RUBRIC, folder, folder.parent / "other"), lambda *_: None, Inline())
     submission = next(job.submission for job in run_.jobs if job.submission.student_id == decision.student_id)
     return replace(decision, basis=basis_of(submission, PUMP, RUBRIC, decision.criterion))

@@ -44,7 +44,7 @@ def test_the_roster_and_files_of_tools_are_no_submissions(tmp_path):
 
 
 def told_of(folder):
-    """What an inventory says of each file of a folder, by the file's name."""
+    """An inventory's result for each file of a folder, by the file's name."""
     files = submissions(folder)
     cache = PageCache(folder.parent / "notes")
     contents = take_inventory(files, folder, None, Inline(), lambda *_: None, cache)

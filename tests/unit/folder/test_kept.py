@@ -58,7 +58,7 @@ SCALES = "1:5,kv = omega kL"
 
 
 def drawn_exactly(n, off_mm=0.0):
-    """What is read of a velocity plan without fault, but for one vector."""
+    """The reading of an exact velocity plan, with v_D longer by `off_mm`."""
     plan = plan_document(PUMP, exact_plan(PUMP, [Variant(n=n)]))
     vectors = {
         name: ReadVector(
@@ -127,7 +127,7 @@ def run(folder, out, rubric=RUBRIC, progress=lambda *_: None):
 
 
 def wider(rubric):
-    """The rubric of a teacher who thought again."""
+    """The rubric with wider tolerances."""
     table = rubric.tolerance.model_copy(update={"length_mm": 6.0, "across_mm": 6.0})
     return rubric.model_copy(update={"tolerance": table})
 
@@ -209,7 +209,7 @@ def test_each_page_is_decoded_registered_and_tested_for_blankness_once(class_fol
 
 
 class SlowStrokes(Inline):
-    """Workers in which looking for strokes takes too long."""
+    """Workers that take too long to find strokes."""
 
     def run(self, function, calls, sheets=()):
         if function is identify_page:
@@ -343,7 +343,7 @@ def sources(tmp_path_factory):
 
 
 def digests(top):
-    """Of each stage of the work, by the sources in a folder."""
+    """The digest of each stage of the work, by the sources in a folder."""
     stage_digest.cache_clear()
     return {stage: stage_digest(modules, top=top) for stage, modules in STAGES.items()}
 
@@ -508,7 +508,7 @@ def test_a_damaged_note_of_inputs_leaves_the_why_open(class_folder, tmp_path, da
 
 @pytest.mark.usefixtures("reader")
 def test_sheets_scanned_twice_are_told_beside_the_marks(class_folder, tmp_path):
-    """Whose ink lies alike is kept with the reading: a regrade finds the same."""
+    """The pairs whose ink is similar are kept with the readings: a regrade finds the same."""
     numbers = {}
     for k in range(8):
         scan(class_folder / f"t{k}.png", 20 * k + 11)

@@ -1,4 +1,4 @@
-"""What was graded last, for those who come back to it with the folder of results or of submissions."""
+"""The last run is found again by the folder of results or of submissions."""
 
 import shutil
 

@@ -22,7 +22,7 @@ def batch(tmp_path):
 
 
 def watched(batch, *events):
-    """What comes while one event after the other happens between two looks."""
+    """The arrivals reported while one event after another happens between two looks."""
     happening = iter(events)
 
     def sleep(seconds):
@@ -40,7 +40,7 @@ def watched(batch, *events):
 
 
 def nothing():
-    """Happens between two looks."""
+    """Do nothing between two looks."""
 
 
 def test_a_file_is_taken_when_it_has_stopped_growing(batch):

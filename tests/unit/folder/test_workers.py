@@ -28,7 +28,7 @@ KILLED = 0.05
 
 
 def codes(jobs, work, limits=LIMITS):
-    """What each call gives: its result, or the code of its problem."""
+    """Each call's result, or the code of its problem."""
     with Workers(jobs, limits, calls.__name__) as workers:
         results = dict(workers.run(calls.does, work))
     assert sorted(results) == list(range(len(work)))

@@ -1,4 +1,4 @@
-"""Whose data a drawing follows, found from what a student may not choose."""
+"""The owner of the data that a drawing follows is found from things that a student may not choose."""
 
 import math
 from dataclasses import replace

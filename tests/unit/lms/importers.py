@@ -1,4 +1,4 @@
-"""What the platforms' importers do with a file, written from their documentation and behaviour."""
+"""The platforms' importers of files, written from their documentation and behaviour."""
 
 import csv
 import io

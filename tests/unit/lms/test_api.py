@@ -34,7 +34,7 @@ SCHEMAS = {
 
 
 def planned(tmp_path, to, *reports, **how):
-    """What was delivered, the plan, and every file by its name."""
+    """Export to a platform's API; the delivery, the plan, and every file by its name."""
     for name in ("criteria", "submissions"):
         if name in how:
             path = tmp_path / f"{name}.json"

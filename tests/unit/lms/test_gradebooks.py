@@ -21,7 +21,7 @@ EXPORTED = (
 )
 
 WRITTEN = "Student,ID,SIS User ID,SIS Login ID,Section,Pump (12345)\r\n    Points Possible,,,,,10.00\r\n"
-"""What is written of it: who a row is, and the assignment that is asked for."""
+"""The columns of it that are written: those that identify a row, and the assignment asked for."""
 GRADED = WRITTEN + '"Popescu, Ion",4711,s01,ion@x.ro,"Group ""A"", 2",7.5\r\n'
 
 

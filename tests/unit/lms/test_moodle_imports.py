@@ -1,4 +1,4 @@
-"""What Moodle stores of the files that are written: first import, regrade, languages, zero, groups.
+"""Moodle stores the exported files as meant: first import, regrade, languages, zero, groups.
 
 Rules are those of Moodle 4.5 and stand in `importers`, each with its file and function. Headings and words
 are those of Moodle's language packs: assign.php (recordid, hiddenuser, gradenoun, maxgrade, submissionteam,

@@ -1,4 +1,4 @@
-"""What a person decides of a doubtful verdict is evidence for what else is in doubt."""
+"""A person's decision on a doubtful verdict is evidence for the other doubtful ones."""
 
 from dataclasses import replace
 
@@ -32,7 +32,7 @@ def unsure(reading, *names, figure="velocity_plan", confidence=0.5):
 
 
 def report(reading, scales=SCALES, **decided):
-    """The report of a sheet on which this was read, with verdicts by criterion and places by node."""
+    """The report of a sheet with this reading, with verdicts by criterion and places by node."""
     names = {name.replace("__", ":"): verdict for name, verdict in decided.items()}
     rows = tuple(Decision("s01", None, name, verdict) for name, verdict in names.items())
     submission = StudentSubmission("s01", PUMP.variant, (), declared_texts(scales), decided=rows)

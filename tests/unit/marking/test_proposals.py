@@ -1,4 +1,4 @@
-"""What is proposed of a doubtful verdict agrees with the numbers and the sentence beside it."""
+"""The verdict proposed for a doubtful criterion agrees with the numbers and the sentence beside it."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ from tests.hands import rule_scales, sheet, task_for
 
 TASKS = {"pump": {"n": 7}, "press": {"position": 3}, "engine": {"n": 3}, "shaper": {"n": 4}}
 SHEETS = 12
-"""Of each task, in each of which a part of the nodes is misplaced and read without confidence."""
+"""Sheets of each task; on each some nodes are misplaced and read without confidence."""
 FAR_MM = 25.0
 
 
@@ -36,7 +36,7 @@ def doubtful(reading, lot, share):
 
 
 def report(task, reading, scales):
-    """The report of a sheet on which this was read."""
+    """The report of a sheet with this reading."""
     submission = StudentSubmission("s01", task.variant, (), declared_texts(scales))
     page = ScannedPage(PageRef("s01.jpg"), reading=reading)
     return mark(submission, [page], task.assignment, task.rubric)[0]

@@ -1,4 +1,4 @@
-"""What is settled once verdicts and mistakes are known together."""
+"""Verdicts that are settled once verdicts and mistakes are known together."""
 
 import pytest
 

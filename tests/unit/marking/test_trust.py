@@ -1,4 +1,4 @@
-"""What checked verdicts say of the others: the bound, the sample, what is opened, and what is not."""
+"""Checked verdicts as evidence for the others: the bound, the sample, which are opened and which not."""
 
 import random
 

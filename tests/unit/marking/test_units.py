@@ -22,7 +22,7 @@ ONE_PRICE = 0.1
 
 
 def entered(task, change, *mistakes, hand=TYPICAL, seed=1):
-    """What a hand draws and measures, every vector entered with a change."""
+    """A hand's drawing as measured, every vector entered with a change."""
     nodes = drawn_by(task, hand, np.random.default_rng(seed), mistakes)
     submission = handed_in(task, nodes, "directions")
     reading = submission.measured

@@ -43,7 +43,7 @@ def test_results_of_an_earlier_version_load_with_nothing_lost(folder):
 
 
 def holds(after, before):
-    """Whether all that stood before stands now; keys may have been added."""
+    """Return whether everything there before is still there; keys may have been added."""
     if isinstance(before, dict):
         return all(key in after and holds(after[key], one) for key, one in before.items())
     if isinstance(before, list):

@@ -187,7 +187,7 @@ JUST_NOTICEABLE = 2.3
 
 
 def apart(seen, *verdicts):
-    """How far apart two verdicts' colours look, CIE L*a*b*."""
+    """The perceived distance of two verdicts' colours, CIE L*a*b*."""
     shown = np.clip(np.array([np.array(seen) @ linear(one) for one in verdicts]), 0, 1)
     gamma = np.where(shown <= 0.0031308, 12.92 * shown, 1.055 * shown ** (1 / 2.4) - 0.055)
     lab = cv2.cvtColor(gamma[None].astype(np.float32), cv2.COLOR_RGB2LAB)[0]

@@ -1,4 +1,4 @@
-"""Whose page it is and which number it has, by what stands on it and by the drawing."""
+"""A page's owner and number are found by the texts on it and by the drawing."""
 
 from pathlib import Path
 

@@ -20,7 +20,7 @@ PEN_MM = 0.5
 
 @dataclass(frozen=True)
 class Drawn:
-    """What was drawn on one sheet: ink, and the true nodes and vectors."""
+    """One sheet as drawn: its ink, and the true nodes and vectors."""
 
     ink: Ink
     sheet: Sheet

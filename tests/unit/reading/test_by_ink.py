@@ -19,7 +19,7 @@ def fit_at(at: np.ndarray, se_mm: float = 0.3) -> NodeFit:
 
 
 def ink_with(places: Sequence[tuple[complex, float, float]]):
-    """What tells all nodes the same places, relative to the true ones: (off, standard error, share)."""
+    """A look at the ink that gives all nodes the same places relative to the true ones: (off, se, share)."""
 
     def look(views: Sequence[NodeView]) -> NodePlaces:
         true = np.array([TRUE[np.abs(TRUE - view.at).argmin()] for view in views])

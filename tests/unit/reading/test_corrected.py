@@ -15,7 +15,7 @@ from tests.unit.reading.drawn import Pen, draw, ink_of, task
 CLOSE_MM = 0.25
 CROSSING = ink_of([(100 - 100j, 140 - 100j), (100 - 60j, 130 - 120j), (160 - 100j, 160 - 150j)])
 MEET = 120 - 100j
-"""Where the first two strokes cross."""
+"""The crossing of the first two strokes."""
 
 
 def pointed_at(ink, at, figure=VELOCITY_PLAN):

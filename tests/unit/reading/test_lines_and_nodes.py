@@ -117,7 +117,7 @@ def test_strokes_are_told_apart_by_where_they_should_lie():
 
 
 def velocity_plan_drawn():
-    """What is expected of a velocity plan, and lines where that lies."""
+    """The expected velocity plan, and lines at the expected places."""
     _, _, drawing = task()
     edges = vectors_of(drawing.construction, VELOCITY_PLAN)
     expected = expect(drawing, VELOCITY_PLAN, {}, DraftingErrors(), edges)

@@ -12,7 +12,7 @@ from reference.errors import CallError
 from reference.plan import exact_plan
 
 RELATIVE = 1e-12
-"""Of the drawn normal component, against the largest length on the sketch."""
+"""Error of the drawn normal component, relative to the largest length on the sketch."""
 
 
 def plan_of(name, **scales):

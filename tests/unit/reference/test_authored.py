@@ -184,7 +184,7 @@ DAMAGE = [
 
 
 DRAWN = 3
-"""Of the plans of damaged files, so many are drawn as well."""
+"""The number of plans of damaged files that are drawn as well."""
 
 
 def files(name: str) -> tuple[dict, dict]:

@@ -10,7 +10,7 @@ from reference.construction.graph import evaluate
 from reference.plan import exact_plan
 
 ROUNDING = 1e-11
-"""Of the centre's own distance: centres may lie far off."""
+"""Share of the centre's own distance: centres may lie far away."""
 
 
 def planned(name):

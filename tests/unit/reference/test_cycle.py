@@ -394,7 +394,7 @@ few = st.sampled_from([1.0, 2.0, 3.0, 4.0])
 def test_flat_positions_of_four_bars_with_whole_lengths_are_passed_without_jumps(
     ground, bars, angle_deg, side
 ):
-    """Of whole lengths many sums agree: kites, parallelograms, and those flat once in a turn."""
+    """With whole lengths many sums are equal: kites, parallelograms, and those flat once in a turn."""
     mechanism = four_bar(ground, bars, angle_deg, side)
     try:
         move(mechanism)

@@ -1,4 +1,4 @@
-"""How far a hand may miss: the derivative of the construction, held against drawings by lot."""
+"""The drafting errors of a hand: the construction's derivative, compared with random drawings."""
 
 import numpy as np
 import pytest

@@ -21,7 +21,7 @@ from tests.examples import slow
 
 SVG = "{http://www.w3.org/2000/svg}"
 TOUCH_MM = 0.1
-"""How far a letter may reach under a stroke's edge or another letter: a fifth of a thin line's width."""
+"""Largest overlap of a letter with a stroke's edge or another letter: a fifth of a thin line's width."""
 SLANT = math.tan(math.radians(12.0))
 FONT_PX = 200
 FAR_MM = 2.0

@@ -17,7 +17,7 @@ USUAL = Skill(angle_deg=0.3, place_mm=0.25, mark_mm=0.1)
 READ_MM2 = (0.02, 0.0, 0.02)
 CARES = (0.6, 1.0, 1.6, 2.5, 4.0)
 SURE_COST = 10.0
-"""What the next account must cost more: odds of 150 to one."""
+"""Least extra cost of the next explanation: odds of 150 to one."""
 
 
 def pump(n: int = 7) -> Drawing:

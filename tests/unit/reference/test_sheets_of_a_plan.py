@@ -1,4 +1,4 @@
-"""What stands on a sheet of the reference drawing, and where: figures apart, tables complete, senses."""
+"""Sheets of the reference drawing: figures do not overlap, tables are complete, senses are shown."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""What is asked of a person about what was read in doubt, and what is not asked as it is known."""
+"""A person is asked about doubtful readings, and not about things that are known."""
 
 from dataclasses import replace
 
@@ -37,7 +37,7 @@ def unread(reading, node, *, is_blank):
 
 
 def reviewed(task, reading, **decided):
-    """The report of a sheet on which this was read, and its questions."""
+    """The report of a sheet with this reading, and its questions."""
     rows = tuple(Decision("s01", None, name, verdict) for name, verdict in decided.items())
     told = declared_texts(rule_scales(task))
     submission = StudentSubmission("s01", task.variant, (), told, decided=rows)

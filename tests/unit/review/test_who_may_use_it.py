@@ -1,4 +1,4 @@
-"""Who may read and post: this machine's own page, or whoever has the token."""
+"""Only this machine's own page, or a holder of the token, may read and post."""
 
 import pytest
 from starlette.testclient import TestClient

@@ -1,4 +1,4 @@
-"""What spoils a picture is found where it is, and nowhere else."""
+"""Flaws of a picture are found where they are, and nowhere else."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -36,7 +36,7 @@ def good() -> tuple[Page, float]:
 
 
 def flaws_of(page: Page) -> dict[str, Reason]:
-    """Of a page, registered where it can be."""
+    """The flaws of a page, registered if it can be."""
     sheet, _ = register(page)
     return {flaw.code: flaw for flaw in flaws(page, sheet if isinstance(sheet, Sheet) else None)}
 

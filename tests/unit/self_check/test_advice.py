@@ -1,4 +1,4 @@
-"""What a self-check says beside right and off: one line of advice, a law, and no answer."""
+"""A self-check adds one line of advice to right and off: a law, and no answer."""
 
 import re
 

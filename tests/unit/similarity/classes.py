@@ -64,7 +64,7 @@ def scanned_class(name, count, hand="typical", variants="same", mistakes=()):
 
 
 def measured(drawn, seed, step_mm=0.5, spread_mm=0.1, *, directions=True):
-    """What the student's ruler and protractor say of a drawing."""
+    """The readings of a student's ruler and protractor on a drawing."""
     rng = np.random.default_rng([seed, 21])
     (figures,) = drawn.sheets
     nodes = {node: at for figure in figures.values() for node, at in figure.items()}

@@ -1,4 +1,4 @@
-"""What is to be drawn again: from the wrong point on, all that hangs on it, with or without numbers."""
+"""The steps to draw again: from the wrong point on, all that depends on it, with or without numbers."""
 
 import re
 

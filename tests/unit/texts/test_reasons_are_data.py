@@ -41,7 +41,7 @@ APART = {
 }  # fmt: skip
 SEARCHES = {"match", "fullmatch", "search", "findall", "finditer", "sub"}
 MAKERS = {"Reason", "_why", "_no_order", "TextError", "_at", "refused"}
-"""What makes a reason: the codes stand in its arguments."""
+"""Functions that make a reason: the codes are in their arguments."""
 PLACEHOLDER = re.compile(r"%\((\w+)\)s")
 
 
@@ -110,7 +110,7 @@ def test_no_key_of_the_catalogues_is_made_at_run_time() -> None:
 
 
 def codes_made() -> Iterator[tuple[str, str]]:
-    """Every code that stands where a reason is made, and where that is."""
+    """Every code with which a reason is made, and its place in the source."""
     for name, tree in trees():
         for node in ast.walk(tree):
             match node:
@@ -133,7 +133,7 @@ def test_every_code_that_is_made_has_its_sentence() -> None:
 
 
 def refusals_made() -> Iterator[tuple[str, str]]:
-    """What says why wherever a request is refused, and where that is."""
+    """Every code with which a request is refused, and its place in the source."""
     before = {"RefusedError": "", "forbidden": "", "_refused": "", "missing": "no_"}
     for name, tree in trees():
         for node in ast.walk(tree) if name.startswith(("grader/web/", "grader/review/")) else ():

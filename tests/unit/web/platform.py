@@ -96,7 +96,7 @@ class Platform:
     # Launches -------------------------------------------------------------------------------------
 
     def begun(self, browser):
-        """What the tool asks for after the first request of a launch."""
+        """The parameters that the tool asks with after the first request of a launch."""
         form = {"iss": self.address, "login_hint": "user", "client_id": CLIENT, "lti_message_hint": "m"}
         answer = browser.post("/lti/login", data=form, follow_redirects=False)
         assert answer.status_code == 303, answer.text

@@ -26,7 +26,7 @@ HOSTILE = "\"'><img src=x onerror=alert(1)><script>alert(1)</script>"
 
 
 def test_a_visit_begins_anew_with_a_personal_link(graded, app):
-    """Who knew the cookie before, on a computer that many use, is not the student after."""
+    """Whoever knew the cookie before, on a shared computer, is not the student afterwards."""
     key, links = graded
     victim, other = Browser(app), Browser(app)
     for browser in (victim, other):
@@ -136,7 +136,7 @@ def test_a_page_of_results_is_alone_in_a_sandbox(graded, admin):
 
 
 def test_an_assignment_names_no_file_outside_its_own_folder(admin, tmp_path, settings):
-    """What it names is read, and faults are told with what stands in the file."""
+    """Otherwise that file would be read, and messages of its faults would show its text."""
     (settings.data / "other").mkdir(parents=True)
     new_assignment(tmp_path / "own.toml", mechanism="slider-crank")
     for path in tmp_path.glob("*.toml"):
@@ -221,7 +221,7 @@ def finished(coroutine):
 
 
 def test_all_bodies_together_have_a_bound(settings):
-    """Of three that are sent at once two find room; whoever comes when they have gone finds it again."""
+    """Two of three bodies sent at once find room; a later one finds it again."""
     sent = rim_of(settings, room=1500)
 
     async def all_sent():

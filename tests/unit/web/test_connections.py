@@ -42,7 +42,7 @@ def opened(server, text):
 
 
 def is_closed(connection):
-    """Whether the server ends it; waits for that."""
+    """Wait for the server to close a connection; return whether it does."""
     try:
         return connection.recv(1000) == b""
     except ConnectionError:

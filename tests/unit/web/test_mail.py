@@ -24,7 +24,7 @@ SENDER = "planmark@marks.example"
 
 @pytest.fixture
 def letters():
-    """What a mail server of this machine is sent."""
+    """The letters sent to a mail server on this machine."""
     found = queue.Queue()
 
     class Dialogue(socketserver.StreamRequestHandler):

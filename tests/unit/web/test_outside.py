@@ -17,7 +17,7 @@ PUBLIC = "93.184.215.14"
 
 @pytest.fixture
 def leads(monkeypatch):
-    """What names lead to, one look-up after the other; and to which addresses was connected."""
+    """The addresses given by look-ups, one after the other, and the addresses connected to."""
     answers, connected = [], []
 
     def looked_up(_host, port, **_known):

@@ -15,7 +15,7 @@ CALL = ServeOptions(port=0, jobs=1)
 
 @pytest.fixture
 def served(monkeypatch):
-    """What would be served: nothing listens longer than the test."""
+    """The applications that would be served: nothing listens longer than the test."""
     apps = []
 
     def run(app, listener):

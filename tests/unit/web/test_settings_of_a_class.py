@@ -1,4 +1,4 @@
-"""What an instructor sets is made of the record of options: its bounds, choices and helps."""
+"""An instructor's settings are made from the record of options: its bounds, choices and helps."""
 
 import pytest
 from pydantic import ValidationError

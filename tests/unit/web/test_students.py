@@ -1,4 +1,4 @@
-"""What students may do: checks, attempts, personal links, feedback, requests, sheets."""
+"""Actions of students: checks, attempts, personal links, feedback, requests, sheets."""
 
 import time
 from concurrent.futures import ThreadPoolExecutor

@@ -1,4 +1,4 @@
-"""Who decides is who is signed in, whatever a request says; every change of a mark is in the audit trail."""
+"""The person signed in decides, whatever a request says; every change of a mark is in the audit trail."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Who may do what: visits, forms, hosts, rates, passwords, invitations, tokens."""
+"""Permissions: visits, forms, hosts, rates, passwords, invitations, tokens."""
 
 import time
 

@@ -18,7 +18,7 @@ DARK = 255 - GREY
 NOTHING = np.zeros_like(GREY)
 WHITE = [0.95, 1.0, 1.09]
 NEAR = 40
-"""Of 255: what renders a page shows full black ink as 32, and smooths a border."""
+"""Grey values out of 255: the renderer shows full black ink as 32, and smooths a border."""
 
 
 def ink(white, black):

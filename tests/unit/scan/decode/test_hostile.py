@@ -284,7 +284,7 @@ def strip_of(data):
 
 
 ALIKE_SHARE = 0.25
-"""Of flipped bits: those that put a valid code in another's place, such as an edge 1 px right for 1 px left.
+"""Share of flipped bits that put a valid code in another's place, such as an edge 1 px right for left.
 
 No decoder can tell these from a drawing.
 """

@@ -73,7 +73,7 @@ def contrast_along(grey, start, end):
 
 
 def left_of_squares(clean):
-    """How dark the darkest hundredth is of what is not drawn on."""
+    """The darkness of the darkest hundredth of the areas without drawing."""
     bare = clean[20:160, 800:1380], clean[820:, 20:1380]
     return 1.0 - float(np.quantile(np.concatenate([part.ravel() for part in bare]), 0.01)) / PAPER
 

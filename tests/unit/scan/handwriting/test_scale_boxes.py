@@ -18,7 +18,7 @@ SURE = 0.9
 
 
 def walked(name: str, text: str) -> set[bool]:
-    """Whether the texts that the machine can spell this way may end there; empty where it cannot."""
+    """For each path of the state machine that spells a text, whether it may end there; empty without one."""
     states = {(start(name), "")}
     while any(told != text for _, told in states):
         states = {
@@ -77,7 +77,7 @@ UNITS = {"kL": "m/mm", "kv": "(m/s)/mm", "ka": "(m/s^2)/mm"}
 
 
 def _read_boxes(units=None):
-    """What is read in the boxes of a student's printed sheets, and what was written there."""
+    """The scales read in the boxes of a student's printed sheets, and those written there."""
     assignment = load_assignment("pump")
     document = make_sheets(assignment, [RosterRow("s1", "Student 1", n=6)], "en")
     printed = printed_sheets(document.pdf, document.layout)

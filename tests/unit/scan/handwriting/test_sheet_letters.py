@@ -24,7 +24,7 @@ from reference.authored.assignment import load_assignment
 from samples.simulation import CAREFUL, CLEAN_SCAN, PageStyle, Settings, simulate
 
 READ_SHARE, TOUCHING_SHARE = 0.85, 0.45
-"""Of the letters of nodes of a careful drawing that are to be read; of those that touch lines."""
+"""Least share read of a careful drawing's node letters; of those that touch lines."""
 
 
 def sheet_of(page_style, seed):
@@ -43,7 +43,7 @@ def drawn():
 
 
 def share_read(ink, truth):
-    """Of the letters of nodes."""
+    """The share of nodes' letters that are read."""
     letters = find_letters(ink)
     named = letters.probability.argmax(axis=1)
     x, y = letters.at.real, -letters.at.imag

@@ -1,4 +1,4 @@
-"""Where points lie on a sheet and in its picture, held against a known map."""
+"""Points on a sheet and in its picture, compared with a known map."""
 
 import numpy as np
 

@@ -169,7 +169,7 @@ def test_a_frame_at_the_scanners_scale_tells_which_way_up_without_a_title_block(
 
 @pytest.mark.parametrize("dpi", [None, (72.0, 72.0)])
 def test_a_cameras_picture_is_not_taken_for_a_scan_of_a_larger_window(dpi):
-    """Of 4 to 3: at 240 dpi as wide as A3, and 20 mm higher."""
+    """A 4 to 3 picture: at 240 dpi as wide as A3, and 20 mm higher."""
     matrix = np.array([[8.4, 0.02, 250.0], [0.03, 8.2, 300.0], [0.0, 0.0, 1.0]])
     assert not rectify(Page("photo.jpg", 1, painted(matrix, (2992, 3990), frame=None), dpi))
 
@@ -203,7 +203,7 @@ def test_a_bent_photo_is_straightened(bend):
 
 
 def unknown_because(sheet) -> str:
-    """Why the page's scale is not known by what is printed on it or stated; empty where it is."""
+    """The reason why print or stated resolution do not give the page's scale; empty if one does."""
     if not sheet:
         return message(sheet.reason)
     return next((message(problem) for problem in sheet.problems if problem.code == "scale_unknown"), "")

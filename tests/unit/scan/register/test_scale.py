@@ -21,7 +21,7 @@ OTHERS = [(1, 150.0), (3, 150.0), (4, 150.0), (2, 300.0)]
 
 
 def log_scale(mm_to_px) -> float:
-    """Of the resolution at the sheet's middle."""
+    """The logarithm of the resolution at the sheet's middle."""
     corners = np.array([[210.0, 148.0, 1.0], [211.0, 148.0, 1.0], [210.0, 149.0, 1.0]])
     found = corners @ np.asarray(mm_to_px).T
     at, right, down = found[:, :2] / found[:, 2:]
