@@ -96,7 +96,7 @@ EXAMPLES: Mapping[str, str] = {
     "versions": "python 3.12 / 3.11", "whole": "7", "worker": "tcp://desk:40001",
     "wait": "90\u00a0s",
     "bias": "-0.05", "difference": "0.21", "equal": "17",
-    "wide": "@90 mm", "zone_high": "@120 mm", "zone_wide": "@180 mm",
+    "waiting": "4", "zone": "EET", "wide": "@90 mm", "zone_high": "@120 mm", "zone_wide": "@180 mm",
 }  # fmt: skip
 """Parameters by name: after ``@`` a number with its unit; other texts of the catalogues are translated."""
 OTHERWISE: Mapping[str, Mapping[str, str]] = {
@@ -105,6 +105,10 @@ OTHERWISE: Mapping[str, Mapping[str, str]] = {
     "%(declared)s is declared": {"expected": "@0.4 (m/s)/mm", "factor": "%(times)s times too small"},
     "No default": {"least": "80\u00a0%"},
     "this file has": {"most": "10"},
+    "Hand in until": {"at": "2026-12-01 23:59:00 EET"},
+    "You will see your feedback": {"at": "2026-12-05 08:00:00 EET"},
+    "from %(at)s": {"at": "2026-12-05 08:00"},
+    "the deadline was": {"at": "2026-12-01 23:59:00 EET"},
     "The letters": {"first": "b", "second": "c"},
     "Through %(first)s": {"first": "n_BA", "second": "o'"},
     "All of": {"at": "the velocity plan"},

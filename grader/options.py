@@ -304,6 +304,11 @@ class PublicationOptions:
     is_open: bool | None = option("whether students may check")
     is_released: bool | None = option("whether students see their feedback")
     takes_sheets: bool | None = option("whether students may hand in sheets")
+    deadline: str | None = option(
+        "until when: 2026-12-01T23:59, in the server's time where no zone is given; empty for none",
+        longest=40,
+    )
+    release_at: str | None = option("from when released feedback is seen, as the deadline", longest=40)
 
 
 # Servers ------------------------------------------------------------------------------------------

@@ -241,11 +241,17 @@ class RubricFile(Authored):
 
     @property
     def points(self) -> Mapping[str, float]:
-        """Points by criterion, scaled so that each section has its weight."""
-        factors = {
-            section: (self.weight_of(section) or whole) / whole for section, whole in self.sections.items()
-        }
-        return {one.id: one.points * factors[one.section] for one in self.criterion}
+        """Points by criterion, scaled so that each section has its weight, which they add up to in cents."""
+        found, before = dict[str, float](), dict[Section, float]()
+        for one in self.criterion:
+            weight, whole = self.weight_of(one.section), self.sections[one.section]
+            found[one.id] = one.points
+            if weight is not None:
+                exact, first = one.points * weight / whole, before.get(one.section, 0.0)
+                before[one.section] = last = first + exact
+                end = weight if math.isclose(last, weight) else round(last, 2)
+                found[one.id] = round(end - round(first, 2), 6) or exact
+        return found
 
     def weight_of(self, section: Section) -> float | None:
         """Return the weight of a section; None if its points determine it."""

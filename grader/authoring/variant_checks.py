@@ -20,7 +20,7 @@ from grader.authoring.round_scales import AskedVectors
 from grader.rubric import RubricFile
 from reference.authored.assignment import Assignment, Variant
 from reference.authored.flat_positions import other_assemblies
-from reference.errors import MechanismError
+from reference.errors import MechanismError, counted
 from reference.geometry import FloatArray
 from reference.kinematics.motion import move_where_possible, reason_at
 from reference.plan import Plan, conditioning
@@ -267,7 +267,9 @@ def tie_findings(plan: Plan, ties: Ties) -> Iterator[LintFinding]:
         members = sorted(index for group in groups for index in group)
         meant = tuple(variants[index] for index in members)
         listed = "; ".join(named([variants[index] for index in group]) for group in groups[:NAMED_GROUPS])
-        more = f" and {len(groups) - NAMED_GROUPS} more groups" if len(groups) > NAMED_GROUPS else ""
+        more = (
+            f" and {counted(len(groups) - NAMED_GROUPS, 'more group')}" if len(groups) > NAMED_GROUPS else ""
+        )
         message = f"the same drawing within {SAME_MM:g} mm: {listed}{more}"
         yield LintFinding("warning", "ties", "assignment", "$.variant", message, meant, names_them=True)
     count = len(variants)

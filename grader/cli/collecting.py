@@ -11,6 +11,7 @@ from grader.folder.batch import graded, noted_batch
 from grader.folder.collect import LOOK, PAGES, check_scans, check_target, collect
 from grader.lms.export import read_results
 from grader.lms.grades import in_a_row
+from reference.errors import counted
 
 NAMED = 6
 """Pages named of those that wait."""
@@ -24,10 +25,11 @@ def collect_class(folder: Path, file: Path, jobs: int | None) -> bool:
     with progress() as tell:
         done = collect(batch, graded(batch, tell), file)
     if done.given is not None:
-        note(f"{done.given} page(s) written to {file}; the preview in {done.preview} can be removed")
+        note(f"{counted(done.given, 'page')} written to {file}; the preview in {done.preview} can be removed")
         return False
     if done.left_out:
-        note(f"{done.left_out} page(s) left out: no figure was read, or one lies where the title block is")
+        count = counted(done.left_out, "page")
+        note(f"{count} left out: no figure was read, or one lies where the title block is")
     terminal.say(f"Nothing is written yet. Check {in_a_row(done.waiting, NAMED)}:")
     terminal.say(f"open {done.preview / LOOK}, answer for each page in {done.preview / PAGES},")
     terminal.say("then run the same command again.")

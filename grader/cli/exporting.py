@@ -30,7 +30,7 @@ from grader.solution.document import PlanDocument
 from grader.texts.spoken import clause, failure
 from reference.authored.assignment import AssignmentFile
 from reference.authored.mechanism import MechanismFile
-from reference.errors import CallError
+from reference.errors import CallError, counted
 
 MODELS: dict[str, tuple[type[BaseModel], Literal["validation", "serialization"]]] = {
     "measurements": (MeasurementsDocument, "validation"),
@@ -94,7 +94,7 @@ def _report(delivery: Delivery, path: Path, lang: str) -> None:
     speaker = tongue(lang)
     words = {name: speaker.gettext(text) for name, text in LABELS.items()}
     is_of_students = delivery.written or delivery.withheld or delivery.unplaced
-    who = f"{len(delivery.written)} students " if is_of_students else ""
+    who = f"{counted(len(delivery.written), 'student')} " if is_of_students else ""
     terminal.note(f"{who}written to {path}")
     for student, label, reasons in delivery.left_out():
         why = ", ".join(clause(reason, speaker) for reason in reasons)

@@ -21,6 +21,7 @@ from grader.cli.terminal import note, tell_next
 from grader.documents import AlikeDocument, MovedDocument, ReadingDocument, ResultsDocument
 from grader.feedback.class_page import CAUSES, SIGNS, trust_sentences, write_demo_page
 from grader.feedback.class_statistics import waiting
+from grader.feedback.words import STATES
 from grader.files import make_folder, samples_folder, shown_text
 from grader.folder.batch import Batch, grade
 from grader.folder.changes import standing_text
@@ -37,7 +38,7 @@ from grader.scan.decode.pages import count_pages
 from grader.scan.page import open_page
 from grader.texts.spoken import failure
 from reference.authored.assignment import Assignment, Variant, load_assignment
-from reference.errors import CallError, InputFileError
+from reference.errors import CallError, InputFileError, counted
 
 
 def grade_folder(folder: Path, name: str, out: Path, options: GradeOptions) -> ResultsDocument:
@@ -261,8 +262,8 @@ def tell_class(results: ResultsDocument, out: Path) -> None:
 
 def _states(results: ResultsDocument) -> str:
     states = Counter(report.status for report in results.reports)
-    told = ", ".join(f"{count} {state.replace('_', ' ')}" for state, count in states.most_common())
-    return f"{len(results.reports)} submissions: {told or 'none'}"
+    told = ", ".join(f"{STATES[state]} {count}" for state, count in states.most_common())
+    return f"{counted(len(results.reports), 'submission')}: {told or 'none'}"
 
 
 def tell_next_of_class(results: ResultsDocument, out: Path, platform: str | None = None) -> None:

@@ -153,7 +153,7 @@ def print_handout(name: str, roster: Path | None, variant: VariantOptions, out: 
         rows = read_roster(roster).rows
     file = "" if roster is None else roster.name
     write_whole(out, make_handout(assignment, rubric_of(assignment), rows, lang, roster=file))
-    note(f"{out}: {len(rows)} task sheet(s) on A4, without the solution")
+    note(f"{out}: {counted(len(rows), 'task sheet')} on A4, without the solution")
 
 
 # match --------------------------------------------------------------------------------------------

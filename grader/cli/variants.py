@@ -23,7 +23,7 @@ from grader.options import CycleOptions, PlanOptions
 from grader.solution.document import plan_documents
 from grader.texts.spoken import failure
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant, load_assignment
-from reference.errors import CallError, MechanismError
+from reference.errors import CallError, MechanismError, counted
 from reference.kinematics.cycle import cycle
 from reference.plan import Plan, exact_plan
 
@@ -72,7 +72,7 @@ def show_class(name: str, options: PlanOptions) -> bool:
         _show_table(assignment, plan)
     for file in (csv, pdf):
         if file is not None:
-            terminal.say(f"{len(variants)} variants written to {file}")
+            terminal.say(f"{counted(len(variants), 'variant')} written to {file}")
     return is_open
 
 

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 from markupsafe import Markup
@@ -37,7 +38,7 @@ from grader.feedback.class_statistics import (
     wrong_scales,
 )
 from grader.feedback.mistakes import MISTAKES
-from grader.feedback.numbers import score_text
+from grader.feedback.numbers import points_text, score_text
 from grader.feedback.words import STATES, VERDICTS, environment, problem_sentence, unmatched_sentence
 from grader.files import result_folders, write_whole
 from grader.language import N_, Tongue, tongue
@@ -109,9 +110,11 @@ def write_index(
     *,
     title: str = "",
     student_names: Mapping[str, str] = NO_NAMES,
+    addresses: Sequence[str] = (),
 ) -> None:
-    """Write `index.html`, the class at a glance, into a folder; `student_names` by student_id."""
-    page = index_page(results, lang, title=title, student_names=student_names, out=str(out_dir))
+    """Write `index.html`, the class at a glance, into a folder; arguments as of `index_page`."""
+    known: dict[str, Any] = {"title": title, "student_names": student_names, "addresses": addresses}
+    page = index_page(results, lang, out=str(out_dir), **known)
     write_whole(out_dir / "index.html", page)
 
 
@@ -122,8 +125,16 @@ def index_page(
     title: str = "",
     student_names: Mapping[str, str] = NO_NAMES,
     out: str = "OUT",
+    addresses: Sequence[str] = (),
 ) -> str:
-    """Return the class's page; `out` is the folder of the results, as commands name it."""
+    """Return the class's page.
+
+    Arguments
+    ---------
+    student_names : by student_id
+    out : the folder of the results, as commands name it
+    addresses : of the review and of the export, on a server, in the place of commands
+    """
     speaker = tongue(lang)
     links = _links(results.reports)
     followed = follow_through(results)
@@ -134,7 +145,7 @@ def index_page(
     return environment(speaker.lang).get_template("index.html").render(
         results=results,
         title=title or results.assignment,
-        steps=_next_steps(results, out),
+        steps=_next_steps(results, out, addresses),
         how_sure=_how_sure(results, speaker),
         trust=list(trust_sentences(results, speaker)),
         reliability=list(_reliability(results, speaker)),
@@ -174,13 +185,15 @@ def needs_review(results: ResultsDocument) -> bool:
     return bool(results.unmatched or results.stale or waiting(results))
 
 
-def _next_steps(results: ResultsDocument, out: str) -> list[tuple[str, str]]:
-    """Return the next steps, each with its command."""
+def _next_steps(
+    results: ResultsDocument, out: str, addresses: Sequence[str] = ()
+) -> list[tuple[str, str, str]]:
+    """Return the next steps, each with its command, or its address."""
     folder = shlex.quote(out)
-    steps = [(REVIEW, f"planmark review {folder}")] if needs_review(results) else []
-    if states(results)["graded"]:
-        steps.append((EXPORT, f"planmark export {folder} --to moodle"))
-    return steps
+    commands = (f"planmark review {folder}", f"planmark export {folder} --to moodle")
+    wanted = (needs_review(results), states(results)["graded"])
+    steps = zip((REVIEW, EXPORT), commands, addresses or ("", ""), wanted, strict=True)
+    return [(text, command, link) for text, command, link, is_wanted in steps if is_wanted]
 
 
 def _how_sure(results: ResultsDocument, speaker: Tongue) -> str:
@@ -357,13 +370,20 @@ def _change_row(
     }
 
 
+def change_lines(results: ResultsDocument, speaker: Tongue) -> Iterator[str]:
+    """Yield a line for each mark that the last run changed: the student, before and now."""
+    for one in results.moved:
+        who = one.student_id if one.position is None else f"{one.student_id}, {one.position}"
+        yield f"{who}: {_standing(one.before, speaker)} → {_standing(one.after, speaker)}"
+
+
 def _standing(standing: StandingDocument | None, speaker: Tongue) -> str:
     if standing is None:
         return "–"
     if standing.score is not None:
-        return speaker.trimmed(standing.score, 2)
+        return points_text(standing.score, speaker)
     if standing.status == "needs_review" and standing.score_range is not None:
-        return "–".join(speaker.trimmed(value, 2) for value in dict.fromkeys(standing.score_range))
+        return "–".join(points_text(value, speaker) for value in dict.fromkeys(standing.score_range))
     return speaker.gettext(STATES[standing.status])
 
 
@@ -371,7 +391,7 @@ def _verdict(verdict: str | None, points: float | None, speaker: Tongue) -> str:
     if verdict is None:
         return "–"
     told = f"{MARKS[verdict]} {speaker.gettext(VERDICTS[verdict])}"
-    return told if points is None else f"{told} ({speaker.trimmed(points, 2)})"
+    return told if points is None else f"{told} ({points_text(points, speaker)})"
 
 
 def _causes(changes: Sequence[MovedDocument]) -> list[tuple[str, int]]:

@@ -7,6 +7,7 @@ from math import floor
 from statistics import mean, median
 
 from grader.documents import CriterionDocument, CriterionMovedDocument, ReportDocument, ResultsDocument
+from grader.feedback.numbers import shown
 from grader.outcomes import CHARGED, CREDITED
 
 BINS = 10
@@ -181,4 +182,4 @@ def _stake(report: ReportDocument) -> float:
     """Return the difference between the largest and the smallest score that are still possible."""
     if report.status == "unreadable" or report.score_range is None:
         return report.max_score
-    return report.score_range[1] - report.score_range[0]
+    return shown(report.score_range[1]) - shown(report.score_range[0])

@@ -60,13 +60,31 @@ def scale_text(value: float | None, name: str, speaker: Tongue) -> str:
 # The score ----------------------------------------------------------------------------------------
 
 
+MOST_DECIMALS = 4
+"""Decimals of points that are shown in full: a quarter of a share of 0.75 has so many."""
+
+
+def shown(points: float) -> float:
+    """Return points as pages show them, so that what is shown adds up: in full, or with two decimals.
+
+    A total that was scaled has no end; the points of criteria have few decimals.
+    """
+    known = round(points, 6)
+    return known if known == round(known, MOST_DECIMALS) else round(known, 2)
+
+
+def points_text(points: float, speaker: Tongue) -> str:
+    """Return points in a language, as `shown` has them."""
+    return speaker.trimmed(shown(points), MOST_DECIMALS)
+
+
 def score_text(report: ReportDocument, speaker: Tongue) -> str:
     """Return the score, its range, or a dash."""
     if report.score is not None:
-        return speaker.trimmed(report.score, 2)
+        return points_text(report.score, speaker)
     if report.score_range is None or report.status in {"missing", "unreadable"}:
         return "–"
-    low, high = (speaker.trimmed(value, 2) for value in report.score_range)
+    low, high = (points_text(value, speaker) for value in report.score_range)
     return low if low == high else f"{low}–{high}"
 
 
@@ -111,14 +129,14 @@ def parts_of(report: ReportDocument) -> list[Part]:
 
 def _settled(report: ReportDocument, parts: Sequence[Part], speaker: Tongue) -> str:
     def points(value: float) -> str:
-        return speaker.trimmed(value, 2)
+        return points_text(value, speaker)
 
     first = parts[0].factor
     known = {
         "sum": points(sum(part.given for part in parts)),
         "judged": points(sum(part.judged for part in parts)),
         "maximum": points(report.max_score),
-        "result": points(sum(part.result for part in parts)),
+        "result": points(_result(report, parts)),
         "terms": " + ".join(f"{points(part.given)} × {speaker.trimmed(part.factor, 4)}" for part in parts),
     }
     is_one = all(math.isclose(part.factor, first) for part in parts)
@@ -126,12 +144,19 @@ def _settled(report: ReportDocument, parts: Sequence[Part], speaker: Tongue) -> 
     return speaker.gettext(text) % known
 
 
+def _result(report: ReportDocument, parts: Sequence[Part]) -> float:
+    """Return the points before a person added any: of a final score to its last decimal."""
+    if report.score is not None:
+        return report.score - report.added
+    return sum(part.result for part in parts)
+
+
 def _open_and_added(report: ReportDocument, parts: Sequence[Part], speaker: Tongue) -> Iterator[str]:
     """Yield the open points, and those that a person added or subtracted."""
     if report.score is None and report.score_range is not None:
-        settled = sum(part.result for part in parts) + report.added
-        low, high = (max(end - settled, 0.0) for end in report.score_range)
-        yield speaker.gettext(WAITS) % {"low": speaker.trimmed(low, 2), "high": speaker.trimmed(high, 2)}
+        settled = shown(_result(report, parts)) + shown(report.added)
+        low, high = (max(shown(end) - settled, 0.0) for end in report.score_range)
+        yield speaker.gettext(WAITS) % {"low": points_text(low, speaker), "high": points_text(high, speaker)}
     if report.added:
         yield added_text(report, speaker)
 
@@ -139,5 +164,5 @@ def _open_and_added(report: ReportDocument, parts: Sequence[Part], speaker: Tong
 def added_text(report: ReportDocument, speaker: Tongue) -> str:
     """Return the points that a person added or subtracted; empty if none."""
     text = ADDED if report.added > 0.0 else TAKEN
-    points = speaker.trimmed(abs(report.added), 2)
+    points = points_text(abs(report.added), speaker)
     return speaker.gettext(text) % {"points": points} if report.added else ""

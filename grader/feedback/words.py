@@ -8,6 +8,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from grader.documents import ProblemDocument, UnmatchedDocument
+from grader.feedback.numbers import points_text
 from grader.feedback.sentences import BETWEEN_RIVALS, RIVALS
 from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
 from grader.overlay.scene import COLOURS, MARKS
@@ -18,12 +19,12 @@ VERDICTS = {
     "partial": N_("nearly right"),
     "none": N_("wrong"),
     "follow_through": N_("consistent with earlier work"),
-    "review": N_("waits for a person"),
+    "review": N_("waiting for review"),
     "not_judged": N_("not judged"),
 }
 STATES = {
     "graded": N_("graded"),
-    "needs_review": N_("needs review"),
+    "needs_review": N_("waiting for review"),
     "unreadable": N_("unreadable"),
     "missing": N_("nothing handed in"),
 }
@@ -111,7 +112,7 @@ def environment(lang: str) -> Environment:
     )
     made.filters["symbols"] = symbols
     made.filters["first_up"] = lambda text: text[:1].upper() + text[1:]
-    made.filters["points"] = lambda value: speaker.trimmed(value, 2)
+    made.filters["points"] = lambda value: points_text(value, speaker)
     made.globals.update(
         speaker=speaker, verdicts=VERDICTS, states_words=STATES, state_marks=STATE_MARKS,
         tones=STATE_TONES, colours=COLOURS, dark_colours=DARK_COLOURS, marks=MARKS,

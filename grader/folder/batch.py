@@ -93,6 +93,7 @@ class Batch(ClassOptions):
     jobs, limits : worker processes, and what a file or a sheet may take in one
     growing : files that are still being written: this run passes them over
     called : what people call files that are stored under other names
+    addresses : of the review and of the export, on a server
     """
 
     assignment: Assignment
@@ -104,6 +105,7 @@ class Batch(ClassOptions):
     limits: Limits = field(default_factory=Limits)
     growing: tuple[Path, ...] = ()
     called: Mapping[Path, str] = field(default_factory=dict)
+    addresses: tuple[str, ...] = ()
 
     @property
     def roster_path(self) -> Path:
@@ -550,7 +552,7 @@ def _write_results(batch: Batch, results: ResultsDocument, students: Sequence[St
     write_documents(batch.out, results)
     names = {submission.student_id: submission.name for submission in students}
     title = batch.assignment.file.title.in_language(batch.lang)
-    write_index(results, batch.out, batch.lang, title=title, student_names=names)
+    write_index(results, batch.out, batch.lang, title=title, student_names=names, addresses=batch.addresses)
     write_parts(batch.out / "results.json", _results_text(batch.out, results))
     note_standings(batch.out / "results.json", results)
 

@@ -22,6 +22,7 @@ from grader.documents import (
     Status,
     Verdict,
 )
+from grader.feedback.numbers import shown
 from grader.files import Stamp, stamp_of, write_whole
 from grader.options import ClassOptions
 from grader.tables.measurements import StudentSubmission
@@ -307,7 +308,9 @@ def standing_text(standing: StandingDocument | None) -> str:
         return "-"
     words = standing.status.replace("_", " ")
     if standing.score is not None:
-        return f"{standing.score:g}" if standing.status == "graded" else f"{standing.score:g} {words}"
+        score = f"{shown(standing.score):g}"
+        return score if standing.status == "graded" else f"{score} {words}"
     if standing.score_range is not None:
-        return f"{standing.score_range[0]:g}..{standing.score_range[1]:g} {words}"
+        low, high = map(shown, standing.score_range)
+        return f"{low:g}..{high:g} {words}"
     return words

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from markupsafe import Markup
 
 from grader.documents import CriterionDocument, Quantity
-from grader.feedback.numbers import quantity_cells
+from grader.feedback.numbers import points_text, quantity_cells
 from grader.feedback.words import VERDICTS, symbols
 from grader.language import N_, Tongue
 from grader.overlay.closeup import LEAST_LOOK_MM, LOOK_MARGIN_MM, box_around
@@ -211,7 +211,7 @@ def _doubt_numbers(
             if cells:
                 yield speaker.gettext(name), Markup.escape(" · ".join(cells))
     points = sum(one.max_points for one in student.report.criteria if one.id in doubt.criteria)
-    yield speaker.gettext("Points"), Markup.escape(f"– / {speaker.trimmed(points, 2)}")
+    yield speaker.gettext("Points"), Markup.escape(f"– / {points_text(points, speaker)}")
 
 
 def _doubt_look(session: Session, student: Student, doubt: Doubt, first: CriterionDocument) -> Facts | None:

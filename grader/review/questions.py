@@ -7,7 +7,7 @@ from urllib.parse import urlencode
 from markupsafe import Markup
 
 from grader.documents import CriterionDocument, FigureDocument, Quantity
-from grader.feedback.numbers import quantity_cells, score_text, tolerance_cells
+from grader.feedback.numbers import points_text, quantity_cells, score_text, tolerance_cells
 from grader.feedback.sentences import feedback_again
 from grader.feedback.words import VERDICTS, problem_sentence, symbols, unmatched_sentence
 from grader.language import N_, Tongue
@@ -57,7 +57,7 @@ TEXTS = {
     "can_finish": N_(
         "You may export now: open submissions have no grade yet. Or continue with the open ones."
     ),
-    "now_finish": N_("Bring the pages up to date and export the grades; then look through the class's page."),
+    "now_finish": N_("Update the marks and the pages now; any decision can still be changed afterwards."),
 }
 """Texts of the script, which fills in the braces."""
 CLASH = N_("%(who)s has decided this in the meantime: %(verdict)s. Yours was not written.")
@@ -112,7 +112,7 @@ def student_facts(
         "number": student.number,
         "place": student.place,
         "label": label_of(student, speaker),
-        "score": f"{score_text(report, speaker)} / {speaker.trimmed(report.max_score, 2)}",
+        "score": f"{score_text(report, speaker)} / {points_text(report.max_score, speaker)}",
         "remark": report.comment,
         "added": report.added,
         "seen": [mark_of(standing.of(student, name)) for name in ("comment", "total")],
@@ -304,8 +304,8 @@ def _numbers(criterion: CriterionDocument, speaker: Tongue) -> Iterator[tuple[st
 
 
 def _points(criterion: CriterionDocument, speaker: Tongue) -> str:
-    given = "–" if criterion.points is None else speaker.trimmed(criterion.points, 2)
-    return f"{given} / {speaker.trimmed(criterion.max_points, 2)}"
+    given = "–" if criterion.points is None else points_text(criterion.points, speaker)
+    return f"{given} / {points_text(criterion.max_points, speaker)}"
 
 
 # Where to look ------------------------------------------------------------------------------------

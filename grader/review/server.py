@@ -11,7 +11,7 @@ import math
 import threading
 import time
 from collections.abc import Awaitable, Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
@@ -28,6 +28,7 @@ from starlette.responses import FileResponse, JSONResponse, RedirectResponse, Re
 from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from grader.feedback.class_page import change_lines
 from grader.feedback.words import VERDICTS, environment
 from grader.language import N_, Tongue, tongue
 from grader.lms.export import export, usual_name
@@ -38,6 +39,7 @@ from grader.review.session import (
     Answer,
     ChangedError,
     Kept,
+    Run,
     Said,
     Session,
     Standing,
@@ -67,19 +69,9 @@ HEADERS = {
     "Cache-Control": "no-store",
 }
 EXPORTS = ("moodle", "canvas", "gradescope")
-WORKING = N_("Bringing the pages up to date: %(done)d of %(total)d")
+WORKING = N_("Updating the pages: %(done)d of %(total)d")
 UP_TO_DATE = N_("The pages are up to date.")
 CLASS_PAGE, TABLE = N_("the class's page"), N_("the table of grades")
-
-
-@dataclass(slots=True)
-class Run:
-    """A run in the background that brings the class up to date."""
-
-    running: bool = False
-    progress: str = ""
-    message: str = ""
-    files: list[dict[str, str]] = field(default_factory=list)
 
 
 @dataclass(slots=True)
@@ -90,13 +82,14 @@ class Review:
     ----------
     token : asked for where the server can be reached from elsewhere
     by : who decides, where another application has let them in; None on the own machine
+    home : there the address of the class's page
     """
 
     session: Session
     lang: str = "en"
     token: str = ""
     by: str | None = None
-    run: Run = field(default_factory=Run)
+    home: str = ""
 
     @property
     def speaker(self) -> Tongue:
@@ -120,6 +113,7 @@ class Review:
             texts=texts,
             by=_user() if self.by is None else self.by,
             is_known=self.by is not None,
+            home=self.home,
             verdicts=VERDICTS,
         )
         return Response(page, media_type="text/html")
@@ -255,9 +249,9 @@ class Review:
 
     def finish(self, said: Said) -> dict[str, Any]:
         """Start to bring all pages up to date and to export."""
-        if not self.run.running:
-            self.run = Run(running=True)
-            threading.Thread(target=self._finish, args=(self.run, said.by), daemon=True).start()
+        if not self.session.run.running:
+            self.session.run = Run(running=True)
+            threading.Thread(target=self._finish, args=(self.session.run, said.by), daemon=True).start()
         return {}
 
     def _finish(self, run: Run, by: str) -> None:
@@ -268,15 +262,18 @@ class Review:
 
         try:
             results = self.session.bring_up_to_date(progress, by).results
+            run.changes = list(change_lines(results, speaker))
+            run.summary = speaker.gettext(UP_TO_DATE)
+            if num := len(run.changes):
+                told = speaker.ngettext("%(num)d mark has changed:", "%(num)d marks have changed:", num)
+                run.summary = told % {"num": num}
+            if self.home:  # which has the exports
+                return
             options = Options(to="csv", what="grades", out=out, lang=self.lang)
             table = out / usual_name(options)
             export(results, table, options)
             run.files = [
-                {
-                    "href": f"out/{name}",
-                    "label": speaker.gettext(label),
-                    "path": str(out / name) if self.by is None else name,
-                }
+                {"href": f"out/{name}", "label": speaker.gettext(label), "path": str(out / name)}
                 for name, label in (("index.html", CLASS_PAGE), (table.name, TABLE))
             ]
         except PlanmarkError as error:
@@ -285,17 +282,12 @@ class Review:
             run.running = False
 
     def finished(self, _request: Request) -> Response:
-        """Return the progress of that run, and the files that it wrote."""
-        out = self.session.batch.out
-        return JSONResponse(
-            {
-                **asdict(self.run),
-                "summary": self.speaker.gettext(UP_TO_DATE),
-                "commands": []
-                if self.by is not None
-                else [f"planmark export {_quoted(out)} --to {name}" for name in EXPORTS],
-            }
-        )
+        """Return the progress of that run, its changes and files, and the page or commands that follow."""
+        out, known = self.session.batch.out, asdict(self.session.run)
+        if self.home:
+            return JSONResponse({**known, "to": f"{self.home}#marks"})
+        commands = [f"planmark export {_quoted(out)} --to {name}" for name in EXPORTS]
+        return JSONResponse({**known, "to": "", "commands": commands})
 
 
 def result_file(folder: Path, name: str) -> FileResponse:
@@ -389,12 +381,15 @@ def _number(value: object) -> float:
 # The application ----------------------------------------------------------------------------------
 
 
-def application(session: Session, lang: str = "en", token: str = "", by: str | None = None) -> Starlette:
+def application(
+    session: Session, lang: str = "en", token: str = "", by: str | None = None, home: str = ""
+) -> Starlette:
     """Return the web application of a class; with a `token`, only for those who have it.
 
-    Arguments: `by` is who decides, where another application has let them in, and guards this one.
+    Arguments: `by` is who decides, where another application has let them in, and guards this one; `home`
+    the address of its page of the class.
     """
-    review = Review(session, lang, token, by)
+    review = Review(session, lang, token, by, home)
     gets: dict[str, Callable[[Request], Response]] = {
         "/": review.index,
         "/audit": review.audit_page,

@@ -21,6 +21,7 @@ from grader.documents import (
     ResultsDocument,
     StandingDocument,
 )
+from grader.feedback.numbers import shown
 from grader.folder.batch import Batch, Graded, Job, graded, pages_read
 from grader.folder.decisions import basis_of, decided, page_basis
 from grader.folder.workers import Pool
@@ -168,6 +169,18 @@ class Change:
     before: tuple[Decision, ...]
 
 
+@dataclass(slots=True)
+class Run:
+    """A run in the background that brings the class up to date, and what a page shows of it."""
+
+    running: bool = False
+    progress: str = ""
+    message: str = ""
+    summary: str = ""
+    changes: list[str] = field(default_factory=list)
+    files: list[dict[str, str]] = field(default_factory=list)
+
+
 Note = Callable[[str, str, str, str], None]
 """Called with a change of a mark: who made it, what it is about, before, after."""
 
@@ -182,7 +195,7 @@ def moves(results: ResultsDocument) -> Iterator[tuple[str, str, str]]:
 def _stands(standing: StandingDocument | None) -> str:
     if standing is None:
         return ""
-    return standing.status if standing.score is None else f"{standing.score:g}"
+    return standing.status if standing.score is None else f"{shown(standing.score):g}"
 
 
 class Standing:
@@ -223,6 +236,7 @@ class Session:
     scans: Scans = field(default_factory=Scans)
     graded: Graded | None = None
     note: Note = lambda *_: None
+    run: Run = field(default_factory=Run)
     _file: DecisionFile = field(init=False)
     _stamp: tuple[int, int] = (0, 0)
     _rows: list[Decision] = field(default_factory=list)

@@ -37,8 +37,8 @@ _LINES = N_(
     "Look at the two lines that meet in its end: from which point, and along or across what, is each?"
 )
 _LETTERS = N_("Look at the letters of its name: from which point of the plan to which does it run?")
-_ENTRY = N_("Look at this entry of your file: its number, unit and column.")
-_SCALE = N_("Write the scale that you used into your file, with its unit, such as 1:5 or 0.005 m/mm.")
+_ENTRY = N_("Look at this entry again: its number and its unit.")
+_SCALE = N_("Give the scale that you used with its unit, such as 1:5 or 0.005 m/mm.")
 SIZE = {
     "driven": N_("Look at the real value that you computed for it, and at the scale that you divided it by."),
     "n": N_("Look at v²/l again: which velocity, which length, and by which scale did you divide?"),
@@ -74,8 +74,8 @@ ADVICE: dict[str, Mapping[str, str]] = {
     "value_too_small": VALUE,
     "value_reversed": {"": N_("Look at your sketch: which way does the relative vector turn the link?")},
     "should_be_zero": {"": N_("Look at which points stand still for an instant here.")},
-    "not_measured": {"": N_("Measure what is missing, and write it into your file.")},
-    "too_short_to_judge": {"": N_("Measure what is missing, and write it into your file.")},
+    "not_measured": {"": N_("Measure what is missing, and enter it.")},
+    "too_short_to_judge": {"": N_("Measure what is missing, and enter it.")},
     "unread": {"": _ENTRY},
     "entry_refused": {"": _ENTRY},
     "near_limit": {"": N_("Measure it again.")},

@@ -98,7 +98,7 @@ OWNERS: dict[str, str] = {
     "several_files": N_("one class file is expected, and there are %(count)s: %(files)s"),
     "uneven": N_(
         "%(pages)s pages that are not blank cannot be %(each)s for each of %(rows)s lines of the roster;"
-        " name the pages in the roster's scans, `planmark match` makes a draft"
+        " name each student's pages in the roster's column scans"
     ),
     "disproved": N_("page %(at)s disproves it: %(claims)s"),
     "id_letters": N_("letters A-Z a-z, digits, '.', '_' and '-', at most 64, are allowed"),

@@ -108,7 +108,7 @@ FAULTS: dict[str, tuple[str, ...]] = {
     "points_negative": (N_("are below 0; points are taken away in a row `total`"),),
     "points_above": (N_("%(given)s points are more than the %(most)s of %(criterion)s"),),
     "points_contradict": (
-        N_("%(verdict)s gives %(most)s points, not %(given)s; leave them blank, or write partial"),
+        N_("the points of %(verdict)s are %(most)s, not %(given)s; leave them blank, or write partial"),
         N_("what is not judged has no points; leave them blank"),
     ),
     "no_node": (N_("'%(text)s' is no node: write node:FIGURE:NODE"),),
@@ -124,7 +124,7 @@ FAULTS: dict[str, tuple[str, ...]] = {
     "page_nothing": (N_("is empty: say owner=STUDENT, turn=90 or corners=x,y x,y x,y x,y"),),
     "page_words": (N_("'%(text)s': owner=, turn= and corners= are known, each once"),),
     "turn_unknown": (N_("turn '%(text)s': one of %(names)s is right"),),
-    "corners_count": (N_("corners has %(count)s places x,y; four are right, parted by blanks"),),
+    "corners_count": (N_("corners: four places x,y, parted by blanks, are right, not %(count)s"),),
     "corners_order": (
         N_("corners: give the upright sheet's from the top left clockwise; no three may lie in a line"),
     ),

@@ -220,7 +220,7 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
         N_("The sheet was not flat when it was photographed or scanned."),
     ),
     "measurements": (
-        N_("The file of measurements cannot be used: %(fault)s, and %(more)s more faults."),
+        N_("The file of measurements cannot be used: %(fault)s; more faults: %(more)s."),
         N_("The file of measurements cannot be used: %(fault)s."),
         N_("The file of measurements has faults."),
     ),
@@ -231,7 +231,7 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
     ),
     "measurement_fault": (
         "%(fault)s",
-        N_("... and %(more)s more faults"),
+        N_("... more faults: %(more)s"),
         N_("A measured value could not be used."),
     ),
     "measurement_columns": (
@@ -294,7 +294,7 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
     "measurements_unmatched": (
         N_("%(student)s differs in case only from %(other)s, and the two would share a folder."),
         N_("%(student)s is not on the roster."),
-        N_("Nothing says whose measurements these are: %(fault)s, and %(more)s more faults."),
+        N_("Nothing says whose measurements these are: %(fault)s; more faults: %(more)s."),
         N_("Nothing says whose measurements these are: %(fault)s."),
         N_("Nothing says whose measurements these are."),
     ),
@@ -328,7 +328,7 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
         N_("The roster's order cannot be used for these pages."),
     ),
     "scan_missing": (
-        N_("%(student)s has %(scan)s among the scans, and the file has only %(pages)s pages."),
+        N_("%(student)s has %(scan)s among the scans, and the last page of the file is %(pages)s."),
         N_("%(student)s has %(scan)s among the scans, which is not in the folder. Is %(near)s meant?"),
         N_("%(student)s has %(scan)s among the scans, which is not in the folder."),
         N_("A scan that the roster names is not there."),
@@ -344,11 +344,11 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
         N_("The file ended the program that read it; scan or export it again."),
     ),
     "too_slow": (
-        N_("It took more than %(limit)s: scan or export it again, or raise --time-limit."),
+        N_("It took more than %(limit)s: scan or export it again, or raise the time limit."),
         N_("Reading the file took too long; scan or export it again."),
     ),
     "too_much_memory": (
-        N_("It needs more than %(limit)s MB of memory: scan or export it again, or raise --memory-limit."),
+        N_("It needs more than %(limit)s MB of memory: scan or export it again, or raise the memory limit."),
         N_("Reading the file took too much memory; scan or export it again."),
     ),
     "internal_error": (

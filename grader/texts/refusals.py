@@ -35,6 +35,7 @@ REFUSALS: dict[str, str] = {
     "no_photo": N_("there is no such photo"),
     "no_platform": N_("there is no such platform"),
     "no_export": N_("there are exports for: %(known)s"),
+    "no_receipt": N_("no sheet with this receipt was handed in here"),
     "no_request": N_("there is no such request"),
     "no_result": N_("there is no result: grade the class first"),
     "no_student": N_("there is no such student on the roster"),
@@ -49,16 +50,18 @@ REFUSALS: dict[str, str] = {
         "checking the photos of this class took too long: use your personal link, or try again in an hour"
     ),
     "pages_of_photo": N_("this file has %(pages)s pages: send %(most)s at most"),
-    "pages": N_("this file has %(pages)s pages: %(left)s more may be handed in"),
+    "pages": N_("too many pages: %(pages)s in this file, and %(left)s may still be handed in"),
     "sheets": N_("you have already handed in %(count)s sheets"),
     "no_sheets_now": N_("sheets are not handed in here now"),
+    "deadline_over": N_("the deadline was %(at)s: nothing can be handed in any more; ask your instructor"),
     "not_open": N_("the self-check is not open now"),
     "not_released": N_("the feedback is not released yet"),
-    "attempts_used": N_("all %(count)s attempts are used"),
+    "attempts_used": N_("no attempt is left (allowed: %(count)s)"),
     "file_type": N_("send a photo or scan: JPEG, PNG, TIFF, HEIC or PDF"),
     # Instructors
     "job_runs": N_("the class is being graded: cancel that, or wait for its end"),
     "assignment_missing": N_("no assignment is chosen yet"),
+    "time_refused": N_("“%(given)s” is no date with a time: write 2026-12-01T23:59"),
     "file_unknown": N_("there is no file “%(name)s”"),
     "file_elsewhere": N_("%(file)s: “%(name)s” is not in its own folder; upload it beside it"),
     "file_exists": N_(

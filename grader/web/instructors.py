@@ -1,12 +1,14 @@
 """Actions of instructors: publish, upload, grade, release, export, answer, delete."""
 
 import pathlib
+import re
 import secrets
 import shutil
 import tempfile
 import time
 from collections.abc import Mapping
 from contextlib import suppress
+from functools import lru_cache
 from pathlib import PurePath
 from types import MappingProxyType
 from typing import Annotated, Any
@@ -19,8 +21,9 @@ from sqlalchemy.orm import Session
 
 from grader.authoring.lint import lint, lint_document
 from grader.documents import LintDocument
+from grader.feedback.class_statistics import states, waiting
 from grader.folder.workers import result_of
-from grader.language import tongue
+from grader.language import N_, tongue
 from grader.lms.export import TARGETS, export, read_results, usual_name
 from grader.lms.grades import Delivery, Options, people_of
 from grader.lms.table import with_ids
@@ -40,7 +43,21 @@ from grader.web.places import (
     store,
     stored_name,
 )
-from grader.web.service import FILE_BODY, LARGEST_ROW, Body, Call, Called, Files, Key, Own, Route, Row
+from grader.web.service import (
+    FILE_BODY,
+    LARGEST_ROW,
+    Body,
+    Call,
+    Called,
+    Files,
+    Key,
+    Own,
+    Route,
+    Row,
+    moment,
+    text_of,
+    time_of,
+)
 from grader.web.store import (
     UNFINISHED,
     Account,
@@ -64,10 +81,12 @@ from grader.web.students import (
     check_pages,
     pages_in,
     queued,
+    receipt_of,
     state_of,
     trial_of,
 )
 from reference.authored.assignment import built_in
+from reference.errors import PlanmarkError
 
 router = APIRouter(route_class=Route, prefix="/api/v1", tags=["instructors"])
 FileName = Annotated[str, Path(max_length=400)]
@@ -79,6 +98,8 @@ StudentId = Annotated[str, Path(pattern=r"^[A-Za-z0-9._-]{1,80}$")]
 
 
 SETTINGS = tuple(one.name for one, _ in offered(PublicationOptions))
+TIMES = {"deadline", "release_at"}
+OPEN_ONES = N_("Submissions without a final mark: %(waiting)s; criteria still open: %(open)s.")
 
 
 class Settings(model_of("Settings", PublicationOptions, Strict, SETTINGS)):  # type: ignore[misc]
@@ -123,6 +144,7 @@ def publication(call: Called, own: Own) -> dict[str, Any]:
         "job": None if job is None else state_of(call, job).model_dump(),
         "requests": len(unanswered(call.session, own)),
         "has_results": (places.results / "results.json").is_file(),
+        "standing": standing_of(places),
         "has_activities": call.session.scalar(select(LtiActivity.id).where(of_own).limit(1)) is not None,
     }
 
@@ -136,10 +158,11 @@ def lint_assignment(call: Called, own: Own) -> LintDocument:
 
 @router.patch("/publications/{key}")
 def change(call: Called, own: Own, settings: Settings) -> dict[str, Any]:
-    """Change settings."""
+    """Change settings; the answer to a release has a ``warning`` where a person must still look."""
     change_settings(call, own, settings)
     call.note("changed", f"{own.key} {', '.join(settings.model_fields_set)}")
-    return facts(own)
+    told = open_ones(standing_of(call.places(own)), call.lang) if own.is_released else ""
+    return {**facts(own), **({"warning": told} if told else {})}
 
 
 @router.delete("/publications/{key}")
@@ -189,6 +212,8 @@ def change_settings(call: Call, publication: Publication, settings: Settings) ->
     for name in ("attempts", "pages_per_student"):
         if given.get(name) == 0:
             given[name] = None
+    for name in TIMES & given.keys():
+        given[name] = time_of(given[name])
     for name, value in given.items():
         setattr(publication, name, value)
     if "assignment" in given or given.get("is_open"):
@@ -210,10 +235,43 @@ def linted(data: pathlib.Path, key: str, name: str) -> LintDocument:
     return lint_document(lint(assignment, rubric_of(assignment)))
 
 
+def standing_of(places: Places) -> dict[str, Any] | None:
+    """Return how a class stands by its results, and whether there are later decisions; None without any.
+
+    ``states`` counts the submissions, of which ``waiting`` wait for a person with ``open`` criteria, whose
+    ``titles`` are there by their ids.
+    """
+    with suppress(OSError, PlanmarkError):  # the class can be graded again
+        at = (places.results / "results.json").stat().st_mtime_ns
+        decisions = places.handed_in / "decisions.csv"
+        return {
+            **_standing(places.results, at),
+            "is_behind": decisions.is_file() and decisions.stat().st_mtime_ns > at,
+        }
+    return None
+
+
+def open_ones(standing: dict[str, Any] | None, lang: str) -> str:
+    """Return how much a person must still look at, in words; empty if there is nothing."""
+    return tongue(lang).gettext(OPEN_ONES) % standing if standing and standing["waiting"] else ""
+
+
+@lru_cache(maxsize=64)
+def _standing(out: pathlib.Path, _written_ns: int) -> dict[str, Any]:
+    results = read_results(out)
+    left = waiting(results)
+    return {
+        "states": {state: count for state, count in states(results).items() if count},
+        "unmatched": len(results.unmatched), "waiting": len(left),
+        "open": sum(len(one.criteria) for one in left), "titles": results.titles,
+    }  # fmt: skip
+
+
 def facts(publication: Publication) -> dict[str, Any]:
     """A publication's settings."""
     members = [{"id": one.id, "name": one.name} for one in publication.members]
-    return {**columns_of(publication, "key", *SETTINGS, "created"), "members": members}
+    times = {name: text_of(getattr(publication, name)) for name in TIMES}
+    return {**columns_of(publication, "key", *SETTINGS, "created"), **times, "members": members}
 
 
 def students_of(places: Places) -> list[dict[str, Any]]:
@@ -288,6 +346,20 @@ def put_file(call: Called, own: Own, name: FileName, body: Body, *, replace: boo
             trial.unlink()
     call.note("file", f"{own.key} {called}")
     return {"name": called, "is_same": is_same}
+
+
+@router.get("/publications/{key}/receipts")
+def find_receipt(
+    call: Called, own: Own, code: Annotated[str, Query(max_length=20, description="as on the receipt")]
+) -> dict[str, str]:
+    """The version that a student's receipt names; its file may have been deleted since."""
+    wanted = re.sub(r"[^A-Z2-7]", "", code.upper().translate(str.maketrans("01", "OI")))
+    for sheet in call.session.scalars(select(Sheet).where(Sheet.publication_id == own.id)):
+        if sheet.student_id and receipt_of(sheet).replace("-", "") == wanted:
+            shown = f" ({sheet.shown})" if sheet.shown else ""
+            told = f"{sheet.student_id}, {moment(sheet.sent)}: {sheet.file}{shown}"
+            return {"student_id": sheet.student_id, "file": sheet.file, "told": told}
+    raise missing("receipt")
 
 
 @router.delete("/publications/{key}/files/{name:path}")

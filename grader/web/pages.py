@@ -1,13 +1,15 @@
 """The pages for browsers. All changes go through the routes of the API."""
 
-from datetime import UTC, datetime
+import time
 from functools import cache
 from importlib.resources import files
 from typing import Annotated, Any
 
+import segno
 from fastapi import APIRouter, Query
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from jinja2 import Environment, PackageLoader
+from markupsafe import Markup
 
 from grader.feedback.words import STATES, environment
 from grader.language import LANGUAGES, N_, tongue
@@ -17,7 +19,7 @@ from grader.web import accounts, claims, instructors, lti, students
 from grader.web.guard import HEADERS, missing
 from grader.web.places import assignment_of
 from grader.web.self_check import form_of
-from grader.web.service import Call, Called, Key, Own, Route
+from grader.web.service import Call, Called, Key, Own, Route, moment
 from reference.authored.assignment import built_in
 
 router = APIRouter(route_class=Route, include_in_schema=False)
@@ -36,7 +38,8 @@ TEXTS = {
     "refused": N_("These files were not taken:"),
     "sure": N_("This cannot be undone. Go on?"),
     "mailed": N_("If this is an account's address, a link to a new password is on its way."),
-    "sent": N_("Your request waits for the instructor."),
+    "sent": N_("Your instructor has your request."),
+    "receipt": N_("receipt"),
     "queued": N_("Waiting ..."),
     "opening": N_("Opening files"),
     "looking_at": N_("Looking at pages"),
@@ -44,7 +47,9 @@ TEXTS = {
     "in_file": N_("Students in the file: %(count)s."),
     "withheld": N_("withheld"),
     "unplaced": N_("no place in the file"),
+    "copied": N_("Copied."),
 }
+QR_CODE = N_("The address as a QR code")
 
 
 @cache
@@ -52,7 +57,7 @@ def _environment(lang: str) -> Environment:
     made = environment(lang).overlay(loader=PackageLoader("grader.web"))
     speaker = tongue(lang)
     made.globals["texts"] = {name: speaker.gettext(text) for name, text in TEXTS.items()}
-    made.filters["moment"] = lambda at: f"{datetime.fromtimestamp(at, UTC):%Y-%m-%d %H:%M:%S}"
+    made.filters["moment"] = moment
     made.globals["languages"] = {one: tongue(one).name for one in LANGUAGES}
     return made
 
@@ -109,16 +114,17 @@ def self_check(call: Called, key: Key) -> Response:
     link = call.link(publication)
     if link is None:
         students.open_for_checks(call, key)
-        own, requests, sheets = [], [], []
+        own, requests, sheets = [], [], list[dict[str, Any]]()
     else:
-        own = students.own_reports(call, link) if publication.is_released else []
+        own = students.own_reports(call, link) if publication.shows_feedback else []
         requests, sheets = students.own_requests(call, key), students.own_sheets(call, key)
     assignment = assignment_of(call.service.settings.data, publication)
     rows = call.places(publication).students() if link is not None else ()
     row = next((one for one in rows if link is not None and one.student_id == link.student_id), None)
     return page(
         call, "self_check.html", publication=publication, form=form_of(assignment, call.lang), link=link,
-        own=own, requests=requests, sheets=sheets, row=row,
+        own=own, requests=requests, sheets=sheets, row=row, takes_sheets=link and publication.takes_sheets,
+        titles={one.id: one.title for _folder, report in own for one in report.criteria},
         is_open=publication.is_open or call.visitor.is_member(publication),
     )  # fmt: skip
 
@@ -137,10 +143,15 @@ def publication(call: Called, own: Own) -> Response:
     """Show an instructor's page of a class."""
     known = instructors.publication(call, own)
     links = {one["student_id"]: one for one in instructors.links(call, own) if not one["is_revoked"]}
+    address = f"{call.service.settings.address}/c/{own.key}"
+    title = tongue(call.lang).gettext(QR_CODE)
+    code = segno.make(address, micro=False).svg_inline(omitsize=True, light="#fff", title=title)
     return page(
         call, "publication.html", one=known, links=links, requests=instructors.requests(call, own),
         assignments=built_in(), colleagues=accounts.listed(call), platforms=TARGETS, states=STATES,
-        claims=claims.listed(call, own), address=f"{call.service.settings.address}/c/{own.key}",
+        open_ones=instructors.open_ones(known["standing"], call.lang),
+        zone=moment(time.time()).split(" ", 2)[2],
+        claims=claims.listed(call, own), address=address, picture=Markup(code),  # noqa: S704 - segno's
     )  # fmt: skip
 
 

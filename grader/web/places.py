@@ -220,4 +220,5 @@ def batch_of(data: Path, publication: Publication, jobs: int = 1) -> Batch:
         assignment, rubric_of(assignment), places.handed_in, places.results,
         pages_per_student=publication.pages_per_student, jobs=jobs, lang=publication.lang,
         called=places.called(),
+        addresses=(f"/review/{publication.key}/", f"/publications/{publication.key}#export"),
     )  # fmt: skip

@@ -43,7 +43,7 @@ class Reviews:
         if not path and not scope["path"].endswith("/"):
             await RedirectResponse(f"{scope['path']}/", 307)(scope, receive, send)
             return
-        app = application(session, lang, by=name)
+        app = application(session, lang, by=name, home=f"/publications/{key}")
         await app({**scope, "path": f"/{path}", "root_path": ""}, receive, send)
         if scope["method"] == "POST":
             await run_in_threadpool(self._answer, key, session, name)

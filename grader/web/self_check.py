@@ -4,23 +4,27 @@ Nothing in it gives the answer away: the level says how much is told, and no exp
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from grader.comparison.task import task_of
 from grader.feedback.student_page import AS_MEASURED, SHEET
 from grader.feedback.words import symbols
-from grader.language import tongue
+from grader.language import Tongue, tongue
 from grader.options import Level
+from grader.outcomes import Outcome
 from grader.overlay.closeup import page_views, scan_element, svg
 from grader.overlay.measured import measured_picture
 from grader.overlay.scene import Picture
+from grader.records import Reason
 from grader.rubric import rubric_of
-from grader.self_check.advice import RESULTS, CheckedLine
+from grader.self_check.advice import RESULTS, CheckedLine, advice_on
 from grader.self_check.values import check_values
 from grader.tables.measurements import NOTHING_MEASURED, columns_of, measurements_in, names_of
-from grader.texts.spoken import PLACES, RefusedError
+from grader.texts.reasons import reason_sentence
+from grader.texts.spoken import PLACES, RefusedError, clause, message
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.quantities import SCALE_UNITS, unit_of
 
@@ -76,14 +80,33 @@ def checked_values(
     entered = measurements_in(filled, names_of(assignment), "", lang) if filled else NOTHING_MEASURED
     check = check_values(entered, assignment, variant, tongue(lang), level)
     outcomes = {} if check.judgement is None else {one.name: one for one in check.judgement.outcomes}
+    speaker = tongue(lang)
+    told = (*entered.problems, *entered.reading.problems)
+    fields = dict(_faults(told, outcomes, speaker))
     construction = task_of(assignment, rubric_of(assignment), variant).construction
     picture = measured_picture("", entered.reading, construction, outcomes, show_expected=False)
     return {
-        "lines": _lines(check.lines, lang),
-        "is_right": check.is_all_right,
-        "problems": list(check.problems),
+        "lines": [line for line in _lines(check.lines, lang) if line["name"] not in fields],
+        "is_right": check.is_all_right and not fields,
+        "problems": [message(one, speaker) for one in told if "cell" not in one.parameters],
+        "fields": fields,
         "drawing": [] if picture is None else _drawings([picture], assignment, lang),
     }
+
+
+def _faults(
+    problems: Sequence[Reason], outcomes: Mapping[str, Outcome], speaker: Tongue
+) -> Iterator[tuple[str, str]]:
+    """Yield what is wrong with a field that cannot be used, by its column."""
+    for one in problems:
+        if "cell" in one.parameters:
+            why = replace(one, code=str(one.parameters["why"]))
+            yield str(one.parameters["cell"]), clause(why, speaker)
+    for name, outcome in outcomes.items():
+        for one in outcome.reasons:
+            if one.code == "scale_refused":
+                advice = speaker.gettext(advice_on([one], name, ""))
+                yield name, f"{reason_sentence(one, speaker, 'hint')} {advice}"
 
 
 def _with_unit(column: str, text: str) -> str:

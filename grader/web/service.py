@@ -1,7 +1,9 @@
 """Parameters of every route: the visitor, the publication, the body, the parts of the server."""
 
 from collections.abc import Awaitable, Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import wraps
 from typing import Annotated, Any, TypeVar
 
@@ -140,6 +142,24 @@ class Call:
     def places(self, publication: Publication) -> Places:
         """Return a publication's folders."""
         return places_of(self.service.settings.data, publication)
+
+
+def moment(at: float) -> str:
+    """Return a time as people read it, in the server's zone: ``2026-12-01 23:59:00 EET``."""
+    return f"{datetime.fromtimestamp(at, UTC).astimezone():%Y-%m-%d %H:%M:%S %Z}"
+
+
+def time_of(text: str) -> float | None:
+    """Return a time, the server's if no zone is given; None for an empty text. Raises RefusedError."""
+    with suppress(ValueError, OverflowError, OSError):
+        if not text or ":" in text:  # a day alone would be its first minute
+            return datetime.fromisoformat(text).timestamp() if text else None
+    raise RefusedError(422, "time_refused", given=text)
+
+
+def text_of(at: float | None) -> str:
+    """Return a time so that `time_of` takes it, with the server's zone; empty for None."""
+    return "" if at is None else datetime.fromtimestamp(at, UTC).astimezone().isoformat(timespec="minutes")
 
 
 class Route(APIRoute):

@@ -98,6 +98,7 @@ class Publication(Table):
     attempts : allowed for each student and variant; None for any number
     is_open, is_released : whether students may check, and whether they see their feedback
     takes_sheets : whether students may hand in sheets by their personal links
+    deadline, release_at : until when they may, and from when they see feedback that is released
     """
 
     __tablename__ = "publications"
@@ -114,7 +115,19 @@ class Publication(Table):
     takes_sheets: Mapped[bool] = mapped_column(default=False)
     pages_per_student: Mapped[int | None] = mapped_column(default=None)
     created: Mapped[float] = mapped_column(default=time.time)
+    deadline: Mapped[float | None] = mapped_column(default=None)
+    release_at: Mapped[float | None] = mapped_column(default=None)
     members: Mapped[list[Account]] = relationship(secondary="members", lazy="selectin")
+
+    @property
+    def is_over(self) -> bool:
+        """True after the deadline."""
+        return self.deadline is not None and self.deadline < time.time()
+
+    @property
+    def shows_feedback(self) -> bool:
+        """True if students see their feedback now."""
+        return self.is_released and (self.release_at or 0.0) <= time.time()
 
 
 class Member(Table):

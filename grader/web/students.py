@@ -1,5 +1,6 @@
 """Actions of students: check values and photos, see their feedback, hand in, ask for regrading."""
 
+import base64
 import contextlib
 import hashlib
 import re
@@ -30,7 +31,7 @@ from grader.texts.spoken import RefusedError, refusal
 from grader.web.guard import forbidden, missing
 from grader.web.places import assignment_of
 from grader.web.self_check import checked_values, form_of, variant_of
-from grader.web.service import FILE_BODY, Call, Called, Key, Route, body_after
+from grader.web.service import FILE_BODY, Call, Called, Key, Route, body_after, moment
 from grader.web.store import Attempt, Job, Link, Publication, Regrading, Sheet, columns_of
 from reference.authored.assignment import Variant
 from reference.errors import InputFileError
@@ -84,10 +85,15 @@ class Line(BaseModel):
 
 
 class Told(BaseModel):
-    """The result of a self-check: `drawing` are SVG elements, `attempts_left` is null without a limit."""
+    """The result of a self-check.
+
+    `fields` says by column what could not be used; `drawing` are SVG elements; `attempts_left` is null
+    without a limit.
+    """
 
     lines: list[Line]
     problems: list[str]
+    fields: dict[str, str] = {}
     drawing: list[str]
     is_right: bool
     attempts_left: int | None = None
@@ -280,6 +286,8 @@ def may_hand_in(call: Called, key: Key) -> Link:
     link = personal(call, call.publication(key))
     if not link.publication.takes_sheets:
         raise forbidden("no_sheets_now")
+    if link.publication.is_over:
+        raise RefusedError(403, "forbidden", "deadline_over", at=moment(link.publication.deadline or 0.0))
     call.count("photo")
     call.session.commit()
     return link
@@ -352,7 +360,14 @@ def own_sheets(call: Called, key: Key) -> list[dict[str, Any]]:
 
 def version_of(sheet: Sheet) -> dict[str, Any]:
     """Return a version as pages show it."""
-    return {"file": sheet.file, "name": sheet.shown, "sent": sheet.sent}
+    known = {"file": sheet.file, "name": sheet.shown, "sent": sheet.sent}
+    return {**known, "at": moment(sheet.sent), "code": receipt_of(sheet)}
+
+
+def receipt_of(sheet: Sheet) -> str:
+    """Return the code by which the student and the instructor name a version: ``K7MQ-2XA4``."""
+    code = base64.b32encode(hashlib.sha256(sheet.file.encode()).digest()).decode()
+    return f"{code[:4]}-{code[4:8]}"
 
 
 # What they share ----------------------------------------------------------------------------------
@@ -395,7 +410,7 @@ def personal(call: Call, publication: Publication) -> Link:
 def released(call: Call, key: str) -> Link:
     """Return the student's personal link. Raises RefusedError where the feedback is not released."""
     link = personal(call, call.publication(key))
-    if not link.publication.is_released:
+    if not link.publication.shows_feedback:
         raise forbidden("not_released")
     return link
 

@@ -20,7 +20,7 @@ from pydantic import (
 
 from reference.authored import formula
 from reference.authored.formula import Formula
-from reference.errors import MOST_FINDINGS, AuthoredFileError, Finding, look_alikes, near_names
+from reference.errors import MOST_FINDINGS, AuthoredFileError, Finding, counted, look_alikes, near_names
 
 LENGTH_UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 MAX_BYTES = 200_000
@@ -261,7 +261,7 @@ def findings_of(error: ValidationError, model: type[BaseModel]) -> Iterator[Find
             message.replace("Input should be a valid", "must be a").replace("Input should be", "must be"),
         )
     if len(faults) > MOST_FINDINGS:
-        yield Finding("$", f"and {len(faults) - MOST_FINDINGS} more faults")
+        yield Finding("$", f"and {counted(len(faults) - MOST_FINDINGS, 'more fault')}")
 
 
 _GROUP_TYPES = ("RRR", "RRP", "RPR", "PRP", "RPP", "plate", "point_on_line", "point")

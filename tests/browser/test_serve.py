@@ -5,10 +5,13 @@ import shutil
 import socket
 import threading
 import time
+from io import BytesIO
 from pathlib import Path
 
 import pytest
 import uvicorn
+import zxingcpp
+from PIL import Image
 
 from grader.files import samples_folder
 from grader.folder.batch import grade
@@ -62,8 +65,8 @@ class Served:
         self.uvicorn.should_exit = True
         self.thread.join()
 
-    def graded_class(self, lang):
-        """A released class of one student with a scan: its key and the student's personal link."""
+    def graded_class(self, lang, *scans):
+        """A released class of one student with scans: its key and the student's personal link."""
         with self.store.session() as session:
             one = Publication(
                 assignment="pump", title="Pump, group 3", lang=lang, is_open=True, is_released=True,
@@ -73,7 +76,7 @@ class Served:
             session.add_all([one, link])
             session.flush()
             folder = places_of(self.settings.data, one).handed_in
-            copied(folder, "roster.csv", "s01_1.jpg")
+            copied(folder, "roster.csv", *(scans or ["s01_1.jpg"]))
             grade(batch_of(self.settings.data, one), lambda *_: None, Inline())
             token = application_link(self.settings, link)
             return one.key, token
@@ -132,6 +135,8 @@ class Visit:
         for _ in range(2 * wanted + 10):
             page.keyboard.press("Tab")
             place, is_shown = page.evaluate(FOCUSED)
+            if reached and place == reached[-1]:  # within a date: day, month, year
+                continue
             if place < 0 or place in reached:
                 break
             reached.append(place)
@@ -177,6 +182,54 @@ def visit(chromium, served, tmp_path):
         one.end()
 
 
+def joined(instructor):
+    """The browser, in which the first administrator has made the account."""
+    page = instructor.page
+    page.goto(first_invitation(instructor.served.settings))
+    page.fill("#name", "admin")
+    page.fill("#password", PASSWORD)
+    page.click("main form button")
+    page.wait_for_url(f"{instructor.served.address}/")
+    return page
+
+
+def follows(page, first, second):
+    """Whether a part of the page stands right behind another one."""
+    return page.evaluate(f"document.querySelector('{first}').nextElementSibling.matches('{second}')")
+
+
+SHOWN = """() => !document.body.dataset.busy && document.body.dataset.ready
+    && !document.getElementById("question").hidden"""
+
+
+def test_the_last_answer_leads_to_the_class_with_its_marks_and_the_export(served, visit):
+    key, _ = served.graded_class("en", "s02_1.jpg", "s02_2.jpg")
+    page = joined(visit())
+    address = f"{served.address}/publications/{key}"
+    page.goto(address)
+    assert "waiting for review: 1" in page.inner_text("#marks").lower()
+    page.click(f"a[href='/review/{key}/']")
+    while "/review/" in page.url:
+        page.wait_for_function(SHOWN)
+        before = page.evaluate("document.body.dataset.shown")
+        page.keyboard.press("Enter" if page.is_enabled("#accept") else "1")
+        page.wait_for_function(f"() => document.body.dataset.shown !== {before!r}")
+    assert page.url == f"{address}#marks"
+    assert "waiting for review" not in page.inner_text("#marks").lower()
+    with page.expect_download() as download:
+        page.click("#export button")
+    assert "s02" in Path(download.value.path()).read_text(encoding="utf-8")
+    page.click(f"a[href='/publications/{key}/results/index.html']")
+    page.wait_for_url("**/index.html")
+    page.click(f"a[href='/publications/{key}#export']")
+    page.wait_for_selector("#export")
+    # What was pressed by mistake is taken back where it was decided.
+    page.click(f"a[href='/review/{key}/']")
+    page.wait_for_selector("#done:visible")
+    page.keyboard.press("u")
+    page.wait_for_function(SHOWN)
+
+
 LOCALES = ("en-US", "ro-RO", "ru-RU")
 PLATFORM = {
     "issuer": "https://moodle.example.org", "client_id": "planmark", "deployments": "1\n2",
@@ -187,7 +240,7 @@ PLATFORM = {
 
 
 @pytest.mark.parametrize("locale", LOCALES)
-def test_a_student_checks_values_and_a_photo_and_asks_again(served, visit, locale):
+def test_a_student_checks_values_and_a_photo_and_asks_again(served, visit, locale):  # noqa: PLR0915 - one story
     lang = locale[:2]
     key, link = served.graded_class(lang)
     student = visit(locale)
@@ -206,19 +259,32 @@ def test_a_student_checks_values_and_a_photo_and_asks_again(served, visit, local
     assert page.locator("#result .r-off, #result .r-open").count()
     assert "19" in page.inner_text("#left")
     student.look(f"{name}-checked")
+    assert follows(page, "#check", "#result")
+    page.fill("#f-v_A", "abc")
+    page.click("#check button")
+    page.wait_for_selector("#f-v_A[aria-invalid] + .fault")
+    assert page.evaluate("document.activeElement.id") == "f-v_A"
+    assert page.get_attribute("#f-v_A", "aria-describedby").split()[0] == "fault-f-v_A"
+    student.look(f"{name}-fault")
+    page.fill("#f-v_A", "60,0")
     page.fill("#in-n", "999")
     page.click("#check button")
-    page.wait_for_selector("#check .said:not(:empty)")
+    page.wait_for_selector("#in-n[aria-invalid] + .fault")
+    assert page.locator(".fault").count() == 1
     student.faults = [fault for fault in student.faults if "422" not in fault]
     page.fill("#in-n", "7")
     page.set_input_files("#picture", SAMPLES / "s01_1.jpg")
     page.evaluate("document.getElementById('result').replaceChildren()")
     page.click("#photo button")
     page.locator("#result h2").first.wait_for()
+    assert follows(page, "#photo", "#result")
     student.look(f"{name}-photo")
     page.click("#hand-in")
-    page.wait_for_selector("#photo .said.good:not(:empty)")
-    assert "s01_sent2" in page.inner_text("#photo .said")
+    page.wait_for_selector("#sheets:visible")
+    receipt = page.inner_text("#sheets li")
+    assert "s01_1.jpg" in receipt
+    page.reload()
+    assert page.inner_text("#sheets li") == receipt
     page.click("main summary >> nth=0")
     page.fill("#why", "The arrow of a_B is there.")
     student.look(f"{name}-asks")
@@ -262,6 +328,12 @@ def test_an_instructor_publishes_grades_and_gives_back(served, visit, locale):  
     page.wait_for_url("**/publications/*")
     address, key = page.url, page.url.rpartition("/")[2]
     instructor.look(f"{name}-published")
+    instructor.context.grant_permissions(["clipboard-read"])
+    page.click("[data-copy]")
+    page.wait_for_selector("[data-copy] ~ [role=status]:not(:empty)")
+    assert page.evaluate("navigator.clipboard.readText()") == f"{served.address}/c/{key}"
+    read = zxingcpp.read_barcode(Image.open(BytesIO(page.locator(".wall svg").screenshot())))
+    assert read.text == f"{served.address}/c/{key}"
     with page.expect_response(f"**/api/v1/publications/{key}"):
         page.check("[name=is_open]")
     with page.expect_navigation():
@@ -272,6 +344,10 @@ def test_an_instructor_publishes_grades_and_gives_back(served, visit, locale):  
     page.wait_for_selector("#job:not([hidden])")
     instructor.look(f"{name}-grading", axe=False)
     page.wait_for_selector(f"a[href='/publications/{key}/results/index.html']")
+    page.fill("#deadline", "2126-12-01T23:59")
+    with page.expect_navigation():
+        page.click("form:has(#deadline) button")
+    assert page.input_value("#deadline") == "2126-12-01T23:59"
     with page.expect_response(f"**/api/v1/publications/{key}"):
         page.check("[name=is_released]")
     with page.expect_navigation():

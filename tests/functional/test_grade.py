@@ -257,7 +257,7 @@ def test_the_page_of_a_self_check_has_no_points_and_sends_nobody_to_a_person(pla
     page = tmp_path / "mine.html"
     assert planmark("check", "pump", "--n", 7, "--measured", file, "--page", page).returncode == 1
     text = page.read_text(encoding="utf-8")
-    for word in ("needs review", "waits for a person", "Points", "score is", "/ 43"):
+    for word in ("waiting for review", "Points", "score is", "/ 43"):
         assert word not in text
     assert 'class="score' not in text
     assert "Look at" in text

@@ -66,7 +66,7 @@ def test_a_decision_is_in_the_results_when_the_review_has_ended(graded):
     served.send_signal(signal.SIGINT)
     said, _ = served.communicate(timeout=PATIENCE_S)
     assert served.returncode == 0, said
-    assert "1 submissions" in said
+    assert "1 submission: " in said
     report = json.loads((graded / "out" / "s07" / "report.json").read_text(encoding="utf-8"))
     decided = {one["id"]: one["decided"] for one in report["criteria"] if one["decided"]}
     assert decided["v_A"]["by"] == "Ana"

@@ -92,6 +92,12 @@ def test_names_that_the_mechanism_does_not_have_are_faults(rubric):
     assert faults == ["$.criterion[0].vector", "$.criterion[1].angular", "$.criterion[2].link"]
 
 
+def test_what_a_section_is_worth_is_divided_into_cents_that_add_up(rubric):
+    named = "".join(criterion(f'vector = "v_{name}"', f"v_{name}") for name in "ABC")
+    points = rubric("[weights]\nvelocity_plan = 10\n" + named).points
+    assert sorted(points.values()) == [3.33, 3.33, 3.34]
+
+
 def test_weights_scale_the_points_of_a_section_and_leave_the_others(rubric):
     found = rubric(
         "[weights]\nvelocity_plan = 10\n"

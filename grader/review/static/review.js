@@ -7,7 +7,7 @@ const EIGHT = 8, MOST_KEPT = 12, KEPT_KEYS = "56789", PART_OF_POINTS = ["partial
 
 const state = {
   students: new Map(), rows: new Map(), version: -1, mode: "student", list: [], at: 0, question: null, busy: false,
-  comments: [], looks: [], shown: performance.now(), tiles: [], tile: 0, fetched: new Map(), page: null,
+  comments: [], looks: [], shown: performance.now(), tiles: [], tile: 0, fetched: new Map(), page: null, asked: false,
 };
 
 // The part of the class that this window shows: `?part=2/3` by student, `?criterion=v_B,v_C` by criterion ------
@@ -104,6 +104,7 @@ function showProgress() {
   const settled = rows.filter((row) => row.decided).length;
   const mean = state.looks.length ? state.looks.reduce((a, b) => a + b) / state.looks.length : FIRST_GUESS_S;
   const minutes = Math.ceil((open * mean) / 60);
+  state.asked ||= open > 0;
   $("bar").max = Math.max(1, open + settled);
   $("bar").value = settled;
   $("progress").textContent = open ? texts.left.replace("{open}", open).replace("{minutes}", minutes) : texts.nothing_left;
@@ -531,6 +532,9 @@ function showDone() {
   const settled = all.length ? texts.part_settled.replace("{open}", all.length) : texts.all_settled;
   $("done-title").textContent = open ? texts.still_open.replace("{open}", open) : settled;
   $("done-text").textContent = all.length ? texts.can_finish : texts.now_finish;
+  $("finish").focus();
+  // The last question was settled here; whoever opens a settled class is left in peace.
+  if (!all.length && state.asked) { state.asked = false; setTimeout(finish); }
 }
 
 function finish() {
@@ -546,9 +550,11 @@ function finish() {
         $("finish-progress").textContent = data.progress;
       } while (data.running);
       if (data.message) throw data;
+      if (data.to) { location.assign(data.to); return; }
       state.fetched.clear(); state.rows.clear(); state.students.clear();
       take(await call("api/class"));
       $("finish-progress").textContent = data.summary;
+      $("changes").replaceChildren(...data.changes.map((text) => element("li", {}, text)));
       $("results").replaceChildren(...data.files.map((file) => {
         const item = element("li"), link = element("a", { href: file.href, target: "_blank", rel: "noopener" }, file.label);
         item.append(link, ` ${file.path}`);

@@ -11,7 +11,8 @@ const stored = {
   get: (name, otherwise) => { try { return localStorage.getItem(`planmark-${name}`) ?? otherwise; } catch { return otherwise; } },
   set: (name, value) => { try { localStorage.setItem(`planmark-${name}`, value); } catch { /* not kept */ } },
 };
-const windowId = Math.random().toString(36).slice(2) + Date.now().toString(36);
+let windowId = Math.random().toString(36).slice(2) + Date.now().toString(36);
+try { windowId = sessionStorage.planmarkWindow ??= windowId; } catch { /* a page opened anew takes nothing back */ }
 
 // The server ---------------------------------------------------------------------------------------
 

@@ -15,7 +15,7 @@ async function call(method, path, body, { raw = body instanceof FormData } = {})
   try { response = await fetch(path, { method, headers, body }); } catch { throw { message: texts.gone }; }
   if (response.ok) return response.json();
   const told = await response.json().catch(() => ({}));
-  throw { message: told.message || `${response.status} ${response.statusText}`, code: told.code };
+  throw { message: told.message || `${response.status} ${response.statusText}`, code: told.code, status: response.status };
 }
 
 function tell(place, text, good = false) {
@@ -93,10 +93,20 @@ for (const button of document.querySelectorAll("button[data-send]")) {
 for (const box of document.querySelectorAll("input[data-change]")) {
   box.addEventListener("change", async () => {
     const [method, path] = box.dataset.change.split(" ");
+    if (box.checked && box.dataset.warn && !confirm(box.dataset.warn)) { box.checked = false; return; }
     tell(null, "");
     try { await call(method, path, { [box.name]: box.checked }); } catch (error) { box.checked = !box.checked; tell(null, error.message); }
   });
 }
+
+for (const button of document.querySelectorAll("[data-copy]")) {
+  button.addEventListener("click", () => {
+    // Also where there is no https; where it is refused, the address stands selected.
+    getSelection().selectAllChildren($(button.dataset.copy));
+    if (document.execCommand("copy")) tell(button.parentElement.querySelector("[role=status]"), texts.copied);
+  });
+}
+$("print")?.addEventListener("click", () => print());
 
 // Files -------------------------------------------------------------------------------------------
 
@@ -122,14 +132,48 @@ for (const input of document.querySelectorAll("input[data-put]")) {
 
 // Self-check --------------------------------------------------------------------------------------
 
-const whole = (name) => { const input = $(`in-${name}`); return input && input.value.trim() !== "" ? Number(input.value.trim().replace(",", ".")) : null; };
+const whole = (name) => { const text = $(`in-${name}`)?.value.trim(); return /^\d{1,6}$/.test(text) ? Number(text) : null; };
 
-function show(told) {
+/** Tell errors at their fields, texts by the fields' ids; the first of them has the focus. */
+function faults(texts) {
+  for (const said of document.querySelectorAll(".fault")) {
+    const field = said.previousElementSibling;
+    field.removeAttribute("aria-invalid");
+    field.setAttribute("aria-describedby", field.dataset.described);
+    said.remove();
+  }
+  for (const [id, text] of Object.entries(texts)) {
+    const field = $(id), said = Object.assign(document.createElement("p"), { id: `fault-${id}`, className: "said small fault", textContent: text.charAt(0).toUpperCase() + text.slice(1) });
+    field.dataset.described = field.getAttribute("aria-describedby") || "";
+    field.setAttribute("aria-invalid", "true");
+    field.setAttribute("aria-describedby", `${said.id} ${field.dataset.described}`.trim());
+    field.after(said);
+    field.closest("details")?.setAttribute("open", "");
+  }
+  document.querySelector("[aria-invalid]")?.focus();
+}
+
+/** Do something with what a form holds; what is wrong with a number or with the file is told there. */
+function sending(form, button, act) {
+  const place = form.querySelector(".said");
+  faults({});
+  doing(button, place, async () => {
+    try { await act(place); } catch (error) {
+      const number = /^(n|position)_range$/.exec(error.code)?.[1];
+      const field = number ? `in-${number}` : form.id === "photo" && [413, 415, 422].includes(error.status) ? "picture" : "";
+      if (!$(field)) throw error;
+      tell(place, "");
+      faults({ [field]: error.message });
+    }
+  });
+}
+
+function show(form, told) {
   const place = $("result"), parts = [];
   const add = (name, html, text) => { const one = document.createElement(name); if (html) one.innerHTML = html; else one.textContent = text; parts.push(one); return one; };
   for (const problem of told.problems || []) add("p", "", problem).className = "note";
   if (told.is_right) add("p", "", told.is_read ? texts.right_read : texts.right);
-  else if (!told.lines.length) add("p", "", told.is_read === false ? texts.unread : texts.nothing);
+  else if (!told.lines.length && !Object.keys(told.fields || {}).length) add("p", "", told.is_read === false ? texts.unread : texts.nothing);
   for (const result of ["off", "open", "right"]) {
     const lines = told.lines.filter((line) => line.result === result);
     if (!lines.length) continue;
@@ -144,8 +188,11 @@ function show(told) {
   }
   for (const drawing of told.drawing || []) add("figure", drawing).className = "drawing";
   place.replaceChildren(...parts);
-  place.hidden = false;
+  place.hidden = !parts.length;
+  form.after(place);
   place.focus();
+  place.scrollIntoView({ block: "start" });
+  faults(Object.fromEntries(Object.entries(told.fields || {}).map(([column, text]) => [`f-${column}`, text])));
   if (told.attempts_left !== null && told.attempts_left !== undefined) $("left").textContent = fill(texts.left, { count: told.attempts_left });
 }
 
@@ -154,17 +201,17 @@ $("check")?.addEventListener("submit", (event) => {
   const form = event.target, cells = {};
   for (const input of form.querySelectorAll("[data-column]")) if (input.value.trim()) cells[input.dataset.column] = input.value.trim();
   $("result").hidden = true;
-  doing(event.submitter, form.querySelector(".said"), async () => {
-    show(await call("POST", `/api/v1/publications/${form.dataset.key}/checks`, { n: whole("n"), position: whole("position"), cells, lang: form.dataset.lang }));
+  sending(form, event.submitter, async () => {
+    show(form, await call("POST", `/api/v1/publications/${form.dataset.key}/checks`, { n: whole("n"), position: whole("position"), cells, lang: form.dataset.lang }));
   });
 });
 
 $("photo")?.addEventListener("submit", (event) => {
   event.preventDefault();
-  const form = event.target, place = form.querySelector(".said"), asked = new URLSearchParams({ lang: form.dataset.lang });
+  const form = event.target, asked = new URLSearchParams({ lang: form.dataset.lang });
   for (const name of ["n", "position"]) if (whole(name) !== null) asked.set(name, whole(name));
   $("result").hidden = true;
-  doing(event.submitter, place, async () => {
+  sending(form, event.submitter, async (place) => {
     tell(place, texts.sending, true);
     let job = await call("POST", `/api/v1/publications/${form.dataset.key}/photos?${asked}`, $("picture").files[0], { raw: true });
     while (job.state === "queued" || job.state === "running") {
@@ -172,18 +219,24 @@ $("photo")?.addEventListener("submit", (event) => {
       await pause(700);
       job = await call("GET", `/api/v1/photos/${job.key}`);
     }
-    if (job.state !== "done") throw { message: job.message };
+    if (job.state !== "done") throw { message: job.message, status: 422 };
     tell(place, "");
-    show(job.result);
+    show(form, job.result);
   });
 });
 $("hand-in")?.addEventListener("click", (event) => {
-  const form = $("photo"), place = form.querySelector(".said"), file = $("picture").files[0];
+  const form = $("photo"), file = $("picture").files[0];
   if (!file) { form.reportValidity(); return; }
-  doing(event.target, place, async () => {
-    const asked = new URLSearchParams({ name: file.name.slice(0, 200) });
-    const { file: stored } = await call("POST", `/api/v1/publications/${form.dataset.key}/sheets?${asked}`, file, { raw: true });
-    tell(place, stored, true);
+  sending(form, event.target, async (place) => {
+    tell(place, texts.sending, true);
+    const asked = new URLSearchParams({ name: file.name.slice(0, 200) }), item = document.createElement("li"), sheets = $("sheets");
+    const { at, name, code } = await call("POST", `/api/v1/publications/${form.dataset.key}/sheets?${asked}`, file, { raw: true });
+    item.append(`${at}: `, Object.assign(document.createElement("bdi"), { textContent: name }), `, ${texts.receipt} `, Object.assign(document.createElement("b"), { textContent: code }));
+    sheets.querySelector("ul").append(item);
+    sheets.hidden = false;
+    tell(place, "");
+    item.tabIndex = -1;
+    item.focus();
   });
 });
 

@@ -121,6 +121,16 @@ def test_what_moved_tells_standing_criteria_and_why():
     assert "s777 5–7,5 – nu mai există" in text
 
 
+def test_tiles_name_what_they_count():
+    standing = StandingDocument(status="graded", score=7.5, score_range=(7.5, 7.5))
+    for count, said in ((1, "1 → changed mark "), (2, "2 → changed marks ")):
+        moves = [MovedDocument(student_id=f"s{k}", before=standing, after=None) for k in range(count)]
+        waits = [report(student_id=f"w{k}", status="needs_review", score=None) for k in range(count)]
+        text = Page(index_page(results(*waits).model_copy(update={"moved": moves}), "en")).text
+        assert said in text
+        assert f"{count} ? waiting for review" in text
+
+
 def test_many_changed_criteria_of_a_student_unfold():
     standing = StandingDocument(status="graded", score=7.5, score_range=(7.5, 7.5))
     change = CriterionMovedDocument(id="v_D", title="Vector v_D", before="review", after="full")
@@ -152,6 +162,17 @@ def test_the_page_says_what_to_do_next_with_the_folder_as_a_command_names_it(tmp
     text = Page((tmp_path / "my marks" / "index.html").read_text(encoding="utf-8")).text
     assert f"planmark review '{tmp_path / 'my marks'}'" in text
     assert "planmark export" in text
+
+
+def test_on_a_server_the_next_steps_are_links_and_neither_commands_nor_folders():
+    waits = report(status="needs_review", score=None, score_range=(5.0, 7.5))
+    links = ("/review/KEY/", "/publications/KEY#export")
+    page = Page(index_page(results(waits, report(student_id="s08")), "en", out="/srv/marks", addresses=links))
+    found = {attributes.get("href") for tag, attributes in page.tags if tag == "a"}
+    assert set(links) <= found
+    assert "planmark " not in page.text
+    assert "/srv" not in page.text
+    assert "Decide the open questions" in page.text
 
 
 def test_a_finished_class_asks_for_no_review():

@@ -1,11 +1,21 @@
 """Numbers as a table's cells, and the line that says how they become the score."""
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from grader.documents import Quantity, Tolerance
-from grader.feedback.numbers import quantity_cells, scale_text, score_line, tolerance_cells
+from grader.feedback.class_statistics import waiting
+from grader.feedback.numbers import (
+    points_text,
+    quantity_cells,
+    scale_text,
+    score_line,
+    score_text,
+    tolerance_cells,
+)
 from grader.language import tongue
-from tests.unit.feedback.works import criterion, report
+from tests.unit.feedback.works import criterion, report, results
 
 
 @pytest.mark.parametrize(("direction", "shown"), [(359.96, "0.0"), (359.94, "359.9"), (0.04, "0.0")])
@@ -47,6 +57,41 @@ def test_what_was_not_judged_is_scaled_away_and_the_line_says_how():
     )  # fmt: skip
     assert "add up to 7.5 of 10" in told
     assert told.endswith("7.5 × 15 / 10 = 11.25.")
+
+
+@pytest.mark.parametrize(
+    ("earned", "judged", "most", "told"),
+    # 31 * 43 / 40 is 33.325, and a little less as it is computed: it was 33.33 above, and 33.32 below.
+    [(31.0, 40.0, 43.0, "33.325"), (0.375, 41.0, 43.0, "0.39"), (26.1, 37.0, 43.0, "30.33")],
+)
+def test_the_score_is_the_same_above_and_below(earned, judged, most, told):
+    left = criterion("v_C", "not_judged", None).model_copy(update={"max_points": most - judged})
+    row = criterion("v_A", "partial", earned).model_copy(update={"max_points": judged})
+    made = report(criteria=[row, left], max_score=most, score=round(earned * most / judged, 6))
+    assert score_text(made, tongue("en")) == told
+    assert score_line(made, tongue("en")).endswith(f" = {told}.")
+
+
+@settings(max_examples=300)
+@given(st.lists(st.tuples(st.sampled_from([0.25, 0.5, 1.0, 2.0]), st.sampled_from([0.75, 0.5, 0.33]))))
+def test_what_is_shown_adds_up(rows):
+    points = [most * share for most, share in rows]
+    each = [float(points_text(one, tongue("en"))) for one in points]
+    assert points_text(sum(each), tongue("en")) == points_text(sum(points), tongue("en"))
+
+
+def test_a_range_and_what_is_open_in_it_agree():
+    row = criterion("v_A", points=30.0).model_copy(update={"max_points": 31.0})
+    left = criterion("v_C", "not_judged", None).model_copy(update={"max_points": 4.0})
+    ends = (30.0 * 40.0 / 36.0, 33.0 * 40.0 / 36.0)
+    made = report(
+        criteria=[row, criterion("v_B", "review", None), left],
+        max_score=40.0, score=None, score_range=ends, status="needs_review",
+    )  # fmt: skip
+    assert score_text(made, tongue("en")) == "33.33–36.67"
+    assert "= 33.33. Criteria under review add 0 to 3.34." in score_line(made, tongue("en"))
+    (waits,) = waiting(results(made))
+    assert points_text(waits.points, tongue("en")) == "3.34"
 
 
 def test_a_section_with_a_weight_keeps_it():

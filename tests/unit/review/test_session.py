@@ -478,6 +478,9 @@ def test_finishing_brings_the_pages_up_to_date_and_exports(page, session):
     assert [one["href"] for one in told["files"]] == ["out/index.html", "out/export-csv-grades.csv"]
     assert all(page.get(one["href"]).status_code == 200 for one in told["files"])
     assert any("--to moodle" in line for line in told["commands"])
+    (change,) = told["changes"]
+    assert change.startswith(f"{ENTERED}: ")
+    assert told["summary"] == "1 mark has changed:"
     report = json.loads((session.batch.out / "s09" / "report.json").read_text(encoding="utf-8"))
     written = next(one for one in report["criteria"] if one["id"] == "v_A")
     assert (written["verdict"], written["decided"]["by"]) == ("none", "Ana")

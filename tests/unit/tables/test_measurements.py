@@ -177,7 +177,7 @@ def test_no_more_faults_are_told_than_a_person_reads(entered):
     vectors = list(NAMES.vectors)[:30]
     (one,) = entered(f"student_id,{','.join(vectors)}\ns01{',x' * 30}\n")
     assert len(one.problems) == 21
-    assert message(one.problems[-1]) == "... and 10 more faults"
+    assert message(one.problems[-1]) == "... more faults: 10"
     assert len(one.reading.unread) == 30
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.web.store import Link, LtiClaim, LtiUser, Member, Sheet, Store
+from grader.web.store import Link, LtiClaim, LtiUser, Member, Publication, Sheet, Store
 
 FIRST = Path(__file__).with_name("older_store.sql")
 ROWS = """
@@ -41,6 +41,8 @@ def test_what_an_earlier_version_kept_goes_on(older):
             members = {one.account_id: one.platform_id for one in session.query(Member)}
             session.add(LtiUser(platform_id=1, subject=f"new-{attempt}"))
             assert session.query(Sheet).count() == 0
+            (one,) = session.query(Publication)
+            assert (one.is_over, one.shows_feedback) == (False, True)
         store.close()
         assert claims == {("s09", "user-2"): False, ("s09", "user-3"): False, ("s11", "user-4"): True}
         assert links == {"s09": True, "s11": False}

@@ -2,6 +2,7 @@
 
 import time
 from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime
 from functools import partial
 
 import pytest
@@ -61,7 +62,7 @@ def test_the_plan_is_drawn_as_measured(admin, visitor):
 def test_what_cannot_be_used_is_told_in_the_students_language(admin, visitor):
     key = admin.publish()
     told = checked(visitor, key, {"v_A": "sixty", "v_Q": "3"}, lang="ro").json()
-    assert any("sixty" in problem for problem in told["problems"])
+    assert "sixty" in told["fields"]["v_A"]
     assert any("v_Q" in problem for problem in told["problems"])
     for n in (0, 99, None):
         refused = checked(visitor, key, CELLS, n=n)
@@ -196,11 +197,77 @@ def test_a_link_is_refused_when_it_is_forged_revoked_or_too_old(graded, app, adm
     assert Browser(app).get(new["address"].partition(":8000")[2]).status_code == 200
 
 
+def test_what_cannot_be_used_is_told_of_its_field_and_nothing_else_is(graded, visitor):
+    cells = {"v_A": "abc", "v_A_deg": "400", "kv": "0.2 furlongs", "v_B": "12,5"}
+    told = visitor.act("POST", f"/publications/{graded[0]}/checks", json={"n": 7, "cells": cells}).json()
+    assert set(told["fields"]) == {"v_A", "v_A_deg", "kv"}
+    assert told["fields"]["v_A"] == "'abc' is no number"
+    assert "360 degrees" in told["fields"]["v_A_deg"]
+    assert told["problems"] == []
+    assert not told["is_right"]
+    assert "kv" not in [line["name"] for line in told["lines"]]
+    assert "file" not in str(told)
+
+
 def test_feedback_is_seen_when_it_is_released(graded, admin, student):
     key, _ = graded
     admin.act("PATCH", f"/publications/{key}", json={"is_released": False})
     assert student.get(f"/api/v1/publications/{key}/feedback").status_code == 403
     assert "Your feedback" not in student.get(f"/c/{key}").text
+
+
+def test_feedback_that_is_released_is_seen_from_its_date_on(graded, admin, student):
+    key, _ = graded
+
+    def told(release_at):
+        answer = admin.act("PATCH", f"/publications/{key}", json={"release_at": release_at})
+        page = student.get(f"/c/{key}").text
+        return answer.json().get("release_at"), student.get(f"/api/v1/publications/{key}/feedback"), page
+
+    at, answer, page = told("2126-12-01T08:00+02:00")
+    assert at == datetime(2126, 12, 1, 6, tzinfo=UTC).astimezone().isoformat(timespec="minutes")
+    assert answer.status_code == 403
+    assert "Your feedback" not in page
+    assert "You will see your feedback here from 2126-12-01 " in page
+    for past in ("2026-11-01T08:00", ""):
+        _, answer, page = told(past)
+        assert answer.status_code == 200
+        assert "Your feedback" in page
+    for wrong in ("soon", "2026-12-01", "0000-01-01T00:00"):
+        refused = admin.act("PATCH", f"/publications/{key}", json={"release_at": wrong})
+        assert (refused.status_code, refused.json()["code"]) == (422, "time_refused")
+
+
+@pytest.mark.usefixtures("grades_here")
+def test_a_release_with_open_criteria_warns_with_their_number(graded, admin):
+    key, _ = graded
+    assert "warning" not in admin.act("PATCH", f"/publications/{key}", json={"is_released": True}).json()
+    illegible = b"student_id,n,kL,v_A,v_DC\ns11,5,1:5,60,12 or 13\n"
+    admin.act("PUT", f"/publications/{key}/files/m.csv", content=illegible)
+    admin.act("DELETE", f"/publications/{key}/files/s11.json")
+    job = admin.act("POST", f"/publications/{key}/jobs").json()
+    assert admin.ended(f"/publications/{key}/jobs", job)["state"] == "done"
+    answer = admin.act("PATCH", f"/publications/{key}", json={"is_released": True}).json()
+    assert answer["is_released"]
+    assert answer["warning"] == "Submissions without a final mark: 1; criteria still open: 2."
+    assert f'data-warn="{answer["warning"]}' in admin.get(f"/publications/{key}").text
+
+
+def test_nothing_is_handed_in_after_the_deadline(graded, admin, student, settings):
+    key, _ = graded
+    path = f"/publications/{key}/sheets"
+    admin.act("PATCH", f"/publications/{key}", json={"deadline": "2126-12-01T23:59"})
+    assert "Hand in until 2126-12-01 23:59" in student.get(f"/c/{key}").text
+    assert student.act("POST", path, content=b"\xff\xd8\xff").status_code == 201
+    admin.act("PATCH", f"/publications/{key}", json={"deadline": "2026-11-01T23:59"})
+    refused = student.act("POST", path, content=b"\xff\xd8\xff late")
+    zone = datetime.fromisoformat("2026-11-01T23:59").astimezone().strftime("%Z")
+    assert refused.status_code == 403
+    assert refused.json()["message"].startswith(f"the deadline was 2026-11-01 23:59:00 {zone}: nothing")
+    page = student.get(f"/c/{key}").text
+    assert "The deadline was 2026-11-01 23:59:00" in page
+    assert "hand-in" not in page
+    assert len(list(settings.data.rglob("s09_sent*"))) == 1
 
 
 def test_a_request_waits_for_the_instructor_and_is_answered(graded, admin, student, app):
@@ -213,6 +280,8 @@ def test_a_request_waits_for_the_instructor_and_is_answered(graded, admin, stude
     page = admin.get(f"/publications/{key}").text
     assert "<script>alert" not in page
     assert "&lt;script&gt;alert" in page
+    for shown in (page, student.get(f"/c/{key}").text):
+        assert "Velocity of A: &lt;script" in shown.replace("<b>", "").replace("</b>", "")
     rows = admin.get(f"/review/{key}/api/class").json()["students"]
     assert [(row["student"], row["criterion"]) for one in rows for row in one["rows"] if row["asked"]] == [
         ("s09", "v_A")
@@ -266,7 +335,8 @@ def test_a_handed_in_sheet_is_a_version_that_nothing_replaces(graded, admin, stu
     ]
     first, *others = [one.json()["file"] for one in sent]
     assert admin.act("DELETE", f"/publications/{key}/files/{first}").status_code == 200
-    again = student.act("POST", path, content=b"\xff\xd8\xff0").json()["file"]
+    last = student.act("POST", path, content=b"\xff\xd8\xff0")
+    again = last.json()["file"]
     there = {one.name: one.read_bytes() for one in settings.data.rglob("s09_sent*")}
     assert there == {others[0]: b"\xff\xd8\xff1", others[1]: b"\xff\xd8\xff2", again: b"\xff\xd8\xff0"}
     assert again not in {first, *others}
@@ -275,13 +345,25 @@ def test_a_handed_in_sheet_is_a_version_that_nothing_replaces(graded, admin, stu
         assert taken.status_code == 409, name
     own = student.get(f"/api/v1{path}").json()
     assert [one["name"] for one in own] == ["план 1.jpg", "план 2.jpg", ""]
+    assert [one["code"] for one in own] == [one.json()["code"] for one in (*sent[1:], last)]
+    assert len({one["code"] for one in own}) == 3
+    find = f"/api/v1/publications/{key}/receipts"
+    typed = own[0]["code"].lower().replace("-", " ")
+    found = admin.get(find, params={"code": typed}).json()
+    assert (found["student_id"], found["file"]) == ("s09", others[0])
+    assert own[0]["at"] in found["told"]
+    # The receipt of a version that was deleted still names it.
+    assert admin.get(find, params={"code": sent[0].json()["code"]}).json()["file"] == first
+    assert admin.get(find, params={"code": "AAAA-AAAA"}).json()["code"] == "not_found"
+    assert student.get(find, params={"code": typed}).status_code == 401
+    assert own[0]["code"] in student.get(f"/c/{key}").text
     assert [one["sent"] for one in own] == sorted(one["sent"] for one in own)
     listed = {one["name"]: one for one in admin.get(f"/api/v1/publications/{key}").json()["files"]}
     assert listed[others[0]]["shown"] == "план 1.jpg"
     assert listed[others[0]]["at"] == pytest.approx(own[0]["sent"], abs=5.0)
     for page in (student.get(f"/c/{key}").text, admin.get(f"/publications/{key}").text):
         assert "план 1.jpg" in page
-        assert time.strftime("%Y-%m-%d %H:", time.gmtime(own[0]["sent"])) in page
+        assert time.strftime("%Y-%m-%d %H:%M:%S %Z", time.localtime(own[0]["sent"])) in page
 
 
 def test_all_of_a_student_is_deleted_and_nothing_of_the_others(graded, admin, student, settings, app):

@@ -9,6 +9,7 @@ from grader.web.places import batch_of
 from grader.web.queue import _graded
 from grader.web.store import Audit, Job, Publication
 from tests.inline import Inline
+from tests.waiting import until
 
 
 @pytest.fixture
@@ -70,6 +71,46 @@ def test_every_change_of_a_mark_is_in_the_audit_trail(two, admin, colleague):
     assert second == ("Ana", "s09 v_A", "none", "partial")
     assert third == ("Ana", "s09 v_A", "partial", "none")
     assert "Mark before" in admin.get("/account").text
+
+
+@pytest.mark.usefixtures("grades_here")
+def test_the_end_of_the_review_leads_to_the_class_with_the_marks_as_decided(two, admin, settings):
+    illegible = b"student_id,n,kL,v_A,v_DC\ns11,5,1:5,60,12 or 13\n"
+    assert admin.act("PUT", f"/publications/{two}/files/m.csv", content=illegible).status_code == 200
+    admin.act("DELETE", f"/publications/{two}/files/s11.json")
+    job = admin.act("POST", f"/publications/{two}/jobs").json()
+    assert admin.ended(f"/publications/{two}/jobs", job)["state"] == "done"
+
+    def standing():
+        now = admin.get(f"/api/v1/publications/{two}").json()["standing"]
+        assert now.pop("titles")["v_A"] == "Velocity of A"
+        return now
+
+    was = {"states": {"graded": 1, "needs_review": 1}, "unmatched": 0, "waiting": 1, "open": 2}
+    assert standing() == {**was, "is_behind": False}
+    shown = admin.get(f"/publications/{two}/results/index.html").text
+    assert f'href="/review/{two}/"' in shown
+    assert f'href="/publications/{two}#export"' in shown
+    assert "planmark review" not in shown
+    assert str(settings.data) not in shown
+    rows = [row for one in admin.get(f"/review/{two}/api/class").json()["students"] for row in one["rows"]]
+    answers = [
+        {"student": row["student"], "criterion": row["criterion"], "verdict": "none"}
+        for row in rows
+        if row["verdict"] == "review"
+    ]
+    assert said(admin, two, "decide", answers=answers).status_code == 200
+    assert standing() == {**was, "is_behind": True}
+    assert "grade what is new" in admin.get(f"/publications/{two}").text
+    said(admin, two, "finish")
+
+    def ended():
+        run = admin.get(f"/review/{two}/api/finish").json()
+        return None if run["running"] else run
+
+    assert until(ended)["to"] == f"/publications/{two}#marks"
+    after = {"states": {"graded": 2}, "unmatched": 0, "waiting": 0, "open": 0, "is_behind": False}
+    assert standing() == after
 
 
 def test_nobody_takes_back_what_another_decided(two, admin, colleague, settings):
