@@ -83,6 +83,7 @@ class Page:
     damage : first and last damaged row, if the file shows damage; empty for a whole page
     turn_is_sure : a person confirmed the turn: no other orientation is tried
     ruling : the printed squares of its paper, or None
+    device : `camera` or `scanner`, where the file says so; else empty
     """
 
     source: str
@@ -94,6 +95,7 @@ class Page:
     damage: tuple[int, ...] = ()
     turn_is_sure: bool = False
     ruling: Ruling | None = None
+    device: str = ""
 
 
 @dataclass(frozen=True, slots=True)

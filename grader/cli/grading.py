@@ -23,6 +23,7 @@ from grader.feedback.class_page import CAUSES, SIGNS, trust_sentences, write_dem
 from grader.feedback.class_statistics import waiting
 from grader.feedback.words import STATES
 from grader.files import make_folder, samples_folder, shown_text
+from grader.folder.archives import is_archive
 from grader.folder.batch import Batch, grade
 from grader.folder.changes import standing_text
 from grader.folder.watch import arrivals
@@ -60,6 +61,8 @@ def grade_folder(folder: Path, name: str, out: Path, options: GradeOptions) -> R
             folder, decisions = on_cluster.image_of(address, out), decisions or out / "decisions.csv"
         elif not folder.is_dir():
             raise failure(CallError, "folder_missing", folder=folder)
+        if archive := next((path for path in folder.rglob("*") if is_archive(path)), None):
+            raise failure(CallError, "archive_on_cluster", file=archive)
     limits = Limits(options.time_limit, options.memory_limit)
     given = {**taken(ClassOptions, options), "level": wanted, "decisions": decisions}
     batch = Batch(

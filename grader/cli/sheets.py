@@ -172,7 +172,7 @@ def draft_matches(
         tempfile.TemporaryDirectory() as notes,
         Workers(os.cpu_count() or 1, Limits(), __name__) as workers,
     ):
-        cache = PageCache(Path(notes))
+        cache = PageCache(Path(notes) / "pages")
         contents = take_inventory(paths, folder, names_of(assignment), workers, tell, cache)
         sources = [page for content in contents for page in content.pages]
         draft = suggest(sources, roster, assignment, pages_per_student=pages_per_student)

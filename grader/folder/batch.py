@@ -21,6 +21,7 @@ from grader.documents import (
 from grader.feedback.class_page import write_index
 from grader.feedback.student_page import About, write_feedback
 from grader.files import remove_parts, result_folders, write_parts, write_whole
+from grader.folder.archives import is_archive
 from grader.folder.cache import (
     MARK_STAGE,
     READ_STAGE,
@@ -108,9 +109,14 @@ class Batch(ClassOptions):
     addresses: tuple[str, ...] = ()
 
     @property
+    def base(self) -> Path:
+        """The folder that the names of the files are below: the one that a single archive lies in."""
+        return self.folder if self.folder.is_dir() else self.folder.parent
+
+    @property
     def roster_path(self) -> Path:
         """The path of the roster, whether there is such a file or not."""
-        return self.roster or self.folder / "roster.csv"
+        return self.roster or self.base / "roster.csv"
 
     @property
     def decisions_path(self) -> Path:
@@ -174,7 +180,7 @@ def _graded(
         with Workers(batch.jobs, batch.limits, __name__) if workers is None else nullcontext(workers) as some:
             pool = Whole(some)
             contents = take_inventory(
-                files, batch.folder, names, pool, progress, cache, decisions.place, batch.called
+                files, batch.base, names, pool, progress, cache, decisions.place, batch.called
             )
             students, unmatched = _submissions(batch, listed, contents, cache, pool)
             if not students and not unmatched:
@@ -248,7 +254,9 @@ def _roster(batch: Batch) -> Roster | None:
 
 
 def files_of(batch: Batch) -> list[Path]:
-    """The files handed in. Raises CallError where there is no such folder."""
+    """The files handed in, or the archive of them. Raises CallError where there is no such folder."""
+    if is_archive(batch.folder) and batch.folder.is_file():
+        return [batch.folder]
     if not batch.folder.is_dir():
         raise failure(CallError, "folder_missing", folder=batch.folder)
     others = (batch.out, batch.decisions_path, *batch.growing, *batch.assignment.own_files)

@@ -222,7 +222,7 @@ def noted_run(folder: Path) -> RunNote:
         own = None if last is None else notes[last]
     if own is None:
         raise failure(CallError, "run_unknown", folder=folder)
-    if not own.folder.is_dir():
+    if not own.folder.exists():
         raise failure(CallError, "submissions_moved", folder=folder, was=own.folder)
     return own
 

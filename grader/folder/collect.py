@@ -6,6 +6,7 @@ as they were seen. Pages stand in random order, under numbers. No student, date,
 """
 
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -90,8 +91,9 @@ def check_target(file: Path) -> None:
 
 def check_scans(batch: Batch, reports: Sequence[ReportDocument]) -> None:
     """Raise CallError where scans that the results came from are no longer in their folder."""
-    files = {sheet.source for report in reports for sheet in report.reading.sheets}
-    gone = sorted(files.difference(shown_names(files_of(batch), batch.folder, batch.called)))
+    sources = {sheet.source for report in reports for sheet in report.reading.sheets}
+    files = {re.sub(r"(\.zip)/.*", r"\1", source, flags=re.IGNORECASE) for source in sources}
+    gone = sorted(files.difference(shown_names(files_of(batch), batch.base, batch.called)))
     if gone:
         raise failure(CallError, "scans_moved", folder=batch.folder, names=in_a_row(gone, 3))
 

@@ -2,7 +2,8 @@
 
 Files, pages, blank backs, QR codes, measurements; everything but the roster and the files of tools. Each
 file is opened and each page is decoded in a worker: a page that ends its worker is that page's problem
-alone. The contents of files that an earlier run has read are taken from the cache.
+alone. A ZIP archive stands for the files in it. The contents of files that an earlier run has read are taken
+from the cache.
 """
 
 import json
@@ -15,7 +16,8 @@ from pathlib import Path, PurePath
 from types import MappingProxyType
 
 from grader.files import Stamp, shown_text, stamp_of, write_whole
-from grader.folder.cache import PageCache, packed, unpacked
+from grader.folder import archives
+from grader.folder.cache import PageCache, digest_of, packed, unpacked
 from grader.folder.workers import ENDED, Pool
 from grader.records import PageRef, Reason, of_error
 from grader.scan.decode.limits import load
@@ -150,7 +152,7 @@ def take_inventory(  # noqa: PLR0913, PLR0917 - what a folder is read with
     place: Callable[[Sequence[PageRef]], Sequence[PageRef]] = tuple,
     called: Mapping[Path, str] = MappingProxyType({}),
 ) -> list[FileContent]:
-    """Return the content of each of a folder's files; never raises for a bad file.
+    """Return the content of each of a folder's files, or of the files in it; never raises for a bad one.
 
     Arguments
     ---------
@@ -158,6 +160,8 @@ def take_inventory(  # noqa: PLR0913, PLR0917 - what a folder is read with
     place : all pages with the turns and corners that people gave, in the same order
     called : what people call files that are stored under other names
     """
+    own = {path for path in files if not archives.is_archive(path)}
+    files, called, refused = _with_unpacked(files, folder, cache, workers, called)
     shown = shown_names(files, folder, called)
     stamps = [stamp_of(path) for path in files]
     noted = _noted(cache)
@@ -165,7 +169,9 @@ def take_inventory(  # noqa: PLR0913, PLR0917 - what a folder is read with
     anew: list[int] = []
     for index, (name, stamp) in enumerate(zip(shown, stamps, strict=True)):
         known = noted.get(name)
-        if leads_out(files[index], folder):
+        if files[index] in refused:
+            contents[index] = _failed(name, refused[files[index]])
+        elif files[index] in own and leads_out(files[index], folder):
             contents[index] = _failed(name, Reason("link_leads_out"))
         elif known is not None and stamp is not None and known.stamp == stamp:
             contents[index] = FileContent(tuple(replace(page, path=files[index]) for page in known.pages))
@@ -197,6 +203,34 @@ def take_inventory(  # noqa: PLR0913, PLR0917 - what a folder is read with
     ]
     cache.drop_others([*scanned, *(page for content in contents for page in content.pages)])
     return contents
+
+
+def _with_unpacked(
+    files: Sequence[Path], folder: Path, cache: PageCache, workers: Pool, called: Mapping[Path, str]
+) -> tuple[list[Path], Mapping[Path, str], dict[Path, Reason]]:
+    """Return the files, of archives those in them, their names, and what could not be unpacked."""
+    into = cache.folder.with_name("unpacked")
+    packed_files = [path for path in files if archives.is_archive(path) and not leads_out(path, folder)]
+    folders = {path: into / digest_of(shown_name(path, folder)) for path in packed_files}
+    known = {path: archives.unpacked(path, folders[path]) for path in packed_files}
+    waiting = [path for path in packed_files if known[path] is None]
+    stamps = {path: stamp_of(path) for path in waiting}
+    for index, found in workers.run(archives.unpack, [(path, folders[path]) for path in waiting]):
+        path = waiting[index]
+        known[path] = [("", found)] if isinstance(found, Reason) else found
+        archives.note_unpacked(stamps[path], folders[path], known[path] or [])
+    archives.drop_others(into, {*folders.values()})
+    result, names, refused = list[Path](), dict(called), dict[Path, Reason]()
+    for path in files:
+        for name, file in known.get(path) or [("", "")]:
+            place = path
+            if path in folders:
+                place = folders[path] / (file if isinstance(file, str) else str(len(result)))
+            names[place] = f"{called.get(path) or shown_name(path, folder)}/{name}".rstrip("/")
+            result.append(place)
+            if isinstance(file, Reason):
+                refused[place] = file
+    return result, names, refused
 
 
 # Files as they were at the last run -----------------------------------------------------------------

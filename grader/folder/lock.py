@@ -75,6 +75,6 @@ def _check_same_class(out: Path, folder: Path, assignment: str) -> None:
         known = {"folder": out, "there": before.assignment_id, "given": assignment}
         raise failure(CallError, "results_of_another", "of_another_assignment", **known)
     # A class that was copied with its results is no other class.
-    if before.was_at == before.out and before.folder != folder.resolve() and before.folder.is_dir():
+    if before.was_at == before.out and before.folder != folder.resolve() and before.folder.exists():
         known = {"folder": out, "there": before.folder}
         raise failure(CallError, "results_of_another", "of_another_folder", **known)

@@ -19,6 +19,7 @@ from typing import Any
 
 from grader.documents import UnmatchedDocument
 from grader.owners.pages import How, Owned, PageOwners, student_of_name
+from grader.owners.platforms import owners_by_platform
 from grader.records import Reason, Value, of_error
 from grader.tables.measurements import Measurements, StudentSubmission, combined
 from grader.tables.reader import why_no_id
@@ -69,6 +70,8 @@ class _Submissions:
     """The students whom each measurement file names in itself."""
     everybody: dict[str, None] = field(default_factory=dict)
     """The students whom any measurement file names."""
+    platforms: Mapping[str, str | Reason] = field(default_factory=dict)
+    """As `owners_by_platform` finds them."""
     named: dict[str, str | None] = field(default_factory=dict)
     """The student whom each file's name tells."""
 
@@ -88,6 +91,8 @@ class _Submissions:
             problem = Reason("owner_disagree", {**_line(entered), **claims}, entered.source)
             return Unusable((problem,), (str(named), student), entered.position)
         student = named if student is None and entered.line is None else student
+        if student is None and isinstance(why := self.platforms.get(entered.source), Reason):
+            return Unusable((replace(why, file=entered.source),))
         if student is None:
             first, *others = entered.problems or [Reason("")]
             more: dict[str, Value] = {"more": len(others)} if others else {}
@@ -110,6 +115,9 @@ class _Submissions:
         if file not in self.named:
             ids = self.keys if self.roster is not None else ChainMap[str, Any](self.keys, self.everybody)
             self.named[file] = student_of_name(file, ids) if len(said) <= 1 else None
+            platforms = self.platforms.get(file)
+            if self.named[file] is None and isinstance(platforms, str) and len(said) <= 1:
+                self.named[file] = platforms
             stem = PurePath(file).stem
             is_json = file.lower().endswith(".json") and self.roster is None and why_no_id(stem) is None
             if self.named[file] is None and is_json:
@@ -168,7 +176,8 @@ def submissions_of(
     lang : where the roster does not say
     refused : measurement files that cannot be used, with the students whom they name in themselves
     """
-    submissions = _Submissions(roster)
+    files = [*(one.source for one in measured), *(one.problems[0].file or "" for one in refused)]
+    submissions = _Submissions(roster, platforms=owners_by_platform(dict.fromkeys(files), roster))
     for row in () if roster is None else roster.rows:
         submissions.at((row.student_id, row.position)).row = row
     for owned in (*owners.owned, *_blank_only(owners, roster)):

@@ -30,7 +30,7 @@ def arrivals(
         if changed:
             graded = whole
             growing = tuple(path for path in now if path not in whole)
-            yield replace(batch, growing=growing), [_name(path, batch.folder) for path in changed]
+            yield replace(batch, growing=growing), [_name(path, batch.base) for path in changed]
 
 
 def _looked_at(batch: Batch) -> dict[Path, Stamp | None]:

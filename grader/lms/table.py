@@ -417,9 +417,16 @@ def _rows_in_part(name: set[str], rows_with: Mapping[str, Collection[int]]) -> l
 
 
 def _key(column: str, text: str) -> str:
-    """Return the part of a cell that is compared; a name's parts in alphabetical order, without marks."""
-    if column != NAME:
-        return " ".join(unicodedata.normalize("NFKC", text).casefold().split())
+    """Return the part of a cell that is compared."""
+    return (
+        plain_name(text)
+        if column == NAME
+        else " ".join(unicodedata.normalize("NFKC", text).casefold().split())
+    )
+
+
+def plain_name(text: str) -> str:
+    """Return a name's parts in alphabetical order, in small letters without marks."""
     letters = unicodedata.normalize("NFKD", text).casefold()
     # Of the apostrophes some are letters to Unicode: category Lm.
     plain = "".join(

@@ -111,7 +111,7 @@ def _certain(owned: Owned, roster: Roster) -> Suggestion:
     row = next(
         (row for row in roster.rows_of(owned.student_id) if row.position in (None, owned.position)), None
     )
-    sure = owned.how[0] in {How.CODE, How.SCANS, How.NAME}
+    sure = owned.how[0] in {How.CODE, How.SCANS, How.NAME, How.PLATFORM}
     return Suggestion(owned.source, row, tuple(Reason(how.value) for how in owned.how), sure)
 
 

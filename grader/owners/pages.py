@@ -1,9 +1,9 @@
 """Assign pages to owners: every page goes to one student and position, or to "unmatched", never lost.
 
 Sources, in order of precedence: the page's QR code; the roster's `scans`; the roster's order over one class
-file (`--pages-per-student`); the file's name. All sources that give an owner must agree: a page on which two
-disagree is unmatched, and the problem names both. If none gives one, a name of the roster that surely stands
-on the page decides. A person's decision takes precedence over all.
+file (`--pages-per-student`); the file's name; the name that a platform gave the file or its folder. All that
+give an owner must agree: a page on which two disagree is unmatched, and the problem names both. If none gives
+one, a name of the roster that surely stands on the page decides. A person's decision goes before all.
 Codes of the problems:
 
 | code | meaning |
@@ -11,6 +11,7 @@ Codes of the problems:
 | owner_unknown | nothing says whose the page is |
 | owner_disagree | two sources name different students, positions or numbers |
 | owner_ambiguous | the student is known, but not which of the student's positions |
+| owner_name | a platform's name of the file fits nobody on the roster, or several |
 | owner_not_listed | the QR code names somebody who is not on the roster |
 | owner_other_assignment | the QR code belongs to another assignment |
 | order_refused | the roster's order cannot be trusted over this class file |
@@ -24,6 +25,7 @@ from pathlib import PurePath
 from types import MappingProxyType
 from typing import TypeVar
 
+from grader.owners.platforms import owners_by_platform
 from grader.records import Identity, PageRef, Reason, Value
 from grader.tables.reader import why_no_id
 from grader.tables.roster import Roster, RosterRow, ScanRef
@@ -41,6 +43,7 @@ class How(Enum):
     SCANS = "by_scans"
     ORDER = "by_order"
     NAME = "by_name"
+    PLATFORM = "by_platform"
     WRITTEN = "by_writing"
 
 
@@ -115,9 +118,13 @@ def assign_pages(  # noqa: PLR0913 - a source of owners each
     written : the students whose names stand on pages, by file and page
     """
     owners = [row.student_id for row in decided.values()]
-    listed = roster if roster is not None else _improvised(pages, [*student_ids, *owners])
-    certain = [_certain_claims(page, listed) for page in pages]
+    named = owners_by_platform(dict.fromkeys(page.file for page in pages), roster)
+    listed = roster
+    if listed is None:
+        listed = _improvised([page for page in pages if page.file not in named], [*student_ids, *owners])
+    certain = [_certain_claims(page, listed, named.get(page.file)) for page in pages]
     order, refusals = _order_claims(pages, listed, certain, pages_per_student)
+    refusals |= {file: found for file, found in named.items() if isinstance(found, Reason)}
     owned: list[Owned] = []
     unmatched: list[Unmatched] = []
     blank: list[PageRef] = []
@@ -185,8 +192,8 @@ def _improvised(pages: Sequence[PageRef], student_ids: Iterable[str]) -> Roster:
     return Roster("", tuple(rows.values()))
 
 
-def _certain_claims(page: PageRef, roster: Roster) -> list[_Claim]:
-    """Return the claims of the code, the roster's scans and the file's name."""
+def _certain_claims(page: PageRef, roster: Roster, named: str | Reason | None) -> list[_Claim]:
+    """Return the claims of code, scans and name of the file, and of its platform: the student `named`."""
     claims: list[_Claim] = []
     if page.identity is not None:
         claims.append(_code_claim(page.identity, roster))
@@ -201,6 +208,8 @@ def _certain_claims(page: PageRef, roster: Roster) -> list[_Claim]:
     student = student_of_name(page.file, roster.by_student)
     if student is not None:
         claims.append(_Claim(How.NAME, roster.rows_of(student), student))
+    if isinstance(named, str):
+        claims.append(_Claim(How.PLATFORM, roster.rows_of(named), named))
     return claims
 
 

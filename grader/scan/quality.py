@@ -11,10 +11,13 @@ Each flaw has its measured figure and the limit that it passes:
 - `overexposed`: contrast of the ink, 0..1
 - `glare`: share of the sheet
 - `no_sheet`, `not_placed`: share of the picture that could be paper
+
+Its `device` made the picture: `camera`, `scanner`, or `copier` (black and white alone). What to do depends on
+it, and a flaw that the device cannot have is none, such as white paper on a scan.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -37,6 +40,7 @@ from grader.scan.pixels import (
     shrink,
     through_corners,
 )
+from grader.scan.register.homography import UNSET_DPI, is_as_large, looks_a4
 from reference.drawing.canvas import MM_PER_INCH
 
 _CORNERS_MM = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]) * PAGE_MM
@@ -53,25 +57,76 @@ def flaws(page: Page, sheet: Sheet | None) -> tuple[Reason, ...]:
     """
     flat = flatten(page.grey)
     outline = None if sheet is not None else _paper(page)
+    device = device_of(page, sheet, sees_edges=outline is not None)
     if sheet is not None:
         mm_to_px = sheet.mm_to_px
     elif outline is not None:
         mm_to_px = outline.mm_to_px
     else:
         mm_to_px = _whole_picture(page)
-    light = list(_light(flat, mm_to_px, sheet))
+    light = _possible(_light(flat, mm_to_px, sheet), device)
     # In bad light the table may look like the paper.
     is_seen = sheet is not None or not light
     cut = list(_cut_corners(page, sheet, outline)) if is_seen else []
-    found = [*cut, *_resolution(page, mm_to_px), *light, *_blur(flat, mm_to_px)]
+    stated = page.dpi if sheet is None and device != CAMERA and _is_stated(page) else None
+    others = _possible([*_resolution(page, mm_to_px, stated, device), *_blur(flat, mm_to_px)], device)
+    found = [*cut, *light, *others]
     if sheet is None and not found:
         share = 0.0 if outline is None else outline.share
-        found.append(_flaw("no_sheet" if outline is None else "not_placed", share, _LEAST_PAPER))
-    return tuple(found)
+        is_lost = outline is None or device != CAMERA
+        found.append(_flaw("no_sheet" if is_lost else "not_placed", share, _LEAST_PAPER))
+    return tuple(replace(flaw, parameters={**flaw.parameters, "device": device}) for flaw in found)
 
 
 def _flaw(code: str, measured: float, limit: float, **places: tuple[str, ...]) -> Reason:
     return Reason(code, {"measured": measured, "limit": limit, **places})
+
+
+# Devices ------------------------------------------------------------------------------------------
+
+CAMERA, SCANNER, COPIER = "camera", "scanner", "copier"
+_OF_SCANS = frozenset({"corner_cut", "too_coarse", "too_dark", "shadow", "no_sheet"})
+FLAWS: Mapping[str, frozenset[str]] = {
+    CAMERA: _OF_SCANS | {"blurred", "far_away", "too_tilted", "overexposed", "glare", "not_placed"},
+    SCANNER: _OF_SCANS | {"blurred"},
+    COPIER: _OF_SCANS,
+}
+"""The flaws that a picture of each device can have: scanners set the brightness, edges of 1 bit are sharp."""
+_HELD = 1.02
+"""Largest over smallest resolution: photos have 1.08 or more, a scan whose frame is ruled askew 1.01."""
+_SHAPES = (1.0, 4 / 3, 3 / 2, 16 / 9)
+"""Sides of cameras' pictures."""
+_SHAPE_WITHIN = 0.004
+"""Cameras round to whole blocks of 8 or 16 pixels."""
+_SAME_MM = 1.0
+"""A scan that states no resolution has the paper's size at a usual one, rounded to pixels."""
+
+
+def device_of(page: Page, sheet: Sheet | None, *, sees_edges: bool = False) -> str:
+    """Return by what a page was made: as its file says, else by projection, size, resolution and shape.
+
+    Arguments: `sees_edges` of paper within a picture that could not be registered.
+    """
+    if is_black_and_white(page.grey):
+        return COPIER
+    if page.device:
+        return page.device
+    axes = np.ones(1) if sheet is None else _axes(sheet.mm_to_px)
+    if axes.max() > _HELD * axes.min():
+        return CAMERA
+    if sheet is not None or _is_stated(page) or looks_a4(page) or is_as_large(page, PAGE_MM, _SAME_MM):
+        return SCANNER
+    shape = max(page.grey.shape) / min(page.grey.shape)
+    return CAMERA if sees_edges or np.abs(np.divide(_SHAPES, shape) - 1.0).min() < _SHAPE_WITHIN else SCANNER
+
+
+def _is_stated(page: Page) -> bool:
+    """Return whether the file states a resolution as scanners do; that of a PDF follows from its paper."""
+    return page.dpi is not None and page.paper_mm is None and min(page.dpi) >= UNSET_DPI
+
+
+def _possible(found: Iterable[Reason], device: str) -> list[Reason]:
+    return [flaw for flaw in found if flaw.code in FLAWS[device]]
 
 
 # Where the sheet lies -----------------------------------------------------------------------------
@@ -255,13 +310,16 @@ def _px_per_mm(mm_to_px: FloatArray) -> float:
     return float(np.exp(np.log(np.maximum(_axes(mm_to_px), 1e-6)).mean()))
 
 
-def _resolution(page: Page, mm_to_px: FloatArray) -> Iterator[Reason]:
-    """Report too few pixels on the sheet, or on a part of it."""
+def _resolution(
+    page: Page, mm_to_px: FloatArray, stated: tuple[float, float] | None, device: str
+) -> Iterator[Reason]:
+    """Report too few pixels on the sheet, or on a part of it; a `stated` resolution is not measured."""
     axes = _axes(mm_to_px)
-    dpi = _px_per_mm(mm_to_px) * MM_PER_INCH
+    dpi = _px_per_mm(mm_to_px) * MM_PER_INCH if stated is None else min(stated)
     if dpi < _DPI_SHARE * LEAST_DPI:
         area = cv2.contourArea(mapped(mm_to_px, _CORNERS_MM).astype(np.float32)) / page.grey.size
-        yield _flaw("far_away" if area < _FAR else "too_coarse", round(dpi), round(LEAST_DPI))
+        is_far = area < _FAR and device == CAMERA
+        yield _flaw("far_away" if is_far else "too_coarse", round(dpi), round(LEAST_DPI))
     uneven = float(axes.max() / max(axes.min(), 1e-6))
     if uneven > _MOST_UNEVEN:
         yield _flaw("too_tilted", uneven, _MOST_UNEVEN)
@@ -309,9 +367,6 @@ def _light(flat: Flat, mm_to_px: FloatArray, sheet: Sheet | None) -> Iterator[Re
     shaded = light < _SHADE * level
     if shaded.mean() > _LEAST_SHADE:
         yield _flaw("shadow", float(np.quantile(light, 0.02) / level), _SHADE, areas=_areas(shaded))
-    is_scanned = sheet is not None and not sheet.mm_to_px[2, :2].any()
-    if is_scanned or is_black_and_white(flat.grey):
-        return  # the scanner sets the brightness, and may have made the paper white
     white = light >= _WHITE
     if white.mean() > _MOST_WHITE:
         boxes = [inner] if sheet is None or not sheet.zones else list(sheet.zones.values())

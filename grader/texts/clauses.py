@@ -125,6 +125,7 @@ CLAIMS: dict[str, tuple[str, str]] = {
     "by_code": (N_("the QR code: %(claim)s"), N_("the QR code")),
     "by_scans": (N_("the roster's scans: %(claim)s"), N_("the roster's scans")),
     "by_name": (N_("the file's name: %(claim)s"), N_("the file's name")),
+    "by_platform": (N_("the platform's name of it: %(claim)s"), N_("the platform's name of it")),
     "by_writing": (N_("the name on the sheet: %(claim)s"), N_("the name on the sheet")),
     "by_order": (N_("the roster's order: %(claim)s"), N_("the roster's order")),
     "by_roster": (N_("the roster: %(claim)s"), N_("the roster")),

@@ -58,6 +58,9 @@ FAILURES: dict[str, str] = {
     "no_page_given": N_("%(file)s: no page is marked yes"),
     "answers_wrong": N_("%(file)s: is no longer a picture; remove the preview, and start again"),
     # A cluster
+    "archive_on_cluster": N_(
+        "%(file)s: workers of a cluster do not read archives; unpack it into the folder"
+    ),
     "cluster_needed": N_("%(folder)s: workers of a cluster read a folder elsewhere; give --cluster ADDRESS"),
     "storage_unreadable": N_(
         "%(folder)s: cannot be read (%(error)s); check the address, and the storage's settings in the"

@@ -1,7 +1,8 @@
 """The sentences of problems: of files, pages, sheets, owners, numbers, scales and pictures.
 
 Each code has its sentences, the most precise first: the first one whose parameters are all known is used. The
-last one needs none, and says the least: class pages count problems by it.
+last one needs none, and says the least: class pages count problems by it. Flaws of pictures have more precise
+ones for each device.
 """
 
 from grader.language import N_
@@ -12,6 +13,18 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
         N_("The file could not be opened."),
     ),
     "link_leads_out": (N_("This is a link to a file elsewhere; hand in the file itself."),),
+    "archive_damaged": (
+        N_("This archive, or this file of one, cannot be unpacked (%(error)s): download or unpack it anew."),
+        N_("This archive, or this file of one, cannot be unpacked: download or unpack it anew."),
+    ),
+    "archive_encrypted": (N_("The archive asks for a password: unpack it yourself."),),
+    "archive_name": (N_("The name leads out of the archive: unpack it yourself, and look what it is."),),
+    "archive_nested": (N_("This is an archive in an archive: unpack it yourself."),),
+    "archive_too_large": (
+        N_("The archive has %(count)s files of %(size)s MB, more than a class can need: split it."),
+        N_("It unpacks to %(size)s MB, more than a scan can need: unpack it yourself, and look what it is."),
+        N_("It unpacks to more than a scan or a class can need."),
+    ),
     "file_empty": (N_("The file is empty; hand it in again."),),
     "file_type_unsupported": (
         N_(
@@ -307,6 +320,13 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
         N_("Nothing says whose page this is, and its name is no student's id: %(why)s."),
         N_("Nothing says whose page this is."),
     ),
+    "owner_name": (
+        N_(
+            "The platform's name of it says %(name)s, whom no student of the roster fits for certain: enter"
+            " the file in the roster's column scans."
+        ),
+        N_("The platform's name of it fits no student of the roster for certain."),
+    ),
     "owner_disagree": (
         N_("Sources disagree about whose page this is: %(claims)s."),
         N_("Sources disagree about whose page this is."),
@@ -360,61 +380,104 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
         N_("The font lacks letters of a name; boxes stand instead."),
     ),
     "cluster_versions": (N_("A worker runs another version of the program."),),
-    "blurred": (
-        N_(
+    "blurred": (N_("The picture is blurred."),),
+    "shadow": (N_("A shadow lies on the sheet."),),
+    "too_dark": (N_("The picture is too dark."),),
+    "overexposed": (N_("The picture is too bright, the lines fade."),),
+    "glare": (N_("Light is reflected on the sheet."),),
+    "too_coarse": (N_("The picture has too few pixels."),),
+    "far_away": (N_("The sheet fills too little of the picture."),),
+    "too_tilted": (N_("The sheet was photographed from one side."),),
+    "not_placed": (N_("The sheet's edges could not be followed."),),
+    "no_sheet": (N_("No sheet was found in the picture."),),
+    "corner_cut": (N_("A corner of the sheet is not in the picture."),),
+}
+
+_DARK_PART = N_(
+    "A part of the sheet is dark (%(areas)s): press the sheet flat on the glass, and close the lid."
+)
+_COARSE_SCAN = N_(
+    "The scan has too few pixels (%(measured)s of the %(limit)s dots per inch of paper that are needed): scan"
+    " at 200 dpi or more."
+)
+_NO_SHEET_SCANNED = N_(
+    "No A3 drawing was recognised in the scan: scan the whole sheet in one piece, with its frame and edges."
+)
+_CUT_BY_SCANNER = N_(
+    "Not in the scan: %(corners)s. Scan the whole sheet; an A3 sheet needs a scanner for A3, or a photo."
+)
+ADVICE: dict[str, dict[str, str]] = {
+    "blurred": {
+        "camera": N_(
             "The picture is blurred: wipe the lens, tap on the sheet so that the camera focuses, and"
             " hold the phone still with both hands."
         ),
-    ),
-    "shadow": (
-        N_(
+        "scanner": N_(
+            "The scan is blurred: press the sheet flat on the glass, close the lid, and scan again."
+        ),
+    },
+    "shadow": {
+        "camera": N_(
             "A shadow lies on the sheet (%(areas)s): put the lamp to one side, or stand so that neither"
             " you nor the phone shades the sheet."
         ),
-        N_("A shadow lies on the sheet."),
-    ),
-    "too_dark": (N_("The picture is too dark: photograph by daylight or under a bright lamp."),),
-    "overexposed": (
-        N_(
+        "scanner": _DARK_PART,
+        "copier": _DARK_PART,
+    },
+    "too_dark": {
+        "camera": N_("The picture is too dark: photograph by daylight or under a bright lamp."),
+        "scanner": N_("The scan is too dark: set the brightness higher, and scan in greyscale."),
+        "copier": N_("The copy is too dark: set the copier lighter, or scan the sheet itself in greyscale."),
+    },
+    "overexposed": {
+        "camera": N_(
             "The picture is too bright, the lines fade: tap on the sheet to set the brightness, and"
             " switch the flash off."
-        ),
-    ),
-    "glare": (
-        N_(
+        )
+    },
+    "glare": {
+        "camera": N_(
             "Light is reflected on the sheet (%(areas)s): switch the flash off, or move the sheet away"
             " from the lamp."
-        ),
-        N_("Light is reflected on the sheet."),
-    ),
-    "too_coarse": (
-        N_(
+        )
+    },
+    "too_coarse": {
+        "camera": N_(
             "The picture has too few pixels (%(measured)s of the %(limit)s dots per inch of paper that"
-            " are needed): send the original photo, not a reduced copy, or scan at 200 dpi or more."
+            " are needed): send the original photo, not a reduced copy."
         ),
-        N_("The picture has too few pixels."),
-    ),
-    "far_away": (N_("The sheet fills too little of the picture: go nearer until it fills the picture."),),
-    "too_tilted": (
-        N_(
+        "scanner": _COARSE_SCAN,
+        "copier": _COARSE_SCAN,
+    },
+    "far_away": {
+        "camera": N_("The sheet fills too little of the picture: go nearer until it fills the picture.")
+    },
+    "too_tilted": {
+        "camera": N_(
             "The sheet was photographed from one side, so that its far side is too small: hold the"
             " phone level above the middle of the sheet."
-        ),
-    ),
-    "not_placed": (
-        N_(
+        )
+    },
+    "not_placed": {
+        "camera": N_(
             "The sheet's edges could not be followed: lay it flat, with a strip of a darker table"
             " around it, and hold the phone level above its middle."
-        ),
-    ),
-    "no_sheet": (
-        N_(
+        )
+    },
+    "no_sheet": {
+        "camera": N_(
             "No sheet was found in the picture: lay the sheet flat on a table of another colour, and"
             " photograph it from above with all four corners in view."
         ),
-    ),
-    "corner_cut": (
-        N_("Not in the picture: %(corners)s. Step back until all four corners of the sheet are in view."),
-        N_("A corner of the sheet is not in the picture."),
-    ),
+        "scanner": _NO_SHEET_SCANNED,
+        "copier": _NO_SHEET_SCANNED,
+    },
+    "corner_cut": {
+        "camera": N_(
+            "Not in the picture: %(corners)s. Step back until all four corners of the sheet are in view."
+        ),
+        "scanner": _CUT_BY_SCANNER,
+        "copier": _CUT_BY_SCANNER,
+    },
 }
+"""Sentences that say what to do about a flaw of a picture, by the `device` that made it."""

@@ -10,7 +10,7 @@ from grader.texts.clauses import CLAIMS, CLAUSES
 from grader.texts.exports import EXPORTS
 from grader.texts.failures import FAILURES
 from grader.texts.faults import FAULTS, WHERE
-from grader.texts.problems import PROBLEMS
+from grader.texts.problems import ADVICE, PROBLEMS
 from grader.texts.refusals import REFUSALS
 from reference.errors import PlanmarkError, lines_of
 
@@ -206,7 +206,8 @@ def sentence(
 
     An error's own words (`detail`) are no sentence: `details` shows them beside it.
     """
-    texts = PROBLEMS.get(reason.code, ())
+    advice = ADVICE.get(reason.code, {}).get(str(reason.parameters.get("device")))
+    texts = (*filter(None, [advice]), *PROBLEMS.get(reason.code, ()))
     said = spoken(reason.parameters, speaker, names)
     text = filled(texts[-1:] if brief else texts, said, speaker)
     also = PROBLEMS.get(str(reason.parameters.get("also", "")))

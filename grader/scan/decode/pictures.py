@@ -1,5 +1,6 @@
 """JPEG and PNG files, grey levels and resolution tags."""
 
+import contextlib
 import io
 import struct
 from collections.abc import Callable
@@ -8,6 +9,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from PIL import Image, PngImagePlugin
+from PIL.ExifTags import IFD, Base
 
 from grader.records import GreyImage, Page
 from grader.scan.decode import jpeg
@@ -105,6 +107,9 @@ _INCH, _CENTIMETRE = 2, 3
 _TURN_CCW = {1: 0, 2: 0, 3: 180, 4: 180, 5: 90, 6: 270, 7: 270, 8: 90}
 """EXIF/TIFF orientation to the counter-clockwise turn that a viewer applies, after undoing the mirror."""
 _MIRRORED = frozenset({2, 4, 5, 7})
+_SOURCES = {b"\1": "scanner", b"\2": "scanner", b"\3": "camera"}
+"""EXIF 2.3, FileSource: a scanner of film or of prints, a camera."""
+_OF_LENS = {Base.ExposureTime, Base.FNumber, Base.FocalLength, Base.LensModel}
 _PLAUSIBLE_DPI = (30.0, 4800.0)
 """Below and above, a file states a number that is no resolution."""
 
@@ -138,35 +143,40 @@ class Tags:
     """A file's statements about its picture: its resolution, and how a viewer shows it.
 
     `mirrored` pictures (a selfie's camera, a scan through film) are mirrored left to right first, then
-    turned by `turn_deg` counter-clockwise.
+    turned by `turn_deg` counter-clockwise. `device` is as in `Page`.
     """
 
     dpi: Dpi | None
     turn_deg: int
     mirrored: bool = False
+    device: str = ""
 
-    def unmirrored(self, grey: GreyImage) -> GreyImage:
-        """The pixels as drawn: a mirrored drawing is another drawing."""
-        return np.ascontiguousarray(grey[:, ::-1]) if self.mirrored else grey
+    def page(self, file: InputFile, grey: GreyImage) -> Page:
+        """The one page of a file, its pixels as drawn: a mirrored drawing is another drawing."""
+        grey = np.ascontiguousarray(grey[:, ::-1]) if self.mirrored else grey
+        return Page(file.name, 1, grey, self.dpi, self.turn_deg, device=self.device)
 
 
-def tags_of(dpi: Dpi | None, orientation: int) -> Tags:
+def tags_of(dpi: Dpi | None, orientation: int, device: str = "") -> Tags:
     """From a resolution and an EXIF orientation; an unknown one counts as upright."""
-    return Tags(dpi, _TURN_CCW.get(orientation, 0), orientation in _MIRRORED)
+    return Tags(dpi, _TURN_CCW.get(orientation, 0), orientation in _MIRRORED, device)
 
 
 def tags_within(image: Image.Image) -> Tags:
     """From JFIF, EXIF or pHYs of an image that is opened; nothing is decoded."""
-    return tags_of(plausible(image.info.get("dpi")), _orientation(image))
+    return tags_of(plausible(image.info.get("dpi")), *_by_exif(image))
 
 
-def _orientation(image: Image.Image) -> int:
-    """As the EXIF says; 1 where there is none, or none that can be read."""
-    try:
+def _by_exif(image: Image.Image) -> tuple[int, str]:
+    """Return orientation and device as the EXIF says; 1 and none where there is none that can be read."""
+    orientation, device = 1, ""
+    with contextlib.suppress(OSError, SyntaxError, ValueError, TypeError, KeyError, struct.error):
         # That of PNG would decode the picture to look behind it.
-        return int(Image.Image.getexif(image).get(_ORIENTATION_TAG, 1) or 1)
-    except (OSError, SyntaxError, ValueError, TypeError, KeyError, struct.error):
-        return 1
+        exif = Image.Image.getexif(image)
+        orientation = int(exif.get(_ORIENTATION_TAG, 1) or 1)
+        taken = exif.get_ifd(IFD.Exif)
+        device = _SOURCES.get(taken.get(Base.FileSource, b""), "camera" if _OF_LENS & taken.keys() else "")
+    return orientation, device
 
 
 # JPEG ---------------------------------------------------------------------------------------------
@@ -194,7 +204,7 @@ def _jpeg_page(file: InputFile, number: int) -> Page | None:
     with Image.open(io.BytesIO(file.data)) as image:
         tags = tags_within(image)
         grey = from_pillow(image) if four_inks else decode(file, 1, file.data)
-    return Page(file.name, 1, tags.unmirrored(grey), tags.dpi, tags.turn_deg)
+    return tags.page(file, grey)
 
 
 def check_header(file: InputFile, page: int, data: bytes, *, least: bool = True) -> str:
@@ -264,7 +274,7 @@ def _png_page(file: InputFile, number: int) -> Page | None:
     pixels = cv2.imdecode(np.frombuffer(file.data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
     if pixels is None:
         raise damaged(file, 1, "it cannot be decoded")
-    return Page(file.name, 1, tags.unmirrored(to_grey(pixels)), tags.dpi, tags.turn_deg)
+    return tags.page(file, to_grey(pixels))
 
 
 PNG = Door(_png_page)

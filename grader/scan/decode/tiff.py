@@ -61,7 +61,7 @@ def _page(file: InputFile, number: int) -> Page | None:
     damage = _fax_damage(file, image, parts) if image.info["compression"] in _FAX else ()
     # Pillow has turned the picture already.
     grey = np.ascontiguousarray(np.rot90(_grey(image), -about.turn_deg // 90))
-    return Page(file.name, number, grey, about.dpi, about.turn_deg, damage=damage)
+    return Page(file.name, number, grey, about.dpi, about.turn_deg, damage=damage, device="scanner")
 
 
 def _parts(file: InputFile, number: int, image: TiffImageFile) -> Parts:

@@ -127,7 +127,12 @@ def size_mm(page: Page, dpi: tuple[float, float]) -> tuple[float, float]:
 
 
 def looks_a4(page: Page) -> bool:
-    """Return whether the picture is as large as A4, by its resolution or else by one that scanners have."""
+    """Return whether the picture is as large as A4, as far as scanners' windows are."""
+    return is_as_large(page, _A4_MM, _A4_WITHIN_MM)
+
+
+def is_as_large(page: Page, paper_mm: tuple[float, float], within_mm: float) -> bool:
+    """Return whether a picture is as large as paper, by its resolution or else by one that scanners have."""
     stated = page.dpi is not None and min(page.dpi) >= UNSET_DPI
     tried = [page.dpi] if stated and page.dpi is not None else [(dpi, dpi) for dpi in _SCANNERS_DPI]
-    return any(np.all(np.abs(np.subtract(size_mm(page, dpi), _A4_MM)) < _A4_WITHIN_MM) for dpi in tried)
+    return any(np.all(np.abs(np.subtract(size_mm(page, dpi), paper_mm)) < within_mm) for dpi in tried)
