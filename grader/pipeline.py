@@ -20,7 +20,7 @@ from grader.documents import ReportDocument
 from grader.feedback.redo_steps import with_mistakes_explained
 from grader.feedback.sentences import criterion_feedback
 from grader.marking.answers import NONE_DECIDED, answers_of
-from grader.marking.decided import decide, open_again, with_decisions, with_nodes
+from grader.marking.decided import decide, open_again, with_decisions, with_ink, with_nodes
 from grader.marking.mark import judge
 from grader.marking.report import reading_document, report_of, unjudged_report
 from grader.marking.trust import opened_by_audit, with_said
@@ -194,7 +194,7 @@ def mark(
 ) -> tuple[ReportDocument, Painter]:
     """The report of a submission whose pages were read, and what paints a picture of each page."""
     pages = [page.asked_only(rubric.vectors) for page in pages]
-    pages, astray = with_nodes(pages, submission, assignment)
+    pages, astray = with_nodes(with_ink(pages, submission.decided), submission, assignment)
     sheets = [reading_document(page, submission.student_id) for page in pages]
     problems = (*submission.problems, *(problem for page in pages for problem in page.problems), *astray)
     doubtful = [page for page in pages if _is_doubtful(page.reading)]

@@ -547,6 +547,7 @@ class Backdrop:
     scan : (h, w) uint8
     page_mm : its whole width and height on paper
     registered : whether sheet millimetres are known on it
+    ink : strokes that a person drew for the student, points in mm of the sheet
     """
 
     source: str
@@ -554,6 +555,7 @@ class Backdrop:
     scan: GreyImage
     page_mm: tuple[float, float]
     registered: bool
+    ink: tuple[tuple[tuple[float, float], ...], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

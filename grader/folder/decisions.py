@@ -14,13 +14,13 @@ import numpy as np
 
 from grader.documents import ReportDocument, StaleDecisionDocument, UnmatchedDocument
 from grader.folder.cache import digest_of
-from grader.marking.decided import NOT_APPLIED, why_not
+from grader.marking.decided import NOT_APPLIED, strokes_on, why_not
 from grader.printed.layout import PAGE_MM
 from grader.records import PageRef, Reason, Value
 from grader.rubric import RubricFile
 from grader.tables.decisions import FILE_NAME, Decision, read_table
 from grader.tables.measurements import StudentSubmission
-from grader.tables.reader import at, near
+from grader.tables.reader import at, near, short
 from grader.tables.roster import Roster, RosterRow
 from grader.texts.spoken import ENGLISH, clause, unmatched_document
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
@@ -64,8 +64,11 @@ def _handed_in(submission: StudentSubmission, assignment: Assignment) -> list[ob
 
 
 def _asked(submission: StudentSubmission, rubric: RubricFile, criterion: str) -> object:
-    """Return what a criterion asks for; for a node, the turn and corners of its page."""
-    is_node, asked = criterion.startswith("node:"), criterion.removeprefix("audit:").removeprefix("second:")
+    """Return what a criterion asks for; for a node or ink, the turn and corners of the pages."""
+    is_node, asked = (
+        criterion.startswith(("node:", "ink:")),
+        criterion.removeprefix("audit:").removeprefix("second:"),
+    )
     placed = [(page.turn_deg, page.corners_px) for page in submission.pages] if is_node else []
     return [one.name for one in rubric.criterion if one.id == asked], placed
 
@@ -209,6 +212,12 @@ class ClassDecisions:
                 continue
             asked = _asked(students[index], rubric, row.criterion)
             why = _why_stale(row.basis, _basis([*about[index], asked])) if row.basis else None
+            if (
+                why is None
+                and row.kind == "ink"
+                and not any(strokes_on(page, [row]) for page in students[index].pages)
+            ):
+                why = "page_gone"
             if why is not None:
                 self._out_of_date(row, why)
             else:
@@ -259,10 +268,11 @@ class ClassDecisions:
         """Note a decision to be made again; an audit's answer or a second mark just stops counting."""
         if row.kind in {"audit", "second"}:
             return
+        said = short(row.verdict) if row.kind == "ink" else row.verdict
         self.stale.append(
             StaleDecisionDocument(
                 line=row.line, student_id=row.student_id, position=row.position, criterion=row.criterion,
-                verdict=row.verdict, by=row.by, at=row.at, comment=row.comment, code=code,
+                verdict=said, by=row.by, at=row.at, comment=row.comment, code=code,
                 reason=clause(Reason(code), ENGLISH),
             )
         )  # fmt: skip

@@ -19,7 +19,7 @@ from grader.marking.mark import DECIMALS, score, with_mistake
 from grader.marking.settling import at_stake
 from grader.outcomes import CHARGED, Judgement, NamedMistake, Outcome
 from grader.reading.corrected import corrected
-from grader.records import Reason, ScannedPage, Value
+from grader.records import PageRef, Reason, ScannedPage, Value
 from grader.rubric import CriterionTable, RubricFile
 from grader.tables.decisions import Decision
 from grader.tables.measurements import StudentSubmission
@@ -150,6 +150,24 @@ def with_nodes(
 
 def _not_applied(criterion: str, why: str) -> Reason:
     return Reason(NOT_APPLIED, {"criterion": criterion, "why": why})
+
+
+def strokes_on(page: PageRef, rows: Sequence[Decision]) -> list[Decision]:
+    """Return the strokes of ink that people drew on a page."""
+    ink = [row for row in rows if row.kind == "ink"]
+    return [row for row in ink if (row.scan.file, row.scan.page or 1) == (page.file, page.page)]
+
+
+def with_ink(pages: Sequence[ScannedPage], rows: Sequence[Decision]) -> list[ScannedPage]:
+    """The pages with what people drew on them for the student, if there is a picture to show it on."""
+    return [
+        replace(
+            page, backdrop=replace(page.backdrop, ink=tuple(row.stroke for row in strokes_on(page.ref, rows)))
+        )
+        if page.backdrop is not None and page.backdrop.registered
+        else page
+        for page in pages
+    ]
 
 
 # The report -----------------------------------------------------------------------------------------

@@ -62,6 +62,7 @@ def overlay(
         scene = scene_of(
             behind.page_mm, reading, vectors, outcomes, show_expected=show_expected, links=links or {}
         )
+    scene = replace(scene, ink=behind.ink)
     plain = np.asarray(cv2.LUT(scan, _FEW_TONES), dtype=np.uint8)
     png = encode(".png", paint(plain, scene), _FLAT_PNG)
     return Picture(behind.source, behind.page, png, _smaller(scan, plain), scene)

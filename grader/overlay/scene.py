@@ -75,6 +75,8 @@ GHOST_DASH_MM = (0.35, 1.0)
 GHOST_WIDTH_MM = 0.5
 """Expected vectors are dotted."""
 NODE_COLOUR = "#24303c"
+INK_COLOUR, INK_MM = "#c4007a", 0.7
+"""Free ink: no verdict has this colour."""
 HAS_GHOST = CHARGED | {"review"}
 """Verdicts of vectors that have a ghost."""
 
@@ -142,6 +144,8 @@ class Scene:
     arrows: tuple[Arrow, ...] = ()
     ghosts: tuple[Ghost, ...] = ()
     dots: tuple[Dot, ...] = ()
+    ink: tuple[tuple[XY, ...], ...] = ()
+    """Strokes that a person drew for the student."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -384,8 +388,14 @@ def layers_of(
         Layer(tuple(shape for dot in dots for shape in _dot(dot, size))),
         Layer(tuple(_ground(label) for label in labels), GROUND_OPACITY),
         Layer(tuple(shape for label in labels for shape in _label(label))),
+        Layer(tuple(ink_of(scene.ink))),
     )
     return tuple(layer for layer in layers if layer.shapes)
+
+
+def ink_of(strokes: Iterable[tuple[XY, ...]]) -> Iterator[Shape]:
+    """Yield the shapes of strokes that a person drew."""
+    return (Curve(points, INK_MM, INK_COLOUR) for points in strokes)
 
 
 def is_in(at: XY, box: Box) -> bool:

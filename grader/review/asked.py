@@ -25,7 +25,7 @@ from grader.review.questions import (
     node_facts,
     per_cent,
     question_facts,
-    scan_address,
+    sheet_facts,
     state_of,
     verdict_badge,
     whole_title,
@@ -244,7 +244,7 @@ def _on_the_sketch(session: Session, student: Student) -> Facts:
         figure = document.figures.get("mechanism")
         if figure is not None:
             nodes = node_facts(student, standing, MECHANISM, figure)
-            return {"sheet": sheet, "scan": scan_address(session, student, sheet), "nodes": nodes}
+            return {**sheet_facts(session, student, sheet), "nodes": nodes}
     return {}
 
 
@@ -280,8 +280,7 @@ def _written_at(session: Session, student: Student, doubt: Doubt, look: Facts) -
             x, y, wide, high = SCALE_BOXES[scale]
             margin = 0.25 * wide
             box = (x - margin, y - margin, wide + 2 * margin, high + 2 * margin)
-            scan = scan_address(session, student, sheet)
-            return {"sheet": sheet, "scan": scan, "box": box, "marks": "", "nodes": []}
+            return {**sheet_facts(session, student, sheet), "box": box, "marks": "", "nodes": []}
     wide, high = look["page_mm"]
     return {
         "box": (0.5 * wide, 0.6 * high, 0.5 * wide, 0.4 * high),

@@ -244,6 +244,7 @@ def _second_question(session: Session, one: Decided, speaker: Tongue) -> dict[st
     about = questions.question_facts(session, blind, name, speaker)
     seen, asks = mark_of(session.standing().of(student, f"second:{name}")), speaker.gettext(WHICH)
     facts = {fact: about[fact] for fact in (*SHOWN, "most")}
+    facts["look"] = about["look"] and {**about["look"], "ink": ""}
     return {**facts, **_about(student, speaker), "sentence": "", "asks": asks, "seen": seen}
 
 

@@ -12,13 +12,14 @@ from grader.feedback.sentences import feedback_again
 from grader.feedback.words import VERDICTS, problem_sentence, symbols, unmatched_sentence
 from grader.language import N_, Tongue
 from grader.overlay.closeup import look
-from grader.overlay.scene import MARKS
+from grader.overlay.scene import MARKS, ink_of
 from grader.records import MECHANISM, Box, Reason
 from grader.review.doubts import SURE, known_probability
 from grader.review.session import OPEN, Session, Standing, Student, mark_of, page_criterion
 from grader.rubric import RubricFile
 from grader.tables.decisions import Decision
 from grader.texts.spoken import clause
+from reference.drawing.canvas import elements
 
 Facts = dict[str, Any]
 """An object of JSON."""
@@ -326,8 +327,7 @@ def look_of(session: Session, student: Student, criterion: CriterionDocument) ->
         read = student.report.reading.sheets[sheet].figures
         box = seen[0] if seen else _box_of(read.get(figure), scene.page_mm)  # type: ignore[call-overload]
         facts = {
-            "sheet": sheet,
-            "scan": scan_address(session, student, sheet),
+            **sheet_facts(session, student, sheet),
             "page_mm": scene.page_mm,
             "box": box,
             "marks": seen[1] if seen else "",
@@ -344,9 +344,11 @@ def look_of(session: Session, student: Student, criterion: CriterionDocument) ->
     return first
 
 
-def scan_address(session: Session, student: Student, sheet: int) -> str:
-    """Return the address of a page's picture, to which the page adds the part that it wants."""
-    return "scan?" + urlencode({"student": student.key, "sheet": sheet, "run": session.runs})
+def sheet_facts(session: Session, student: Student, sheet: int) -> Facts:
+    """Return the address of a page's picture, to which the page adds the part that it wants, and its ink."""
+    scan = "scan?" + urlencode({"student": student.key, "sheet": sheet, "run": session.runs})
+    ink = "".join(elements(ink_of(row.stroke for row in session.ink(student, sheet))))
+    return {"sheet": sheet, "scan": scan, "ink": ink}
 
 
 def node_facts(student: Student, standing: Standing, kind: str, figure: FigureDocument) -> list[Facts]:

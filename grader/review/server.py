@@ -38,6 +38,7 @@ from grader.review.scans import page_of
 from grader.review.session import (
     Answer,
     ChangedError,
+    Drawn,
     Kept,
     Run,
     Said,
@@ -414,6 +415,7 @@ def application(
             Answers,
             review.after(lambda said: session.decide(said.answers, said.by, said.window)),
         ),
+        "/api/ink": (Drawn, review.after(session.draw)),
         "/api/comment": (Kept, review.after(session.change_kept)),
         "/api/whole": (Whole, review.after(session.decide_whole)),
         "/api/node": (Moved, review.after(review.node)),

@@ -8,6 +8,7 @@ import threading
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from itertools import count
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -25,7 +26,7 @@ from grader.feedback.numbers import shown
 from grader.folder.batch import Batch, Graded, Job, graded, pages_read
 from grader.folder.decisions import basis_of, decided, page_basis
 from grader.folder.workers import Pool
-from grader.marking.decided import why_not
+from grader.marking.decided import strokes_on, why_not
 from grader.marking.trust import opened_in, trust_of
 from grader.overlay.scene import Arrow, Ghost, Scene, expected_vector, ghost_of, scene_of
 from grader.pipeline import mark
@@ -109,6 +110,10 @@ class Said(BaseModel):
     window: str = ""
 
 
+MOST_POINTS = 250
+"""Points of a stroke: as many as a cell of the file holds."""
+Coordinate = Annotated[float, Field(ge=0.0, le=9999.0)]
+Place = Annotated[tuple[Coordinate, Coordinate], Field(strict=False)]
 Points = Annotated[float, Field(gt=-1e5, lt=1e5, allow_inf_nan=False)] | None
 """Points of a criterion; None where the rubric's share counts."""
 
@@ -150,6 +155,14 @@ class Kept(Said):
     students: list[str]
     words: str = ""
     worth: Points = None
+
+
+class Drawn(Said):
+    """Strokes of ink on a student's page, points in sheet mm; none takes the ink of the page away."""
+
+    student: str
+    sheet: Annotated[int, Field(ge=0)]
+    strokes: list[Annotated[list[Place], Field(min_length=2, max_length=MOST_POINTS)]]
 
 
 class Whole(Said):
@@ -352,6 +365,31 @@ class Session:
         with self._lock:
             dated = replace(row, at=_now(), basis=page_basis(ref))
             self._write([(dated, seen)], self.standing(), window, row.by)
+
+    def draw(self, said: Drawn) -> list[Student]:
+        """Write strokes of ink on a student's page; none takes all ink there away.
+
+        Raises as `decide`.
+        """
+        with self._lock:
+            student, there = self.student(said.student), self.standing()
+            page = self._page(student, said.sheet).ref
+            taken = {
+                row.criterion for row in there.rows.values() if row.student_id == student.report.student_id
+            }
+            names = (f"ink:{k}:{page.file}#{page.page}" for k in count(1))
+            free = (name for name in names if name not in taken)
+            texts = [" ".join(f"{x:.1f},{y:.1f}" for x, y in stroke) for stroke in said.strokes]
+            new = [(self._row(student, next(free), text, said.by, there), "") for text in texts]
+            own = [] if new else [(row, mark_of(row)) for row in self.ink(student, said.sheet)]
+            self._write(new, there, said.window, said.by, own)
+            return self._marked_anew({student.key})
+
+    def ink(self, student: Student, sheet: int) -> list[Decision]:
+        """Return the strokes of ink in force on one of a student's pages."""
+        applied, ref = {row.criterion for row in student.report.decisions}, self.pages_of(student)[sheet].ref
+        rows = [row for row in self.standing().rows.values() if row.student_id == student.report.student_id]
+        return [row for row in strokes_on(ref, rows) if row.criterion in applied]
 
     def undo(self, window: str, by: str = "") -> tuple[list[Student], Decision | None]:
         """Take back the last decision of a window; return the students concerned, and a row of it.
@@ -598,11 +636,14 @@ class Session:
 
         Raises RefusedError for a page that there is not.
         """
-        pages = self.pages_of(self.student(key))
+        node = snapped(self._page(self.student(key), sheet).ink, *at, figure)
+        return on_sheet(node.at)
+
+    def _page(self, student: Student, sheet: int) -> ScannedPage:
+        pages = self.pages_of(student)
         if not 0 <= sheet < len(pages):
             raise RefusedError(400, "page_missing", "no_page")
-        node = snapped(pages[sheet].ink, *at, figure)
-        return on_sheet(node.at)
+        return pages[sheet]
 
     # Pages ----------------------------------------------------------------------------------------
 
@@ -699,7 +740,7 @@ def _said(row: Decision | None) -> str:
     if row is None:
         return ""
     points = "" if row.points is None else f"{row.points:g}"
-    return " ".join(filter(None, (row.verdict, points))) or row.comment
+    return " ".join(filter(None, (row.verdict[:100], points))) or row.comment
 
 
 def _now() -> str:

@@ -9,6 +9,7 @@ a semicolon-separated file `points` has a decimal comma. `criterion` says what a
 | `node:FIGURE:NODE` | the node's place, ``x,y`` in millimetres of the sheet | blank |
 | `audit:ID` | ``right; said=full``: whether the settled verdict is right (or `wrong`, `unclear`) | blank |
 | `second:ID` | ``none; said=full``: a second person's verdict, and the first one's | how many more it gives |
+| `ink:K:FILE#N` | a stroke on a page, the K-th: places ``x,y x,y ...`` in millimetres of the sheet | blank |
 | `page:FILE#N` | ``owner=s03; turn=90; corners=x,y x,y x,y x,y``, at least one of them | blank |
 | `total` | blank | added, or taken away with a minus |
 | `comment` | blank | blank |
@@ -58,7 +59,7 @@ from reference.errors import PlanmarkError
 FILE_NAME = "decisions.csv"
 COLUMNS = ("student_id", "position", "criterion", "verdict", "points", "comment", "by", "at", "basis")
 VERDICTS = ("full", "partial", "none", "follow_through", "not_judged")
-Kind = Literal["verdict", "audit", "second", "node", "page", "total", "comment"]
+Kind = Literal["verdict", "audit", "second", "node", "ink", "page", "total", "comment"]
 Key = tuple[str, int | None, str]
 """Subject of a row: student, position, criterion; of a page the page alone."""
 
@@ -115,7 +116,7 @@ class Decision:
         """The kind of decision, by its criterion."""
         start = self.criterion.partition(":")[0]
         match start:
-            case "audit" | "second" | "node" | "page" if ":" in self.criterion:
+            case "audit" | "second" | "node" | "ink" | "page" if ":" in self.criterion:
                 return start
             case "total" | "comment":
                 return start
@@ -132,10 +133,16 @@ class Decision:
     @property
     def scan(self) -> ScanRef:
         """The page that it is about. Raises TextError where it is about none."""
-        ref = parse_scan(self.criterion.removeprefix("page:"))
-        if self.kind != "page" or not isinstance(ref, ScanRef):
-            raise TextError("no_scan", text=short(self.criterion.removeprefix("page:")))
+        name = self.criterion.split(":", 2 if self.kind == "ink" else 1)[-1]
+        ref = parse_scan(name)
+        if self.kind not in {"page", "ink"} or not isinstance(ref, ScanRef):
+            raise TextError("no_scan", text=short(name))
         return ref
+
+    @property
+    def stroke(self) -> tuple[tuple[float, float], ...]:
+        """The points of a stroke of ink, x and y in mm of the sheet, y down. Raises TextError."""
+        return tuple(place(each) for each in self.verdict.split() or [""])
 
     @property
     def node(self) -> tuple[str, str]:
@@ -296,7 +303,7 @@ def faults_of(row: Decision) -> Iterator[tuple[str, Reason]]:
     yield from _faults_of_kind(row)
     if row.points is not None and not abs(row.points) <= LARGEST:
         yield "points", Reason("no_points")
-    elif row.points is not None and row.kind in {"audit", "node", "page", "comment"}:
+    elif row.points is not None and row.kind in {"audit", "node", "ink", "page", "comment"}:
         yield "points", Reason("not_blank", {"kind": row.kind})
     elif row.points is not None and row.kind == "verdict" and row.points < 0.0:
         yield "points", Reason("points_negative")
@@ -314,6 +321,9 @@ def _faults_of_kind(row: Decision) -> Iterator[tuple[str, Reason]]:
         case "node":
             yield from _fault("criterion", lambda: row.node)
             yield from _fault("verdict", lambda: row.place)
+        case "ink":
+            yield from _fault("criterion", lambda: row.scan)
+            yield from _fault("verdict", lambda: row.stroke)
         case "page":
             yield from _fault("criterion", lambda: row.scan)
             yield from _fault("verdict", lambda: row.page)

@@ -172,6 +172,25 @@ def test_a_dragged_node_snaps_and_the_marks_follow(open_window, server):
     assert page.inner_text("#numbers") != before
 
 
+def test_what_is_drawn_quickly_is_all_kept(open_window, server):
+    window = open_window(server, student="s02")
+    page = window.page
+    page.click("#pen")
+    box = page.locator("#view").bounding_box()
+    for number in range(4):
+        x, y = box["x"] + 150 + 60 * number, box["y"] + 200
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x + 30, y + 40, steps=5)
+        page.mouse.up()
+    page.wait_for_function("() => !state.ink.length && !state.busy")
+    assert len([row for row in server.decisions().values() if row.kind == "ink"]) == 4
+    assert not violations(page)
+    page.click("#wipe")
+    page.wait_for_function("() => !state.ink.length && !state.busy")
+    assert not server.decisions()
+
+
 def nearest_node(page, besides):
     """The node nearest to the middle of the view, by its name, and where its circle is."""
     view = page.locator("#view").bounding_box()

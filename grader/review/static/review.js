@@ -3,11 +3,11 @@
 // to the server at once; nothing is kept here but where one is and what is shown.
 
 const FIRST_GUESS_S = 6, LONGEST_LOOK_S = 60, LOOKS_COUNTED = 20, POLL_MS = 2500;
-const EIGHT = 8, MOST_KEPT = 12, KEPT_KEYS = "56789", PART_OF_POINTS = ["partial", "follow_through"];
+const INK_MS = 500, EIGHT = 8, MOST_KEPT = 12, KEPT_KEYS = "56789", PART_OF_POINTS = ["partial", "follow_through"];
 
 const state = {
   students: new Map(), rows: new Map(), version: -1, mode: "student", list: [], at: 0, question: null, busy: false,
-  comments: [], looks: [], shown: performance.now(), tiles: [], tile: 0, fetched: new Map(), page: null, asked: false,
+  comments: [], looks: [], shown: performance.now(), tiles: [], tile: 0, fetched: new Map(), page: null, asked: false, ink: [],
 };
 
 // The part of the class that this window shows: `?part=2/3` by student, `?criterion=v_B,v_C` by criterion ------
@@ -306,6 +306,7 @@ function showKept(kept) {
 }
 
 function undo() {
+  if (state.ink.length) { state.ink = []; return showQuestion(true); }
   return busy(async () => {
     const data = await call("api/undo", {});
     if (!data.undone) { advise(texts.nothing_to_undo); return; }
@@ -332,6 +333,37 @@ function moveNode(node, x, y) {
     }
     document.body.dataset.nodeMs = Math.round(performance.now() - started);
   });
+}
+
+// Ink ----------------------------------------------------------------------------------------------
+
+/** Post the strokes that wait: a hand that writes is not kept waiting, and one undo takes a word back. */
+function sendInk() {
+  clearTimeout(state.inkTimer);
+  if (state.busy) { state.inkTimer = setTimeout(sendInk, INK_MS); return; }
+  const [first] = state.ink, isSame = (one) => one.student === first.student && one.sheet === first.sheet;
+  const now = state.ink.filter(isSame);
+  state.ink = state.ink.filter((one) => !isSame(one));
+  busy(async () => {
+    try { take(await call("api/ink", { student: first.student, sheet: first.sheet, strokes: now.map((one) => one.stroke).filter(Boolean) })); }
+    catch (error) { await showQuestion(true); throw error; }
+    if (!first.stroke) await showQuestion(true);
+    if (state.ink.length) state.inkTimer = setTimeout(sendInk, INK_MS);
+  });
+}
+
+function addInk(points) {
+  const { student, look } = state.question;
+  if (!points) state.ink = [];
+  state.ink.push({ student, sheet: look.sheet, stroke: points && points.map(({ x, y }) => [x, y]) });
+  clearTimeout(state.inkTimer);
+  state.inkTimer = setTimeout(sendInk, points ? INK_MS : 0);
+}
+
+function takePen() {
+  viewer.onStroke = viewer.onStroke ? null : addInk;
+  $("pen").setAttribute("aria-pressed", String(Boolean(viewer.onStroke)));
+  $("wipe").hidden = !viewer.onStroke;
 }
 
 // Eight to a screen --------------------------------------------------------------------------------
@@ -645,6 +677,8 @@ $("on").onclick = () => step(1);
 $("undo").onclick = undo;
 $("eight-undo").onclick = undo;
 $("hide").onclick = hideMarks;
+$("pen").onclick = takePen;
+$("wipe").onclick = () => addInk(null);
 $("closer").onclick = () => viewer.zoom(0.7);
 $("wider").onclick = () => viewer.zoom(1.4);
 $("whole").onclick = () => viewer.whole();

@@ -6,7 +6,7 @@ const $ = (id) => document.getElementById(id);
 const texts = JSON.parse($("texts").textContent);
 const SVG = "http://www.w3.org/2000/svg";
 const VERDICT_KEYS = { 1: "full", 2: "partial", 3: "none", 4: "follow_through", 0: "not_judged" };
-const SETTLE_MS = 160;
+const SETTLE_MS = 160, MOST_POINTS = 250;
 const stored = {
   get: (name, otherwise) => { try { return localStorage.getItem(`planmark-${name}`) ?? otherwise; } catch { return otherwise; } },
   set: (name, value) => { try { localStorage.setItem(`planmark-${name}`, value); } catch { /* not kept */ } },
@@ -81,7 +81,9 @@ class Viewer {
     this.marks = svgElement("g", { class: "marks" });
     this.marks.innerHTML = look.marks || "";
     this.nodes = svgElement("g", { class: "nodes" });
-    this.svg.append(this.base, this.fine, this.marks, this.nodes);
+    this.ink = svgElement("g", { class: "ink" });
+    this.ink.innerHTML = look.ink || "";
+    this.svg.append(this.base, this.fine, this.marks, this.nodes, this.ink);
     for (const node of look.nodes || []) this.addNode(node);
     const [x, y, w, h] = look.box;
     this.fit({ x, y, w, h });
@@ -179,6 +181,11 @@ class Viewer {
     if (!this.look) return;
     this.svg.setPointerCapture(event.pointerId);
     this.pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+    if (this.line) { this.line.remove(); this.line = null; } // a second finger zooms
+    else if (this.onStroke && this.pointers.size === 1) {
+      this.line = svgElement("polyline", { class: "stroke" }); this.points = [this.point(event)];
+      this.ink.append(this.line);
+    }
     const node = event.target.closest(".node");
     // A node that cannot be saved now does not move.
     this.drag = node && this.pointers.size === 1 && !state.busy ? node : null;
@@ -188,6 +195,7 @@ class Viewer {
   move(event) {
     const last = this.pointers.get(event.pointerId);
     if (!last || !this.look) return;
+    if (this.line) { this.draw(this.point(event)); return; }
     const mm = this.view.w / this.svg.getBoundingClientRect().width;
     const by = { x: (event.clientX - last.x) * mm, y: (event.clientY - last.y) * mm };
     if (this.drag) {
@@ -203,8 +211,18 @@ class Viewer {
     this.pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
   }
 
+  /** Draw on to a point, inside the sheet; points of a long stroke are farther apart. */
+  draw(at) {
+    const [wide, high] = this.look.page_mm, last = this.points.at(-1), next = { x: Math.min(Math.max(at.x, 0), wide), y: Math.min(Math.max(at.y, 0), high) };
+    if (Math.hypot(next.x - last.x, next.y - last.y) < 0.3) return;
+    this.points.push(next);
+    if (this.points.length > MOST_POINTS) this.points = this.points.filter((_, index) => index % 2 === 0);
+    this.line.setAttribute("points", this.points.map(({ x, y }) => `${x},${y}`).join(" "));
+  }
+
   up(event) {
     if (!this.pointers.delete(event.pointerId)) return;
+    if (this.line) { this.line = null; if (this.points.length > 1) this.onStroke(this.points); return; }
     if (this.drag && this.moved) this.onNode(this.drag.dataset.node, Number(this.drag.getAttribute("cx")), Number(this.drag.getAttribute("cy")));
     else if (!this.drag) this.refine();
     this.drag = null;
@@ -225,7 +243,7 @@ function showFacts(question) {
   $("view").style.display = question.look ? "" : "none";
   $("no-scan").hidden = Boolean(question.look);
   $("no-scan").textContent = texts.no_scan;
-  for (const tool of document.querySelectorAll(".tools button")) tool.hidden = !question.look;
+  document.querySelector(".tools").hidden = !question.look;
 }
 
 async function busy(work) {

@@ -181,7 +181,7 @@ def test_a_second_run_marks_nothing_again_whatever_line_a_decision_is_on(folder)
         (replace(row("v_D", "full"), position=3), "line 2, position", "has no positions"),
         (row("v_D", "full", points=99.0), "line 2, points", "99 points are more"),
         (row("v_D", "full", points=0.5), "line 2, points", "write partial"),
-        (row("v_D", "none", points=0.5), "line 2, points", "gives 0 points"),
+        (row("v_D", "none", points=0.5), "line 2, points", "the points of none are 0"),
         (row("v_D", "not_judged", points=0.0), "line 2, points", "leave them blank"),
         (row("node:velocity:c", "1.0,2.0"), "line 2, criterion", "no figure"),
         (row("node:velocity_plan:q", "1.0,2.0"), "line 2, criterion", "no node"),

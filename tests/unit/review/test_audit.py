@@ -123,12 +123,14 @@ def marked(page, question, verdict, **said):
 
 def test_a_decision_is_marked_again_by_another_person_who_does_not_see_it(page, session):
     page.answer("s02", "v_B", "none", comment="turned round")
+    page.said("/api/ink", student="s02", sheet=0, strokes=[[[100, 200], [120, 220]]])
     assert second(page, by=" ana")["question"] is None
     question = second(page)["question"]
     assert (question["student"], question["criterion"]) == ("s02", "v_B")
     shown = json.dumps(question, ensure_ascii=False)
     assert not [told for told in ("Ana", "wrong", "turned round", COLOURS["none"]) if told in shown]
     assert COLOURS["review"] in question["look"]["marks"]
+    assert question["look"]["ink"] == ""
     rows = page.rows()
     told = marked(page, question, "full").json()
     assert page.rows() == rows

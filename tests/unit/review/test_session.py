@@ -401,6 +401,68 @@ def test_a_node_snaps_to_the_ink_and_marks_follow_it_away_and_back(page, session
     assert page.said("/api/node", **said, x=node["x"], y=node["y"]).status_code == 409
 
 
+# Ink ------------------------------------------------------------------------------------------------
+
+RING = [[100.0, 200.0], [120.0, 200.0], [120.0, 220.0], [100.0, 200.0]]
+
+
+def drawn(page, strokes=(RING,), **said):
+    return page.said("/api/ink", **{"student": SCANNED, "sheet": 0, "strokes": list(strokes), **said})
+
+
+def ink_of(page):
+    return page.get("/api/question", params={"student": SCANNED, "criterion": "v_B"}).json()["look"]["ink"]
+
+
+def test_ink_is_kept_in_millimetres_shown_and_taken_back(page, session):
+    rows = page.rows()
+    drawn(page, [RING, RING[:2]])
+    drawn(page)
+    assert [row.criterion for row in decided(session).values()] == [f"ink:{k}:s02_1.jpg#1" for k in (1, 2, 3)]
+    assert decided(session)["s02", "ink:2:s02_1.jpg#1"].stroke == ((100.0, 200.0), (120.0, 200.0))
+    assert ink_of(page).count("<polyline") == 3
+    assert page.rows() == rows
+    page.said("/api/undo")
+    page.said("/api/undo")
+    assert ink_of(page) == ""
+    drawn(page)
+    drawn(page, [])
+    assert not decided(session)
+    page.said("/api/undo")
+    assert ink_of(page).count("<polyline") == 1
+
+
+def test_the_student_sees_the_ink_until_the_scan_is_replaced(page, session):
+    drawn(page)
+    session.bring_up_to_date(silent)
+    feedback = (session.batch.out / "s02" / "feedback.html").read_text(encoding="utf-8")
+    assert "100.000,200.000 120.000,200.000" in feedback
+    overlay = Image.open(session.batch.out / "s02" / "overlay.png").convert("RGB")
+    red, green, blue = overlay.getpixel(
+        (round(110.0 * overlay.width / 420.0), round(200.0 * overlay.width / 420.0))
+    )
+    assert red > green + 100 < blue + 100
+    scan = session.batch.folder / "s02_1.jpg"
+    Image.open(scan).rotate(0.3, fillcolor="white").save(scan, quality=90)
+    session.bring_up_to_date(silent)
+    (stale,) = session.graded.results.stale
+    assert (stale.criterion, stale.code) == ("ink:1:s02_1.jpg#1", "handed_in_changed")
+    assert ink_of(page) == ""
+    scan.unlink()
+
+
+NO_INK = [
+    {"strokes": [[[1, 1]]]}, {"strokes": [[[1, 1], [-5, 1]]]}, {"strokes": [[[1, 1]] * 251]}, {"sheet": 7},
+    {"student": "s90"}, {"strokes": [[[1, 1], ["a", 1]]]}, {"student": ENTERED},
+]  # fmt: skip
+
+
+def test_what_is_no_stroke_on_a_sheet_is_refused(page, session):
+    for said in NO_INK:
+        assert drawn(page, **said).status_code == 400, said
+    assert not decided(session)
+
+
 # Pages ----------------------------------------------------------------------------------------------
 
 
