@@ -43,6 +43,27 @@ FOCUSED = f"""(() => {{
 }})()"""
 
 
+BROKEN = """() => {
+    const found = [], range = document.createRange(), texts = document.createTreeWalker(document.body, 4);
+    const styles = (one) => getComputedStyle(one).overflowX;
+    while (texts.nextNode()) {
+        const text = texts.currentNode, host = text.parentElement;
+        if (!host.checkVisibility() || host.closest("code, bdi, pre, svg, script, style")) continue;
+        for (const word of text.data.matchAll(/[\\p{L}\\p{N}]+/gu)) {
+            range.setStart(text, word.index);
+            range.setEnd(text, word.index + word[0].length);
+            if (new Set([...range.getClientRects()].map((one) => Math.round(one.top))).size > 1)
+                found.push(`wrapped inside: ${word[0]}`);
+        }
+        for (let one = host; one !== document.body; one = one.parentElement)
+            if (one.clientWidth > 1 && one.scrollWidth > one.clientWidth + 1 && styles(one) !== "visible"
+                && styles(one) !== "auto") { found.push(`cut: ${text.data.trim()}`); break; }
+    }
+    return found;
+}"""
+"""Words that are cut, or wrapped inside; names of files and addresses may be."""
+
+
 class Served:
     """The application in a thread of the test, on a port of its own."""
 
@@ -119,9 +140,10 @@ class Visit:
             wide = page.evaluate("document.documentElement.scrollWidth")
             if wide > width:
                 self.faults.append(f"{name} at {width} px is {wide} px wide")
+            self.faults += [f"{name} at {width} px: {word}" for word in page.evaluate(BROKEN)]
             page.screenshot(path=self.shots / f"{name}-{width}.png", full_page=True)
-            if axe and self.axe and width != 390:
-                scheme = "light" if width == 320 else "dark"
+            if axe and self.axe:
+                scheme = "dark" if width == 1400 else "light"
                 page.emulate_media(color_scheme=scheme)
                 self.faults += [f"{name} ({scheme}) {fault}" for fault in violations(page)]
         page.screenshot(path=self.shots / f"{name}-dark.png", full_page=True)
@@ -323,7 +345,7 @@ def test_an_instructor_publishes_grades_and_gives_back(served, visit, locale):  
     page.wait_for_url(f"{served.address}/")
     instructor.look(f"{name}-empty")
     page.select_option("#assignment", "pump")
-    page.fill("#title", "Pump, group 3")
+    page.fill("#title", "Pump mechanism: velocities and accelerations, group 3")
     page.click("main form button")
     page.wait_for_url("**/publications/*")
     address, key = page.url, page.url.rpartition("/")[2]
