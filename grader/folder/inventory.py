@@ -250,12 +250,22 @@ class Noted:
 
 def _noted(cache: PageCache) -> dict[str, Noted]:
     """Return the last run's note on each file, by its name; empty if another program wrote it."""
-    try:
-        key, files = json.loads((cache.folder.parent / FILE_NOTES).read_bytes())
-        known = {name: Noted(tuple(stamp), unpacked(pages, ())) for name, (stamp, pages) in files.items()}
-    except (OSError, KeyError, TypeError, ValueError):
-        return {}
+    key, known = _notes(cache.folder.parent)
     return known if key == cache.key else {}
+
+
+def noted_pages(folder: Path) -> dict[str, tuple[PageRef, ...]]:
+    """Return the pages of each file as the last run saw them, with their codes; `folder` has its notes."""
+    return {name: noted.pages for name, noted in _notes(folder)[1].items()}
+
+
+def _notes(folder: Path) -> tuple[str, dict[str, Noted]]:
+    """Return the key of the program that wrote the notes, and those on each file."""
+    try:
+        key, files = json.loads((folder / FILE_NOTES).read_bytes())
+        return key, {name: Noted(tuple(stamp), unpacked(pages, ())) for name, (stamp, pages) in files.items()}
+    except (OSError, KeyError, TypeError, ValueError):
+        return "", {}
 
 
 def _note(cache: PageCache, files: Sequence[Path], seen: Mapping[str, Noted]) -> None:

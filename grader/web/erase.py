@@ -14,6 +14,7 @@ from grader.files import result_folders, write_whole
 from grader.folder.changes import CACHE_FOLDER, RUN_NOTE
 from grader.lms.assessments import write_documents
 from grader.lms.export import read_results
+from grader.owners.platforms import owners_by_platform
 from grader.tables.decisions import DecisionFile
 from grader.tables.measurements import students_in
 from grader.tables.reader import MARK, decoded
@@ -57,7 +58,8 @@ def erase_student(session: Session, publication: Publication, places: Places, st
 
 def _owners(places: Places) -> dict[str, set[str]]:
     """Return the owners of each file, as the last run found them, or as the table has them."""
-    owners: dict[str, set[str]] = {}
+    by_platform = owners_by_platform(places.called().values(), places.listed())
+    owners = {name: {one} for name, one in by_platform.items() if isinstance(one, str)}
     for report in _reports(places).reports:
         for sheet in report.reading.sheets:
             owners.setdefault(sheet.source, set()).add(report.student_id)

@@ -17,20 +17,23 @@ from fastapi import APIRouter, Path, Query
 from fastapi.responses import FileResponse, Response
 from pydantic import BaseModel, Field
 from sqlalchemy import select
-from sqlalchemy.orm import Session
 
 from grader.authoring.lint import lint, lint_document
 from grader.documents import LintDocument
 from grader.feedback.class_statistics import states, waiting
+from grader.files import write_whole
+from grader.folder.archives import ENDING, unpack
 from grader.folder.workers import result_of
 from grader.language import N_, tongue
 from grader.lms.export import TARGETS, export, read_results, usual_name
 from grader.lms.grades import Delivery, Options, people_of
 from grader.lms.table import with_ids
 from grader.options import ExportOptions, PublicationOptions, model_of, offered
+from grader.records import Reason
 from grader.rubric import rubric_of
 from grader.tables.roster import read_roster
-from grader.texts.spoken import RefusedError, told
+from grader.texts.spoken import RefusedError, told, told_of
+from grader.web.arrived import owners, picture
 from grader.web.erase import erase_student
 from grader.web.guard import missing
 from grader.web.places import (
@@ -89,7 +92,8 @@ from reference.authored.assignment import built_in
 from reference.errors import PlanmarkError
 
 router = APIRouter(route_class=Route, prefix="/api/v1", tags=["instructors"])
-FileName = Annotated[str, Path(max_length=400)]
+LONGEST = 400
+FileName = Annotated[str, Path(max_length=LONGEST)]
 """As people's systems allow them, with the folders above; see `grader.web.places.person_name`."""
 StudentId = Annotated[str, Path(pattern=r"^[A-Za-z0-9._-]{1,80}$")]
 
@@ -136,11 +140,14 @@ def publication(call: Called, own: Own) -> dict[str, Any]:
     places = call.places(own)
     job = last_job(call.session, own)
     of_own = LtiActivity.publication_id == own.id
+    files, students = files_of(call, own, places), students_of(places)
+    having = {student for file in files for student in file["students"]}
     return {
         **facts(own),
         "authored": sorted(path.name for path in places.authored.glob("*")),
-        "files": files_of(call.session, own, places),
-        "students": students_of(places),
+        "files": files,
+        "students": students,
+        "missing": [one for one in students if one["student_id"] not in having],
         "job": None if job is None else state_of(call, job).model_dump(),
         "requests": len(unanswered(call.session, own)),
         "has_results": (places.results / "results.json").is_file(),
@@ -280,14 +287,19 @@ def students_of(places: Places) -> list[dict[str, Any]]:
     return [{"student_id": student, "name": name} for student, name in names.items()]
 
 
-def files_of(session: Session, publication: Publication, places: Places) -> list[dict[str, Any]]:
-    """The files handed in, each with its time; of a student's version also what the student calls it."""
-    sheets = session.scalars(select(Sheet).where(Sheet.publication_id == publication.id))
+def files_of(call: Call, publication: Publication, places: Places) -> list[dict[str, Any]]:
+    """The files handed in, with time and students; of a student's version also the student's name of it."""
+    sheets = call.session.scalars(select(Sheet).where(Sheet.publication_id == publication.id)).all()
     shown = {one.file: one.shown for one in sheets}
+    pages = {one.file: one.pages for one in sheets}
+    whose = owners(call.service.settings.data, publication, places, pages)
     return [
-        {"name": name, "bytes": stat.st_size, "at": stat.st_mtime, "shown": shown.get(path.name, "")}
+        {
+            "name": name, "bytes": stat.st_size, "at": stat.st_mtime, "shown": shown.get(path.name, ""),
+            "students": whose.get(name, ()), "is_picture": path.suffix.lower() not in {".csv", ".json"},
+        }
         for path, name, stat in ((path, name, path.stat()) for path, name in places.called().items())
-    ]
+    ]  # fmt: skip
 
 
 def _remove(call: Call, publication: Publication) -> None:
@@ -325,9 +337,40 @@ def put_roster(call: Called, own: Own, body: Body) -> dict[str, Any]:
 
 @router.put("/publications/{key}/files/{name:path}", openapi_extra=FILE_BODY)
 def put_file(call: Called, own: Own, name: FileName, body: Body, *, replace: bool = False) -> dict[str, Any]:
-    """Store a sheet, a class file or measurements that were handed in."""
+    """Store a sheet, a class file or measurements; of a ZIP all files, but those that are `refused`."""
     call.count("upload")
-    called = person_name(name, SUBMITTED)
+    called = person_name(name, (*SUBMITTED, ENDING))
+    if PurePath(called).suffix.lower() == ENDING:
+        answer = _put_archive(call, own, called, body, replace=replace)
+    else:
+        answer = _put(call, own, called, body, replace=replace)
+    call.note("file", f"{own.key} {called}")
+    return answer
+
+
+def _put_archive(call: Call, own: Publication, called: str, body: bytes, *, replace: bool) -> dict[str, Any]:
+    files, refused, speaker = list[dict[str, Any]](), list[dict[str, str]](), tongue(call.lang)
+    with trial_of(call, own, ENDING, body) as trial, tempfile.TemporaryDirectory(dir=trial.parent) as into:
+        for name, file in result_of(call.service.queue.workers, unpack, trial, pathlib.Path(into)):
+            try:
+                if isinstance(file, Reason) or len(name) > LONGEST:
+                    why = file if isinstance(file, Reason) else Reason("archive_name")
+                    raise RefusedError(422, why.code, **dict[str, Any](why.parameters))
+                content = (pathlib.Path(into) / file).read_bytes()
+                files.append(_put(call, own, person_name(name, SUBMITTED), content, replace=replace))
+            except PlanmarkError as error:
+                refused.append({"name": name or called, "message": told_of(error, speaker)})
+        trial.unlink()
+    return {
+        "name": called,
+        "is_same": all(one["is_same"] for one in files),
+        "files": files,
+        "refused": refused,
+    }
+
+
+def _put(call: Call, own: Publication, called: str, body: bytes, *, replace: bool) -> dict[str, Any]:
+    """Store one file that was handed in."""
     if PurePath(called).name.lower() in {"roster.csv", "decisions.csv"}:
         raise RefusedError(422, "file_name", "file_reserved")
     stored = stored_name(called)
@@ -344,7 +387,6 @@ def put_file(call: Called, own: Own, name: FileName, body: Body, *, replace: boo
             call.session.add(sheet)
             call.session.commit()
             trial.unlink()
-    call.note("file", f"{own.key} {called}")
     return {"name": called, "is_same": is_same}
 
 
@@ -362,11 +404,24 @@ def find_receipt(
     raise missing("receipt")
 
 
+@router.get("/publications/{key}/thumbnails/{name:path}")
+def thumbnail(call: Called, own: Own, name: FileName) -> Response:
+    """A small picture of a file's first page, as JPEG."""
+    places = call.places(own)
+    path = places.file(name)
+    if path is None:
+        raise missing("file")
+    small = places.thumbnail(path)
+    if not small.is_file() or small.stat().st_mtime < path.stat().st_mtime:
+        write_whole(small, result_of(call.service.queue.workers, picture, path, name))
+    return Response(small.read_bytes(), media_type="image/jpeg")
+
+
 @router.delete("/publications/{key}/files/{name:path}")
 def remove_file(call: Called, own: Own, name: FileName) -> dict[str, str]:
     """Delete a file that was handed in."""
     places = call.places(own)
-    path = next((path for path, called in places.called().items() if called == name), None)
+    path = places.file(name)
     if path is None:
         raise missing("file")
     places.delete(path)

@@ -12,12 +12,13 @@ from jinja2 import Environment, PackageLoader
 from markupsafe import Markup
 
 from grader.feedback.words import STATES, environment
+from grader.folder.archives import ENDING
 from grader.language import LANGUAGES, N_, tongue
 from grader.lms.export import TARGETS
 from grader.review.server import result_file
 from grader.web import accounts, claims, instructors, lti, students
 from grader.web.guard import HEADERS, missing
-from grader.web.places import assignment_of
+from grader.web.places import SUBMITTED, assignment_of
 from grader.web.self_check import form_of
 from grader.web.service import Call, Called, Key, Own, Route, moment
 from reference.authored.assignment import built_in
@@ -36,6 +37,7 @@ TEXTS = {
     "unread": N_("The drawing could not be read."),
     "uploaded": N_("%(done)s of %(total)s files are there"),
     "refused": N_("These files were not taken:"),
+    "upload_ended": N_("All others are there. Load the page again to see them."),
     "sure": N_("This cannot be undone. Go on?"),
     "mailed": N_("If this is an account's address, a link to a new password is on its way."),
     "sent": N_("Your instructor has your request."),
@@ -142,6 +144,7 @@ def open_link(call: Called, token: str) -> Response:
 def publication(call: Called, own: Own) -> Response:
     """Show an instructor's page of a class."""
     known = instructors.publication(call, own)
+    names = {one["student_id"]: one["name"] for one in known["students"]}
     links = {one["student_id"]: one for one in instructors.links(call, own) if not one["is_revoked"]}
     address = f"{call.service.settings.address}/c/{own.key}"
     title = tongue(call.lang).gettext(QR_CODE)
@@ -151,6 +154,7 @@ def publication(call: Called, own: Own) -> Response:
         assignments=built_in(), colleagues=accounts.listed(call), platforms=TARGETS, states=STATES,
         open_ones=instructors.open_ones(known["standing"], call.lang),
         zone=moment(time.time()).split(" ", 2)[2],
+        accepted=",".join((*SUBMITTED, ENDING)), names=names,
         claims=claims.listed(call, own), address=address, picture=Markup(code),  # noqa: S704 - segno's
     )  # fmt: skip
 

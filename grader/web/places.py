@@ -18,7 +18,7 @@ from grader.folder.batch import Batch
 from grader.folder.inventory import is_tool_file
 from grader.rubric import rubric_of
 from grader.tables.reader import why_no_id
-from grader.tables.roster import RosterRow, read_roster
+from grader.tables.roster import Roster, RosterRow, read_roster
 from grader.texts.spoken import RefusedError, failure
 from grader.web.store import Publication
 from reference.authored.assignment import Assignment, built_in, load_assignment
@@ -69,12 +69,17 @@ class Places:
         """The roster, whether there is one or not."""
         return self.handed_in / "roster.csv"
 
+    def listed(self) -> Roster | None:
+        """Return the roster; None where there is no usable one."""
+        try:
+            return read_roster(self.roster) if self.roster.is_file() else None
+        except PlanmarkError:
+            return None
+
     def students(self) -> tuple[RosterRow, ...]:
         """Return the lines of the roster; none where there is no usable one."""
-        try:
-            return read_roster(self.roster).rows if self.roster.is_file() else ()
-        except PlanmarkError:
-            return ()
+        roster = self.listed()
+        return () if roster is None else roster.rows
 
     def submitted(self) -> list[Path]:
         """The files handed in, by name."""
@@ -103,6 +108,15 @@ class Places:
         """Delete a file handed in, with what it was called."""
         path.unlink(missing_ok=True)
         self._note_of(path).unlink(missing_ok=True)
+        self.thumbnail(path).unlink(missing_ok=True)
+
+    def file(self, name: str) -> Path | None:
+        """Return a file handed in by what people call it."""
+        return next((path for path, called in self.called().items() if called == name), None)
+
+    def thumbnail(self, path: Path) -> Path:
+        """Return the path of a file's picture, whether there is one or not."""
+        return self.top / "thumbnails" / f"{path.name}.jpg"
 
     def _note_of(self, path: Path) -> Path:
         return self.top / "names" / path.name

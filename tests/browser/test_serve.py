@@ -1,10 +1,12 @@
 """The web application in a real browser: what an instructor and a student do, on a phone and on a screen."""
 
+import base64
 import os
 import shutil
 import socket
 import threading
 import time
+import zipfile
 from io import BytesIO
 from pathlib import Path
 
@@ -114,6 +116,30 @@ def copied(folder, *names):
     folder.mkdir(parents=True, exist_ok=True)
     for name in names:
         shutil.copy(SAMPLES / name, folder)
+
+
+def zipped(folder):
+    """A platform's archive of one student's scan."""
+    with zipfile.ZipFile(folder / "all.zip", "w") as archive:
+        archive.write(SAMPLES / "s01_1.jpg", "Student 1_101_assignsubmission_file_/plan.jpg")
+    return folder / "all.zip"
+
+
+def dropped(page, folder, name):
+    """Drop a sample as the file of a folder: what a browser gives of one is made by hand."""
+    content = base64.b64encode((SAMPLES / name).read_bytes()).decode()
+    page.evaluate(
+        """([folder, name, content]) => {
+            const file = new File([Uint8Array.from(atob(content), (sign) => sign.charCodeAt(0))], name);
+            let left = [{ isFile: true, name, file: (found) => found(file) }];
+            const reader = { readEntries: (found) => { found(left); left = []; } };
+            const entry = { isFile: false, name: folder, createReader: () => reader };
+            const event = new Event("drop", { bubbles: true, cancelable: true });
+            event.dataTransfer = { items: [{ webkitGetAsEntry: () => entry }] };
+            document.querySelector(".drop").dispatchEvent(event);
+        }""",
+        [folder, name, content],
+    )
 
 
 class Visit:
@@ -361,7 +387,22 @@ def test_an_instructor_publishes_grades_and_gives_back(served, visit, locale):  
     with page.expect_navigation():
         page.set_input_files("#roster", SAMPLES / "roster.csv")
     with page.expect_navigation():
-        page.set_input_files("#files", [SAMPLES / "s01_1.jpg", SAMPLES / "s08.json"])
+        page.set_input_files("#files", [SAMPLES / "s08.json", zipped(served.settings.data.parent)])
+    with page.expect_navigation():
+        dropped(page, "photos", "s02_1.jpg")
+    page.locator(".files img").last.scroll_into_view_if_needed()
+    page.wait_for_load_state("networkidle")
+    assert (
+        page.evaluate("[...document.querySelectorAll('.files img')].map((one) => one.naturalWidth > 0)")
+        == [True] * 2
+    )
+    instructor.look(f"{name}-arrived")
+    whose = page.locator(".files li").all_inner_texts()
+    assert [any(who in one for one in whose) for who in ("s01", "s02", "s08")] == [True, True, True], whose
+    assert "s04" in page.locator("details:has(.files) + details").text_content()
+    page.set_input_files("#files", {"name": "bad.zip", "mimeType": "application/zip", "buffer": b"PK"})
+    page.wait_for_selector(".upload li")
+    assert "bad.zip" in page.inner_text(".upload li")
     page.click("#grade")
     page.wait_for_selector("#job:not([hidden])")
     instructor.look(f"{name}-grading", axe=False)

@@ -110,23 +110,47 @@ $("print")?.addEventListener("click", () => print());
 
 // Files -------------------------------------------------------------------------------------------
 
+/** Send files, one after the other; what is refused is listed, and the page shows what is there. */
+async function upload(input, files) {
+  const box = document.querySelector(".upload"), bar = box?.querySelector("progress"), said = box?.querySelector("[role=status]");
+  const refused = [], again = "fixed" in input.dataset || !$("replace")?.checked ? "" : "?replace=true";
+  let done = 0;
+  if (box) { box.hidden = false; box.querySelector("ul").replaceChildren(); bar.value = 0; }
+  for (const [file, name] of files) {
+    if (said) said.textContent = `${fill(texts.uploaded, { done, total: files.length })}: ${name}`;
+    const path = input.dataset.put + ("fixed" in input.dataset ? "" : name.split("/").map(encodeURIComponent).join("/"));
+    try {
+      const answer = await call("PUT", path + again, file, { raw: true });
+      refused.push(...(answer.refused || []).map((one) => `${one.name}: ${one.message}`));
+    } catch (error) { refused.push(`${name}: ${error.message}`); }
+    done += 1;
+    if (box) bar.value = done / files.length;
+  }
+  if (!refused.length) { location.reload(); return; }
+  if (box) box.querySelector("ul").replaceChildren(...refused.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
+  if (said) said.textContent = texts.upload_ended;
+  tell(null, `${texts.refused} ${refused.slice(0, 5).join("; ")}`);
+}
 for (const input of document.querySelectorAll("input[data-put]")) {
-  input.addEventListener("change", async () => {
-    const box = document.querySelector(".upload"), bar = box?.querySelector("progress"), said = box?.querySelector("[role=status]");
-    const refused = [];
-    let done = 0;
-    if (box) { box.hidden = false; box.querySelector("ul").replaceChildren(); }
-    for (const file of input.files) {
-      const name = file.webkitRelativePath ? file.webkitRelativePath.split("/").slice(1).join("/") : file.name;
-      const path = input.dataset.put + ("fixed" in input.dataset ? "" : name.split("/").map(encodeURIComponent).join("/"));
-      try { await call("PUT", path, file, { raw: true }); } catch (error) { refused.push(`${name}: ${error.message}`); }
-      done += 1;
-      if (box) { bar.value = done / input.files.length; said.textContent = fill(texts.uploaded, { done: done - refused.length, total: input.files.length }); }
-    }
-    if (!refused.length) { location.reload(); return; }
-    const list = box ? box.querySelector("ul") : null;
-    if (list) list.replaceChildren(...refused.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
-    tell(null, `${texts.refused} ${refused.slice(0, 5).join("; ")}`);
+  input.addEventListener("change", () => upload(input, [...input.files].map((file) => [file, file.webkitRelativePath.split("/").slice(1).join("/") || file.name])));
+}
+
+/** The files of what was dropped, with folders; each with its path. */
+async function filesOf(entry, before = "") {
+  if (entry.isFile) return [[await new Promise((found, failed) => entry.file(found, failed)), before + entry.name]];
+  const reader = entry.createReader(), files = [];
+  for (;;) {
+    const some = await new Promise((found, failed) => reader.readEntries(found, failed));
+    if (!some.length) return files;
+    for (const one of some) files.push(...await filesOf(one, `${before}${entry.name}/`));
+  }
+}
+for (const place of document.querySelectorAll(".drop")) {
+  const over = (event) => { event.preventDefault(); place.classList.toggle("over", event.type === "dragover"); };
+  for (const kind of ["dragover", "dragleave", "drop"]) place.addEventListener(kind, over);
+  place.addEventListener("drop", async (event) => {
+    const entries = [...event.dataTransfer.items].map((item) => item.webkitGetAsEntry()).filter(Boolean);
+    upload(place.querySelector("input[multiple]"), (await Promise.all(entries.map((one) => filesOf(one)))).flat());
   });
 }
 

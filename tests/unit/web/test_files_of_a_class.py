@@ -1,14 +1,22 @@
 """Files that instructors upload: names, kinds, sizes; rosters and assignments with faults."""
 
+import io
 import json
 import re
+import zipfile
 from urllib.parse import quote
 
 import pytest
+from PIL import Image
 
 from grader.authoring.new import new_assignment
+from grader.files import samples_folder
+from grader.folder.cache import packed as packed_record
+from grader.folder.changes import CACHE_FOLDER
+from grader.records import Identity, PageRef
 from grader.texts.spoken import RefusedError
 from grader.web.places import AUTHORED, SUBMITTED, person_name, safe_name, stored_name
+from tests.unit.web.test_budgets import pdf
 
 NAMES = {
     "s01.jpg": "s01.jpg",
@@ -202,3 +210,87 @@ def test_a_publication_and_a_term_are_deleted_with_all_their_files(admin, settin
     assert admin.act("DELETE", "/terms/2026%20autumn").json() == {"removed": 2}
     assert not list(settings.data.rglob("s01.jpg"))
     assert admin.act("DELETE", "/terms/2026%20autumn").status_code == 404
+
+
+# What arrived, and whose it is --------------------------------------------------------------------
+
+JPEG = (samples_folder() / "pump" / "s01_1.jpg").read_bytes()
+ROSTER = (
+    "student_id,name,n,scans\ns01,Ștefan Țurcanu,7,\ns02,Ana Pop,8,\ns03,Ion Rusu,9,class.pdf#2\n"
+    "s04,Olga Lungu,10,\n"
+)
+
+
+def packed(**files):
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w") as made:
+        for name, content in files.items():
+            made.writestr(name, content)
+    return archive.getvalue()
+
+
+def listed(admin, key):
+    known = admin.get(f"/api/v1/publications/{key}").json()
+    missing = [one["student_id"] for one in known["missing"]]
+    return {one["name"]: one["students"] for one in known["files"]}, missing
+
+
+@pytest.mark.usefixtures("grades_here")
+def test_a_zip_is_taken_file_by_file_and_each_has_its_student(admin, settings):
+    key = admin.publish()
+    admin.act("PUT", f"/publications/{key}/roster/files/roster.csv", content=ROSTER.encode())
+    moodle = "Stefan Turcanu_101_assignsubmission_file_/plan.jpg"
+    files = dict.fromkeys([moodle, "s02_1.jpg", "x/what.jpg", "../../out.jpg"], JPEG)
+    files |= {"a.exe": b"", "roster.csv": b""}
+    sent = admin.act("PUT", f"/publications/{key}/files/all.zip", content=packed(**files)).json()
+    assert [one["name"] for one in sent["files"]] == [moodle, "s02_1.jpg", "x/what.jpg"]
+    assert {one["name"] for one in sent["refused"]} == {"../../out.jpg", "a.exe", "roster.csv"}
+    assert listed(admin, key) == ({moodle: ["s01"], "s02_1.jpg": ["s02"], "x/what.jpg": []}, ["s03", "s04"])
+    assert {path.suffix for path in settings.data.rglob("*.*")}.isdisjoint({".zip", ".exe"})
+    changed = packed(**files | {moodle: JPEG + b"more"})
+    again = admin.act("PUT", f"/publications/{key}/files/all.zip", content=changed).json()
+    assert [one["is_same"] for one in again["files"]] == [True, True]
+    assert "plan.jpg" in str(again["refused"])
+    newer = packed(**{moodle: JPEG + b"more"})
+    sent = admin.act("PUT", f"/publications/{key}/files/all.zip?replace=true", content=newer).json()
+    assert (sent["files"], sent["refused"]) == ([{"name": moodle, "is_same": False}], [])
+    assert admin.act("DELETE", f"/publications/{key}/students/s01").status_code == 200
+    assert moodle not in listed(admin, key)[0]
+
+
+@pytest.mark.usefixtures("grades_here")
+def test_a_class_file_is_of_those_of_its_pages_and_a_table_of_those_in_it(admin):
+    key = admin.publish()
+    admin.act("PUT", f"/publications/{key}/roster/files/roster.csv", content=ROSTER.encode())
+    admin.act("PUT", f"/publications/{key}/files/class.pdf", content=pdf(3))
+    table = b"student_id,v_A\ns01,60\nstranger,60\ns02,60\n"
+    admin.act("PUT", f"/publications/{key}/files/measured.csv", content=table)
+    assert listed(admin, key) == ({"class.pdf": ["s03"], "measured.csv": ["s01", "s02"]}, ["s04"])
+
+
+@pytest.mark.usefixtures("grades_here")
+def test_a_page_that_was_graded_is_of_the_student_of_its_code(admin, settings):
+    key = admin.publish()
+    admin.act("PUT", f"/publications/{key}/roster/files/roster.csv", content=ROSTER.encode())
+    admin.act("PUT", f"/publications/{key}/files/scan7.jpg", content=JPEG)
+    page = PageRef("scan7.jpg", identity=Identity("pump", "s04", 10, None, "all"))
+    note = json.dumps(("", {"scan7.jpg": ((0, 0, 0, 0), packed_record([page], []))}))
+    where = settings.data / "publications" / key / "results" / CACHE_FOLDER
+    where.mkdir(parents=True)
+    (where / "files.json").write_text(note, encoding="utf-8")
+    assert listed(admin, key)[0] == {"scan7.jpg": ["s04"]}
+
+
+@pytest.mark.usefixtures("grades_here")
+def test_a_file_has_a_small_picture_for_its_instructors_alone(admin, visitor):
+    key = admin.publish()
+    admin.act("PUT", f"/publications/{key}/files/s01.jpg", content=JPEG)
+    admin.act("PUT", f"/publications/{key}/files/s02.jpg", content=b"junk")
+    path = f"/api/v1/publications/{key}/thumbnails"
+    small = admin.get(f"{path}/s01.jpg")
+    assert (small.status_code, small.headers["content-type"]) == (200, "image/jpeg")
+    assert max(Image.open(io.BytesIO(small.content)).size) < 1000
+    assert admin.get(f"{path}/s01.jpg").content == small.content
+    assert admin.get(f"{path}/s02.jpg").status_code in {400, 422}
+    assert admin.get(f"{path}/nothing.jpg").status_code == 404
+    assert visitor.get(f"{path}/s01.jpg").status_code in {401, 404}
