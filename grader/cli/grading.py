@@ -314,7 +314,7 @@ def _waiting(results: ResultsDocument) -> Iterator[str]:
         about = f", {count}, {wait.points:.4g} points at stake" if wait.criteria else ""
         problem = f"; {report.problems[0].message}" if report.problems else ""
         who = _who(report.student_id, report.position)
-        yield f"{who}: {report.status.replace('_', ' ')}{about}{problem}"
+        yield f"{who}: {STATES[report.status]}{about}{problem}"
     for report in results.reports:
         if report.status == "missing":
             problem = f"; {report.problems[0].message}" if report.problems else ""

@@ -242,7 +242,7 @@ def joined(instructor):
 
 
 def follows(page, first, second):
-    """Whether a part of the page stands right behind another one."""
+    """Return whether a part of the page stands right behind another one."""
     return page.evaluate(f"document.querySelector('{first}').nextElementSibling.matches('{second}')")
 
 

@@ -203,7 +203,7 @@ def site():
 
 @pytest.fixture
 def waits(monkeypatch):
-    """How long was waited, in a moment."""
+    """Return the waits that were asked for, without waiting."""
     monkeypatch.setenv("PLANMARK_TOKEN", TOKEN)
     waited = []
     monkeypatch.setattr("grader.cli.sending.time.sleep", waited.append)

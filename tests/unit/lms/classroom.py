@@ -92,7 +92,7 @@ def notes(delivery):
 
 
 def left_out(delivery):
-    """Who is not in a file, and why, in English."""
+    """The students who are not in a file, with the reasons in English."""
     return {
         student: ", ".join(clause(reason, ENGLISH) for reason in reasons)
         for student, _, reasons in delivery.left_out()

@@ -38,13 +38,13 @@ def sent(browser, key, pages):
 def test_pages_that_a_student_may_hand_in_are_counted_and_told_at_once(graded, admin, student, app, settings):
     key, links = graded
     status, message = sent(student, key, 7)
-    assert (status, "7 pages: 6 more" in message) == (403, True)
+    assert (status, "7 in this file, and 6 may" in message) == (403, True)
     assert sent(student, key, 4)[0] == 201
-    assert "2 more" in sent(student, key, 3)[1]
+    assert "and 2 may" in sent(student, key, 3)[1]
     assert sent(student, key, 2)[0] == 201
     other = Browser(app)
     other.get(links["s11"])
-    assert "2 more" in sent(other, key, 3)[1], "the class has eight"
+    assert "and 2 may" in sent(other, key, 3)[1], "the class has eight"
     assert sent(other, key, 2)[0] == 201
     first = student.get(f"/api/v1/publications/{key}/sheets").json()[0]["file"]
     assert admin.act("DELETE", f"/publications/{key}/files/{first}").status_code == 200
@@ -81,8 +81,8 @@ def test_pages_that_instructors_upload_are_counted_and_told_at_once(admin, grade
     assert uploaded(admin, key, "class.pdf", 6) == (200, "")
     assert sent(student, key, 3)[0] == 201
     status, message = uploaded(admin, key, "more.pdf", 2)
-    assert (status, "2 pages: 1 more" in message) == (403, True)
-    assert "1 more" in sent(student, key, 2)[1]
+    assert (status, "2 in this file, and 1 may" in message) == (403, True)
+    assert "and 1 may" in sent(student, key, 2)[1]
     assert uploaded(admin, key, "class.pdf", 7, "?replace=true") == (200, "")
     assert uploaded(admin, key, "one.pdf", 1)[0] == 403
     assert admin.act("DELETE", f"/publications/{key}/files/class.pdf").status_code == 200
