@@ -30,12 +30,13 @@ def _page(file: InputFile, number: int) -> Page | None:
         wide, high = picture.size
         check_memory(file, 1, wide * high, _PIXEL_BYTES * wide * high)
         check_size(file, 1, wide, high)
-        pixels = np.asarray(picture)
+        # A copy: the decoder takes its memory back. Its rows may be longer than the picture.
+        pixels = np.array(picture)[:, :wide]
     except (EOFError, ValueError) as error:
         if "end of file" in str(error).lower():
             raise truncated(file, 1) from error
         raise
-    return Page(file.name, 1, to_grey(pixels, rgb=True), None, 0)
+    return Page(file.name, 1, to_grey(np.ascontiguousarray(pixels), rgb=True), None, 0)
 
 
 HEIC = Door(_page)
