@@ -12,6 +12,7 @@ from reference.errors import InputFileError
 
 _PIXEL_BYTES = 9
 """The planes of the decoder, the pixels made of them, and their copy: three bytes each."""
+_CUT_OFF = ("end of file", "cannot read full")
 
 
 def _page(file: InputFile, number: int) -> Page | None:
@@ -33,7 +34,7 @@ def _page(file: InputFile, number: int) -> Page | None:
         # A copy: the decoder takes its memory back. Its rows may be longer than the picture.
         pixels = np.array(picture)[:, :wide]
     except (EOFError, ValueError) as error:
-        if "end of file" in str(error).lower():
+        if any(sign in str(error).lower() for sign in _CUT_OFF):
             raise truncated(file, 1) from error
         raise
     return Page(file.name, 1, to_grey(np.ascontiguousarray(pixels), rgb=True), None, 0)

@@ -94,8 +94,9 @@ def test_a_phones_heic_is_turned_once():
 def test_a_heic_that_is_cut_off_or_of_too_many_pixels_is_refused(tmp_path):
     pytest.importorskip("pi_heif")
     data = HEIC["plain"].read_bytes()
-    (tmp_path / "cut.heic").write_bytes(data[:-200])
-    assert refused(lambda: only_page(tmp_path / "cut.heic")).code == "image_truncated"
+    for size in (100, len(data) - 200):
+        (tmp_path / "cut.heic").write_bytes(data[:size])
+        assert refused(lambda: only_page(tmp_path / "cut.heic")).code == "image_truncated"
     at = data.index(b"ispe") + 8
     (tmp_path / "bomb.heic").write_bytes(data[:at] + struct.pack(">II", 60_000, 60_000) + data[at + 8 :])
     assert refused(lambda: only_page(tmp_path / "bomb.heic")).code in {"image_too_large", "image_damaged"}
