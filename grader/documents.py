@@ -7,7 +7,7 @@ from +x, 0 <= d < 360. Real values are SI; scales are real units per millimetre 
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from reference.construction.mistakes import Code
 
@@ -22,6 +22,16 @@ Cause = Literal["assignment", "rubric", "submission", "roster", "decision", "pro
 Sign = Literal["hand_errors", "same_place", "same_numbers", "same_picture", "other_number"]
 """Sign of similarity between sheets."""
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+def _with_english(titles: dict[str, str]) -> dict[str, str]:
+    if "en" not in titles:
+        raise ValueError("has no English title (en)")
+    return titles
+
+
+Titles = Annotated[dict[str, str], AfterValidator(_with_english)]
+"""Titles by language, English among them."""
 Parameters = dict[str, int | float | str | list[str]]
 """Values in a reason or problem: numbers (the name ends in the unit), vector names, texts as written."""
 
@@ -510,7 +520,7 @@ class RubricCriterionDocument(Document):
     """A criterion of the rubric: titles by language, levels from the best to the worst, then `not_judged`."""
 
     id: str
-    titles: dict[str, str]
+    titles: Titles
     section: str
     max_points: float
     levels: list[LevelDocument]
@@ -519,7 +529,7 @@ class RubricCriterionDocument(Document):
 class RubricDocument(Document):
     """The rubric by which a class is marked; `changed`: when its file was last changed (ISO 8601, UTC)."""
 
-    titles: dict[str, str]
+    titles: Titles
     changed: str
     criteria: list[RubricCriterionDocument]
 
