@@ -348,13 +348,13 @@ Participant 8,A. B.,-,,43.00,Yes,-
 """
 IDS = b"student_id,participant\ns08,8\n"
 TOLD = {
-    "en": ("Students in the file: 1.", "withheld: nothing handed in: s02, s03", "Moodle reports must be 1"),
+    "en": ("Students in the file: 1.", "withheld: nothing handed in: s03, s04", "Moodle reports must be 1"),
     "ro": (
         "Studenți în fișier: 1.",
-        "fără notă deocamdată: nepredat: s02, s03",
+        "fără notă deocamdată: nepredat: s03, s04",
         "numărul de note actualizate",
     ),
-    "ru": ("Студентов в файле: 1.", "оценки пока нет: не сдано: s02, s03", "обновлено оценок: 1"),
+    "ru": ("Студентов в файле: 1.", "оценки пока нет: не сдано: s03, s04", "обновлено оценок: 1"),
 }
 
 
