@@ -20,7 +20,7 @@ from grader.folder import archives
 from grader.folder.cache import PageCache, digest_of, packed, unpacked
 from grader.folder.workers import ENDED, Pool
 from grader.records import PageRef, Reason, of_error
-from grader.scan.decode.limits import load
+from grader.scan.decode.limits import SUFFIXES, load
 from grader.scan.decode.pages import count_pages, decode
 from grader.scan.register.registration import register
 from grader.tables.measurements import Measurements, Names, read_measurements, students_in
@@ -32,7 +32,9 @@ from reference.errors import InputFileError
 _TOOL_NAMES = RESULT_FILES | {"thumbs.db", "desktop.ini", "layout.json", "truth.jsonl"}
 _TOOL_STARTS = (".", "~$", "__MACOSX")
 _TOOL_ENDS = (".part", ".tmp", ".bak", ".crdownload", ".log", ".toml", "~")
-_FILE_TYPES = frozenset({".jpg", ".jpeg", ".png", ".tif", ".tiff", ".heic", ".heif", ".pdf", ".csv", ".json"})
+MEASUREMENT_TYPES = (".csv", ".json")
+FILE_TYPES = (*SUFFIXES, *MEASUREMENT_TYPES)
+"""Endings of the files that students hand in."""
 _DIGITS = re.compile(r"(\d+)")
 
 
@@ -106,7 +108,7 @@ def _real(path: Path) -> Path:
 def _named_as_file(folder: Path) -> bool:
     """Return whether an empty folder is named as scans and measurements are."""
     try:
-        return folder.suffix.lower() in _FILE_TYPES and next(folder.iterdir(), None) is None
+        return folder.suffix.lower() in FILE_TYPES and next(folder.iterdir(), None) is None
     except OSError:
         return False
 
@@ -119,7 +121,6 @@ def natural_key(name: str) -> tuple[tuple[int, int | str], ...]:
 
 # What is in them ----------------------------------------------------------------------------------
 
-MEASUREMENT_TYPES = {".csv", ".json"}
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, how many are done, and of how many."""
 

@@ -23,6 +23,7 @@ from grader.documents import LintDocument
 from grader.feedback.class_statistics import states, waiting
 from grader.files import write_whole
 from grader.folder.archives import ENDING, unpack
+from grader.folder.inventory import FILE_TYPES, MEASUREMENT_TYPES
 from grader.folder.workers import result_of
 from grader.language import N_, tongue
 from grader.lms.export import TARGETS, export, read_results, usual_name
@@ -38,7 +39,6 @@ from grader.web.erase import erase_student
 from grader.web.guard import missing
 from grader.web.places import (
     AUTHORED,
-    SUBMITTED,
     Places,
     assignment_of,
     person_name,
@@ -296,7 +296,7 @@ def files_of(call: Call, publication: Publication, places: Places) -> list[dict[
     return [
         {
             "name": name, "bytes": stat.st_size, "at": stat.st_mtime, "shown": shown.get(path.name, ""),
-            "students": whose.get(name, ()), "is_picture": path.suffix.lower() not in {".csv", ".json"},
+            "students": whose.get(name, ()), "is_picture": path.suffix.lower() not in MEASUREMENT_TYPES,
         }
         for path, name, stat in ((path, name, path.stat()) for path, name in places.called().items())
     ]  # fmt: skip
@@ -339,7 +339,7 @@ def put_roster(call: Called, own: Own, body: Body) -> dict[str, Any]:
 def put_file(call: Called, own: Own, name: FileName, body: Body, *, replace: bool = False) -> dict[str, Any]:
     """Store a sheet, a class file or measurements; of a ZIP all files, but those that are `refused`."""
     call.count("upload")
-    called = person_name(name, (*SUBMITTED, ENDING))
+    called = person_name(name, (*FILE_TYPES, ENDING))
     if PurePath(called).suffix.lower() == ENDING:
         answer = _put_archive(call, own, called, body, replace=replace)
     else:
@@ -357,7 +357,7 @@ def _put_archive(call: Call, own: Publication, called: str, body: bytes, *, repl
                     why = file if isinstance(file, Reason) else Reason("archive_name")
                     raise RefusedError(422, why.code, **dict[str, Any](why.parameters))
                 content = (pathlib.Path(into) / file).read_bytes()
-                files.append(_put(call, own, person_name(name, SUBMITTED), content, replace=replace))
+                files.append(_put(call, own, person_name(name, FILE_TYPES), content, replace=replace))
             except PlanmarkError as error:
                 refused.append({"name": name or called, "message": told_of(error, speaker)})
         trial.unlink()

@@ -13,12 +13,13 @@ from markupsafe import Markup
 
 from grader.feedback.words import STATES, environment
 from grader.folder.archives import ENDING
+from grader.folder.inventory import FILE_TYPES
 from grader.language import LANGUAGES, N_, tongue
 from grader.lms.export import TARGETS
 from grader.review.server import result_file
 from grader.web import accounts, claims, instructors, lti, students
 from grader.web.guard import HEADERS, missing
-from grader.web.places import SUBMITTED, assignment_of
+from grader.web.places import assignment_of
 from grader.web.self_check import form_of
 from grader.web.service import Call, Called, Key, Own, Route, moment
 from reference.authored.assignment import built_in
@@ -154,7 +155,7 @@ def publication(call: Called, own: Own) -> Response:
         assignments=built_in(), colleagues=accounts.listed(call), platforms=TARGETS, states=STATES,
         open_ones=instructors.open_ones(known["standing"], call.lang),
         zone=moment(time.time()).split(" ", 2)[2],
-        accepted=",".join((*SUBMITTED, ENDING)), names=names,
+        accepted=",".join((*FILE_TYPES, ENDING)), names=names,
         claims=claims.listed(call, own), address=address, picture=Markup(code),  # noqa: S704 - segno's
     )  # fmt: skip
 

@@ -15,7 +15,7 @@ from pathlib import Path, PurePath
 
 from grader.files import shown_text, write_whole
 from grader.folder.batch import Batch
-from grader.folder.inventory import is_tool_file
+from grader.folder.inventory import FILE_TYPES, is_tool_file
 from grader.rubric import rubric_of
 from grader.tables.reader import why_no_id
 from grader.tables.roster import Roster, RosterRow, read_roster
@@ -26,7 +26,6 @@ from reference.authored.toml_file import MAX_BYTES
 from reference.errors import CallError, PlanmarkError
 
 AUTHORED = (".toml", ".csv")
-SUBMITTED = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".heic", ".heif", ".pdf", ".csv", ".json")
 LONGEST_NAME = 120
 """Characters of a file's name: with its folder a path stays within every file system's limit."""
 _PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
@@ -86,7 +85,7 @@ class Places:
         return sorted(
             path
             for path in self.handed_in.glob("*")
-            if path.suffix.lower() in SUBMITTED and not is_tool_file(path.name) and path != self.roster
+            if path.suffix.lower() in FILE_TYPES and not is_tool_file(path.name) and path != self.roster
         )
 
     def called(self) -> dict[Path, str]:

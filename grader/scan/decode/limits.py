@@ -60,10 +60,11 @@ _PDF_HEADER_WITHIN = 1024
 """Readers accept junk before `%PDF-`, so copiers that write some are let in."""
 _NO_WAIT = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 """Not every system knows both."""
-_NAMES = {
+SUFFIXES = {
     ".jpg": "JPEG", ".jpeg": "JPEG", ".png": "PNG", ".tif": "TIFF", ".tiff": "TIFF", ".heic": "HEIC",
     ".heif": "HEIC", ".pdf": "PDF",
 }  # fmt: skip
+"""The kinds of files by the endings of their names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,7 +158,7 @@ def kind_of(file: InputFile) -> str:
     if b"%PDF-" in file.data[:_PDF_HEADER_WITHIN]:
         return "pdf"
     suffix = Path(file.name).suffix
-    named = _NAMES.get(suffix.lower())
+    named = SUFFIXES.get(suffix.lower())
     what = f"named {suffix} but is no {named} file" if named else "of a type that is not read"
     known = {"suffix": suffix, "kind": named} if named else {}
     raise InputFileError(

@@ -13,9 +13,10 @@ from grader.authoring.new import new_assignment
 from grader.files import samples_folder
 from grader.folder.cache import packed as packed_record
 from grader.folder.changes import CACHE_FOLDER
+from grader.folder.inventory import FILE_TYPES
 from grader.records import Identity, PageRef
 from grader.texts.spoken import RefusedError
-from grader.web.places import AUTHORED, SUBMITTED, person_name, safe_name, stored_name
+from grader.web.places import AUTHORED, person_name, safe_name, stored_name
 from tests.unit.web.test_budgets import pdf
 
 NAMES = {
@@ -41,7 +42,7 @@ NAMES = {
 
 @pytest.mark.parametrize(("name", "called"), NAMES.items())
 def test_a_name_is_kept_for_people_in_any_script(name, called):
-    assert person_name(name, SUBMITTED) == called
+    assert person_name(name, FILE_TYPES) == called
 
 
 def test_a_name_never_reaches_a_path_as_it_is():
@@ -57,13 +58,13 @@ def test_a_name_never_reaches_a_path_as_it_is():
 @pytest.mark.parametrize("name", ["s01.exe", "s01.html", "s01.svg", ".jpg", "..", "", "/", "a.toml"])
 def test_other_kinds_of_files_are_refused(name):
     with pytest.raises(RefusedError, match="must end in"):
-        person_name(name, SUBMITTED)
+        person_name(name, FILE_TYPES)
 
 
 @pytest.mark.parametrize("name", ["._s01.jpg", "~$class.csv", "class/.hidden.pdf", "results.json"])
 def test_what_other_programs_leave_behind_is_refused(name):
     with pytest.raises(RefusedError, match="other programs"):
-        person_name(name, SUBMITTED)
+        person_name(name, FILE_TYPES)
 
 
 def test_files_in_any_script_are_listed_replaced_and_deleted_by_the_names_people_gave(admin, settings):
