@@ -8,11 +8,12 @@ difference is the direction counter-clockwise from the sheet's +x, as in `refere
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.errors import PlanmarkError
+from reference.errors import InputFileError, PlanmarkError
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -48,8 +49,19 @@ class Reason:
 
 
 def of_error(error: PlanmarkError, file: str | None = None) -> Reason:
-    """Convert an error to a problem: its parameters, and its own words as the `detail`."""
-    return Reason(error.code, {**error.parameters, "detail": error.message}, file)
+    """Convert an error to a problem: its parameters, and its own words, if it has any, as the `detail`."""
+    if error.message:
+        return Reason(error.code, {**error.parameters, "detail": error.message}, file)
+    known = dict(error.parameters)
+    named = str(known.pop("file", ""))
+    return Reason(error.code, known, file or named or None)
+
+
+def as_error(problem: Reason) -> InputFileError:
+    """Return the error that `of_error` made the problem from."""
+    known: dict[str, Any] = {**problem.parameters}
+    named = {"file": problem.file} if problem.file else {}
+    return InputFileError(problem.code, str(known.pop("detail", "")), **{**named, **known})
 
 
 def on_sheet(at: complex) -> tuple[float, float]:

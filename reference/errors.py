@@ -28,6 +28,7 @@ class PlanmarkError(Exception):
 
     Attributes
     ----------
+    message : empty where only the sentence of the code, made of the parameters, tells it
     parameters : what the message names, from which it can be told in another language; empty where it cannot
     faults : reasons that are listed below its sentence
     """
@@ -35,15 +36,15 @@ class PlanmarkError(Exception):
     exit_status = 2
     faults: tuple[Any, ...] = ()
 
-    def __init__(self, code: str, message: str, **parameters: float | str | tuple[str, ...]) -> None:
+    def __init__(self, code: str, message: str = "", **parameters: float | str | tuple[str, ...]) -> None:
         # A file's name may hold bytes that are no text; told as they are, no report could be written.
         self.message = message.encode("utf-8", "backslashreplace").decode()
-        super().__init__(self.message)
+        super().__init__(self.message or f"{code} {parameters or ''}".strip())
         self.code, self.parameters = code, parameters
 
     def __reduce__(self) -> tuple[object, ...]:
         # Errors return from worker processes unchanged, whatever arguments their classes take.
-        return (type(self).__new__, (type(self), self.message), self.__dict__)
+        return (type(self).__new__, (type(self), *self.args), self.__dict__)
 
 
 class CallError(PlanmarkError):

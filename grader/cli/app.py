@@ -116,8 +116,10 @@ class Commands(_Help, TyperGroup):
         try:
             return super().invoke(ctx)
         except PlanmarkError as error:
+            from grader.texts.spoken import in_english  # pydantic and documents: only for an error
+
             terminal.LOG.debug("%s", error.code, exc_info=error)
-            self._end(ctx, error.message, error.exit_status)
+            self._end(ctx, in_english(error), error.exit_status)
         except KeyboardInterrupt:
             # A second Ctrl+C would only break the end of this one.
             signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -20,7 +20,7 @@ from grader.options import VariantOptions
 from grader.owners.draft_roster import SURE, contact_sheet, draft_csv, suggest, thumbnail
 from grader.printed.answer_sheet import make_calibration, make_sheets
 from grader.printed.handout import make_handout
-from grader.records import FloatArray, PageRef, Reason, Unread
+from grader.records import FloatArray, PageRef, Reason, Unread, as_error
 from grader.rubric import rubric_of
 from grader.scan.decode.pages import count_pages
 from grader.scan.register.calibration import ALL_IS_WELL, calibrate, residual_map
@@ -28,7 +28,7 @@ from grader.tables.measurements import names_of
 from grader.tables.roster import RosterRow, read_roster
 from grader.texts.spoken import failure, message
 from reference.authored.assignment import Variant, load_assignment
-from reference.errors import CallError, InputFileError, counted
+from reference.errors import CallError, counted
 
 # calibrate ----------------------------------------------------------------------------------------
 
@@ -216,5 +216,5 @@ def _strokes(cache: PageCache, ref: PageRef) -> FloatArray | None:
 def _thumbnail(cache: PageCache, ref: PageRef) -> bytes:
     page = cache.page(ref)
     if page.backdrop is None:
-        raise InputFileError(page.problems[0].code, message(page.problems[0]))
+        raise as_error(page.problems[0])
     return thumbnail(page.backdrop.scan)

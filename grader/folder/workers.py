@@ -23,9 +23,9 @@ from pebble import ProcessExpired, ProcessPool
 from pebble.pool.process import WORKERS_NAME
 
 from grader.files import CANNOT_WRITE, OutputError, log_to
-from grader.records import Reason, of_error
-from grader.texts.spoken import message, told_parameters
-from reference.errors import InputFileError, PlanmarkError
+from grader.records import Reason, as_error, of_error
+from grader.texts.spoken import message
+from reference.errors import PlanmarkError
 
 Result = TypeVar("Result")
 LOG = logging.getLogger("planmark")
@@ -80,7 +80,7 @@ def result_of(pool: Pool, function: Callable[..., Result], *call: object, sheets
     """Return the result of one call; raises InputFileError for the Reason in its place."""
     ((_, result),) = pool.run(function, [call], [sheets])
     if isinstance(result, Reason):
-        raise InputFileError(result.code, message(result), **told_parameters(result))
+        raise as_error(result)
     return result
 
 

@@ -62,6 +62,18 @@ PLACING: dict[str, str] = {
 }
 """Reasons why a page could not be placed or is no such drawing, and what to do."""
 
+FILES: dict[str, str] = {
+    "no_regular_file": N_("it is a folder or a pipe, not a file"),
+    "no_pixels": N_("it has no pixels"),
+    "no_header": N_("its header cannot be read"),
+    "parts_missing": N_("some of its parts are missing"),
+    "wrong_amount": N_("it holds more or fewer data than its size asks for"),
+    "undecodable": N_("it cannot be decoded"),
+    "pdf_cut_off": N_("it is cut off before its end"),
+    "pdf_without_pages": N_("it cannot be opened, or has no pages"),
+}
+"""Reasons why a file cannot be used."""
+
 SCALES: dict[str, str] = {
     "nothing_written": N_("nothing is written"),
     "too_many_characters": N_("it has more than %(most)s characters"),
@@ -118,7 +130,7 @@ OWNERS: dict[str, str] = {
 }
 """The evidence for a page's owner and number, and why something was not done or applied."""
 
-CLAUSES: dict[str, str] = {**READING, **PLACING, **SCALES, **OWNERS}
+CLAUSES: dict[str, str] = {**READING, **PLACING, **FILES, **SCALES, **OWNERS}
 
 CLAIMS: dict[str, tuple[str, str]] = {
     "by_person": (N_("a person: %(claim)s"), N_("a person")),

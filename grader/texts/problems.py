@@ -10,6 +10,7 @@ from grader.language import N_
 PROBLEMS: dict[str, tuple[str, ...]] = {
     "file_missing": (
         N_("The file could not be opened (%(error)s); check the path."),
+        N_("The file could not be opened: %(why)s; check the path."),
         N_("The file could not be opened."),
     ),
     "link_leads_out": (N_("This is a link to a file elsewhere; hand in the file itself."),),
@@ -35,8 +36,8 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
     ),
     "heic_unreadable": (
         N_(
-            "HEIC pictures are not read here; send JPEG: on an iPhone choose Settings, Camera, Formats,"
-            " Most Compatible, and take the picture again."
+            "HEIC pictures are not read here (the extra `heic` is not installed); send JPEG: on an iPhone"
+            " choose Settings, Camera, Formats, Most Compatible, and take the picture again."
         ),
     ),
     "image_too_large": (
@@ -72,12 +73,14 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
     ),
     "image_damaged": (
         N_("The image is damaged (%(error)s); scan or export it again."),
+        N_("The image is damaged: %(why)s; scan or export it again."),
         N_("The image is damaged; scan or export it again."),
     ),
     "image_truncated": (N_("The image is cut off before its end; upload it again."),),
     "pdf_encrypted": (N_("The PDF asks for a password; save it without one."),),
     "pdf_damaged": (
         N_("The PDF is damaged (%(error)s); export it again."),
+        N_("The PDF is damaged: %(why)s; export or upload it again."),
         N_("The PDF is damaged; export it again."),
     ),
     "page_missing": (

@@ -234,11 +234,6 @@ def message(reason: Coded, speaker: Tongue = ENGLISH) -> str:
     return str(reason.parameters.get("detail", "")) or sentence(reason, speaker) or reason.code
 
 
-def told_parameters(reason: Reason) -> dict[str, Any]:
-    """Return what a problem's sentence names, as an error's parameters; its own words are the message."""
-    return {key: value for key, value in reason.parameters.items() if key != "detail"}
-
-
 def refusal(reason: Reason, speaker: Tongue = ENGLISH, faults: Sequence[Reason] = ()) -> str:
     """Return a refused request's sentence; of an error its own words, in other languages its sentence."""
     text = SENTENCES.get(str(reason.parameters.get("cause", reason.code)))
@@ -294,6 +289,12 @@ def told_of(error: PlanmarkError, speaker: Tongue) -> str:
     """Return the sentence of an error in a language."""
     reason = error.reason if isinstance(error, RefusedError) else of_error(error)
     return refusal(reason, speaker, error.faults)
+
+
+def in_english(error: PlanmarkError) -> str:
+    """Return an error's own words; if it has none, its sentence behind the file that it concerns."""
+    file = of_error(error).file
+    return error.message or (f"{file}: " if file else "") + told_of(error, ENGLISH)
 
 
 # Documents ----------------------------------------------------------------------------------------

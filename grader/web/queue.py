@@ -22,9 +22,9 @@ from sqlalchemy import select, update
 
 from grader.folder.batch import Batch, grade
 from grader.folder.workers import Workers, guarded, result_of
-from grader.records import Reason
+from grader.records import Reason, as_error
 from grader.review.session import moves
-from grader.texts.spoken import failure, message, told_parameters
+from grader.texts.spoken import failure, in_english
 from grader.web.judges import MOST_JUDGES, Judges, end_with_parent
 from grader.web.places import batch_of, places_of
 from grader.web.settings import Settings
@@ -189,7 +189,7 @@ class Queue:
                     name: shown(one) if isinstance(one, str) else one
                     for name, one in error.parameters.items()
                 }
-                self._end(job, "failed", {"code": error.code, "parameters": known}, error.message)
+                self._end(job, "failed", {"code": error.code, "parameters": known}, in_english(error))
             except Exception as error:
                 LOG.exception("job %d", job_id)
                 self._end(job, "failed", {"code": "internal_error"}, f"a fault of planmark ({error})")
@@ -261,7 +261,7 @@ class Queue:
                 case ("done", result):
                     return result  # type: ignore[no-any-return]
                 case ("failed", Reason() as problem):
-                    raise PlanmarkError(problem.code, message(problem), **told_parameters(problem))
+                    raise as_error(problem)
 
 
 class _StoppedError(Exception):

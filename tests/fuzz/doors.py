@@ -35,7 +35,7 @@ from grader.tables.decisions import Decision, DecisionFile, read_table
 from grader.tables.measurements import names_of, read_measurements
 from grader.tables.roster import read_roster
 from grader.tables.scale_text import parse_scale
-from grader.texts.spoken import message
+from grader.texts.spoken import in_english, message
 from reference.authored.assignment import load_assignment
 from reference.authored.variant_table import DataTable, read_rows
 from reference.errors import PlanmarkError
@@ -85,7 +85,7 @@ def enter(door: str, data: bytes) -> str:
         try:
             return _ENTER[door](path)
         except PlanmarkError as error:
-            message = error.message.replace(folder, "")  # its name is another for every file
+            message = in_english(error).replace(folder, "")  # its name is another for every file
             return f"{error.code}: {' '.join(re.findall(r'[a-z]{4,}', message)[:8])}"
 
 

@@ -21,21 +21,17 @@ def _page(file: InputFile, number: int) -> Page | None:
     try:
         from pi_heif import open_heif  # noqa: PLC0415 - an extra
     except ModuleNotFoundError as error:
-        raise InputFileError(
-            "heic_unreadable",
-            f"{file.name}: HEIC pictures are read with `pip install 'planmark[heic]'`; or send JPEG: on an"
-            " iPhone choose Settings, Camera, Formats, Most Compatible, and take the picture again",
-        ) from error
+        raise InputFileError("heic_unreadable", file=file.name) from error
     try:
         picture = open_heif(file.data)
         wide, high = picture.size
-        check_memory(file, 1, wide * high, _PIXEL_BYTES * wide * high)
-        check_size(file, 1, wide, high)
+        check_memory(file, wide * high, _PIXEL_BYTES * wide * high)
+        check_size(file, wide, high)
         # A copy: the decoder takes its memory back. Its rows may be longer than the picture.
         pixels = np.array(picture)[:, :wide]
     except (EOFError, ValueError) as error:
         if any(sign in str(error).lower() for sign in _CUT_OFF):
-            raise truncated(file, 1) from error
+            raise truncated(file) from error
         raise
     return Page(file.name, 1, to_grey(np.ascontiguousarray(pixels), rgb=True), None, 0)
 

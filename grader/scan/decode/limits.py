@@ -22,7 +22,6 @@ Codes of `InputFileError` raised in this package:
 | pages_too_many | more pages than one class can need |
 """
 
-import errno
 import hashlib
 import os
 import stat
@@ -94,32 +93,24 @@ def load(path: Path | str, shown: str = "") -> InputFile:
     try:
         data = _content(path, name)
     except OSError as error:
-        reason = error.strerror or str(error)
-        raise InputFileError(
-            "file_missing", f"{name}: cannot be opened ({reason}); check the path", error=reason
-        ) from error
+        raise InputFileError("file_missing", error=error.strerror or str(error), file=name) from error
     if not data:
-        raise InputFileError("file_empty", f"{name}: the file is empty (0 bytes); hand it in again")
+        raise InputFileError("file_empty", file=name)
     return InputFile(name, data, hashlib.sha256(data).hexdigest())
 
 
 def _content(path: Path, name: str) -> bytes:
     """All bytes of a regular file. A pipe or device is not read: it may never say anything, or end."""
     if path.exists() and not path.is_file():
-        raise OSError(errno.EISDIR, "it is a folder or a pipe, not a file")
+        raise InputFileError("file_missing", why="no_regular_file", file=name)
     # Should a pipe take the file's place meanwhile, opening it must not wait for a writer.
     with os.fdopen(os.open(path, os.O_RDONLY | _NO_WAIT), "rb") as file:
         status = os.fstat(file.fileno())
         if not stat.S_ISREG(status.st_mode):
-            raise OSError(errno.EISDIR, "it is a folder or a pipe, not a file")
+            raise InputFileError("file_missing", why="no_regular_file", file=name)
         if status.st_size > MAX_FILE_BYTES:
-            raise InputFileError(
-                "file_too_large",
-                f"{name}: {status.st_size // 1_000_000} MB, more than {MAX_FILE_BYTES // 1_000_000} MB;"
-                " split the file, or scan at 300 dpi",
-                size=status.st_size // 1_000_000,
-                most=MAX_FILE_BYTES // 1_000_000,
-            )
+            size, most = status.st_size // 1_000_000, MAX_FILE_BYTES // 1_000_000
+            raise InputFileError("file_too_large", size=size, most=most, file=name)
         data = file.read(status.st_size + 1)
     if len(data) != status.st_size:
         raise changed(name)
@@ -128,7 +119,7 @@ def _content(path: Path, name: str) -> bytes:
 
 def changed(name: str) -> InputFileError:
     """The error for a file whose content is not what it was when the folder was read."""
-    return InputFileError("file_changed", f"{name}: changed while the folder was read; grade again")
+    return InputFileError("file_changed", file=name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,13 +130,12 @@ class Door:
     ----------
     page : a page by its number from 1; None where the file has fewer
     count : number of pages, without decoding them
-    code, noun : of the error for a page that the libraries cannot read
+    code : of the error for a page that the libraries cannot read
     """
 
     page: Callable[[InputFile, int], Page | None]
     count: Callable[[InputFile], int] = lambda _: 1
     code: str = "image_damaged"
-    noun: str = "image"
 
 
 def kind_of(file: InputFile) -> str:
@@ -159,69 +149,40 @@ def kind_of(file: InputFile) -> str:
         return "pdf"
     suffix = Path(file.name).suffix
     named = SUFFIXES.get(suffix.lower())
-    what = f"named {suffix} but is no {named} file" if named else "of a type that is not read"
     known = {"suffix": suffix, "kind": named} if named else {}
-    raise InputFileError(
-        "file_type_unsupported",
-        f"{file.name}: {what}; scan or export it as JPEG, PNG, TIFF, HEIC or PDF",
-        **known,
-    )
+    raise InputFileError("file_type_unsupported", file=file.name, **known)
 
 
-def check_size(file: InputFile, page: int, width: int, height: int) -> None:
+def check_size(file: InputFile, width: int, height: int) -> None:
     """Raise InputFileError for a page that cannot be a drawing by its width and height in pixels."""
-    check_memory(file, page, width * height, 0)
+    check_memory(file, width * height, 0)
     if min(width, height) < max(_LEAST_SIDE_PX, _LEAST_SHARE * max(width, height)):
-        raise InputFileError(
-            "image_too_small",
-            f"{file.name}, page {page}: {width} x {height} pixels are too few or too narrow for a drawing; "
-            "scan the whole sheet at 300 dpi",
-            wide=width,
-            high=height,
-        )
+        raise InputFileError("image_too_small", wide=width, high=height, file=file.name)
 
 
-def check_memory(file: InputFile, page: int, pixels: int, decoded_bytes: int) -> None:
+def check_memory(file: InputFile, pixels: int, decoded_bytes: int) -> None:
     """Raise InputFileError for an image without pixels, with too many, or with too many bytes for them.
 
     Arguments: what decoding needs besides the file and its grey is `decoded_bytes`.
     """
     if pixels <= 0:
-        raise damaged(file, page, "it has no pixels")
+        raise damaged(file, "no_pixels")
     if pixels > MAX_PIXELS or len(file.data) + decoded_bytes + pixels > MAX_MEMORY_BYTES:
-        raise InputFileError(
-            "image_too_large",
-            f"{file.name}, page {page}: {pixels / 1e6:.0f} million pixels that unpack to"
-            f" {decoded_bytes / 1e6:.0f} MB are more than a sheet can need;"
-            " scan A3 at 600 dpi or less, in grey",
-            millions=round(pixels / 1e6),
-            unpacked=round(decoded_bytes / 1e6),
-        )
+        millions, unpacked = round(pixels / 1e6), round(decoded_bytes / 1e6)
+        raise InputFileError("image_too_large", millions=millions, unpacked=unpacked, file=file.name)
 
 
 def check_pages(file: InputFile, pages: int) -> None:
     """Raise InputFileError for a document of too many pages."""
     if pages > MAX_PAGES:
-        raise InputFileError(
-            "pages_too_many",
-            f"{file.name}: {pages} pages, more than {MAX_PAGES}; split the file",
-            pages=pages,
-            most=MAX_PAGES,
-        )
+        raise InputFileError("pages_too_many", pages=pages, most=MAX_PAGES, file=file.name)
 
 
-def damaged(file: InputFile, page: int, why: str) -> InputFileError:
-    """The error for an image that cannot be decoded."""
-    return InputFileError(
-        "image_damaged",
-        f"{file.name}, page {page}: the image is damaged ({why}); scan or export it again",
-        error=why,
-    )
+def damaged(file: InputFile, why: str) -> InputFileError:
+    """The error for an image that cannot be decoded, with the code of the reason."""
+    return InputFileError("image_damaged", why=why, file=file.name)
 
 
-def truncated(file: InputFile, page: int) -> InputFileError:
+def truncated(file: InputFile) -> InputFileError:
     """The error for an image whose data end too early."""
-    return InputFileError(
-        "image_truncated",
-        f"{file.name}, page {page}: the image is cut off before its end; copy or upload the file again",
-    )
+    return InputFileError("image_truncated", file=file.name)

@@ -53,15 +53,10 @@ def page_of(source: InputFile | Path | str, number: int) -> Page:
     """One page of a file, from 1, decoding no other. Raises as `pages_of`, and for a number too high."""
     file = _loaded(source)
     door = _DOORS[kind_of(file)]
-    with _as_input_error(file, door, number):
+    with _as_input_error(file, door):
         page = door.page(file, number)
     if page is None:
-        raise InputFileError(
-            "page_missing",
-            f"{file.name}: there is no page {number}; it has {count_pages(file)}",
-            wanted=number,
-            pages=count_pages(file),
-        )
+        raise InputFileError("page_missing", wanted=number, pages=count_pages(file), file=file.name)
     grey, ruling = without_ruling(page.grey)
     return page if ruling is None else replace(page, grey=grey, ruling=ruling)
 
@@ -78,7 +73,7 @@ def count_pages(source: InputFile | Path | str) -> int:
     """Number of pages, found without decoding them. Raises as `pages_of` does."""
     file = _loaded(source)
     door = _DOORS[kind_of(file)]
-    with _as_input_error(file, door, 1):
+    with _as_input_error(file, door):
         return door.count(file)
 
 
@@ -87,7 +82,7 @@ def _loaded(source: InputFile | Path | str) -> InputFile:
 
 
 @contextmanager
-def _as_input_error(file: InputFile, door: Door, number: int) -> Iterator[None]:
+def _as_input_error(file: InputFile, door: Door) -> Iterator[None]:
     """Any error of a library becomes an InputFileError of the page; want of memory stays a MemoryError."""
     try:
         with warnings.catch_warnings():
@@ -99,11 +94,7 @@ def _as_input_error(file: InputFile, door: Door, number: int) -> Iterator[None]:
         reason = " ".join(str(error).split()) or type(error).__name__
         if "insufficient memory" in reason.lower():  # OpenCV and libjpeg say it in words
             raise MemoryError(reason) from error
-        raise InputFileError(
-            door.code,
-            f"{file.name}, page {number}: the {door.noun} is damaged ({reason}); scan or export it again",
-            error=reason,
-        ) from error
+        raise InputFileError(door.code, error=reason, file=file.name) from error
 
 
 def is_blank(page: Page) -> bool:

@@ -52,16 +52,16 @@ def _page(file: InputFile, number: int) -> Page | None:
         drawn = list(page.get_objects(filter=[raw.FPDF_PAGEOBJ_IMAGE]))
         for image in drawn:
             wide, high = image.get_px_size()
-            check_memory(file, number, wide * high, _PIXEL_BYTES * wide * high)
+            check_memory(file, wide * high, _PIXEL_BYTES * wide * high)
         damage = next((rows for image in drawn if (rows := _fax_damage(image))), ())
-        taken = None if _OTHERWISE_SHOWN.search(file.data) else _taken_out(file, number, page)
+        taken = None if _OTHERWISE_SHOWN.search(file.data) else _taken_out(file, page)
         if taken is None:
             for image in drawn:
                 if image.get_filters() == ["DCTDecode"]:
                     # What renders the page would fill the rest of a damaged one without a word.
-                    pictures.check_header(file, number, _stored(image), least=False)
-                    pictures.decode(file, number, _stored(image))
-            taken = _rendered(file, number, page)
+                    pictures.check_header(file, _stored(image), least=False)
+                    pictures.decode(file, _stored(image))
+            taken = _rendered(file, page)
         return Page(file.name, number, *taken, damage=damage)
 
 
@@ -69,18 +69,13 @@ def _page(file: InputFile, number: int) -> Page | None:
 def _opened(file: InputFile) -> Iterator[pypdfium2.PdfDocument]:
     # What could be saved of a file without its end silently lacks pages.
     if not any(sign in file.data[-_END_WITHIN:] for sign in _END):
-        raise InputFileError(
-            "pdf_damaged", f"{file.name}: the PDF is cut off before its end; copy or upload the file again"
-        )
+        raise InputFileError("pdf_damaged", why="pdf_cut_off", file=file.name)
     try:
         document = pypdfium2.PdfDocument(file.data)
     except pypdfium2.PdfiumError as error:
         if b"/Encrypt" in file.data:
-            raise InputFileError(
-                "pdf_encrypted", f"{file.name}: the PDF asks for a password; save it without one"
-            ) from error
-        why = "it cannot be opened, or has no pages"
-        raise InputFileError("pdf_damaged", f"{file.name}: {why}; export it again", error=why) from error
+            raise InputFileError("pdf_encrypted", file=file.name) from error
+        raise InputFileError("pdf_damaged", why="pdf_without_pages", file=file.name) from error
     with document:
         yield document
 
@@ -95,12 +90,12 @@ _Taken = tuple[GreyImage, pictures.Dpi | None, int, tuple[float, float]]
 """Grey, resolution, turn of the page and size of the paper, mm."""
 
 
-def _rendered(file: InputFile, number: int, page: pypdfium2.PdfPage) -> _Taken:
+def _rendered(file: InputFile, page: pypdfium2.PdfPage) -> _Taken:
     width_pt, height_pt = page.get_size()
     scale = RENDER_DPI / _POINTS_PER_INCH
     wide, high = int(width_pt * scale), int(height_pt * scale)
-    check_memory(file, number, wide * high, _PIXEL_BYTES * wide * high)
-    check_size(file, number, wide, high)
+    check_memory(file, wide * high, _PIXEL_BYTES * wide * high)
+    check_size(file, wide, high)
     grey = page.render(scale=scale, grayscale=True).to_numpy()
     plane = np.ascontiguousarray(grey.reshape(grey.shape[0], grey.shape[1], -1)[..., 0]).copy()
     return plane, *_resolved(plane, width_pt, height_pt, 0)
@@ -117,7 +112,7 @@ def _resolved(
 # A page that is one picture -------------------------------------------------------------------------
 
 
-def _taken_out(file: InputFile, number: int, page: pypdfium2.PdfPage) -> _Taken | None:
+def _taken_out(file: InputFile, page: pypdfium2.PdfPage) -> _Taken | None:
     """The picture that is the whole page, or None where only rendering gives what a viewer shows."""
     shown = [one for one in page.get_objects(max_depth=1) if not _is_invisible(one)]
     if len(shown) != 1 or not isinstance(shown[0], pypdfium2.PdfImage) or raw.FPDFPage_GetAnnotCount(page):
@@ -136,8 +131,8 @@ def _taken_out(file: InputFile, number: int, page: pypdfium2.PdfPage) -> _Taken 
     corners = np.array([(e, f), (e + a + c, f + b + d)])
     if _overlap(corners, box) < _SHOWN * width * height:
         return None
-    check_size(file, number, *image.get_px_size())
-    grey = _decoded(file, number, image, about)
+    check_size(file, *image.get_px_size())
+    grey = _decoded(file, image, about)
     drawn_turn = round(math.degrees(math.atan2(b, a)) / 90.0) * 90
     return grey, *_resolved(grey, width, height, (drawn_turn - page.get_rotation()) % 360)
 
@@ -156,23 +151,21 @@ def _overlap(corners: FloatArray, box: tuple[float, ...]) -> float:
     return float(np.prod(np.maximum(high - low, 0.0)))
 
 
-def _decoded(
-    file: InputFile, number: int, image: pypdfium2.PdfImage, about: raw.FPDF_IMAGEOBJ_METADATA
-) -> GreyImage:
+def _decoded(file: InputFile, image: pypdfium2.PdfImage, about: raw.FPDF_IMAGEOBJ_METADATA) -> GreyImage:
     filters = image.get_filters()
     if filters == ["DCTDecode"] and about.colorspace in _OF_LIGHT:
         data = _stored(image)
-        if pictures.check_header(file, number, data, least=False) not in pictures.FOUR_INKS:
-            return pictures.decode(file, number, data)
+        if pictures.check_header(file, data, least=False) not in pictures.FOUR_INKS:
+            return pictures.decode(file, data)
     if filters == ["FlateDecode"]:
         unpacking = zlib.decompressobj()
         unpacking.decompress(image.get_data(), about.height * (_MOST_BYTES * about.width + 2) + _SLACK)
         if not unpacking.eof:
-            raise damaged(file, number, "its data are cut off, or more than its size asks for")
+            raise damaged(file, "wrong_amount")
     try:
         pixels = image.get_bitmap().to_numpy()
     except pypdfium2.PdfiumError as error:
-        raise damaged(file, number, "it cannot be decoded") from error
+        raise damaged(file, "undecodable") from error
     return to_grey(pixels[..., :3]) if pixels.ndim == 3 else pixels.copy()
 
 
@@ -195,4 +188,4 @@ def _fax_damage(image: pypdfium2.PdfImage) -> tuple[int, ...]:
     return row + 1, high
 
 
-PDF = Door(_page, _count, "pdf_damaged", "page")
+PDF = Door(_page, _count, "pdf_damaged")

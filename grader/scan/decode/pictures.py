@@ -199,15 +199,15 @@ def _jpeg_page(file: InputFile, number: int) -> Page | None:
     if number > 1:
         return None
     if not file.data.rstrip(b"\0").endswith(_JPEG_END) and len(file.data) < _LEAST_BYTES:
-        raise truncated(file, 1)
-    four_inks = check_header(file, 1, file.data) in FOUR_INKS
+        raise truncated(file)
+    four_inks = check_header(file, file.data) in FOUR_INKS
     with Image.open(io.BytesIO(file.data)) as image:
         tags = tags_within(image)
-        grey = from_pillow(image) if four_inks else decode(file, 1, file.data)
+        grey = from_pillow(image) if four_inks else decode(file, file.data)
     return tags.page(file, grey)
 
 
-def check_header(file: InputFile, page: int, data: bytes, *, least: bool = True) -> str:
+def check_header(file: InputFile, data: bytes, *, least: bool = True) -> str:
     """Colour space of a JPEG stream; raises InputFileError for one that costs too much, or is too small.
 
     Arguments: it may be of any size without `least`, as a part of a page.
@@ -216,22 +216,17 @@ def check_header(file: InputFile, page: int, data: bytes, *, least: bool = True)
     # Counts those of a thumbnail too: more never harms a picture of a sheet's size.
     scans = data.count(_SCAN)
     if scans > _MAX_SCANS:
-        raise InputFileError(
-            "image_too_large",
-            f"{file.name}, page {page}: the JPEG has {scans} scans, more than {_MAX_SCANS}; save it again",
-            scans=scans,
-            most=_MAX_SCANS,
-        )
+        raise InputFileError("image_too_large", scans=scans, most=_MAX_SCANS, file=file.name)
     planes = _PLANES.get(sampling, 3.0) if space not in FOUR_INKS else 4.0
     decoded = 9.0 if space in FOUR_INKS else 0.0 if space == "Gray" else 3.0
     pixel_bytes = decoded + (2.0 * planes if scans > 1 else 0.0)
-    check_memory(file, page, wide * high, int(wide * high * pixel_bytes))
+    check_memory(file, wide * high, int(wide * high * pixel_bytes))
     if least:
-        check_size(file, page, wide, high)
+        check_size(file, wide, high)
     return space
 
 
-def decode(file: InputFile, page: int, data: bytes) -> GreyImage:
+def decode(file: InputFile, data: bytes) -> GreyImage:
     """Grey of a JPEG stream, (h, w) uint8; raises InputFileError where it is cut off or damaged.
 
     libjpeg fills what is missing with grey and only warns: the warning is an error here.
@@ -241,9 +236,9 @@ def decode(file: InputFile, page: int, data: bytes) -> GreyImage:
     except ValueError as error:
         message = str(error)
     if any(sign in message for sign in _CUT_OFF):
-        raise truncated(file, page)
+        raise truncated(file)
     if not any(harmless in message for harmless in _HARMLESS):
-        raise damaged(file, page, message)
+        raise InputFileError("image_damaged", error=message, file=file.name)
     return to_grey(jpeg.pixels(data, strict=False))
 
 
@@ -262,18 +257,18 @@ def _png_page(file: InputFile, number: int) -> Page | None:
     if number > 1:
         return None
     if _PNG_END not in file.data:
-        raise truncated(file, 1)
+        raise truncated(file)
     wide, high, bits, colour = _HEADER.unpack_from(file.data, _HEADER_AT)
     if colour not in _CHANNELS:
-        raise damaged(file, 1, "its header cannot be read")
-    check_memory(file, 1, wide * high, wide * high * _CHANNELS[colour] * max(bits // 8, 1))
-    check_size(file, 1, wide, high)
+        raise damaged(file, "no_header")
+    check_memory(file, wide * high, wide * high * _CHANNELS[colour] * max(bits // 8, 1))
+    check_size(file, wide, high)
     with PngImagePlugin.PngImageFile(io.BytesIO(file.data)) as image:
         tags = tags_within(image)
         image.verify()
     pixels = cv2.imdecode(np.frombuffer(file.data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
     if pixels is None:
-        raise damaged(file, 1, "it cannot be decoded")
+        raise damaged(file, "undecodable")
     return tags.page(file, to_grey(pixels))
 
 

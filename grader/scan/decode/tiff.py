@@ -42,7 +42,7 @@ def _opened(file: InputFile, number: int) -> TiffImageFile | None:
     except (SyntaxError, TypeError) as error:
         if "dimensions" in str(error):
             # The list of pages stands at the end of most files, behind the pixels.
-            raise truncated(file, number) from error
+            raise truncated(file) from error
         raise
     return image
 
@@ -53,18 +53,18 @@ def _page(file: InputFile, number: int) -> Page | None:
         return None
     known = image.tag_v2
     wide, high = known[Tag.ImageWidth], known[Tag.ImageLength]
-    check_memory(file, number, wide * high, _PIXEL_BYTES * wide * high)
-    check_size(file, number, wide, high)
+    check_memory(file, wide * high, _PIXEL_BYTES * wide * high)
+    check_size(file, wide, high)
     x, y = (known.get(tag, 0) for tag in (Tag.XResolution, Tag.YResolution))
     about = tags_of(from_unit(x, y, known.get(Tag.ResolutionUnit, 2)), known.get(Tag.Orientation, 1))
-    parts = _parts(file, number, image)
+    parts = _parts(file, image)
     damage = _fax_damage(file, image, parts) if image.info["compression"] in _FAX else ()
     # Pillow has turned the picture already.
     grey = np.ascontiguousarray(np.rot90(_grey(image), -about.turn_deg // 90))
     return Page(file.name, number, grey, about.dpi, about.turn_deg, damage=damage, device="scanner")
 
 
-def _parts(file: InputFile, number: int, image: TiffImageFile) -> Parts:
+def _parts(file: InputFile, image: TiffImageFile) -> Parts:
     """The strips or tiles of a page; raises InputFileError for some that are not there, or damaged."""
     known = image.tag_v2
     tiled = Tag.TileOffsets in known
@@ -72,20 +72,20 @@ def _parts(file: InputFile, number: int, image: TiffImageFile) -> Parts:
     lengths = known.get(Tag.TileByteCounts if tiled else Tag.StripByteCounts, ())
     parts = list(zip(starts, lengths, strict=False))
     if any(start + length > len(file.data) for start, length in parts):
-        raise truncated(file, number)
+        raise truncated(file)
     if len(parts) * _size(image)[0] * _size(image)[1] < known[Tag.ImageWidth] * known[Tag.ImageLength]:
-        raise damaged(file, number, "some of its parts are missing")
+        raise damaged(file, "parts_missing")
     if image.info["compression"] == "jpeg" and image.mode in ("L", "RGB"):
         # libtiff fills what is damaged without a word.
         tables = bytes(known.get(Tag.JPEGTables, b""))[:-2]
         for start, length in parts:
             strip = file.data[start : start + length]
-            pictures.decode(file, number, tables + strip[2:] if tables else strip)
+            pictures.decode(file, tables + strip[2:] if tables else strip)
     if image.info["compression"] == "packbits" and not tiled and known.get(Tag.PlanarConfiguration) != 2:
         row_bytes = -(-known[Tag.ImageWidth] * sum(known.get(Tag.BitsPerSample, (1,))) // 8)
         unpacked = sum(_unpacked_bytes(file.data[start : start + length]) for start, length in parts)
         if unpacked != known[Tag.ImageLength] * row_bytes:
-            raise damaged(file, number, "its parts do not unpack to its size")
+            raise damaged(file, "wrong_amount")
     return parts
 
 

@@ -72,7 +72,7 @@ def test_a_broken_file_stops_nobody_else(class_folder, tmp_path):
     (class_folder / "s9.json").write_text("{")
     results, _ = run(class_folder, tmp_path / "out")
     assert [report.status for report in results.reports] == ["graded", "graded", "unreadable"]
-    assert "0 bytes" in results.reports[2].problems[0].message
+    assert "The file is empty" in results.reports[2].problems[0].message
     assert [one.file for one in results.unmatched] == ["s9.json"]
 
 

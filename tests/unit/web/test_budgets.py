@@ -58,7 +58,8 @@ def test_a_file_that_cannot_be_counted_is_told_to_its_sender(graded, student, se
     assert answer.status_code == 422
     assert "cut off" in answer.json()["message"]
     answer = student.act("POST", f"/publications/{key}/sheets?lang=ro", content=b"%PDF-1.4 and nothing else")
-    assert answer.json() == {"code": "pdf_damaged", "message": "PDF-ul este deteriorat; exportați-l din nou."}
+    message = "PDF-ul este deteriorat: este trunchiat; exportați-l sau încărcați-l din nou."
+    assert answer.json() == {"code": "pdf_damaged", "message": message}
     assert not list(settings.data.rglob("s09_sent*"))
     assert not list(settings.data.rglob("photos/*"))
 
