@@ -125,15 +125,19 @@ class CrossSlider:
 
 @dataclass(frozen=True, slots=True)
 class Yoke:
-    """Assur group RPP: a block hinged at `pin` slides in a yoke's slot, the yoke on a fixed guide.
+    """Assur group RPP: a block hinged at `pin` slides in a yoke's slot, the yoke on a guide.
 
-    `node` is the yoke's point where slot and guide cross.
+    On a fixed guide `node` is the yoke's point where slot and guide cross, and `slot_rad` the slot's
+    direction. On a moving guide, with which yoke and block turn, the slot is perpendicular to the guide, and
+    `node` is the yoke's point that coincides with the pin at this instant.
     """
 
     node: str
     pin: str
     slot_rad: FloatArray
-    guide: FixedGuide
+    guide: Guide
+    link: str = ""
+    """The yoke's name, on a moving guide."""
 
 
 @dataclass(frozen=True, slots=True)

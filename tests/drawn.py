@@ -65,6 +65,20 @@ pin = "A"
 slot_deg = 90
 guide = { through = [0, 0], angle_deg = 0 }
 """,
+    "yoke on a moving link": _FOUR_BAR + """
+[[mechanism.group]]
+type = "RPP"
+node = "E5"
+pin = "E"
+link = "5"
+guide = { joints = ["O2", "B"], coincident = "E3" }
+[[mechanism.group]]
+type = "point_on_line"
+node = "E"
+base = ["O1", "A"]
+link = "1"
+ratio = 1.4
+""",
     "two crossed guides": _FOUR_BAR + """
 [[mechanism.group]]
 type = "PRP"

@@ -6,6 +6,7 @@ They are the four-bar's commented files with other titles, data, scales and crit
 import json
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from itertools import compress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -21,6 +22,7 @@ from reference.authored.assignment import SUFFIXES, Assignment, load_assignment
 from reference.authored.formula import Formula
 from reference.authored.mechanism import (
     CrankTable,
+    CylinderTable,
     DrivenSliderTable,
     DyadTable,
     MechanismFile,
@@ -31,7 +33,7 @@ from reference.authored.mechanism import (
 from reference.authored.toml_file import SideText, Text, load, text_of
 from reference.authored.variant_table import KEYS, MEASURES
 from reference.construction.graph import Construction
-from reference.errors import AuthoredFileError, CallError
+from reference.errors import AuthoredFileError, CallError, lines_of
 from reference.plan import construction_for
 
 Texts = Mapping[str, str]
@@ -60,6 +62,7 @@ RATES = {
 ABSOLUTE = {
     "v": N_("Velocity of %(point)s"), "a": N_("Acceleration of %(point)s"),
     "a_n": N_("Normal acceleration of %(point)s"), "a_t": N_("Tangential acceleration of %(point)s"),
+    "a_c": N_("Coriolis acceleration of %(point)s"), "a_r": N_("Acceleration of %(point)s along the guide"),
 }  # fmt: skip
 RELATIVE = {
     "v": N_("Velocity of %(point)s relative to %(other)s"),
@@ -120,10 +123,11 @@ def texts_for(mechanism: Path, name: str, start: Texts, table: Path | None) -> d
             raise AuthoredFileError(str(table if of_table else mechanism), error.findings) from error
         rubric = _rubric(file, name, start["rubric"], loaded)
         paths["rubric"].write_text(rubric, encoding="utf-8")
-        proposed = lint(loaded, load_rubric(paths["rubric"])).scales
-        if not proposed:
-            raise failure(CallError, "no_variant", file=mechanism)
-        scales = {scale: float(f"{np.max(getattr(proposed[1].scales, scale)):.6g}") for scale in SCALES}
+        found = lint(loaded, load_rubric(paths["rubric"]))
+        if not found.scales:
+            faults = lines_of([one for one in found.findings if one.severity == "fault"])
+            raise failure(CallError, "no_variant", file=mechanism, findings=faults)
+        scales = {scale: float(f"{np.max(getattr(found.scales[1].scales, scale)):.6g}") for scale in SCALES}
         paths["assignment"].write_text(
             _assignment(file, name, start["assignment"], scales, table), encoding="utf-8"
         )
@@ -135,17 +139,14 @@ def texts_for(mechanism: Path, name: str, start: Texts, table: Path | None) -> d
 
 
 def _too_short(assignment: Assignment, rubric: RubricFile) -> set[str]:
-    """Return the vectors that in some variant are too short to judge their direction."""
+    """Return the vectors that in most variants are zero or too short to judge their direction."""
     plan = lint(assignment, rubric).plan
-    asked = asked_vectors(rubric, plan) if plan is not None else None
-    if asked is None:
-        return set()
-    short = np.any(asked.short(asked.least_mm[:, None]), axis=1)
-    return {name for name, is_short in zip(asked.names, short, strict=True) if is_short}
+    asked = plan and asked_vectors(rubric, plan)
+    return {*compress(asked.names, asked.mostly_short)} if asked else set()
 
 
 def _first_speed(file: MechanismFile) -> str:
-    return "speed" if file.crank is None else "omega * crank_m"
+    return "speed" if file.driven_slider else "omega * crank_m"
 
 
 # The assignment -----------------------------------------------------------------------------------
@@ -217,7 +218,7 @@ def _titles(title: Text, phrase: str) -> list[str]:
 
 def _given(file: MechanismFile) -> Iterator[tuple[str, str, str]]:
     """Yield label, value and unit of the data that the student needs to draw the mechanism."""
-    tables: list[Any] = [file.driver, *file.group]
+    tables: list[Any] = [file.driver, *filter(None, [file.crank and file.crank.cylinder]), *file.group]
     for joint, at in file.ground.items():
         yield from _point(joint, at, file.length_unit)
     for table in tables:
@@ -237,7 +238,7 @@ def _given(file: MechanismFile) -> Iterator[tuple[str, str, str]]:
             for index, one in enumerate(values if isinstance(values, list) else [values]):
                 yield labels.get((key, index), labels.get(key, key)), one.text, unit
         guides = getattr(table, "guides", None) or [getattr(table, "guide", None)]
-        node = getattr(table, "node", None) or table.pin
+        node = str(getattr(table, "node", None) or getattr(table, "pin", ""))
         for guide in guides:
             if guide is not None and guide.angle_deg is not None:
                 yield from _point(f"guide {node}", guide.through, file.length_unit)
@@ -265,6 +266,9 @@ def _labels(table: object) -> dict[Any, str]:
                 "length": table.pivot + table.pin, "angle_deg": f"φ{link}", "omega": f"ω{link}", "rpm": "n",
                 "epsilon": f"ε{link}",
             }  # fmt: skip
+        case CylinderTable(pivot=pivot):
+            letters = {"length": "s", "speed": "v", "acceleration": "a", "side": "s"}
+            return {key: f"{letter}({pivot})" for key, letter in letters.items()}
         case DrivenSliderTable():
             return {"displacement": "s", "speed": "v", "acceleration": "a"}
         case DyadTable():
@@ -309,7 +313,7 @@ def _rubric(
     left_out = [_criterion(*one) for one in criteria if one[1] in unasked]
     if left_out:
         asked.append(
-            "# Not asked for: too short in some variants to be judged on their direction. Without the # they"
+            "# Not asked for: too short in most variants to be judged on their direction. Without the # they"
             "\n# are judged there on their length alone, and lint names the variants."
         )
         asked += [re.sub("(?m)^", "# ", one) for one in left_out]

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from grader.authoring.findings import NAMED, BoolArray, LintFinding, chosen
+from grader.authoring.findings import NAMED, BoolArray, LintFinding, Severity, chosen
 from grader.documents import LintLeast, LintScales
 from grader.printed.layout import FRAME_MM, MARGIN_MM, TEMPLATES, Template, template_for
 from grader.records import MECHANISM, Box
@@ -65,6 +65,12 @@ class AskedVectors:
         """(V, N): drawn shorter than a limit, though not zero."""
         return np.asarray((self.length_mm < limit_mm) & ~self.is_zero)
 
+    @property
+    def mostly_short(self) -> BoolArray:
+        """(V,): in half of the variants or more, zero or too short for its direction to be judged."""
+        short = self.is_zero | self.short(self.least_mm[:, None])
+        return np.asarray(2 * short.sum(axis=1) >= short.shape[1])
+
 
 def asked_vectors(rubric: RubricFile, plan: Plan) -> AskedVectors:
     """Return the requested vectors that the mechanism has."""
@@ -94,8 +100,8 @@ def length_findings(rubric: RubricFile, plan: Plan, asked: AskedVectors) -> Iter
         if np.any(short):
             shortest = float(np.min(asked.length_mm[row][short]))
             message = f"{name} is shorter than {least:g} mm at the proposed scales, down to {shortest:.2g} mm"
-            meant = chosen(plan.variants, short)
-            yield LintFinding("warning", "short_vector", "rubric", path, message, meant)
+            grave: Severity = "warning" if asked.mostly_short[row] else "hint"
+            yield LintFinding(grave, "short_vector", "rubric", path, message, chosen(plan.variants, short))
         if np.any(zero):
             message = f"{name} is zero: it has a length to be judged, and no direction"
             yield LintFinding("hint", "zero_vector", "rubric", path, message, chosen(plan.variants, zero))
@@ -113,15 +119,16 @@ def length_findings(rubric: RubricFile, plan: Plan, asked: AskedVectors) -> Iter
 def _unasked_findings(rubric: RubricFile, plan: Plan, asked: AskedVectors) -> Iterator[LintFinding]:
     names = tuple(name for name in plan.vectors_si if name not in asked.names)
     lengths, zeros = _lengths(plan, names)
-    short = (lengths < rubric.tolerance.least_mm) & ~zeros
+    lengths[zeros] = 0.0
+    short, count = lengths < rubric.tolerance.least_mm, len(plan.variants)
     unasked = [
-        f"{name} (down to {np.min(lengths[row][short[row]]):.2g} mm)"
-        for row, name in enumerate(names)
-        if np.any(short[row])
+        f"{name} (in {few.sum()} of {count} variants, down to {np.min(length[few]):.2g} mm)"
+        for name, length, few in zip(names, lengths, short, strict=True)
+        if np.any(few)
     ]
     if unasked:
         least = f"{rubric.tolerance.least_mm:g} mm"
-        message = f"shorter than {least}, though not asked for: {', '.join(unasked)}"
+        message = f"not asked for, and shorter than {least}: {', '.join(unasked)}"
         meant = chosen(plan.variants, np.any(short, axis=0))
         yield LintFinding("hint", "short_unasked", "assignment", "$.scales", message, meant)
 

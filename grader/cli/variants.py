@@ -133,6 +133,8 @@ def show_cycle(name: str, options: CycleOptions) -> None:
     words, csv = tongue(options.lang), options.csv
     assignment = load_assignment(name)
     variant = assignment.variant(options.n, options.position)
+    if (crank := assignment.mechanism_file.crank) is not None and crank.cylinder is not None:
+        raise failure(CallError, "cycle_of_cylinder", name=name)
     subject = CycleSubject(cycle(assignment.mechanism([variant]), options.samples))
     names = [part.strip() for text in options.of or () for part in text.split(",")]
     selection = subject.select([name for name in names if name])

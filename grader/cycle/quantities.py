@@ -272,7 +272,7 @@ def _outputs(subject: CycleSubject) -> Iterator[_Output]:
     is_ground = subject.structure.is_ground
     for group in subject.structure.groups:
         match group:
-            case Slider(guide=FixedGuide() as guide) | Yoke(guide=guide):
+            case Slider(guide=FixedGuide() as guide) | Yoke(guide=FixedGuide() as guide):
                 yield _slider(group.node, guide)
             case CrossSlider(guides=guides):
                 yield from (_slider(group.node, guide) for guide in guides if isinstance(guide, FixedGuide))

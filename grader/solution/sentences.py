@@ -38,7 +38,7 @@ from reference.construction.steps import (
 )
 from reference.drawing.canvas import Piece, pieces_of, scale_pieces
 from reference.drawing.subject import Subject, Wording
-from reference.mechanism import SlottedLink, moving_guides
+from reference.mechanism import SlottedLink, Yoke, moving_guides
 from reference.quantities import unit_of
 
 PERPENDICULAR = N_("perpendicular to %(link)s")
@@ -448,6 +448,7 @@ def _link_under(speaker: Speaker, node: str) -> str:
     """Return the link of a point that lies under another only at this moment."""
     groups = speaker.subject.plan.mechanism.groups
     links = {group.node: group.link for group in groups if isinstance(group, SlottedLink)}
+    links |= {group.node: group.link for group in groups if isinstance(group, Yoke)}
     links |= {guide.coincident: guide.link for group in groups for guide in moving_guides(group)}
     return links[node]
 

@@ -92,6 +92,10 @@ FAILURES: dict[str, str] = {
     "unknown_language": N_("'%(text)s' is no language of planmark; choose one of %(names)s"),
     "quantity_near": N_("no '%(text)s' on this cycle (did you mean %(near)s?): known are %(names)s"),
     "unknown_quantity": N_("no '%(text)s' on this cycle: known are %(names)s; _x or _y for a component"),
+    "cycle_of_cylinder": N_(
+        "%(name)s: a cylinder drives the crank, whose speed is known at the variant's position alone; use"
+        " planmark plan --all"
+    ),
     "altitude": N_("--altitude is drawn on the sketch: name a file by --svg or --pdf"),
     "crank_mm": N_("--crank-mm %(value)s: a length in mm above 0 and below 1000 is needed"),
     "all_or_one": N_("--csv is a table of all variants: add --all"),
@@ -100,7 +104,7 @@ FAILURES: dict[str, str] = {
         "%(file)s: give the values of %(names)s by a CSV with a row for each student, which names them in its"
         " first line beside n (--table)"
     ),
-    "no_variant": N_("%(file)s: no variant of it assembles: its lengths and sides do not fit"),
+    "no_variant": N_("%(file)s: no variant of it assembles:\n%(findings)s"),
     "table_unused": N_("--table goes with a mechanism of your own: --mechanism FILE.toml"),
     "new_name": N_("'%(text)s': a name of letters, digits, ., _ or - is needed"),
     "like_form": N_('a copy needs other names: write %(names)s as KEY = "NAME", each on a line of its own'),

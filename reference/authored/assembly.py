@@ -11,8 +11,8 @@ from reference.authored.mechanism import (
     AnyGroupTable,
     CrankTable,
     CrossSliderTable,
+    CylinderTable,
     DyadTable,
-    FixedGuideTable,
     GuideTable,
     MechanismFile,
     PlateTable,
@@ -23,7 +23,7 @@ from reference.authored.mechanism import (
 )
 from reference.authored.toml_file import LENGTH_UNITS_M, SideText
 from reference.errors import near_names
-from reference.geometry import ComplexArray, FloatArray
+from reference.geometry import ComplexArray, FloatArray, cross, dot
 from reference.kinematics import assur
 from reference.mechanism import (
     Array,
@@ -50,6 +50,8 @@ from reference.mechanism import (
 IN_LINE_TOLERANCE = 1e-9
 """Relative tolerance: lengths that sum up this closely are meant to be in line."""
 
+LEAST_SINE = 1e-6
+"""Sine of the angle between a driving cylinder and its crank; below it the two are in line."""
 LARGEST = 1e9
 SHORTEST_M = 1e-9
 """No number of an authored file is larger, no length shorter: their squares then neither over- nor
@@ -150,7 +152,7 @@ def build_mechanism(file: MechanismFile, values: Mapping[str, Value], count: int
     if isinstance(driver, Crank):
         bodies.carry(driver.link, driver.pivot, driver.pin, driver.length_m)
     ground = {joint: numbers.point(point) for joint, point in file.ground.items()}
-    groups_ = (_located(index, table, numbers, bodies) for index, table in enumerate(file.group))
+    groups_ = (_located(index, table, numbers, bodies) for index, table in file.in_order)
     mechanism: Mechanism = with_arrays(Mechanism(ground, driver, tuple(groups_)), numbers.for_all)
     return mechanism
 
@@ -172,26 +174,54 @@ def _located(index: int, table: AnyGroupTable, numbers: Numbers, bodies: _LinkAx
 
 def _driver(file: MechanismFile, numbers: Numbers) -> Driver:
     zero, table = np.zeros(1), file.driver
+    if isinstance(table, CrankTable) and table.cylinder is not None:
+        return _by_cylinder(table, table.cylinder, file, numbers)
     if isinstance(table, CrankTable):
         return Crank(
             link=table.link,
             pivot=table.pivot,
             pin=table.pin,
             length_m=numbers.length(table.length, "crank"),
-            angle_rad=numbers.angle(table.angle_deg),
+            angle_rad=numbers.angle(cast("Formula", table.angle_deg)),
             omega=_omega(table, numbers),
             epsilon=zero if table.epsilon is None else numbers.number(table.epsilon),
             accelerated=table.epsilon is not None,
         )
+    guide = cast("FixedGuide", _guide(table.guide, numbers, _LinkAxes()))
     return DrivenSlider(
         link=table.link,
         pin=table.pin,
-        guide_m=numbers.point(table.guide.through),
-        guide_rad=numbers.angle(table.guide.angle_deg),
+        guide_m=guide.through_m,
+        guide_rad=guide.angle_rad,
         displacement_m=numbers.distance(table.displacement),
         speed=numbers.distance(table.speed),
         acceleration=zero if table.acceleration is None else numbers.distance(table.acceleration),
     )
+
+
+def _by_cylinder(crank: CrankTable, cylinder: CylinderTable, file: MechanismFile, numbers: Numbers) -> Crank:
+    """Return the crank that a cylinder drives, from the triangle of both pivots and the pin.
+
+    With u along the cylinder and r along the crank, the pin's velocity has the component s' along u, its
+    acceleration s'' - omega_cylinder^2 s.
+    """
+    foot, pivot = (numbers.point(file.ground[joint]) for joint in (cylinder.pivot, crank.pivot))
+    arm, length = numbers.length(crank.length, "crank"), numbers.length(cylinder.length, "cylinder")
+    base = pivot - foot
+    with np.errstate(all="ignore"):
+        along, across, sine = assur.rrr_place(base, length, arm, numbers.side(cylinder.side))
+    if np.any(~(sine > LEAST_SINE)):
+        least, most = np.abs(np.abs(base) - arm).max(), (np.abs(base) + arm).min()
+        message = f"'{cylinder.length.text}' (cylinder) must lie between {least:g} and {most:g} m"
+        raise FormulaError(f"{message}, in line with the crank", ~(sine > LEAST_SINE))
+    reach = base * (along + 1j * across)
+    u, r = reach / length, reach - base
+    speed = numbers.distance(cylinder.speed)
+    growth = np.zeros(1) if cylinder.acceleration is None else numbers.distance(cylinder.acceleration)
+    omega = -speed / cross(u, r)
+    swing = cross(u, 1j * omega * r) / length
+    epsilon = -(growth - swing**2 * length + omega**2 * dot(u, r)) / cross(u, r)
+    return Crank(crank.link, crank.pivot, crank.pin, arm, np.angle(r), omega, epsilon, accelerated=True)
 
 
 def _omega(crank: CrankTable, numbers: Numbers) -> FloatArray:
@@ -207,15 +237,11 @@ def _omega(crank: CrankTable, numbers: Numbers) -> FloatArray:
     return np.asarray(np.pi * rpm / 30.0)
 
 
-def _fixed(guide: FixedGuideTable | GuideTable, numbers: Numbers) -> FixedGuide:
-    # A table without joints has a point and a direction.
-    through, angle_deg = cast("list[Formula]", guide.through), cast("Formula", guide.angle_deg)
-    return FixedGuide(numbers.point(through), numbers.angle(angle_deg))
-
-
 def _guide(guide: GuideTable, numbers: Numbers, bodies: _LinkAxes) -> Guide:
     if guide.joints is None or guide.coincident is None:
-        return _fixed(guide, numbers)
+        # A table without joints has a point and a direction.
+        through, angle_deg = cast("list[Formula]", guide.through), cast("Formula", guide.angle_deg)
+        return FixedGuide(numbers.point(through), numbers.angle(angle_deg))
     base = (guide.joints[0], guide.joints[1])
     return MovingGuide(bodies.link_of(base), base, guide.coincident)
 
@@ -243,7 +269,8 @@ def _group(table: AnyGroupTable, numbers: Numbers, bodies: _LinkAxes) -> Group:
             first_guide, second_guide = (_guide(guide, numbers, bodies) for guide in table.guides)
             return CrossSlider(node, (first_guide, second_guide))
         case _:
-            return Yoke(node, table.pin, numbers.angle(table.slot_deg), _fixed(table.guide, numbers))
+            slot = np.zeros(1) if table.slot_deg is None else numbers.angle(table.slot_deg)
+            return Yoke(node, table.pin, slot, _guide(table.guide, numbers, bodies), table.link or "")
 
 
 def _slotted_link(table: SlottedLinkTable, numbers: Numbers, bodies: _LinkAxes) -> SlottedLink:

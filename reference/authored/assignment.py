@@ -460,8 +460,8 @@ def _check_formulas(assignment: Assignment, source: Path) -> Faults:
         own += check(f"$.given[{index}].value", datum.value.names, partial(datum.value, known))
     faults = Faults()
     if not (own or of_mechanism):
-        own += _check_scales(assignment, variants)
         of_mechanism += check("$", frozenset(), partial(assignment.mechanism, variants))
+        own += [] if of_mechanism else _check_scales(assignment, variants)
     faults.add(assignment.path, own)
     faults.add(source, of_mechanism)
     return faults

@@ -10,6 +10,7 @@ from typing import Annotated, Literal, Self, cast
 
 from pydantic import Field, model_validator
 
+from reference.authored.chain import GROUND, ONE_DRIVING_LINK, Chain, chain_of, refusal
 from reference.authored.toml_file import (
     AHEAD_BEHIND,
     AheadBehind,
@@ -27,18 +28,38 @@ from reference.authored.toml_file import (
 )
 from reference.errors import Finding
 
+UNSOLVED = "unsolved"
+"""The code of a mechanism of more or less than one degree of freedom, or with a group of a higher class."""
+MOST_LINKS, MOST_NAMED = 40, 6
+"""Links of a mechanism whose chain is examined; joints named in a message."""
+
+
+class CylinderTable(Authored):
+    """A cylinder between a ground pivot and the crank's pin, whose driven length moves the crank.
+
+    `speed` and `acceleration` are those of its length.
+    """
+
+    pivot: Joint
+    length: FormulaText
+    speed: FormulaText
+    acceleration: FormulaText | None = None
+    side: LeftRight
+    """Side of the pin, seen from the cylinder's pivot to the crank's."""
+
 
 class CrankTable(Authored):
     """The driven crank. Its speed is `omega` (rad/s), or `rpm` through a gear of `gear_ratio`.
 
-    Counter-clockwise positive.
+    Counter-clockwise positive. With a `cylinder`, its length gives angle, speed and acceleration.
     """
 
     link: LinkName = "1"
     pivot: Joint
     pin: Joint
     length: FormulaText
-    angle_deg: FormulaText
+    angle_deg: FormulaText | None = None
+    cylinder: CylinderTable | None = None
     omega: FormulaText | None = None
     rpm: FormulaText | None = None
     gear_ratio: FormulaText | None = None
@@ -46,18 +67,19 @@ class CrankTable(Authored):
 
     @model_validator(mode="after")
     def _has_one_speed(self) -> Self:
+        if self.cylinder is not None:
+            if any(one is not None for one in (self.angle_deg, self.omega, self.rpm, self.epsilon)):
+                raise ValueError(
+                    "angle, speed and acceleration come from the cylinder: leave out the crank's"
+                )
+            return self
+        if self.angle_deg is None:
+            raise ValueError("needs angle_deg, or a cylinder that drives it")
         if (self.omega is None) == (self.rpm is None):
             raise ValueError("needs one speed: either omega (rad/s) or rpm (rev/min)")
         if self.gear_ratio is not None and self.rpm is None:
             raise ValueError("gear_ratio goes with rpm: the crank then turns at rpm / gear_ratio")
         return self
-
-
-class FixedGuideTable(Authored):
-    """A fixed straight guide: a point of it and its direction, degrees counter-clockwise from +x."""
-
-    through: Point
-    angle_deg: FormulaText
 
 
 class GuideTable(Authored):
@@ -90,10 +112,19 @@ class DrivenSliderTable(Authored):
 
     link: LinkName = "1"
     pin: Joint
-    guide: FixedGuideTable
+    guide: GuideTable
     displacement: FormulaText
     speed: FormulaText
     acceleration: FormulaText | None = None
+
+    @model_validator(mode="after")
+    def _has_a_fixed_guide(self) -> Self:
+        if self.guide.joints is not None:
+            raise ValueError(
+                "a driven slider's guide is fixed; a cylinder that turns drives the link at its rod's end:"
+                " [crank] with cylinder = { pivot, length, speed, side }"
+            )
+        return self
 
 
 class DyadTable(Authored):
@@ -153,14 +184,27 @@ class CrossSliderTable(Authored):
 
 
 class YokeTable(Authored):
-    """Assur group RPP: a block hinged at `pin` slides in a yoke's slot, the yoke on a fixed guide."""
+    """Assur group RPP: a block hinged at `pin` slides in a yoke's slot, the yoke on a guide."""
 
     type: Literal["RPP"]
     node: Joint
-    """The yoke's point where slot and guide cross."""
+    """The yoke's point where slot and fixed guide cross; on a moving guide, its point under the pin."""
     pin: Joint
-    slot_deg: FormulaText
-    guide: FixedGuideTable
+    link: LinkName | None = None
+    """The yoke's name, on a moving guide."""
+    slot_deg: FormulaText | None = None
+    """The slot's direction; on a moving guide it is perpendicular to the guide."""
+    guide: GuideTable
+
+    @model_validator(mode="after")
+    def _has_slot_or_link(self) -> Self:
+        fixed = self.guide.joints is None
+        if fixed is not (self.slot_deg is not None) or fixed is not (self.link is None):
+            raise ValueError(
+                "a yoke on a fixed guide needs slot_deg; on a moving one, to which its slot is perpendicular,"
+                " it needs link, its own name, and no slot_deg"
+            )
+        return self
 
 
 class PlateTable(Authored):
@@ -218,13 +262,78 @@ class MechanismFile(Authored):
     @model_validator(mode="after")
     def _has_one_driver(self) -> Self:
         if (self.crank is None) == (self.driven_slider is None):
-            raise ValueError("needs one driving link: either [crank] or [driven_slider]")
+            two = f"; two have 2 degrees of freedom: {ONE_DRIVING_LINK}" if self.crank else ""
+            raise ValueError(f"needs one driving link: either [crank] or [driven_slider]{two}")
         return self
 
     @property
     def driver(self) -> CrankTable | DrivenSliderTable:
         """The driving link."""
         return cast("CrankTable | DrivenSliderTable", self.crank or self.driven_slider)
+
+    @property
+    def in_order(self) -> list[tuple[int, AnyGroupTable]]:
+        """Groups that can be placed, with their indices, each after those that place what it needs."""
+        placed, waiting = {*self.ground, self.driver.pin}, list(enumerate(self.group))
+        ordered: list[tuple[int, AnyGroupTable]] = []
+        found = -1
+        while found < len(ordered):
+            found = len(ordered)
+            for index, group in waiting:
+                if all(joint in placed for _, joint in _needed(group)):
+                    ordered.append((index, group))
+                    placed.update(joint for _, joint in _added(group))
+            taken = {index for index, _ in ordered}
+            waiting = [each for each in waiting if each[0] not in taken]
+        return ordered
+
+    @property
+    def chain(self) -> Chain | None:
+        """Links and joints of the file; None if they are too many, or no link carries some guide."""
+        links: dict[str, list[str]] = {GROUND: [*self.ground]}
+        slides: list[tuple[str, str]] = []
+        if self.crank is not None:
+            links[self.crank.link] = [self.crank.pivot, self.crank.pin]
+        else:
+            links[self.driver.link] = [self.driver.pin]
+            slides.append((GROUND, self.driver.link))
+        for group in self.group:
+            for link, *joints in _links_of(group):
+                held = links.setdefault(link, [])
+                held += [joint for joint in joints if joint not in held]
+        for group in self.group:
+            block, guides = f"block {group.node}", [guide for _, guide in _guides(group)]
+            if isinstance(group, SlottedLinkTable):
+                slides.append((block, group.link))
+            if isinstance(group, YokeTable):
+                slides.append((block, yoke := f"yoke {group.node}"))
+                block = yoke
+            for index, guide in enumerate(guides):
+                carriers = [link for link, held in links.items() if {*(guide.joints or ())} <= {*held}]
+                if guide.joints and not carriers:
+                    return None
+                slides.append((f"{block}{index or ''}", carriers[0]))
+        return chain_of(links, slides, self.driver.link) if len(links) <= MOST_LINKS else None
+
+
+def _links_of(group: AnyGroupTable) -> Iterator[tuple[str, ...]]:
+    """Yield the links and blocks of a group, each with joints that it carries."""
+    block, node = f"block {group.node}", group.node
+    match group:
+        case DyadTable():
+            yield from ((link, pin, node) for pin, link in zip(group.pins, group.links, strict=True))
+        case SliderTable():
+            yield from ((group.link, group.pin, node), (block, node))
+        case SlottedLinkTable():
+            yield from ((group.link, group.pivot, *([group.foot] if group.foot else [])), (block, group.pin))
+        case CrossSliderTable():
+            yield from ((block, node), (f"{block}1", node))
+        case YokeTable():
+            yield from ((block, group.pin), (f"yoke {node}", node))
+        case PointTable():
+            yield group.link, node
+        case _:
+            yield group.link, *group.base, node
 
 
 # Checks of joints and links ------------------------------------------------------------------------
@@ -269,33 +378,59 @@ def check_mechanism(file: MechanismFile) -> Iterator[Finding]:
     """Report unplaced or repeated joints, repeated links, and bases and guides that no one link carries."""
     bodies = _CarriedJoints(file)
     placed = {*file.ground}
-    later = [joint for group in file.group for _, joint in _added(group)]
-    if file.crank is not None:
-        if file.crank.pivot not in file.ground:
-            yield Finding("$.crank.pivot", _unknown(file.crank.pivot, set(file.ground), "a ground pivot"))
-        bodies.links[file.crank.link] = {file.crank.pivot, file.crank.pin}
-    pin = file.driver.pin
-    if pin in placed:
-        where = "$.crank.pin" if file.crank else "$.driven_slider.pin"
-        yield Finding(where, f"{pin} is a ground pivot already")
-    placed.add(pin)
-    for index, group in enumerate(file.group):
+    yield from _check_driver(file, bodies)
+    placed.add(file.driver.pin)
+    ordered = file.in_order
+    done = {index for index, _ in ordered}
+    left = [(index, group) for index, group in enumerate(file.group) if index not in done]
+    known = placed.union(joint for group in file.group for _, joint in _added(group))
+    if left and all(joint in known for _, group in left for _, joint in _needed(group)):
+        yield Finding("$.group", _why_unplaced(file, [group for _, group in left]), UNSOLVED)
+        left = []
+    for index, group in ordered + left:
         where = f"$.group[{index}]"
         for key, joint in _needed(group):
-            if joint in later and joint not in placed:
-                detail = f"{joint} is placed further down: groups stand in the order in which they assemble"
-                yield Finding(f"{where}.{key}", detail)
-            elif joint not in placed:
-                yield Finding(f"{where}.{key}", _unknown(joint, placed, "placed above"))
+            if joint not in known:
+                yield Finding(f"{where}.{key}", _unknown(joint, known, "placed by any group"))
         for key, joint in _added(group):
             if joint in placed:
                 detail = f"{joint} has a place already: over-constrained; a group places a new joint"
-                yield Finding(f"{where}.{key}", detail)
+                counts = file.chain if key == "node" else None
+                yield Finding(f"{where}.{key}", f"{detail}; {refusal(counts)}" if counts else detail)
             placed.add(joint)
-            later.remove(joint)
         yield from _check_hinges(group, bodies, where)
         yield from _check_links(group, bodies, where)
     yield from _check_names(placed)
+
+
+def _check_driver(file: MechanismFile, bodies: _CarriedJoints) -> Iterator[Finding]:
+    """Check the joints of the driving link and of the cylinder that drives it."""
+    if file.crank is not None:
+        pivots = {"": file.crank.pivot}
+        if file.crank.cylinder is not None:
+            pivots[".cylinder"] = file.crank.cylinder.pivot
+            slots = [(one.pivot, one.pin) for one in file.group if isinstance(one, SlottedLinkTable)]
+            if (pivots[".cylinder"], file.crank.pin) not in slots:
+                detail = f'of type = "RPR", its pin {file.crank.pin}, its pivot {pivots[".cylinder"]}'
+                yield Finding("$.crank.cylinder", f"the cylinder itself is missing: a group {detail}")
+        for key, pivot in pivots.items():
+            if pivot not in file.ground:
+                yield Finding(f"$.crank{key}.pivot", _unknown(pivot, {*file.ground}, "a ground pivot"))
+        if len({*pivots.values()}) < len(pivots):
+            yield Finding("$.crank.cylinder.pivot", "the cylinder needs a pivot of its own")
+        bodies.links[file.crank.link] = {file.crank.pivot, file.crank.pin}
+    pin = file.driver.pin
+    if pin in file.ground:
+        where = "$.crank.pin" if file.crank else "$.driven_slider.pin"
+        yield Finding(where, f"{pin} is a ground pivot already")
+
+
+def _why_unplaced(file: MechanismFile, waiting: list[AnyGroupTable]) -> str:
+    """Return why groups wait for one another: the mechanism's mobility, or the class of its groups."""
+    if (chain := file.chain) is not None:
+        return refusal(chain)
+    nodes = ", ".join(group.node for group in waiting[:MOST_NAMED])
+    return f"the groups of {nodes} wait for one another: none of them can be placed first"
 
 
 def _check_hinges(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> Iterator[Finding]:
@@ -304,6 +439,8 @@ def _check_hinges(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> I
     for joint in sorted(hinges & bodies.moments.keys()):
         link = bodies.moments[joint]
         detail = f'hinge it to a fixed point of the link, a group of type = "point" on link {link}'
+        if not bodies.links[link]:
+            detail = "a yoke on a moving guide carries no further joint"
         yield Finding(where, f"{joint} is a point of link {link} for this instant only: {detail}")
     moving = [set(guide.joints) for _, guide in _guides(group) if guide.joints]
     match group:
@@ -339,7 +476,7 @@ def _ambiguous_names(joints: set[str]) -> Iterator[Finding]:
 
 def _guides(group: AnyGroupTable) -> list[tuple[str, GuideTable]]:
     match group:
-        case SliderTable():
+        case SliderTable() | YokeTable():
             return [("guide", group.guide)]
         case CrossSliderTable():
             return [(f"guides[{index}]", guide) for index, guide in enumerate(group.guides)]
@@ -372,12 +509,7 @@ def _added(group: AnyGroupTable) -> Keyed:
 
 def _check_links(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> Iterator[Finding]:
     """Check that new links have new names, and that one link carries each base and moving guide."""
-    for key, guide in _guides(group):
-        if guide.joints and (guide.joints[0] == guide.joints[1] or bodies.of(guide.joints) is None):
-            detail = f"{guide.joints[0]} and {guide.joints[1]} must be two joints of one moving link"
-            yield Finding(f"{where}.{key}.joints", detail + bodies.carriers_of(guide.joints))
-        elif guide.joints and guide.coincident:
-            bodies.moments[guide.coincident] = bodies.of(guide.joints) or ""
+    yield from _check_guides(group, bodies, where)
     match group:
         case DyadTable():
             if group.pins[0] == group.pins[1]:
@@ -393,12 +525,24 @@ def _check_links(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> It
             yield from _add_link(group.link, carried, bodies, f"{where}.link")
             bodies.slots[group.link] = {group.pivot, group.node}
             bodies.moments[group.node] = group.link
+        case YokeTable(link=str(link)):
+            yield from _add_link(link, set(), bodies, f"{where}.link")
+            bodies.moments[group.node] = link
         case CrossSliderTable(guides=(first, second)):
             if not first.joints and not second.joints:
                 detail = "two fixed guides cross in a fixed point: one of them must be on a moving link"
                 yield Finding(f"{where}.guides", detail)
         case PlateTable() | PointOnLineTable() | PointTable():
             yield from _check_base(group, bodies, f"{where}.base")
+
+
+def _check_guides(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> Iterator[Finding]:
+    for key, guide in _guides(group):
+        if guide.joints and (guide.joints[0] == guide.joints[1] or bodies.of(guide.joints) is None):
+            detail = f"{guide.joints[0]} and {guide.joints[1]} must be two joints of one moving link"
+            yield Finding(f"{where}.{key}.joints", detail + bodies.carriers_of(guide.joints))
+        elif guide.joints and guide.coincident:
+            bodies.moments[guide.coincident] = bodies.of(guide.joints) or ""
 
 
 def _check_base(
@@ -430,4 +574,4 @@ def _add_link(link: str, joints: set[str], bodies: _CarriedJoints, where: str) -
 def _unknown(joint: str, known: set[str], what: str) -> str:
     near = difflib.get_close_matches(joint, sorted(known), n=1, cutoff=0.5)
     meant = f" (did you mean {near[0]}?)" if near else ""
-    return f"{joint} is not {what}{meant}: known so far are {', '.join(sorted(known))}"
+    return f"{joint} is not {what}{meant}: known are {', '.join(sorted(known))}"

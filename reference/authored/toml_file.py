@@ -19,6 +19,7 @@ from pydantic import (
 )
 
 from reference.authored import formula
+from reference.authored.chain import ONE_DRIVING_LINK
 from reference.authored.formula import Formula
 from reference.errors import MOST_FINDINGS, AuthoredFileError, Finding, counted, look_alikes, near_names
 
@@ -237,13 +238,15 @@ def findings_of(error: ValidationError, model: type[BaseModel]) -> Iterator[Find
         path = "$" + "".join(map(_path_part, above)) + (f".{last}" if is_field else _path_part(last))
         message, given = fault["msg"].removeprefix("Value error, "), fault["input"]
         if fault["type"] == "extra_forbidden":
-            message = _not_known(str(fault["loc"][-1]), model)
+            message = _not_known(str(last), model)
         elif fault["type"] == "missing":
             message = "is missing" + _WHY_NEEDED.get(str(fault["loc"][-1]), "")
         elif fault["type"].startswith("union_tag"):
             path, message = f"{path}.type", _no_type(given)
         elif fault["type"] in {"model_type", "model_attributes_type"}:
             message = "must be a table" + (f": [{last}], not [[{last}]]" if isinstance(given, list) else "")
+            if last in DRIVING and isinstance(given, list) and len(given) > 1:
+                message = f"{len(given)} degrees of freedom: {ONE_DRIVING_LINK}"
         elif fault["type"] == "list_type":
             message = f"must be a list{_a_list(str(last), given)}"
         elif fault["type"] in {"too_long", "too_short"}:
@@ -264,6 +267,35 @@ def findings_of(error: ValidationError, model: type[BaseModel]) -> Iterator[Find
         yield Finding("$", f"and {counted(len(faults) - MOST_FINDINGS, 'more fault')}")
 
 
+DRIVING = ("crank", "driven_slider")
+_EQUIVALENT = "by its equivalent linkage for the instant, see Cams and gears in docs/assignments.md"
+_OTHER_KINDS = {
+    ".*(cam(?!e)|follower|tappet).*": f"replace a cam {_EQUIVALENT}",
+    ".*(gears?$|gear.?(pair|set|train|wheel)|planet|epicycl|pinion|belt|pulley|friction).*":
+        f"a gear before the crank is its gear_ratio; replace a pair of gears between links {_EQUIVALENT}",
+    ".*(geneva|maltese).*": 'a Geneva wheel: while the pin is in a slot, it is a slotted link, type = "RPR"',
+    ".*(spring|damper|rope|cable|screw|spheric|cardan).*":
+        "planmark solves plane mechanisms of rigid links, hinges and sliders",
+    "triad|.*third.*|class.?iii|rr[rp].?[rp]+":
+        "a group of more than two links: only groups of the second class are solved",
+    "oldham.*|(scotch.?)?yoke|ppr|pp": 'a block in a yoke on a guide is type = "RPP"',
+    "dyad|rr|bars?|rods?|rocker|lever": 'two links that meet in a joint are type = "RRR"',
+    "cylinder|slott?ed.*|quick.?return": 'a block in the slot of a turning link is type = "RPR"',
+    "prr|slider|piston|slider.?crank": 'a rod with a slider on a guide is type = "RRP"',
+    "triangle|coupler|ternary|body": 'a third point of a link is type = "plate" or "point"',
+    "(crank|driven.?slider|driver|motor|second).?([2-9]|crank|driver|motor)":
+        f"a second driving link makes 2 degrees of freedom: {ONE_DRIVING_LINK}",
+}  # fmt: skip
+"""Advice about kinds of parts that no file has, or has by another name; the names as regular expressions."""
+
+
+def _other_kind(name: str) -> str:
+    """Return advice about a kind of part that a file does not have by this name; empty if it means none."""
+    word = name[:MAX_NAME]
+    advice = (text for kind, text in _OTHER_KINDS.items() if re.fullmatch(kind, word.lower()))
+    return next((f"'{word}': {text}" for text in advice), "")
+
+
 _GROUP_TYPES = ("RRR", "RRP", "RPR", "PRP", "RPP", "plate", "point_on_line", "point")
 _UNION_TAGS = {*_GROUP_TYPES, "str", "MechanismFile"}
 
@@ -274,6 +306,8 @@ def _no_type(table: object) -> str:
     known = f"one of {', '.join(_GROUP_TYPES)}"
     if not isinstance(given, str):
         return f"is missing: it must be {known}"
+    if other := _other_kind(given):
+        return f"{other}; types are {', '.join(_GROUP_TYPES)}"
     near = near_names(given, _GROUP_TYPES, most=1)
     meant = f"; did you mean {near[0]}?" if near else ""
     return f"'{given[:MAX_NAME]}' is no type: it must be {known}{meant}{look_alikes(given)}"
@@ -299,6 +333,8 @@ def _not_known(name: str, model: type[BaseModel]) -> str:
     fields = {field for kind in _models_in(model, set()) for field in kind.model_fields}
     if name in fields:
         return "does not belong here: another kind of table has it; leave it out"
+    if other := _other_kind(name):
+        return other
     near = near_names(name, sorted(fields), most=1)
     return "is not known here; check its spelling" + (f" (did you mean {near[0]}?)" if near else "")
 

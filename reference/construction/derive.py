@@ -152,8 +152,11 @@ def turning(draft: Draft, link: tuple[str, str], length: Normal) -> Condition:
     return Line(draft.image(pin), across), Line(end, across)
 
 
-def slides(draft: Draft, node: str, guides: Sequence[Guide]) -> list[Condition]:
-    """Add a node that slides on guides: along each, from the image of the point under it."""
+def slides(draft: Draft, node: str, guides: Sequence[Guide], at: str = "") -> list[Condition]:
+    """Add a node that slides on guides: along each, from the image of the point under it.
+
+    Arguments: `at`, the joint with which the node itself coincides.
+    """
     conditions = []
     for guide in guides:
         if isinstance(guide, FixedGuide):
@@ -161,7 +164,7 @@ def slides(draft: Draft, node: str, guides: Sequence[Guide]) -> list[Condition]:
             conditions.append((Line(VELOCITY_POLE, along), Line(ACCELERATION_POLE, along)))
             continue
         under, (g, h) = guide.coincident, guide.base
-        draft.sketch.append(Coincide(under, node))
+        draft.sketch.append(Coincide(under, at or node))
         draft.add_images(*similar_images(draft, under, (g, h)))
         absolute(draft, under)
         turn = (draft.image(g), draft.image(h))
@@ -178,7 +181,7 @@ def sliding(
     joints of it that the velocity belongs to.
     """
     other, node = link
-    about, name = f"{node}{other}", turning_[0]
+    about, name = draft.relative(node, other), turning_[0]
     start, end = draft.image(other, primed=True), f"k_{node}{other}"
     length = Coriolis((draft.image(other), draft.image(node)), guide, turn, turning_[1:])
     draft.acceleration.append(Given(end, start, length, replace(guide, quarters=guide.quarters + 1)))
@@ -401,10 +404,8 @@ def _draw_group(draft: Draft, group: Group) -> None:
         case CrossSlider(node=node, guides=guides):
             draft.sketch.append(TwoLines(node, *(guide_line(node, guide) for guide in guides)))
             images_at(draft, node, slides(draft, node, guides))
-        case Yoke(node=node, pin=pin, guide=guide):
-            slot = Fixed(f"angle slot {node}")
-            draft.sketch.append(TwoLines(node, Line(pin, slot), guide_line(node, guide)))
-            images_at(draft, node, [in_slot(draft, node, pin, slot), *slides(draft, node, (guide,))])
+        case Yoke():
+            _draw_yoke(draft, group)
         case SlottedLink():
             _draw_slotted_link(draft, group)
         case _:
@@ -423,6 +424,20 @@ def _draw_plate(draft: Draft, group: Plate) -> None:
         return
     radii = (Scaled(pair(p, node), "kL"), Scaled(pair(q, node), "kL"))
     draft.sketch.append(TwoArcs(node, (p, q), radii, _side(group)))
+
+
+def _draw_yoke(draft: Draft, group: Yoke) -> None:
+    node, pin, guide = group.node, group.pin, group.guide
+    if isinstance(guide, FixedGuide):
+        slot = Fixed(f"angle slot {node}")
+        draft.sketch.append(TwoLines(node, Line(pin, slot), guide_line(node, guide)))
+        images_at(draft, node, [in_slot(draft, node, pin, slot), *slides(draft, node, (guide,))])
+        return
+    draft.sketch.append(Coincide(node, pin))
+    along, across = slides(draft, node, (guide,), at=pin), Along(*guide.base, 1)
+    turn = draft.images_of(guide.base, primed=False)
+    lines = sliding(draft, (pin, node), across, turn, (guide.link, *guide.base))
+    images_at(draft, node, [*along, lines])
 
 
 def _slot_axis(group: SlottedLink) -> Along:

@@ -312,7 +312,8 @@ def _starts(step: Step, construction: Construction) -> Iterator[str]:
         case Coincide(node=node, other=other):
             # A slotted link's point turns about the link's pivot; a point under a slider has a bar already.
             velocities = (v.link for v in construction.vectors.values() if v.link and v.scale == "kv")
-            yield from (pivot for pivot, head in velocities if head == node and pivot != other)
+            here = {other, *(under for under, over in coincident(construction).items() if over == other)}
+            yield from (pivot for pivot, head in velocities if head == node and pivot not in here)
         case TwoLines(first=first, second=second):
             # The slot of a yoke; guides are no bars.
             lines = (line for line in (first, second) if isinstance(line, Line))

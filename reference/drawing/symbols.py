@@ -5,7 +5,7 @@ About points of the plane: complex millimetres, y up.
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from reference.mechanism import (
     FixedGuide,
     Group,
     Guide,
+    MovingGuide,
     Plate,
     PointOnLine,
     Slider,
@@ -216,17 +217,17 @@ def _bars_of(subject: Subject, group: Group, nodes: dict[str, complex]) -> Itera
         case SlotPoint(node=node, slotted=slotted, link=link):
             yield _between(node, link, slotted_link(subject, slotted).pivot, node, nodes)
         case Yoke(node=node, pin=pin):
-            way = nodes[pin] - nodes[node]
-            along = slot_of_yoke(subject, group)
+            foot, along = slot_of_yoke(subject, group, nodes)
+            way = nodes[pin] - foot
             reach = way if abs(way) > 0.0 else along
-            yield Bar(node, "", (node, node), (nodes[node], nodes[pin] + BEYOND_MM * unit(reach)))
+            yield Bar(node, group.link, (node, node), (foot, nodes[pin] + BEYOND_MM * unit(reach)))
 
 
 def _carriers(group: Group, nodes: dict[str, complex]) -> Iterator[Bar]:
     """Extend the link of a moving guide that its joints do not reach past the block."""
     for guide in moving_guides(group):
         g, h = (nodes[joint] for joint in guide.base)
-        at = nodes[guide.coincident]
+        at = foot_on(guide, nodes[guide.coincident], nodes)
         near, far = (h, g) if abs(at - h) < abs(at - g) else (g, h)
         if abs(at - far) > abs(far - near):
             yield Bar(guide.coincident, guide.link, guide.base, (near, at + BEYOND_MM * unit(at - near)))
@@ -243,9 +244,18 @@ def slot_direction(group: SlottedLink, nodes: dict[str, complex]) -> complex:
     return unit(nodes[group.pin] - nodes[group.foot or group.pivot])
 
 
-def slot_of_yoke(subject: Subject, group: Yoke) -> complex:
-    """Return the direction of a yoke's slot."""
-    return complex(np.exp(1j * subject.number(np.asarray(group.slot_rad))))
+def foot_on(guide: MovingGuide, at: complex, nodes: dict[str, complex]) -> complex:
+    """Return the point of a moving guide's line that is nearest to a point."""
+    g, h = (nodes[joint] for joint in guide.base)
+    return g + unit(h - g) * ((at - g) * unit(h - g).conjugate()).real
+
+
+def slot_of_yoke(subject: Subject, group: Yoke, nodes: dict[str, complex]) -> tuple[complex, complex]:
+    """Return where a yoke's slot crosses its guide, and the slot's direction."""
+    guide = group.guide
+    if isinstance(guide, MovingGuide):
+        return foot_on(guide, nodes[group.pin], nodes), 1j * _along(subject, guide, nodes)
+    return nodes[group.node], complex(np.exp(1j * subject.number(np.asarray(group.slot_rad))))
 
 
 def blocks(subject: Subject, nodes: dict[str, complex]) -> Iterator[Block]:
@@ -261,8 +271,9 @@ def blocks(subject: Subject, nodes: dict[str, complex]) -> Iterator[Block]:
             case CrossSlider(node=node, guides=guides):
                 yield from (_block(subject, node, guide, nodes) for guide in guides)
             case Yoke(node=node, pin=pin, guide=guide):
-                yield Block(node, nodes[pin], slot_of_yoke(subject, group))
-                yield _block(subject, node, guide, nodes, nodes[pin] - nodes[node])
+                foot, along = slot_of_yoke(subject, group, nodes)
+                yield Block(node, nodes[pin], along)
+                yield replace(_block(subject, node, guide, nodes, nodes[pin] - foot), at=foot)
             case SlottedLink(node=node, pin=pin):
                 yield Block(node, nodes[pin], slot_direction(group, nodes))
             case _:

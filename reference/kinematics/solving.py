@@ -155,10 +155,12 @@ def _add(solution: Solution, group: Group) -> None:
             _add_crossing(solution, node, rails)
             for guide, rail in zip(group.guides, rails, strict=True):
                 _add_coincident(solution, guide, rail, node)
-        case Yoke(node=node):
+        case Yoke(node=node, guide=FixedGuide() as guide):
             pin = solution.joints[group.pin]
             slot = Rail(pin, assur.heading(solution.take(group.slot_rad)), pin.amplification)
-            _add_crossing(solution, node, (rail_of(solution, group.guide), slot))
+            _add_crossing(solution, node, (rail_of(solution, guide), slot))
+        case Yoke():
+            _add_carried_yoke(solution, group)
         case SlotPoint():
             _add_slot_point(solution, group, solution.take(group.local_m))
         case _:
@@ -311,6 +313,23 @@ def _add_coincident(solution: Solution, guide: Guide, rail: Rail, node: str) -> 
         rail.acceleration(over.position),
         amplification=over.amplification,
     )
+
+
+def _add_carried_yoke(solution: Solution, group: Yoke) -> None:
+    """Add the point under the pin of a yoke that slides on a moving guide, its slot across the guide.
+
+    All turn alike: the pin's motion about the guide's link is resolved along the guide and along the slot.
+    """
+    pin, rail = solution.joints[group.pin], rail_of(solution, group.guide)
+    place, under = pin.position, rail.velocity(pin.position)
+    slide, along = dot(rail.along, pin.velocity - under), rail.along
+    node = Joint(place, under + along * slide, rest=pin.rest)
+    if solution.accelerations:
+        carried = rail.acceleration(place) + 2j * rail.omega * slide * along
+        in_slot = pin.acceleration + 2j * rail.omega * (node.velocity - pin.velocity)
+        node.acceleration = carried + along * dot(along, in_slot - carried)
+    solution.add(group.node, node, 1.0, larger(pin.amplification, rail.amplification))
+    _add_coincident(solution, group.guide, rail, group.node)
 
 
 def _add_crossing(solution: Solution, node: str, rails: tuple[Rail, Rail]) -> None:

@@ -11,6 +11,7 @@ from reference.construction.steps import ArcAndLine, Divide, Given, OnGuide, Sim
 from reference.mechanism import (
     Crank,
     Dyad,
+    FixedGuide,
     Group,
     Plate,
     PointOnLine,
@@ -52,7 +53,7 @@ def _bars(task: DrawingTask, group: Group) -> Iterator[tuple[str, str]]:
                 yield (q if float(np.mean(ratio)) > 1.0 else p), node
         case Dyad(node=node, pins=pins) | Plate(node=node, base=pins):
             yield from ((pin, node) for pin in pins)
-        case Slider(node=node, pin=pin) | Yoke(node=node, pin=pin):
+        case Slider(node=node, pin=pin) | Yoke(node=node, pin=pin, guide=FixedGuide()):
             yield pin, node
 
 
@@ -71,6 +72,7 @@ def _end_of_slot(task: DrawingTask, link: SlottedLink) -> str:
 def coincident(task: DrawingTask) -> set[str]:
     """Joints that coincide with another and have no symbol or letter of their own."""
     slotted = {g.node for g in task.mechanism.groups if isinstance(g, SlottedLink)}
+    slotted |= {g.node for g in task.mechanism.groups if isinstance(g, Yoke) and moving_guides(g)}
     return slotted | {guide.coincident for g in task.mechanism.groups for guide in moving_guides(g)}
 
 

@@ -10,6 +10,9 @@ from reference.authored.assembly import build_mechanism
 from reference.authored.mechanism import MechanismFile, check_mechanism
 from reference.authored.toml_file import validate
 from reference.kinematics.motion import move
+from reference.mechanism import Yoke
+from tests.bench.oracle import ExactMotion
+from tests.laws.mechanisms import random_mechanism
 
 DIGITS = 40
 NEWTON_STEPS = 10
@@ -204,6 +207,74 @@ def test_an_oscillating_cylinder_has_the_rates_of_its_triangle():
     assert motion.epsilon["3"][0] == pytest.approx(
         (growth - 2 * s * slide * swing) / s**2, rel=DOUBLE_PRECISION
     )
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_yoke_on_a_moving_guide_moves_as_loops_solved_in_many_digits(seed):
+    mechanism = random_mechanism(seed, ["RRR", "RPP on a link", "plate", "RPP on a link"])
+    motion, exact = move(mechanism), ExactMotion(mechanism)
+    yokes = [group for group in mechanism.groups if isinstance(group, Yoke)]
+    assert yokes
+    for joint in [joint for yoke in yokes for joint in (yoke.node, yoke.guide.coincident)]:
+        for what in ("velocity", "acceleration"):
+            rates, true = getattr(motion, what), getattr(exact, what)
+            size = max(float(np.abs(z)[0]) for z in rates.values())
+            assert abs(rates[joint][0] - complex(true[joint])) <= DOUBLE_PRECISION * size
+
+
+def test_the_cross_of_an_oldham_coupling_slides_harmonically_in_both_discs():
+    """Shafts d apart: along the slots the cross's centre is d cos phi from one, d sin phi from the other."""
+    d, phi = 0.06, math.radians(70)
+    cross = {"type": "RPP", "node": "C3", "pin": "C", "link": "3"}
+    cross |= {"guide": {"joints": ["A", "B"], "coincident": "C1"}}
+    motion = motion_of({"ground": {"A": [0, 0], "C": [d, 0]}, "crank": CRANK, "group": [cross]})
+    along = complex(math.cos(phi), math.sin(phi))
+    for rate, first, second, coriolis in (
+        (motion.velocity, -OMEGA * math.sin(phi), OMEGA * math.cos(phi), 0),
+        (
+            motion.acceleration,
+            -EPSILON * math.sin(phi) - OMEGA**2 * math.cos(phi),
+            EPSILON * math.cos(phi) - OMEGA**2 * math.sin(phi),
+            2j * OMEGA,
+        ),
+    ):
+        slip = motion.velocity["C3"][0] - motion.velocity["C1"][0]
+        in_first = d * first * along + coriolis * slip
+        assert rate["C3"][0] - rate["C1"][0] == pytest.approx(in_first, rel=DOUBLE_PRECISION)
+        in_second = d * second * 1j * along + coriolis * motion.velocity["C3"][0]
+        assert rate["C3"][0] == pytest.approx(in_second, rel=DOUBLE_PRECISION)
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_cylinder_of_driven_length_turns_its_crank(side):
+    length, speed, growth, arm = 0.35, 0.2, -0.3, 0.25
+    cylinder = {"pivot": "C", "length": length, "speed": speed, "acceleration": growth, "side": side}
+    crank = {"pivot": "A", "pin": "B", "link": "2", "length": arm, "cylinder": cylinder}
+    mechanism = {"ground": {"A": [0.3, 0.2], "C": [0, 0]}, "crank": crank, "group": [B3]}
+    motion = motion_of(mechanism)
+    sign = 1 if side == "left" else -1
+
+    def pin(time):
+        s, r, base = length + speed * time + growth * time**2 / 2, mp.mpf(arm), mpc(0.3, 0.2)
+        d = abs(base)
+        return base / d * s * mp.expj(sign * mp.acos((s * s + d * d - r * r) / (2 * s * d)))
+
+    for order, rate in enumerate((motion.position, motion.velocity, motion.acceleration)):
+        with mp.workdps(DIGITS):
+            true = complex(mp.diff(pin, 0, order))
+        assert rate["B"][0] == pytest.approx(true, rel=DOUBLE_PRECISION)
+    assert abs(motion.velocity["B"][0] - motion.velocity["B3"][0]) == pytest.approx(speed)
+
+
+def test_the_equivalent_linkage_of_a_gear_pair_has_the_gears_ratio():
+    """The line of action between the base circles, at a pressure angle of 20 degrees."""
+    first, second, alpha = 0.05, 0.12, math.radians(20)
+    gear = {"type": "RRR", "node": "D", "pins": ["B", "C"], "links": ["2", "3"], "side": "right"}
+    gear["lengths"] = [(first + second) * math.sin(alpha), second * math.cos(alpha)]
+    crank = CRANK | {"length": first * math.cos(alpha), "angle_deg": 20}
+    motion = motion_of({"ground": {"A": [0, 0], "C": [first + second, 0]}, "crank": crank, "group": [gear]})
+    assert motion.omega["3"][0] == pytest.approx(-OMEGA * first / second, rel=DOUBLE_PRECISION)
+    assert motion.epsilon["3"][0] == pytest.approx(-EPSILON * first / second, rel=DOUBLE_PRECISION)
 
 
 def test_an_elliptic_trammels_rod_turns_as_its_ends_slide_on_crossed_guides():

@@ -21,6 +21,7 @@ from reference.mechanism import (
     Group,
     Guide,
     Mechanism,
+    MovingGuide,
     Plate,
     PointOnLine,
     Slider,
@@ -138,6 +139,11 @@ class ExactMotion:
             case CrossSlider(guides=guides):
                 lines = [_line(at, guide) for guide in guides]
                 at[node] = _root([_on(*line) for line in lines], lines[0][0])
+            case Yoke(guide=MovingGuide() as guide):
+                foot, along = _line(at, guide)
+                pin = (at[group.pin] - foot) / along * abs(along)
+                at[node] = foot + mpc(pin.real, self._constant(node, pin.imag)) * along / abs(along)
+                at[AXIS + node] = along
             case Yoke():
                 at[AXIS + node] = mp.expj(group.slot_rad)
                 slot = at[group.pin], at[AXIS + node]
@@ -148,7 +154,7 @@ class ExactMotion:
                 at[node] = at[f"pivot of {slotted}"] + at[AXIS + slotted] * group.local_m
         for guide in moving_guides(group):
             foot, along = _line(at, guide)
-            ratio = self._constant(guide.coincident, ((at[node] - foot) / along).real)
+            ratio = self._constant(guide.coincident, (at[node] - foot) / along)
             at[guide.coincident], at[AXIS + guide.coincident] = foot + ratio * along, along
 
     def _turn_slot(self, group: SlottedLink, at: dict[str, Any]) -> None:

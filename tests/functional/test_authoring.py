@@ -57,3 +57,88 @@ def test_an_assignment_that_never_assembles_is_told_and_not_drawn(planmark, tmp_
     assert "nothing drawn" in ran.stdout
     assert not (tmp_path / "worst.svg").exists()
     assert "the group of B does not assemble" in ran.stdout
+
+
+STEPHENSON_III = """
+schema_version = 1
+id = "stephenson"
+title = { en = "Stephenson III", ro = "Stephenson III", ru = "Стефенсон III" }
+length_unit = "cm"
+ground = { O1 = [0, 0], O2 = [40, 0], O3 = [70, 15] }
+crank = { pivot = "O1", pin = "A", length = 10, angle_deg = "12*n", rpm = 120 }
+group = [
+  { type = "RRR", node = "D", pins = ["C", "O3"], links = ["4", "5"], lengths = [42, 30], side = "left" },
+  { type = "plate", node = "C", base = ["A", "B"], link = "2", lengths = [24, 20], side = "left" },
+  { type = "RRR", node = "B", pins = ["A", "O2"], links = ["2", "3"], lengths = [35, 25], side = "left" },
+]
+"""
+GROUP_OF_THE_THIRD_CLASS = """
+group = [
+  { type = "RRR", node = "C", pins = ["A", "B"], links = ["4", "2"], lengths = [42, 20], side = "left" },
+  { type = "plate", node = "D", base = ["B", "C"], link = "2", lengths = [35, 24], side = "left" },
+  { type = "RRR", node = "B", pins = ["O2", "D"], links = ["3", "2"], lengths = [25, 35], side = "left" },
+  { type = "RRR", node = "D", pins = ["O1", "C"], links = ["5", "2"], lengths = [10, 24], side = "left" },
+]
+"""
+
+
+def test_a_new_author_comes_from_a_six_bar_of_a_textbook_to_printed_sheets(planmark, tmp_path):
+    """Groups in any order; then the crank at the third pivot, which leaves a group of the third class."""
+    path = tmp_path / "six.mechanism.toml"
+    path.write_text(STEPHENSON_III, encoding="utf-8")
+    told = planmark("new", "mine", "--mechanism", "six.mechanism.toml")
+    assert (told.returncode, told.stderr) == (0, "")
+    for command in re.findall(r"(?m)^(?:see it:|next:.*) (planmark .*)$", told.stdout):
+        assert planmark(*shlex.split(command)[1:]).returncode == 0
+    (tmp_path / "roster.csv").write_text("student_id,name,n\ns1,Ana,1\n", encoding="utf-8")
+    assert planmark("sheet", "mine.assignment.toml", "--roster", "roster.csv", "-o", "s.pdf").returncode == 0
+    third = (
+        STEPHENSON_III.replace('pivot = "O1"', 'pivot = "O3"').partition("group")[0]
+        + GROUP_OF_THE_THIRD_CLASS
+    )
+    path.write_text(third, encoding="utf-8")
+    told = planmark("new", "other", "--mechanism", "six.mechanism.toml")
+    assert told.returncode == 2
+    assert "AC, BCD, O2B, O1D form a group of the third class: not solved" in told.stderr
+    assert "or with O2B as the driving link" in told.stderr
+    assert not (tmp_path / "other.assignment.toml").exists()
+
+
+EXCAVATOR = """
+schema_version = 1
+id = "excavator"
+title = { en = "Excavator" }
+length_unit = "mm"
+ground = { O1 = [0, 0], O2 = [300, 200] }
+[crank]
+link = "2"
+pivot = "O2"
+pin = "B"
+length = 250
+cylinder = { pivot = "O1", length = "280 + 8*n", speed = 200, acceleration = 300, side = "right" }
+[[group]]
+type = "RPR"
+node = "B1"
+pin = "B"
+pivot = "O1"
+link = "1"
+"""
+
+
+def test_a_cylinder_of_driven_length_is_given_to_students_and_has_no_cycle(planmark, tmp_path):
+    path = tmp_path / "arm.mechanism.toml"
+    path.write_text(EXCAVATOR, encoding="utf-8")
+    assert planmark("new", "mine", "--mechanism", "arm.mechanism.toml").returncode == 0
+    given = tomllib.loads((tmp_path / "mine.assignment.toml").read_text(encoding="utf-8"))["given"]
+    told = {datum["label"]: (datum["value"], datum["unit"]) for datum in given}
+    assert (
+        told.items()
+        >= {"s(O1)": ("280 + 8*n", "mm"), "v(O1)": (200, "mm/s"), "a(O1)": (300, "mm/s²")}.items()
+    )
+    ran = planmark("cycle", "mine.assignment.toml", "--n", "1")
+    assert (ran.returncode, ran.stdout) == (2, "")
+    assert "known at the variant's position alone; use planmark plan --all" in ran.stderr
+    path.write_text(EXCAVATOR.replace("280 + 8*n", "500 + 8*n"), encoding="utf-8")
+    ran = planmark("new", "other", "--mechanism", "arm.mechanism.toml")
+    assert ran.returncode == 2
+    assert "$: '500 + 8*n' (cylinder) must lie between 0.110555 and 0.610555 m" in ran.stderr

@@ -24,7 +24,7 @@ from reference.mechanism import (
 
 KINDS = (
     "RRR", "RRP", "RRP on a link", "RPR", "RPR with offset", "PRP", "PRP on two links", "RPP",
-    "plate", "point on line", "slot point",
+    "RPP on a link", "plate", "point on line", "slot point",
 )  # fmt: skip
 LEAST_SINE = 0.25
 """Least sine of the angle that a group's accuracy depends on; other tests go nearer to singularities."""
@@ -121,7 +121,7 @@ class Sketch:
         if abs(place) > FARTHEST:
             return False
         self.groups.append(group)
-        if not isinstance(group, SlottedLink):
+        if not isinstance(group, SlottedLink) and not getattr(group, "link", "").startswith("Y"):
             self.at[group.node] = place
         for link, joints in links.items():
             self.links.setdefault(link, []).extend(joints)
@@ -236,6 +236,15 @@ class Sketch:
         along = slot * complex(self.sign() * np.sqrt(1 - sine * sine), self.sign() * sine)
         guide = self.fixed_guide(place, along)
         return self.add(Yoke(self.node(), pin, array(float(np.angle(slot))), guide), place, {})
+
+    def rpp_on_a_link(self) -> bool:
+        pin = self.choose(self.at)
+        found = self.moving_guide(but=pin)
+        if found is None:
+            return False
+        guide = replace(found[0], coincident=f"W{len(self.groups)}")
+        yoke = Yoke(f"Z{len(self.groups)}", pin, array(0.0), guide, f"Y{len(self.groups)}")
+        return self.add(yoke, self.at[pin], {})
 
     def plate(self) -> bool:
         found = self.base()
@@ -368,6 +377,8 @@ def group_table(group, mechanism: Mechanism) -> dict:
             told |= {"offset": float(offset[0]), "foot": foot} if foot else {}
         case CrossSlider(guides=guides):
             told |= {"type": "PRP", "guides": [guide_table(guide) for guide in guides]}
+        case Yoke(pin=pin, guide=MovingGuide(), link=link):
+            told |= {"type": "RPP", "pin": pin, "link": link, "guide": guide_table(group.guide)}
         case Yoke(pin=pin, slot_rad=slot):
             told |= {"type": "RPP", "pin": pin, "slot_deg": degrees(slot), "guide": guide_table(group.guide)}
         case Plate(base=base, link=link, lengths_m=lengths, side=side) if len(mechanism.groups) % 2:

@@ -79,7 +79,7 @@ def test_a_slider_stays_on_its_fixed_guide(mechanism):
 def test_a_yokes_slot_does_not_turn(mechanism):
     motion = move(mechanism)
     for group in mechanism.groups:
-        if isinstance(group, Yoke):
+        if isinstance(group, Yoke) and isinstance(group.guide, FixedGuide):
             slot = np.exp(1j * group.slot_rad)
             for rate, size in (
                 (motion.position, 4.0),
@@ -96,6 +96,10 @@ def slides(mechanism, motion):
         for guide in moving_guides(group):
             g, h = guide.base
             yield guide.link, guide.coincident, group.node, (at[h] - at[g]) / np.abs(at[h] - at[g])
+        if isinstance(group, Yoke) and moving_guides(group):
+            g, h = group.guide.base
+            across = 1j * (at[h] - at[g]) / np.abs(at[h] - at[g])
+            yield group.guide.link, group.pin, group.node, across
         if isinstance(group, SlottedLink):
             start = at[group.foot or group.pivot]
             along = group.side * (at[group.pin] - start) / np.abs(at[group.pin] - start)

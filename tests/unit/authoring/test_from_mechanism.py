@@ -45,15 +45,25 @@ def test_an_assignment_of_a_mechanism_and_a_table_has_no_fault_and_no_warning(tm
     assert told.items() <= given.items()
 
 
-def test_vectors_too_short_in_some_variant_are_criteria_behind_comment_signs(tmp_path):
-    mechanism, table = written(
-        tmp_path, table=TABLE + "7,85,260,35,120,left\n"
-    )  # near the dead point, 33.85 degrees
+@pytest.mark.parametrize("near_dead_point", [1, 3])
+def test_vectors_too_short_in_most_variants_are_criteria_behind_comment_signs(tmp_path, near_dead_point):
+    """Two variants, and some near the dead point, 33.85 degrees."""
+    more = "".join(f"{7 + row},85,260,{35 + row / 10},120,left\n" for row in range(near_dead_point))
+    mechanism, table = written(tmp_path, table=TABLE + more)
     new = new_assignment(tmp_path / "six", mechanism=str(mechanism), table=table)
     assignment = load_assignment(new.assignment)
-    asked = {criterion.vector for criterion in rubric_of(assignment).criterion} - {None}
+    rubric = rubric_of(assignment)
+    asked = {criterion.vector for criterion in rubric.criterion} - {None}
     vectors = set(construction_for(assignment).vectors)
+    found = [one for one in lint(assignment, rubric).findings if one.code.startswith("short_")]
+    assert {one.severity for one in found} == {"hint"}
+    told = " ".join(one.message for one in found)
+    assert "a_B_n" in told
+    if near_dead_point == 1:
+        assert asked == vectors
+        return
     assert asked < vectors
+    assert all(f"{name} (in 3 of 5 variants" in told for name in vectors - asked)
     text = new.rubric.read_text(encoding="utf-8")
     before, _, behind = text.partition("# Not asked for")
     blocks = re.sub("(?m)^# ", "", behind.partition("\n\n")[2])

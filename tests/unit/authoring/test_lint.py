@@ -42,7 +42,8 @@ def findings_of(path: Path | str, code: str):
 def test_vectors_too_short_to_measure_are_told_with_their_variants():
     told = [one for one in findings_of("pump", "short_vector") if "a_DC_n" in one.message]
     assert len(told) == 1
-    assert (told[0].severity, told[0].file) == ("warning", "rubric")
+    # Short in 7 of 30 variants, and measured in the others.
+    assert (told[0].severity, told[0].file) == ("hint", "rubric")
     rubric = tomllib.loads((library() / "pump.rubric.toml").read_text(encoding="utf-8"))
     index = int(told[0].path.removeprefix("$.criterion[").removesuffix("]"))
     assert rubric["criterion"][index]["vector"] == "a_DC_n"
