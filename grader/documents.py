@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from reference.construction.mistakes import Code
+from reference.quantities import value_name
 
 SCHEMA_VERSION = 1
 
@@ -237,7 +238,7 @@ class CriterionDocument(Document):
     id: str
     title: str
     vector: str | None
-    """The vector or angular quantity judged; null for a scale and a link."""
+    """The vector or angular quantity judged; null for a scale, a link and a computed value."""
     points: float | None
     """Null while under review, and if not judged."""
     max_points: float
@@ -261,13 +262,15 @@ class CriterionDocument(Document):
     """The same reasons with their parameters."""
     link: str | None = None
     """The link of the mechanism judged."""
+    value: str | None = None
+    """The vector whose computed value is judged."""
     section: str | None = None
     """The section of the rubric that it belongs to, if that has a weight of its own."""
 
     @property
     def drawn(self) -> str:
-        """The vector, angular quantity or link judged; empty for a scale."""
-        return self.vector or self.link or ""
+        """The vector, angular quantity, link or ``NAME_value`` judged; empty for a scale."""
+        return self.vector or self.link or (value_name(self.value) if self.value else "")
 
 
 class RivalDocument(Document):

@@ -74,7 +74,7 @@ class Outcome:
     Attributes
     ----------
     criterion : id in the rubric
-    name : the vector, angular quantity or scale judged
+    name : the vector, its value (``v_B_value``), angular quantity or scale judged
     verdict : full, partial, none, follow_through, review, not_judged
     possible : under review, the verdicts it lies between (worst, best); else twice the verdict
     measured, expected, tolerance : the evidence; `expected` follows the original data, or the student's own

@@ -30,7 +30,7 @@ from grader.overlay.backdrop import backdrop
 from grader.overlay.measured import measured_picture
 from grader.overlay.picture import overlay
 from grader.overlay.scene import Picture
-from grader.printed.layout import cells_of
+from grader.printed.layout import cells_of, values_of
 from grader.reading import page_scale
 from grader.reading.corrected import corrected
 from grader.reading.read import read_figures
@@ -47,6 +47,7 @@ from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.construction.graph import Construction
 from reference.construction.mistakes import Drawing
 from reference.errors import MechanismError
+from reference.quantities import value_name
 
 # One page: pixels to strokes ----------------------------------------------------------------------
 
@@ -58,8 +59,12 @@ def scan(ref: PageRef, asked: Asked) -> ScannedPage:
         return page
     reading = page.reading
     if page.sheet is not None and page.sheet.zones and asked.assignment is not None:
-        cells = cells_of(asked.assignment, tuple(page.sheet.zones), asked.entries)
-        reading = replace(reading, lengths=written_lengths(page.image, page.sheet, cells))
+        zones = tuple(page.sheet.zones)
+        values = values_of(asked.assignment, zones, asked.entries)
+        cells = cells_of(asked.assignment, zones, asked.entries)
+        cells |= {value_name(name): place.cells for name, place in values.items()}
+        decimals = {value_name(name): place.decimals for name, place in values.items()}
+        reading = replace(reading, lengths=written_lengths(page.image, page.sheet, cells, decimals))
     return replace(page, image=None, reading=reading, backdrop=backdrop(page.image, page.sheet))
 
 

@@ -538,7 +538,8 @@ class Reading:
     unread : requested nodes and vectors that were not read
     problems : what a person should know
     written : contents of the printed boxes, or of captions on plain paper, by scale; empty boxes are left out
-    lengths : measured lengths from the printed cells, mm, with their probability, by vector
+    lengths : measured lengths from the printed cells, mm, with their probability, by vector; and computed
+        values, SI, by ``NAME_value``
     swapped : exchanged letters; the figures keep the construction's names
     """
 

@@ -19,6 +19,7 @@ from reference.authored.toml_file import Authored, Identifier, Text, is_file, lo
 from reference.construction.graph import Construction
 from reference.errors import AuthoredFileError, CallError, Faults, Finding, look_alikes
 from reference.plan import construction_for
+from reference.quantities import value_name
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
@@ -146,7 +147,7 @@ class WeightsTable(Authored):
 
 
 class CriterionTable(Authored):
-    """One criterion: exactly one of a `vector`, an `angular` quantity, a `scale` or a `link`, and its points.
+    """One criterion: a `vector`, a vector's computed `value`, an `angular` quantity, a `scale` or a `link`.
 
     `optional`: not judged if it was not handed in. `direction = false`: only the length counts. `tolerance`
     replaces the rubric's for this criterion, so does `follow_through`.
@@ -156,6 +157,7 @@ class CriterionTable(Authored):
     title: Text
     points: Positive
     vector: str | None = None
+    value: str | None = None
     angular: str | None = None
     scale: Literal["kL", "kv", "ka"] | None = None
     link: str | None = None
@@ -166,14 +168,16 @@ class CriterionTable(Authored):
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
-        if sum(kind is not None for kind in (self.vector, self.angular, self.scale, self.link)) != 1:
-            raise ValueError("must have exactly one of vector, angular, scale and link")
+        kinds = (self.vector, self.value, self.angular, self.scale, self.link)
+        if sum(kind is not None for kind in kinds) != 1:
+            raise ValueError("must have exactly one of vector, value, angular, scale and link")
         return self
 
     @property
     def name(self) -> str:
-        """The requested vector, angular quantity, scale or link."""
-        return self.vector or self.angular or self.scale or self.link or ""
+        """The requested vector, angular quantity, scale or link; of a vector's value its column's name."""
+        of_value = None if self.value is None else value_name(self.value)
+        return self.vector or of_value or self.angular or self.scale or self.link or ""
 
     @property
     def section(self) -> Section:
@@ -220,6 +224,16 @@ class RubricFile(Authored):
         return tuple(criterion.vector for criterion in self.criterion if criterion.vector)
 
     @property
+    def values(self) -> tuple[str, ...]:
+        """The vectors whose computed value has a criterion of its own."""
+        return tuple(criterion.value for criterion in self.criterion if criterion.value)
+
+    @property
+    def entries(self) -> tuple[str, ...]:
+        """The numbers that have cells on a printed sheet: lengths of vectors, and ``NAME_value``."""
+        return (*self.vectors, *map(value_name, self.values))
+
+    @property
     def needs_accelerations(self) -> bool:
         """True if any criterion needs the acceleration plan."""
         return any(c.name.startswith(("a_", "epsilon_")) or c.scale == "ka" for c in self.criterion)
@@ -227,11 +241,11 @@ class RubricFile(Authored):
     def tolerance_of(self, asked: CriterionTable | str) -> ToleranceTable:
         """Return the tolerance of a criterion, or of the vector, angular quantity, scale or link so named.
 
-        It is the criterion's own, else the rubric's. If several criteria ask for the same name, the first one
-        with a tolerance of its own counts for it.
+        It is the criterion's own, else the rubric's; of a computed value, that of its vector. If several
+        criteria ask for the same name, the first one with a tolerance of its own counts for it.
         """
         if not isinstance(asked, str):
-            return asked.tolerance or self.tolerance
+            return asked.tolerance or (self.tolerance_of(asked.value) if asked.value else self.tolerance)
         own = (one.tolerance for one in self.criterion if one.tolerance is not None and one.name == asked)
         return next(own, self.tolerance)
 
@@ -278,7 +292,7 @@ class Asked:
     ----------
     figures : those that a rubric has criteria for, and the sketch
     vectors : all vectors of these figures
-    entries : the vectors whose measured lengths have cells on the printed sheets of the `assignment`
+    entries : the vectors and values that have cells on the printed sheets of the `assignment`
     """
 
     figures: frozenset[str] = frozenset()
@@ -299,13 +313,14 @@ def asked_of(assignment: Assignment, rubric: RubricFile) -> Asked:
     plans = dict.fromkeys(construction.figure_of(vector.head) for vector in known)
     figures = frozenset({MECHANISM, *plans} if plans else ())
     vectors = tuple(vector.name for plan in plans for vector in construction.vectors_of(plan))
-    return Asked(figures, vectors, tuple(rubric.vectors), assignment)
+    return Asked(figures, vectors, rubric.entries, assignment)
 
 
 def check_rubric(rubric: RubricFile, construction: Construction) -> list[Finding]:
     """Report names in the rubric that the construction does not know."""
     known = {
         "vector": tuple(construction.vectors),
+        "value": tuple(construction.vectors),
         "angular": tuple(construction.rates),
         "link": tuple(construction.links),
     }

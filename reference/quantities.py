@@ -44,6 +44,16 @@ SCALE_UNITS = {kind.scale: kind.unit_per_mm for kind in DRAWN}
 _KNOWN = {key: kind for kind in KINDS for key in (kind.letter, kind.scale) if key}
 
 
+def value_name(vector: str) -> str:
+    """Return the name of a vector's computed value, as measurement files have it: ``v_B_value``."""
+    return f"{vector}_value"
+
+
+def vector_of_value(name: str) -> str | None:
+    """Return the vector whose computed value has this name; None for any other name."""
+    return name.removesuffix("_value") if name.endswith("_value") else None
+
+
 def kind_of(name: str) -> Kind:
     """Return the kind of a vector, angular quantity or scale; a length for other names, such as a link's."""
     return _KNOWN.get(name.partition("_")[0], KINDS[0])

@@ -77,7 +77,7 @@ _POINTS = {"scale": 1.0, "link": 0.5, "vector": 2.0, "angular": 0.5}
 _OPTIONAL = {"scale", "link", "angular"}
 """Items that a student may leave out without losing points."""
 KEYS_OF_A_CRITERION = """\
-# One for each thing judged: exactly one of vector, angular, scale and link. Of its other keys: points
+# One for each thing judged: exactly one of vector, value, angular, scale and link. Of its other keys: points
 # for full marks; optional = true: not judged where it was not handed in; direction = false: only the length
 # counts."""
 """Replaces the start's comments, which stand at keys that not every criterion has."""

@@ -5,6 +5,7 @@ import io
 import shutil
 import textwrap
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
@@ -29,7 +30,7 @@ from reference.errors import CallError, MechanismError
 
 STYLES = {"right": "green", "off": "red", "open": "magenta"}
 NOTHING = N_("nothing that this assignment asks for was measured")
-WRITTEN = N_("%(file)s: fill in its last line, then check it by --measured %(file)s")
+WRITTEN = N_("%(file)s: fill in what is below the comments, then check it by --measured %(file)s")
 HOW_TO_FILL_IN = N_(
     "# Drawn lengths in mm; _deg: directions counter-clockwise from the horizontal to the right; _value:"
     " computed values, counter-clockwise positive; scales with their units. Blank cells are not checked;"
@@ -41,7 +42,7 @@ def check_measured(name: str, options: CheckOptions) -> bool:
     """Print right or off for every value of a measurement file; whether anything is off.
 
     With a `page`, one student's values are drawn and told in that file, too. With a `template`, the file
-    to fill in is written.
+    to fill in is written, with a line for each position unless one is named.
     """
     lang, file, page = options.lang, options.measured, options.page
     speaker = tongue(lang)
@@ -51,7 +52,9 @@ def check_measured(name: str, options: CheckOptions) -> bool:
     assignment = _assignment(name, speaker)
     rubric = rubric_of(assignment)
     if options.template is not None:
-        _write_template(options.template, rubric, _variant(assignment, None, options, speaker), speaker)
+        named = [replace(options, position=one) for one in assignment.positions(options.position)]
+        variants = [_variant(assignment, None, one, speaker) for one in named]
+        _write_template(options.template, rubric, variants, speaker)
     if file is None:
         if options.template is None:
             raise failure(CallError, "measured_needed", "", speaker)
@@ -63,6 +66,8 @@ def check_measured(name: str, options: CheckOptions) -> bool:
         raise error.told(speaker) from error
     if page is not None and len(students) != 1:
         raise failure(CallError, "page_students", "", speaker, file=file, count=len(students))
+    # Of a table with a line for each position, those that are still blank wait.
+    students = tuple(one for one in students if one.numbers or one.scales or one.problems) or students[:1]
     if not students:
         typer.secho(speaker.gettext(NOTHING), fg="yellow")
     for entered in students:
@@ -121,15 +126,14 @@ def checked_level(level: str, speaker: Tongue = ENGLISH) -> Level:
     return wanted
 
 
-def _write_template(file: Path, rubric: RubricFile, variant: Variant, speaker: Tongue) -> None:
-    """Write the file that a student fills in: columns, a comment with units, a line for the values."""
+def _write_template(file: Path, rubric: RubricFile, variants: Sequence[Variant], speaker: Tongue) -> None:
+    """Write the file that a student fills in: columns, a comment with units, a line for each variant."""
     if file.suffix.lower() != ".csv":
         known = {"option": "--template", "file": file, "names": ".csv"}
         raise failure(CallError, "template_file", "ending", speaker, **known)
     if file.exists():
         raise failure(CallError, "template_exists", "", speaker, file=file)
-    known = {"n": variant.n, "position": variant.position}
-    columns = {name: "" for name, value in known.items() if value is not None} | columns_of(rubric)
+    columns = dict.fromkeys(variants[0].numbers, "") | columns_of(rubric)
     units = [speaker.unit(unit) for unit in columns.values()]
     text = io.StringIO()
     # Spreadsheets of languages with decimal commas separate fields by semicolons.
@@ -137,7 +141,7 @@ def _write_template(file: Path, rubric: RubricFile, variant: Variant, speaker: T
     writer.writerows(
         [list(columns), [f"# {units[0]}".strip(), *units[1:]], [speaker.gettext(HOW_TO_FILL_IN)]]
     )
-    writer.writerow([known.get(name, "") for name in columns])
+    writer.writerows([one.numbers.get(name, "") for name in columns] for one in variants)
     # With a byte order mark: spreadsheets take the file for UTF-8.
     write_whole(file, text.getvalue().encode("utf-8-sig"))
     terminal.say(speaker.gettext(WRITTEN) % {"file": file})
@@ -189,8 +193,7 @@ def _variant(
 
 def _tell_head(entered: Measurements, variant: Variant, speaker: Tongue) -> None:
     who = [entered.student_id] if entered.student_id else []
-    known = (("n", variant.n), (speaker.gettext("position"), variant.position))
-    parts = [*who, *(f"{name} = {value}" for name, value in known if value is not None)]
+    parts = [*who, *(f"{speaker.gettext(name)} = {value}" for name, value in variant.numbers.items())]
     if parts:
         typer.secho(", ".join(parts), bold=True)
     for problem in (*entered.problems, *entered.reading.problems):

@@ -97,7 +97,7 @@ def print_sheets(
         students = read_roster(roster)
         assignment = load_assignment(name)
         rubric = rubric_of(assignment)
-        sheets = make_sheets(assignment, students.rows, lang, roster=students.file, asked=rubric.vectors)
+        sheets = make_sheets(assignment, students.rows, lang, roster=students.file, asked=rubric.entries)
     write_whole(out, sheets.pdf)
     note(f"{out}: to be printed on A3 at 100 %, not fitted to the page")
     if layout is not None:
@@ -140,15 +140,15 @@ def _suggest_scales(name: str, roster: Path) -> None:
 
 
 def print_handout(name: str, roster: Path | None, variant: VariantOptions, out: Path, lang: str) -> None:
-    """Write the PDF of task sheets, of a class or of one variant."""
+    """Write the PDF of task sheets, of a class or of one variant; of all positions if none is named."""
     if out.suffix.lower() != ".pdf":
         raise failure(CallError, "handout_file", "ending", option="--out", file=out, names=".pdf")
     if roster is not None and variant != VariantOptions():
         raise failure(CallError, "option_unused", "unused_beside", option="--n, --position", other="--roster")
     assignment = load_assignment(name)
     if roster is None:
-        rows: tuple[RosterRow, ...] = (RosterRow("", n=variant.n, position=variant.position),)
-        assignment.variant(variant.n, variant.position)
+        asked = [assignment.variant(variant.n, one) for one in assignment.positions(variant.position)]
+        rows = tuple(RosterRow("", n=one.n, position=one.position) for one in asked)
     else:
         rows = read_roster(roster).rows
     file = "" if roster is None else roster.name

@@ -33,15 +33,18 @@ from grader.comparison.task import Task, TaskSegment
 from grader.comparison.verdicts import (
     EVEN,
     FULL,
+    NONE,
     SHORT_MM,
     Expectation,
     Held,
     HeldValue,
     HeldVector,
     MarkRange,
+    open_between,
     the_better,
     the_worse,
     widened,
+    with_confidence,
 )
 from grader.documents import Quantity, Tolerance, Verdict
 from grader.outcomes import CHARGED, Outcome, UsedScale
@@ -51,7 +54,7 @@ from reference.authored.assignment import SCALE_NAMES
 from reference.construction.graph import AngularRate
 from reference.construction.mistakes import line_of
 from reference.construction.steps import Given
-from reference.quantities import kind_of, unit_of
+from reference.quantities import kind_of, unit_of, vector_of_value
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +110,7 @@ def _refused_below(charges: Charges, name: str) -> tuple[str, ...] | None:
     """The entry for the scale, or for a node from which a vector is made, that cannot be used."""
     task, evidence = charges.task, charges.evidence
     turned = task.construction.rates.get(name)
-    segment = task.segments.get(name if turned is None else turned.vector)
+    segment = task.segments.get((vector_of_value(name) or name) if turned is None else turned.vector)
     if segment is None or not evidence.refused:
         return None
     needs = {need for need in task.construction.step(segment.head).needs if need not in evidence.nodes}
@@ -122,6 +125,8 @@ def _judged(charges: Charges, criterion: CriterionTable) -> Outcome:
         return _scale(charges, criterion)
     if criterion.angular is not None:
         return _rate(charges, criterion)
+    if criterion.value is not None:
+        return _computed(charges, criterion, criterion.value)
     sources = (charges.evidence.drawn.get(criterion.name), charges.evidence.measured.get(criterion.name))
     outcomes = [_segment(charges, criterion, drawn) for drawn in sources if drawn is not None]
     if len(outcomes) == 2:
@@ -138,21 +143,23 @@ ORDER = ("length", "velocity", "omega", "acceleration", "epsilon")
 def _in_order(following: FollowThrough) -> list[CriterionTable]:
     """The criteria as they are drawn: scales, sketch, velocities, omega, accelerations, epsilon.
 
-    Of vectors that end at one node, those on wrong lines come first; the rubric's order changes nothing.
+    Of vectors that end at one node, those on wrong lines come first; a computed value comes after its vector.
+    The rubric's order changes nothing.
     """
     task = following.task
     steps = {step.node: place for place, step in enumerate(task.construction.steps)}
     names = list(task.segments)
 
     def place(criterion: CriterionTable) -> tuple[int, ...]:
-        name = criterion.name
+        name = criterion.value or criterion.name
         if criterion.scale is not None:
             return -1, SCALE_NAMES.index(name)
         kind = ORDER.index("length" if criterion.link else kind_of(name).name)
         if name not in task.segments:
             return kind, 0
         one = task.segments[name]
-        return kind, steps[one.head], _rank(following, one), names.index(name)
+        is_value = int(criterion.value is not None)
+        return kind, steps[one.head], _rank(following, one), names.index(name), is_value
 
     return sorted(task.rubric.criterion, key=place)
 
@@ -231,7 +238,8 @@ def _segment(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) ->
     if wrong_value is not None:
         mark = the_worse(mark, wrong_value)
     on_sheet = None if drawn.direction_rad is None else drawn.direction_rad + drawn.turn_rad
-    value = evidence.values.get(one.name, drawn.length_mm * scale)
+    has_value = one.name in evidence.values and one.name not in rubric.values
+    value = evidence.values[one.name] if has_value else drawn.length_mm * scale
     return outcome_of(
         criterion,
         mark,
@@ -259,11 +267,11 @@ def _mark_of_value(
 ) -> MarkRange | None:
     """The mark on a computed value beside its drawing; None where it is right, or right by the drawing.
 
-    A wrong value costs only the value: what the rubric's nearest band takes. A wrong factor in all
-    values of a scale costs once.
+    None, too, where it has a criterion of its own: it is judged there. A wrong value costs only the value:
+    what the rubric's nearest band takes. A wrong factor in all values of a scale costs once.
     """
     one, rubric, values = charges.task.segments[criterion.name], charges.task.rubric, charges.evidence.values
-    if one.name not in values:
+    if one.name not in values or one.name in rubric.values:
         return None
     held = HeldValue(rubric, criterion, abs(values[one.name]), charges.following.used[one.scale])
     rights_mm = [abs(one.real) / held.per_mm, abs(choice.expectation.vector), drawn.length_mm]
@@ -283,24 +291,61 @@ def _mark_of_value(
 def _value(charges: Charges, criterion: CriterionTable) -> Outcome:
     """The outcome of a vector of which only the computed value was handed in, or nothing."""
     one, values, rubric = charges.task.segments[criterion.name], charges.evidence.values, charges.task.rubric
-    used, unit = charges.following.used, unit_of(criterion.name)
-    scale = used[one.scale]
-    if one.name not in values:
+    used, scale = charges.following.used, charges.following.used[one.scale]
+    may_be_drawn = charges.evidence.has_sheets and one.name in rubric.values and not rubric.values_alone
+    if one.name not in values or may_be_drawn:
         expected = expected_quantity(one.name, one.drawn(used), scale, 0.0)
         return _absent(charges, criterion, expected)
     held = HeldValue(rubric, criterion, abs(values[one.name]), scale)
     choice = _chosen(charges, criterion, held)
     if not choice.mark.is_full and rubric.follows_through(criterion):
         choice = _by_factor(charges, one.scale, choice, held)
-    found = outcome_of(
-        criterion,
-        choice.mark,
-        Quantity(value=values[one.name], unit=unit),
-        Quantity(value=abs(choice.expectation.vector) * scale, unit=unit),
-        held.allowed(choice.expectation),
-        followed=choice.is_followed,
-    )
+    found = _of_value(held, choice, choice.mark, values[one.name])
     return found if rubric.values_alone else without_drawing(found)
+
+
+def _computed(charges: Charges, criterion: CriterionTable, name: str) -> Outcome:
+    """The outcome of a computed value with a criterion of its own, beside its vector's.
+
+    It is right by the data, by the length that was drawn times the scale used, and by what follows. A number
+    read in a sheet's cells that is off goes to a person: a digit may have been misread.
+    """
+    one, rubric, evidence = charges.task.segments[name], charges.task.rubric, charges.evidence
+    following, follows = charges.following, rubric.follows_through(criterion)
+    if name not in evidence.values:
+        expected = Quantity(value=abs(one.real), unit=unit_of(name))
+        length, least = abs(one.drawn(following.used)), rubric.tolerance_of(criterion).least_mm
+        if length < least and not criterion.optional:
+            short = Reason("too_short_to_judge", {"length_mm": length, "least_mm": least})
+            return unjudged(criterion, "not_judged", (short, Reason("not_measured")), expected=expected)
+        return _absent(charges, criterion, expected)
+    value, drawn, sure = evidence.values[name], evidence.vector(name), evidence.sure.get(name, 1.0)
+    held = HeldValue(rubric, criterion, abs(value), following.used[one.scale])
+    wrong = charges.charged | charges.doubtful
+    choice = choose(charges, one, following.expectations(one, wrong, follows_through=follows), held)
+    charges.charged |= choice.shown
+    if not choice.mark.is_full and follows and drawn is not None:
+        own = Expectation(complex(drawn.length_mm), "vector", name, frozenset({one.head}))
+        mark, shown = charges.credited(own, held.against(own))
+        charges.charged |= shown
+        if mark.is_better(choice.mark):
+            choice = Choice(the_better(mark, choice.mark, *charges.why(own)), own, is_followed=True)
+    if not choice.mark.is_full and follows:
+        choice = _by_factor(charges, one.scale, choice, held)
+    mark = with_confidence(choice.mark, sure, rubric.doubt.settle)
+    if name in evidence.sure and not choice.mark.is_full:
+        mark = open_between(NONE, FULL, choice.mark, Reason("cells_off"), sure=sure)
+    is_slip = mark.best != FULL and drawn is not None and drawn.confidence >= rubric.least_confidence
+    outcome = _of_value(held, choice, mark, value)
+    return replace(outcome, confidence=sure, mistake="arithmetic" if is_slip else None)
+
+
+def _of_value(held: HeldValue, choice: Choice, mark: MarkRange, value: float) -> Outcome:
+    unit, one = unit_of(held.criterion.name), choice.expectation
+    measured, expected = Quantity(value=value, unit=unit), Quantity(value=held.expected(one), unit=unit)
+    return outcome_of(
+        held.criterion, mark, measured, expected, held.allowed(one), followed=choice.is_followed
+    )
 
 
 def _by_factor(charges: Charges, scale: str, choice: Choice, held: HeldValue) -> Choice:
@@ -328,7 +373,8 @@ def _common_factor(charges: Charges, scale: str) -> float | None:
     task, evidence, used = charges.task, charges.evidence, charges.following.used
     factors = []
     for name, vector in task.construction.vectors.items():
-        if vector.scale != scale or name not in evidence.values:
+        is_sure = evidence.sure.get(name, 1.0) >= task.rubric.least_confidence
+        if vector.scale != scale or name not in evidence.values or not is_sure:
             continue
         drawn = evidence.vector(name)
         length = abs(task.segments[name].drawn(used)) if drawn is None else drawn.length_mm

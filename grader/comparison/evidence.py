@@ -2,7 +2,7 @@
 
 import cmath
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import cast
 
@@ -11,6 +11,7 @@ import numpy as np
 from grader.comparison.task import Task
 from grader.records import MECHANISM, Figure, OtherReading, Reading, ReadNode, Reason
 from grader.rubric import ToleranceTable
+from reference.quantities import value_name
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +82,7 @@ class Evidence:
     refused : what was entered by hand for a vector, angular quantity or scale and cannot be used, by name
     remarks : what to say where the length in the sheets' cells is another, by vector
     verdicts : what a person decided of what waited, by name
+    sure : the probability that a value was read rightly in a sheet's cells, by vector; others were entered
     """
 
     drawn: Mapping[str, DrawnVector]
@@ -97,6 +99,7 @@ class Evidence:
     refused: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     blank: frozenset[str] = frozenset()
     verdicts: Mapping[str, str] = field(default_factory=dict)
+    sure: Mapping[str, float] = field(default_factory=dict)
 
     def vector(self, name: str) -> DrawnVector | None:
         """The vector as read, else as measured."""
@@ -111,7 +114,8 @@ def gather(task: Task, submission: Submission) -> Evidence:
     measured = _measured(submission.measured)
     own = sheets.nodes if submission.readings else _nodes_from(task, measured)
     written = {name: one for reading in submission.readings for name, one in reading.lengths.items()}
-    least = task.rubric.least_confidence
+    values = {name: written[value_name(name)] for name in task.rubric.values if value_name(name) in written}
+    entered, least = submission.values, task.rubric.least_confidence
     drawn, remarks = {}, {}
     for name, one in sheets.drawn.items():
         table = task.rubric.tolerance_of(name)
@@ -124,13 +128,14 @@ def gather(task: Task, submission: Submission) -> Evidence:
         yardstick_mm=min(sheets.lengths, key=lambda one: one[1], default=None),
         unread={gap.name: gap.reason for reading in submission.readings for gap in reading.unread},
         has_sheets=bool(submission.readings),
-        values=submission.values,
+        values={name: value for name, (value, _) in values.items()} | dict(entered),
+        sure={name: sure for name, (_, sure) in values.items() if name not in entered},
         verdicts=submission.verdicts,
         remarks=remarks,
         se_mm=sheets.se_mm,
         sketches=sheets.sketches,
         has_sketch=any(MECHANISM in reading.figures for reading in submission.readings),
-        refused=_refused(submission.measured),
+        refused=_refused(submission.measured, task.rubric.values),
         blank=frozenset(
             gap.name
             for reading in submission.readings
@@ -289,11 +294,14 @@ def _measured(reading: Reading | None) -> dict[str, DrawnVector]:
     return {name: one for read in figures for name, one in _vectors(read, read.vectors).items()}
 
 
-def _refused(reading: Reading | None) -> dict[str, tuple[str, ...]]:
+def _refused(reading: Reading | None, values: Collection[str]) -> dict[str, tuple[str, ...]]:
+    """Entries that cannot be used, by name; those for one of `values` that is judged alone by its column."""
     entries: dict[str, tuple[str, ...]] = {}
     for gap in reading.unread if reading else ():
-        given = cast("tuple[str, ...]", gap.reason.parameters["entries"])
-        entries[gap.name] = (*entries.get(gap.name, ()), *given)
+        for given in cast("tuple[str, ...]", gap.reason.parameters["entries"]):
+            column = value_name(gap.name)
+            name = column if gap.name in values and given.startswith(f"{column}:") else gap.name
+            entries[name] = (*entries.get(name, ()), given)
     return entries
 
 

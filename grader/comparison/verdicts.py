@@ -354,11 +354,15 @@ class HeldValue:
         on_paper = widened(table, most, one, with_direction=False)
         return Tolerance(value=(on_paper.length_mm or 0.0) * self.per_mm, widened=on_paper.widened)
 
+    def expected(self, one: Expectation) -> float:
+        """Return the expected value; nothing but rounding is zero."""
+        in_mm = one.vector.real if self.criterion.angular else abs(one.vector)
+        return in_mm * self.per_mm if abs(in_mm) > ROUNDING else 0.0
+
     def against(self, one: Expectation) -> MarkRange:
         """The mark by the tolerance alone."""
         table, allowed = self.rubric.tolerance_of(self.criterion), self.allowed(one).value or 0.0
-        in_mm = one.vector.real if self.criterion.angular else abs(one.vector)
-        value, expected = self.value, in_mm * self.per_mm
+        value, expected = self.value, self.expected(one)
         residual = abs(value - expected)
         if residual <= allowed:
             return ALL_RIGHT

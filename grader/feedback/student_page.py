@@ -77,6 +77,7 @@ WAITING: dict[str, str] = {
     "not_measured": N_("nothing was handed in for it"),
     "readings_disagree": N_("the drawing and the entered measurement differ"),
     "written_disagrees": N_("the drawing and the length written on the sheet differ"),
+    "cells_off": N_("the number read in the sheet's cells does not fit"),
     "scale_assumed": N_("no scale was declared, and the drawing follows another than the assignment's own"),
     "scale_off": N_("the declared scale does not fit the drawing"),
     "follows": N_("it depends on an open question"),
@@ -175,8 +176,8 @@ class StudentPage:
         return [problem_sentence(problem, self.speaker) for problem in self.report.problems]
 
     def shown(self, name: str) -> str:
-        """Return a vector, link or scale as students know it."""
-        return self.about.names.get(name, name)
+        """Return a vector, computed value, link or scale as students know it."""
+        return place(name, self.speaker, self.about.names)
 
     # Criteria and scales --------------------------------------------------------------------------
 

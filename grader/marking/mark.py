@@ -25,6 +25,7 @@ from grader.rubric import CriterionTable, RubricFile
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.graph import evaluate
 from reference.construction.mistakes import Mistake
+from reference.quantities import vector_of_value
 from reference.replay.replay import Replay
 
 Read = TypeVar("Read", ReadNode, ReadVector)
@@ -237,7 +238,8 @@ def _slips(task: Task, comparison: Comparison, known: Sequence[NamedMistake]) ->
         is_value_off = one.verdict in CHARGED and VALUE_OFF & one.codes
         value, right = one.measured.value, one.expected.value
         factor = value / right if value and right else 1.0
-        slip = NamedMistake(Mistake("arithmetic", one.name, factor=factor), (one.criterion,), SLIPPED)
+        at = vector_of_value(one.name) or one.name
+        slip = NamedMistake(Mistake("arithmetic", at, factor=factor), (one.criterion,), SLIPPED)
         if one.mistake == "arithmetic":
             of_vectors.append(slip)
         elif rate is not None and rate.vector in sure and is_value_off and abs(factor - 1.0) >= LEAST_SLIP:

@@ -11,6 +11,7 @@ from grader.rubric import RubricFile
 from grader.texts.reasons import reason_sentence
 from grader.texts.spoken import ENGLISH, as_json, clause, problem_documents, unread_document
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
+from reference.quantities import vector_of_value
 
 STAGES = ("decode", "sheet", "ink", "reading")
 
@@ -166,11 +167,13 @@ def _head(assignment: Assignment, variant: Variant, student_id: str) -> dict[str
 def _criterion(outcome: Outcome) -> dict[str, object]:
     """The fields of a criterion that come from its outcome."""
     is_scale = outcome.name in SCALE_NAMES
-    is_vector = not is_scale and "_" in outcome.name
+    of_value = vector_of_value(outcome.name)
+    is_vector = not is_scale and not of_value and "_" in outcome.name
     return {
         "id": outcome.criterion,
         "vector": outcome.name if is_vector else None,
-        "link": outcome.name if not is_scale and not is_vector else None,
+        "link": outcome.name if not is_scale and not of_value and not is_vector else None,
+        "value": of_value,
         "verdict": outcome.verdict,
         "measured": outcome.measured,
         "expected": outcome.expected,

@@ -16,6 +16,7 @@ from grader.outcomes import CHARGED, NamedMistake, Outcome, Unfit
 from grader.records import Reason
 from grader.rubric import RubricFile
 from reference.authored.assignment import SCALE_NAMES
+from reference.quantities import vector_of_value
 
 
 def settled(outcome: Outcome, share: float, sure: float, *reasons: Reason) -> Outcome:
@@ -106,8 +107,8 @@ def of_nothing(
 
 
 def _is_in(task: Task, name: str, figures: frozenset[str]) -> bool:
-    """Return whether a vector or angular quantity belongs to these figures; a scale, to all plans."""
-    construction = task.construction
+    """Return whether a vector, its value or an angular quantity belongs to these figures; a scale, to all."""
+    construction, name = task.construction, vector_of_value(name) or name
     if name in SCALE_NAMES:
         return figures >= construction.poles.keys()
     if name in construction.rates:

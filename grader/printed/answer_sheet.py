@@ -11,11 +11,12 @@ from grader.printed.layout import (
     CALIBRATION,
     CODE_MM,
     SCALE_BOXES,
-    WHOLE_CELLS,
+    TENTH_CELLS,
     Layout,
     PageLayout,
     Template,
     TemplateFit,
+    ValuePlace,
     best_template,
     boxes_of,
     calibration_segments,
@@ -25,6 +26,7 @@ from grader.printed.layout import (
     marker_places,
     page_construction,
     poles_mm,
+    values_of,
 )
 from grader.printed.pdf import (
     BOLD,
@@ -44,7 +46,7 @@ from grader.tables.roster import RosterRow
 from reference.authored.assignment import Assignment, PageKind, PageTable, Variant
 from reference.drawing.canvas import Piece, pieces_of, scale_pieces
 from reference.errors import AuthoredFileError, CallError, Finding
-from reference.quantities import SCALE_OF
+from reference.quantities import SCALE_OF, unit_of, value_name
 
 # One page -----------------------------------------------------------------------------------------
 
@@ -74,6 +76,8 @@ _MEASURED = N_(
     "Lengths measured on the drawing, in millimetres with one decimal: one digit in each cell, nothing else"
 )
 _MEASURED_AT_MM = (39.0, 265.2)
+_COMPUTED = N_("Values computed from them, in the unit beside the cells; the last cells may stay empty")
+_COMPUTED_AT_MM = (39.0, 268.2)
 _TICK_MM = 5.0
 """Long enough to be seen, too short to be taken for a stroke."""
 _POLE_MM = (2.0, 4.5)
@@ -82,6 +86,7 @@ _FAINT, _FAINT_PEN_MM = 0.9, 0.25
 """Lighter than any pencil: people see it, but no stroke is found in it on a scan."""
 _CELL_GREY = 0.6
 """Light enough that the digits' ink stands out."""
+_VALUE_PT = 6.5
 _RULER_MM = (24.0, 291.0, 100.0)
 """Left end, height and length of the line that must measure 100 mm."""
 _PT = 1.0 / mm
@@ -115,12 +120,14 @@ class PageForm:
     template : the page's
     fields : boxes to write in, by scale or vector
     poles : the names of the plans' poles, by figure
+    values : places of computed values, by vector
     """
 
     kind: PageKind
     template: Template
     fields: dict[str, Box]
     poles: dict[str, str]
+    values: dict[str, ValuePlace] = field(default_factory=dict)
 
 
 def draw_page(
@@ -143,6 +150,7 @@ def draw_page(
         pole = form.poles[figure]
         _pole(drawing, at, assignment.file.names.get(pole, pole))
     _fields(drawing, assignment, form.fields, tongue)
+    _values(drawing, assignment, form.values, tongue)
     draw_ruler(drawing, tongue)
     drawing.next_page()
 
@@ -160,11 +168,8 @@ def _student(drawing: PdfDrawing, assignment: Assignment, text: PageText, tongue
     identity = text.identity
     title = [assignment.file.title.in_language(tongue.lang)]
     drawing.paragraphs((x, y + 3.5, wide, 9.0), title, (10.0, 9.0, 8.0), BOLD)
-    variant = [
-        f"{label} = {value}"
-        for label, value in (("n", identity.n), (tongue.gettext(N_("position")), identity.position))
-        if value is not None
-    ]
+    numbers = Variant(identity.n, identity.position).numbers
+    variant = [f"{tongue.gettext(name)} = {value}" for name, value in numbers.items()]
     sheet = tongue.gettext(N_("sheet {number} of {count}")).format(number=text.sheet, count=text.sheets)
     name = wrap(text.name, BOLD, 12.0, wide)[:1] or [""]
     drawing.text((x, y + 13.5), name[0], 12.0, BOLD)
@@ -268,13 +273,30 @@ def _fields(drawing: PdfDrawing, assignment: Assignment, fields: dict[str, Box],
         drawing.text(_MEASURED_AT_MM, tongue.gettext(_MEASURED), 6.5, REGULAR, GREY)
 
 
-def _comb(drawing: PdfDrawing, box: Box, tongue: Tongue) -> None:
+def _values(
+    drawing: PdfDrawing, assignment: Assignment, values: Mapping[str, ValuePlace], tongue: Tongue
+) -> None:
+    """Draw the cells for computed values, each with its vector and unit."""
+    if values:
+        drawing.text(_COMPUTED_AT_MM, tongue.gettext(_COMPUTED), 6.5, REGULAR, GREY)
+    for name, place in values.items():
+        x, y, _, h = place.box
+        unit = Piece(f", {tongue.unit(unit_of(name))}")
+        label = (*pieces_of(assignment.file.names.get(name, name)), unit)
+        wide = pieces_width_mm(label, REGULAR, _VALUE_PT)
+        drawing.pieces((x - wide - 0.6, y + 0.7 * h), label, _VALUE_PT)
+        _comb(drawing, place.box, tongue, place.decimals)
+
+
+def _comb(drawing: PdfDrawing, box: Box, tongue: Tongue, decimals: int = TENTH_CELLS) -> None:
     """Draw a cell for each digit, light so that digits stand out, and the decimal mark."""
-    cells = comb_cells(box)
+    cells = comb_cells(box, decimals)
     for cell in cells:
         drawing.box(cell, 0.18, _CELL_GREY)
-    x, y, wide, high = cells[WHOLE_CELLS - 1]
-    middle = (x + wide + cells[WHOLE_CELLS][0]) / 2.0
+    if not decimals:
+        return
+    x, y, wide, high = cells[-decimals - 1]
+    middle = (x + wide + cells[-decimals][0]) / 2.0
     mark = tongue.decimal_mark
     drawing.text((middle - width_mm(mark, BOLD, 11.0) / 2.0, y + high - 1.0), mark, 11.0, BOLD)
 
@@ -322,7 +344,8 @@ def make_sheets(
     ---------
     rows : their `lang`, if given, overrides `lang`
     roster : the file's name, for messages
-    asked : the vectors that have a box for the measured length, all by default
+    asked : the vectors that have a box for the measured length, all by default; and ``NAME_value`` of those
+        that have a place for the computed value
 
     Raises AuthoredFileError with every row whose n or position the assignment does not have.
     """
@@ -376,9 +399,14 @@ def _forms(
         if names and not boxes and (asked is None or set(names) & set(asked)):
             known: dict[str, Value] = {"form": table.kind, "lengths": len(names)}
             problems.append(Reason("sheet_boxes", known, str(assignment.path)))
+        values = values_of(assignment, figures, asked or ())
+        wanted = [name for name in names if value_name(name) in (asked or ())]
+        if len(values) < len(wanted):
+            known = {"form": table.kind, "values": tuple(one for one in wanted if one not in values)}
+            problems.append(Reason("sheet_values", known, str(assignment.path)))
         problems.extend(_too_small(assignment, table, fit))
         scales = {SCALE_OF[figure]: SCALE_BOXES[SCALE_OF[figure]] for figure in figures}
-        forms.append(PageForm(table.kind, fit.template, scales | boxes, dict(construction.poles)))
+        forms.append(PageForm(table.kind, fit.template, scales | boxes, dict(construction.poles), values))
     return forms, tuple(problems)
 
 
@@ -399,7 +427,8 @@ def _too_small(assignment: Assignment, table: PageTable, fit: TemplateFit) -> li
 def _layout(form: PageForm) -> PageLayout:
     zones: dict[str, Box | dict[str, Box]] = {**form.template.zones, "fields": form.fields}
     markers = marker_places(form.template)
-    return PageLayout(kind=form.kind, markers=markers, zones=zones, cells=combs_of(form.fields))
+    cells = combs_of(form.fields)
+    return PageLayout(kind=form.kind, markers=markers, zones=zones, cells=cells, values=form.values)
 
 
 # The calibration page -----------------------------------------------------------------------------

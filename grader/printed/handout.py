@@ -2,6 +2,7 @@
 
 import io
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby
 
 import numpy as np
 from markupsafe import Markup
@@ -55,6 +56,9 @@ SYMBOLS_MM = 34.0
 """Part of that room for grounds, guides and letters around the joints."""
 ROW_MM, GAP_MM = 6.2, 6.0
 """Rows are high enough to write in by hand."""
+EVERY_POSITION = N_("Results of all positions")
+WRITING_MM = 8.0
+"""Height of a row of that table: numbers of four digits are written in narrow columns."""
 MOST_ROWS = 38
 """Rows in a column of tables: as many as a page is high; longer tables stand below one another."""
 
@@ -69,6 +73,8 @@ def make_handout(
 ) -> bytes:
     """Make A4 task sheets as PDF, in the rows' order; a row without a student has lines for a name.
 
+    A page with a table of all positions follows where a student has several.
+
     Arguments
     ---------
     rows : their `lang`, if given, overrides `lang`
@@ -80,17 +86,20 @@ def make_handout(
     embed_fonts()
     variants = variants_of(assignment, rows, roster)
     story: list[Flowable] = []
-    for row, variant in zip(rows, variants, strict=True):
-        if story:
-            story.append(PageBreak())
-        story += _sheet(assignment, rubric, row, variant, tongue(row.lang or lang))
+    for _, group in groupby(zip(rows, variants, strict=True), lambda one: (one[0].student_id, one[1].n)):
+        own = list(group)
+        for row, variant in own:
+            story += _sheet(assignment, rubric, row, variant, tongue(row.lang or lang))
+        if len(own) > 1 and own[0][1].position is not None:
+            positions = [str(variant.position) for _, variant in own]
+            story += _every_position(assignment, rubric, own[0][0], positions, tongue(own[0][0].lang or lang))
     buffer = io.BytesIO()
     margin = (A4[0] - WIDE_MM * mm) / 2.0
     document = SimpleDocTemplate(
         buffer, pagesize=A4, title=assignment.file.title.in_language(lang), creator="planmark", invariant=1,
         leftMargin=margin - FRAME_PT, rightMargin=margin - FRAME_PT, topMargin=12 * mm, bottomMargin=12 * mm,
     )  # fmt: skip
-    document.build(story)
+    document.build(story[:-1])
     return buffer.getvalue()
 
 
@@ -116,6 +125,7 @@ def _sheet(
     yield from _tables(assignment, rubric, speaker)
     yield Spacer(1, 2 * mm)
     yield _text(speaker.gettext(SIGNS), 8)
+    yield PageBreak()
 
 
 def _whose(row: RosterRow, variant: Variant, speaker: Tongue) -> str:
@@ -228,24 +238,25 @@ def _tables(assignment: Assignment, rubric: RubricFile, speaker: Tongue) -> Iter
     names = assignment.file.names
     asked: dict[str, list[str]] = {title: [] for title in TABLES}
     for criterion in rubric.criterion:
-        if criterion.name not in asked.get(criterion.section, [criterion.name]):
-            asked[criterion.section].append(criterion.name)
+        name = criterion.value or criterion.name
+        if name not in asked.get(criterion.section, [name]):
+            asked[criterion.section].append(name)
     asked["scales"] = [name for name in SCALE_NAMES if name != "ka" or rubric.needs_accelerations]
 
     def table(kind: str, wide_mm: float) -> list[Flowable]:
         if not asked[kind]:
             return []
         _ = speaker.gettext
-        if kind == "scales":
-            head = [_(SCALE), _(VALUE)]
-            rows = [[_cell(scale_pieces(names.get(name, name)), name, speaker), ""] for name in asked[kind]]
-        elif kind == "angular":
-            head = [_(QUANTITY), _(VALUE)]
-            rows = [[_cell(pieces_of(names.get(name, name)), name, speaker), ""] for name in asked[kind]]
+        shown = [(name, names.get(name, name)) for name in asked[kind]]
+        if kind in {"scales", "angular"}:
+            word, pieces = (SCALE, scale_pieces) if kind == "scales" else (QUANTITY, pieces_of)
+            head = [_(word), _(VALUE)]
+            rows = [[_cell(pieces(one), unit_of(name), speaker), ""] for name, one in shown]
         else:
             unit = speaker.unit(kind_of(SCALE_OF[kind]).unit)
             head = [_(VECTOR), _(LENGTH), _(DIRECTION), f"{_(VALUE)}, {unit}"]
-            rows = [[_letters(pieces_of(names.get(name, name))), "", "", ""] for name in asked[kind]]
+            values = [name for name in asked[kind] if name in rubric.values] or asked[kind]
+            rows = [[_letters(pieces_of(one)), "", "", "" if name in values else "–"] for name, one in shown]
         return [
             _text(_(TABLES[kind]), 10, BOLD),
             Spacer(1, mm),
@@ -263,13 +274,39 @@ def _tables(assignment: Assignment, rubric: RubricFile, speaker: Tongue) -> Iter
     yield _side_by_side(left, right, half)
 
 
-def _cell(pieces: Iterable[Piece], name: str, speaker: Tongue) -> Markup:
-    """Return a scale or angular quantity, as students see it, with its unit."""
-    return Markup("{}, {}").format(_letters(pieces), speaker.unit(unit_of(name)))
+def _every_position(
+    assignment: Assignment, rubric: RubricFile, row: RosterRow, positions: Sequence[str], speaker: Tongue
+) -> Iterator[Flowable]:
+    """Yield one page's tables of results, a row for each position: drawn lengths, then computed values.
+
+    What the driving link has is the same in all positions, and left out.
+    """
+    names, pin, _ = assignment.file.names, assignment.mechanism_file.driver.pin, speaker.gettext
+    yield _text(assignment.file.title.in_language(speaker.lang), 14, BOLD)
+    yield _text(_whose(row, Variant(row.n), speaker), 10, BOLD)
+    yield _text(_(EVERY_POSITION), 12, BOLD)
+    for plan in SCALE_OF:
+        drawn = [name for name in rubric.vectors if kind_of(name).figure == plan and name[2:] != pin]
+        values = [name for name in rubric.values if kind_of(name).figure == plan]
+        units = [(name, "mm") for name in drawn] + [(name, unit_of(name)) for name in values]
+        if not units:
+            continue
+        heads = [_cell(pieces_of(names.get(name, name)), unit, speaker) for name, unit in units]
+        rows = [[one, *[""] * len(heads)] for one in positions]
+        yield from (Spacer(1, 4 * mm), _text(_(TABLES[plan]), 10, BOLD), Spacer(1, mm))
+        yield _empty([_(NUMBER["position"]), *heads], rows, WIDE_MM, WRITING_MM)
+    yield PageBreak()
 
 
-def _empty(head: list[str], rows: Iterable[Sequence[str]], wide_mm: float) -> Table:
-    first = 0.4 if len(head) == 2 else 0.16
+def _cell(pieces: Iterable[Piece], unit: str, speaker: Tongue) -> Markup:
+    """Return a quantity, as students see it, with its unit."""
+    return Markup("{}, {}").format(_letters(pieces), speaker.unit(unit))
+
+
+def _empty(
+    head: Sequence[str], rows: Iterable[Sequence[str]], wide_mm: float, high_mm: float = ROW_MM
+) -> Table:
+    first = {2: 0.4, 4: 0.16}.get(len(head), 1.0 / len(head))
     rest = (1.0 - first) / (len(head) - 1)
     widths = [share * wide_mm * mm for share in (first, *[rest] * (len(head) - 1))]
     cells = [[_text(word, 6.5) for word in head], *([_markup(cell, 10) for cell in row] for row in rows)]
@@ -279,7 +316,7 @@ def _empty(head: list[str], rows: Iterable[Sequence[str]], wide_mm: float) -> Ta
         ("BOTTOMPADDING", (0, 0), (-1, -1), 0), ("LEFTPADDING", (0, 0), (-1, -1), 3),
         ("RIGHTPADDING", (0, 0), (-1, -1), 1),
     ]  # fmt: skip
-    return Table(cells, colWidths=widths, rowHeights=[ROW_MM * mm] * len(cells), style=style, repeatRows=1)
+    return Table(cells, colWidths=widths, rowHeights=[high_mm * mm] * len(cells), style=style, repeatRows=1)
 
 
 def _side_by_side(left: list[Flowable], right: list[Flowable], left_mm: float) -> Table:

@@ -14,11 +14,12 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, FloatArray, Identity
-from reference.authored.assignment import SCALE_NAMES, Assignment, PageKind, Variant
+from reference.authored.assignment import SCALE_NAMES, Assignment, PageKind, Scales, Variant
 from reference.construction.graph import Construction, evaluate, parameters_of
 from reference.drawing.canvas import A3_MM
 from reference.geometry import ComplexArray
 from reference.plan import construction_for
+from reference.quantities import SCALE_OF, value_name, vector_of_value
 
 # The code's text ----------------------------------------------------------------------------------
 
@@ -88,6 +89,8 @@ WHOLE_CELLS, TENTH_CELLS = 3, 1
 """Cells of a measured length: hundreds, tens and ones of millimetres, then tenths after the printed mark."""
 _CELL_GAP_MM, _MARK_GAP_MM = 0.6, 2.2
 _CELL_MOST_MM = 5.2
+_LEAST_VALUE_MM, _VALUE_WIDE_MM, _HEADROOM = 4.0, 25.4, 1.1
+"""Cells for computed values: least height, width, and ratio of the largest value to the exact one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,15 +209,13 @@ def field_boxes(names: tuple[str, ...]) -> dict[str, Box]:
     return dict(zip(names, cells, strict=False))
 
 
-def comb_cells(box: Box) -> tuple[Box, ...]:
-    """Return the cells of a box for a measured length, a digit each, from the left, tenths last."""
+def comb_cells(box: Box, decimals: int = TENTH_CELLS) -> tuple[Box, ...]:
+    """Return the cells of a box for a number, a digit each, from the left; `decimals` behind the mark."""
     x, y, wide, high = box
     count = WHOLE_CELLS + TENTH_CELLS
-    cell = (wide - _MARK_GAP_MM - (count - 1 - TENTH_CELLS) * _CELL_GAP_MM) / count
-    steps = [k * (cell + _CELL_GAP_MM) for k in range(WHOLE_CELLS)]
-    steps += [
-        wide - (TENTH_CELLS - k) * cell - (TENTH_CELLS - 1 - k) * _CELL_GAP_MM for k in range(TENTH_CELLS)
-    ]
+    cell = (wide - _MARK_GAP_MM - (count - 2) * _CELL_GAP_MM) / count
+    steps = [k * (cell + _CELL_GAP_MM) for k in range(count - decimals)]
+    steps += [wide - (decimals - k) * cell - (decimals - 1 - k) * _CELL_GAP_MM for k in range(decimals)]
     return tuple((round(x + step, 3), y, round(cell, 3), high) for step in steps)
 
 
@@ -289,17 +290,26 @@ class MarkerPlace(_Document):
     corners_mm: list[tuple[float, float]]
 
 
+class ValuePlace(_Document):
+    """The place of a vector's computed value: its box, and its cells from the left, the last for decimals."""
+
+    box: Box
+    decimals: int
+    cells: tuple[Box, ...]
+
+
 class PageLayout(_Document):
     """The positions of everything on the pages of one kind. `zones` holds the figures' boxes and `fields`.
 
     `cells` holds, for each box of `fields` in which a measured length is written (millimetres), its cells
-    from the left: three digits, then the tenths.
+    from the left: three digits, then the tenths. `values` holds the places of computed values, by vector.
     """
 
     kind: PageKind | Literal["calibration"]
     markers: list[MarkerPlace]
     zones: dict[str, Box | dict[str, Box]]
     cells: dict[str, tuple[Box, ...]] = {}
+    values: dict[str, ValuePlace] = {}
 
 
 class Layout(_Document):
@@ -353,16 +363,60 @@ def places_mm(
 
     (nodes, variants) complex millimetres by figure, y up; a sketch's about its own origin.
     """
-    scales = assignment.scales(variants)
     construction = page_construction(assignment, figures)
-    parameters = parameters_of(assignment.mechanism(variants), scales.kL, scales.kv, scales.ka)
-    nodes = evaluate(construction, parameters)
+    _, nodes = _drawn(assignment, construction, variants)
     return {
         figure: np.stack(
             [np.broadcast_to(nodes[step.node], (len(variants),)) for step in construction.figures[figure]]
         )
         for figure in figures
     }
+
+
+def _drawn(
+    assignment: Assignment, construction: Construction, variants: list[Variant]
+) -> tuple[Scales, Mapping[str, ComplexArray]]:
+    """Return the assignment's own scales, and all nodes drawn at them."""
+    scales = assignment.scales(variants)
+    parameters = parameters_of(assignment.mechanism(variants), scales.kL, scales.kv, scales.ka)
+    return scales, evaluate(construction, parameters)
+
+
+def values_of(
+    assignment: Assignment, figures: Sequence[str], asked: Collection[str]
+) -> dict[str, ValuePlace]:
+    """Return the places for the requested values on a page with these figures, by vector.
+
+    A value stands below its vector's length where the lengths fill one row, else in place of a scale that the
+    page does not have; where that is not room for all there are none. Each has as many cells before the mark
+    as the largest one of all variants.
+
+    Arguments: `asked` as `RubricFile.entries`, ``v_B_value`` for the value of v_B.
+    """
+    if not any(map(vector_of_value, asked)):
+        return {}
+    construction, variants = page_construction(assignment, figures), assignment.variants()
+    vectors = {v.name: v for figure in dict.fromkeys(figures) for v in construction.vectors_of(figure)}
+    wanted = [name for name in vectors if value_name(name) in asked]
+    boxes = field_boxes(tuple(vectors)) if wanted and len(vectors) <= EASY_FIELDS else {}
+    below = max((y + high for _, y, _, high in boxes.values()), default=np.inf) + _FIELD_GAP_MM
+    left_mm = _FIELD_TOP_MM + _FIELD_HEIGHT_MM - below
+    if left_mm >= _LEAST_VALUE_MM:
+        places = {name: (boxes[name][0], below, boxes[name][2], left_mm) for name in wanted}
+    else:
+        used = {SCALE_OF[figure] for figure in figures}
+        free = [box for name, box in SCALE_BOXES.items() if name not in used]
+        rows = [(x, y, _VALUE_WIDE_MM, _FIELD_MOST_MM) for x, y, _, _ in free[: len(wanted)]]
+        places = dict(zip(wanted, rows, strict=True)) if len(wanted) == len(rows) else {}
+    found, (scales, nodes) = {}, _drawn(assignment, construction, variants)
+    for name, (x, y, w, h) in places.items():
+        one = vectors[name]
+        most = float(np.nanmax(np.abs(nodes[one.head] - nodes[one.tail]) * getattr(scales, one.scale)))
+        decimals = WHOLE_CELLS + TENTH_CELLS - len(str(int(_HEADROOM * most)))
+        if decimals >= 0:
+            box = (x, round(y, 3), w, round(h, 3))
+            found[name] = ValuePlace(box=box, decimals=decimals, cells=comb_cells(box, decimals))
+    return found
 
 
 def extents_mm(

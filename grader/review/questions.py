@@ -11,15 +11,17 @@ from grader.feedback.numbers import points_text, quantity_cells, score_text, tol
 from grader.feedback.sentences import feedback_again
 from grader.feedback.words import VERDICTS, problem_sentence, symbols, unmatched_sentence
 from grader.language import N_, Tongue
-from grader.overlay.closeup import look
+from grader.overlay.closeup import LEAST_LOOK_MM, LOOK_MARGIN_MM, box_around, look
 from grader.overlay.scene import MARKS, ink_of
-from grader.records import MECHANISM, Box, Reason
+from grader.printed.layout import PAGE_MM, values_of
+from grader.records import MECHANISM, Box, Reason, ScannedPage
 from grader.review.doubts import SURE, known_probability
 from grader.review.session import OPEN, Session, Standing, Student, mark_of, page_criterion
 from grader.rubric import RubricFile
 from grader.tables.decisions import Decision
 from grader.texts.spoken import clause
 from reference.drawing.canvas import elements
+from reference.quantities import vector_of_value
 
 Facts = dict[str, Any]
 """An object of JSON."""
@@ -152,6 +154,7 @@ def _row(
 
 def whole_title(title: str, drawn: str) -> Markup:
     """Return a criterion's title, with the name of what was drawn if the title lacks it."""
+    drawn = vector_of_value(drawn) or drawn
     return symbols(title if drawn in title else f"{title} {drawn}")
 
 
@@ -325,7 +328,8 @@ def look_of(session: Session, student: Student, criterion: CriterionDocument) ->
         seen = look(scene, criterion.drawn, ghost, names) if criterion.drawn else None
         figure = session.figure_of(student, criterion)
         read = student.report.reading.sheets[sheet].figures
-        box = seen[0] if seen else _box_of(read.get(figure), scene.page_mm)  # type: ignore[call-overload]
+        cells = _cells_box(session, page, criterion)
+        box = cells or (seen[0] if seen else _box_of(read.get(figure), scene.page_mm))  # type: ignore[call-overload]
         facts = {
             **sheet_facts(session, student, sheet),
             "page_mm": scene.page_mm,
@@ -338,10 +342,20 @@ def look_of(session: Session, student: Student, criterion: CriterionDocument) ->
                 for node in node_facts(student, standing, kind, one)
             ],
         }
-        if seen or figure in read:
+        if cells or seen or figure in read:
             return facts
         first = first or facts
     return first
+
+
+def _cells_box(session: Session, page: ScannedPage, criterion: CriterionDocument) -> Box | None:
+    """Return the part of a printed sheet around the cells for a computed value; None if it has none."""
+    zones, batch = () if page.sheet is None else tuple(page.sheet.zones), session.batch
+    place = values_of(batch.assignment, zones, batch.rubric.entries).get(criterion.value or "")
+    if place is None:
+        return None
+    x, y, wide, high = place.box
+    return box_around([(x, y), (x + wide, y + high)], LOOK_MARGIN_MM, LEAST_LOOK_MM, PAGE_MM)
 
 
 def sheet_facts(session: Session, student: Student, sheet: int) -> Facts:

@@ -14,6 +14,7 @@ from grader.outcomes import Judgement, NamedMistake
 from grader.records import Reason
 from grader.self_check.results import Checked, Result, certain_mistakes, checked_values
 from grader.texts.reasons import reason_sentence
+from grader.texts.spoken import place
 from reference.authored.assignment import SCALE_NAMES, Assignment
 
 RESULTS: Mapping[Result, tuple[str, str]] = {
@@ -195,7 +196,7 @@ def checked_lines(
         laws |= dict.fromkeys((one for one in mistake.explains if one not in laws), law)
     own = {} if unread is None else ON_SHEET
     for one in values:
-        name = names.get(one.name, one.name)
+        name = place(one.name, speaker, names)
         # A right value needs one reason: the others describe errors that were accepted.
         shown = one.reasons[:1] if one.result == "right" else one.reasons
         hint = " ".join(dict.fromkeys(_hint(reason, speaker, level, names) for reason in shown))

@@ -51,7 +51,7 @@ from reference.authored.variant_table import delimiter_of
 from reference.construction.derive import construction_of
 from reference.construction.graph import Construction, coincident
 from reference.errors import MOST_FINDINGS
-from reference.quantities import SCALE_UNITS, kind_of, unit_of
+from reference.quantities import SCALE_UNITS, kind_of, unit_of, value_name
 
 if TYPE_CHECKING:
     from grader.tables.decisions import Decision
@@ -194,8 +194,10 @@ def columns_of(rubric: RubricFile) -> dict[str, str]:
         if criterion.vector:
             columns[criterion.vector] = "mm"
             columns |= {f"{criterion.vector}_deg": "°"} if criterion.direction else {}
+        elif criterion.value:
+            columns[criterion.name] = unit_of(criterion.value)
         elif criterion.angular:
-            columns[f"{criterion.angular}_value"] = unit_of(criterion.angular)
+            columns[value_name(criterion.angular)] = unit_of(criterion.angular)
     return columns
 
 

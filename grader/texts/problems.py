@@ -220,6 +220,10 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
     "position_needed": (N_("Nothing says this student's number or position; add it to the roster."),),
     "does_not_assemble": (N_("The mechanism does not assemble with these data."),),
     "singular": (N_("The velocities are not determined in this position of the mechanism."),),
+    "sheet_values": (
+        N_("Page %(form)s: there is no room for the computed values of %(values)s; none is printed."),
+        N_("The answer sheet's boxes are too small for this assignment."),
+    ),
     "sheet_boxes": (
         N_("Page %(form)s: there are too many lengths (%(lengths)s) for boxes; none is printed."),
         N_("The answer sheet's boxes are too small for this assignment."),

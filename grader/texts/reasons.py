@@ -53,6 +53,7 @@ HINTS: dict[str, str] = {
     ),
     "readings_disagree": N_("The drawing and the entered measurement differ."),
     "written_disagrees": N_("The drawing and the length written on the sheet differ: a person must look."),
+    "cells_off": N_("The number read in the sheet's cells does not fit: a person must look."),
     "follows": N_("It is consistent with your own earlier work; that mistake costs points only once."),
     "decided": N_("A person has decided this."),
     "scale_refused": N_("The declared scale could not be understood."),

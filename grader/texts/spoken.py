@@ -13,6 +13,7 @@ from grader.texts.faults import FAULTS, WHERE
 from grader.texts.problems import ADVICE, PROBLEMS
 from grader.texts.refusals import REFUSALS
 from reference.errors import PlanmarkError, lines_of
+from reference.quantities import unit_of, vector_of_value
 
 ENGLISH = tongue(ROOT_LANGUAGE)
 SENTENCES = {**FAILURES, **REFUSALS}
@@ -63,7 +64,10 @@ _NOUNS = {"corners": CORNERS, "areas": AREAS}
 
 
 def place(at: str, speaker: Tongue, names: Mapping[str, str] = NO_NAMES) -> str:
-    """Return a node, vector, scale or figure as a sentence names it."""
+    """Return a node, vector, computed value, scale or figure as a sentence names it."""
+    vector = vector_of_value(at)
+    if vector is not None:
+        return f"{names.get(vector, vector)}, {speaker.unit(unit_of(vector))}"
     return speaker.gettext(PLACES[at]) if at in PLACES else names.get(at, at)
 
 

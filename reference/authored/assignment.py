@@ -211,6 +211,11 @@ class Assignment:
         known = {getattr(variant, name) for variant in self.variants()}
         return None if None in known else sorted(known)
 
+    def positions(self, position: int | None) -> list[int | None]:
+        """Return the position asked for; every one if none is named, and None where there are none."""
+        every = self.numbers("position") if position is None else None
+        return [position] if every is None else [*every]
+
     def variant(self, n: int | None, position: int | None = None) -> Variant:
         """Return the requested variant; raises CallError that says what is missing or out of range."""
         variants = self.variants()

@@ -28,12 +28,14 @@ class PrintedSheet:
     zones : boxes in sheet millimetres by figure (``mechanism``, ``velocity_plan``, ...)
     fields : boxes to write in, by scale (``kL``) or vector (``v_A``)
     cells : of the boxes that have one for each digit, the last for the tenths
+    values : by vector, the cells of its computed value, and how many of them are for decimals
     """
 
     background: Background
     zones: Mapping[str, Box]
     fields: Mapping[str, Box] = field(default_factory=dict)
     cells: Mapping[str, Sequence[Box]] = field(default_factory=dict)
+    values: Mapping[str, tuple[Sequence[Box], int]] = field(default_factory=dict)
 
 
 Printed = Mapping[str, PrintedSheet]
@@ -189,7 +191,7 @@ class Desk:
                 texts[vector.name] = ruler_text(
                     length, style, sketch.rng, in_cells=vector.name in paper.cells
                 )
-        filled = {}
+        filled = self._compute(sketch, sheet, paper)
         for name, (x, y, w, h) in paper.fields.items():
             if name in texts and name in paper.cells:
                 _write_digits(sketch, texts[name], paper.cells[name], name)
@@ -199,6 +201,24 @@ class Desk:
                 sketch.text(complex(x + 1.5, -y - h / 2 - 0.4 * height), texts[name], height, names=name)
                 filled[name] = wording.plain(texts[name])
         return filled
+
+    def _compute(self, sketch: SheetSketch, sheet: DrawnSheet, paper: PrintedSheet) -> dict[str, str]:
+        """Write the values computed from the lengths at the declared scales; return the texts by column."""
+        texts = {}
+        for figure in sheet.figures:
+            for vector in self.task.wrong.construction.vectors_of(figure.name):
+                if vector.name not in paper.values or vector.scale not in self.task.declared:
+                    continue
+                cells, decimals = paper.values[vector.name]
+                length = abs(figure.nodes[vector.head] - figure.nodes[vector.tail])
+                # Nobody computes more than three digits from a ruler's millimetres.
+                value = float(f"{round(2.0 * length) / 2.0 * self.task.declared[vector.scale]:.3g}")
+                text = f"{value:.{min(decimals, 2)}f}"
+                whole, _, behind = text.partition(".")
+                places = cells[: len(cells) - decimals + len(behind)]
+                _write_digits(sketch, whole + behind, places, vector.name)
+                texts[f"{vector.name}_value"] = text
+        return texts
 
 
 def ruler_text(length_mm: float, style: PageStyle, rng: Rng, *, in_cells: bool = False) -> str:

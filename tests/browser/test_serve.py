@@ -18,6 +18,7 @@ from PIL import Image
 from grader.files import samples_folder
 from grader.folder.batch import grade
 from grader.folder.workers import Limits
+from grader.rubric import load_rubric
 from grader.web.app import application, first_invitation
 from grader.web.places import batch_of, places_of
 from grader.web.settings import Settings
@@ -343,9 +344,9 @@ def test_a_student_checks_values_and_a_photo_and_asks_again(served, visit, local
     student.look(f"{name}-feedback")
 
 
-WORKSHEET = b"""Identifier,Full name,Status,Grade,Maximum grade,Grade can be changed,Last modified (grade)
-Participant 8,A. B.,-,,43.00,Yes,-
-"""
+WORKSHEET = f"""Identifier,Full name,Status,Grade,Maximum grade,Grade can be changed,Last modified (grade)
+Participant 8,A. B.,-,,{load_rubric("pump").max_score:.2f},Yes,-
+""".encode()
 IDS = b"student_id,participant\ns08,8\n"
 TOLD = {
     "en": ("Students in the file: 1.", "withheld: nothing handed in: s03, s04", "Moodle reports must be 1"),

@@ -227,6 +227,47 @@ def test_a_student_fills_in_the_template_and_needs_no_student_id(planmark, tmp_p
     assert planmark("check", "pump", "--measured", file).returncode == 0
 
 
+PRINTED = {
+    "0": {"v_BA_value": "1,8", "a_BA_n": "25"},
+    "1": {
+        "v_B": "46,4", "v_BA": "47,17", "v_C": "92,8", "v_D": "89,36", "v_DC": "21,61",
+        "v_B_value": "1,67", "v_BA_value": "1,7", "v_C_value": "3,34", "v_D_value": "3,22",
+        "v_DC_value": "0,78",
+        "a_BA_n": "22,2", "a_B_n": "32,4", "a_DC_n": "15,7",
+    },
+}  # fmt: skip
+"""The table of results in the source of the press's course work, as printed."""
+
+
+def test_the_printed_rows_of_the_press_typed_into_its_template_earn_all_their_criteria(planmark, tmp_path):
+    file, work = tmp_path / "mine.csv", tmp_path / "class"
+    assert planmark("check", "press", "--template", file, "--lang", "ru").returncode == 0
+    header, *comments = file.read_text(encoding="utf-8-sig").splitlines()
+    lines = [line.split(";") for line in comments if not line.lstrip('"').startswith("#")]
+    names = header.split(";")
+    assert [line[names.index("position")] for line in lines] == [str(position) for position in range(8)]
+    for line in lines[:2]:
+        scales = {"kL": "0,00667 м/мм", "kv": "0,036 (м/с)/мм", "ka": "0,108 (м/с2)/мм"}
+        for name, text in {**scales, **PRINTED[line[0]]}.items():
+            line[names.index(name)] = text
+    work.mkdir()
+    typed = [f"student_id;{header}", *(f"s01;{';'.join(line)}" for line in lines[:2])]
+    (work / "s01.csv").write_text("\n".join(typed), encoding="utf-8")
+    planmark("grade", work, "--assignment", "press", "--out", tmp_path / "out")
+    reports = json.loads((tmp_path / "out" / "results.json").read_text(encoding="utf-8"))["reports"]
+    for report in reports:
+        entered = PRINTED[str(report["position"])]
+        found = {one["id"]: (one["verdict"], one["points"], one["max_points"]) for one in report["criteria"]}
+        for name in ("kL", "kv", "ka", *entered):
+            verdict, points, most = found[name]
+            assert (verdict, points) == ("full", most), (report["position"], name)
+    # A student's own check skips the positions that are still blank.
+    file.write_text("\n".join([header, *(";".join(line) for line in lines)]), encoding="utf-8")
+    told = planmark("check", "press", "--measured", file).stdout
+    assert "position = 1" in told
+    assert "position = 2" not in told
+
+
 @pytest.mark.parametrize(
     ("call", "told"),
     [
@@ -257,7 +298,7 @@ def test_the_page_of_a_self_check_has_no_points_and_sends_nobody_to_a_person(pla
     page = tmp_path / "mine.html"
     assert planmark("check", "pump", "--n", 7, "--measured", file, "--page", page).returncode == 1
     text = page.read_text(encoding="utf-8")
-    for word in ("waiting for review", "Points", "score is", "/ 43"):
+    for word in ("waiting for review", "Points", "score is", "/ 44"):
         assert word not in text
     assert 'class="score' not in text
     assert "Look at" in text

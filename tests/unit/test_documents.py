@@ -62,9 +62,9 @@ def test_a_report_says_who_what_and_how_much():
     )
     assert (written.status, written.score, written.score_range, written.max_score) == (
         "graded",
-        43.0,
-        (43.0, 43.0),
-        43.0,
+        PUMP.rubric.max_score,
+        (PUMP.rubric.max_score, PUMP.rubric.max_score),
+        PUMP.rubric.max_score,
     )
     by_id = {one.id: one for one in written.criteria}
     assert by_id["v_A"].feedback == "Corect."
@@ -102,7 +102,7 @@ def test_a_report_of_nothing_has_its_reason():
         "unreadable",
         None,
         None,
-        43.0,
+        PUMP.rubric.max_score,
     )
     assert written.problems[0].file == "s07.png"
     jsonschema.validate(json.loads(written.model_dump_json()), schema("report"))

@@ -1,4 +1,4 @@
-"""Read the printed boxes of an answer sheet: scales and measured lengths."""
+"""Read the printed boxes of an answer sheet: scales, measured lengths and computed values."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -8,7 +8,7 @@ from itertools import product
 import cv2
 import numpy as np
 
-from grader.printed.layout import SCALE_BOXES
+from grader.printed.layout import SCALE_BOXES, TENTH_CELLS
 from grader.records import Box, FloatArray, GreyImage, Page, Sheet, Written
 from grader.scan.handwriting.model import (
     COLUMN,
@@ -392,7 +392,9 @@ _SOFTEN_MM = 0.11
 _FULL = 0.97
 """Share of a cell that is less inked than the middle of a stroke."""
 _NO_TENTHS = 0.5
-"""Confidence in whole millimetres if the cell of the tenths is empty: a shifted number looks the same."""
+"""Confidence in a whole number if the cells of the decimals are empty: a shifted number looks the same."""
+NO_DECIMALS: Mapping[str, int] = {}
+"""All numbers are lengths, which have tenths."""
 
 
 def written_scales(page: Page, sheet: Sheet, units: Mapping[str, str] | None = None) -> dict[str, Written]:
@@ -467,12 +469,13 @@ def writing(page: Page, sheet: Sheet, box: Box, border_mm: float) -> GreyImage:
 
 
 def written_lengths(
-    page: Page, sheet: Sheet, cells: Mapping[str, Sequence[Box]]
+    page: Page, sheet: Sheet, cells: Mapping[str, Sequence[Box]], decimals: Mapping[str, int] = NO_DECIMALS
 ) -> dict[str, tuple[float, float]]:
-    """Return lengths, mm, with the probability that they are as written, by name; nothing for empty boxes.
+    """Return numbers with the probability that they are as written, by name; nothing for empty boxes.
 
-    Arguments: `cells` are the boxes of a name's digits in sheet mm, from the left, the last for the tenths.
-    Anything that is no number (a gap between digits, a sign that is no digit) has the probability 0.
+    Arguments: `cells` are the boxes of a name's digits in sheet mm, from the left; the last `decimals` stand
+    behind the decimal mark, of a length (mm) the last one. Anything that is no number (a gap between digits,
+    a sign that is no digit) has the probability 0.
     """
     pictures: list[GreyImage] = []
     sizes: list[tuple[float, float]] = []
@@ -487,7 +490,7 @@ def written_lengths(
                 sizes.append((sign.shape[1], sign.shape[0]))
     probability = recognise(pictures, np.array(sizes, dtype=np.float64).reshape(-1, 2))
     return {
-        name: _length(places, probability)
+        name: _number(places, probability, decimals.get(name, TENTH_CELLS))
         for name, places in filled.items()
         if any(place is not None for place in places)
     }
@@ -509,7 +512,7 @@ def _sign(grey: GreyImage) -> GreyImage | None:
     return np.ascontiguousarray(part)
 
 
-def _length(places: Sequence[int | None], probability: FloatArray) -> tuple[float, float]:
+def _number(places: Sequence[int | None], probability: FloatArray, decimals: int) -> tuple[float, float]:
     """Return the number in a row of cells, and the probability that every digit of it is right."""
     columns = [COLUMN[digit] for digit in _DIGITS]
     value, sure = 0.0, 1.0
@@ -520,9 +523,10 @@ def _length(places: Sequence[int | None], probability: FloatArray) -> tuple[floa
             best = int(np.argmax(row))
             sure *= float(row[best] / max(row.sum() + probability[place, COLUMN[JUNK]], 1e-9))
             value += best
-    begun = places[next(index for index, place in enumerate(places) if place is not None) :]
-    if None in begun[:-1]:
+    filled = [index for index, place in enumerate(places) if place is not None]
+    last, ones = filled[-1], len(places) - decimals - 1
+    if last - filled[0] >= len(filled) or last < ones:
         sure = 0.0
-    elif begun[-1] is None:
+    elif last == ones and decimals:
         sure *= _NO_TENTHS
-    return value / 10.0, sure
+    return value / 10.0**decimals, sure

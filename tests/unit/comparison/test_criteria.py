@@ -134,7 +134,7 @@ def test_the_printed_table_of_the_press_is_right():
     comparison = compare(with_rubric(PRESS, missing="not_judged"), submission)
     assert lost(comparison) == []
     assert {one.criterion for one in comparison.outcomes if one.verdict == "full"} == {
-        "kL", "kv", "ka", *segments}  # fmt: skip
+        "kL", "kv", "ka", *segments, *(f"{name}_value" for name in values)}  # fmt: skip
 
 
 def test_bands_give_their_shares():
@@ -337,9 +337,9 @@ def test_a_plan_that_is_on_no_sheet_goes_to_a_person():
 
 
 def test_a_wrong_value_beside_a_right_drawing_is_arithmetic():
-    value = abs(PUMP.real["v_D"])
-    comparison = compare(PUMP, Submission(measured=measured(PUMP), values={"v_D": 1.3 * value}))
-    outcome = outcome_of(comparison, "v_D")
+    value = abs(PUMP.real["v_B"])
+    comparison = compare(PUMP, Submission(measured=measured(PUMP), values={"v_B": 1.3 * value}))
+    outcome = outcome_of(comparison, "v_B")
     assert outcome.verdict == "partial"
     assert outcome.mistake == "arithmetic"
     assert codes(outcome)[0] == "value_too_large"
@@ -361,9 +361,79 @@ def test_a_factor_in_all_values_costs_once(factor, segments):
 
 
 def test_two_values_off_by_one_factor_are_two_slips():
-    values = {name: 2.0 * abs(PUMP.real[name]) for name in ("v_B", "v_D")}
+    values = {name: 2.0 * abs(PUMP.real[name]) for name in ("v_B", "v_C")}
     found = verdicts(compare(PUMP, Submission(measured=measured(PUMP), values=values)))
-    assert found["v_B"] == found["v_D"] == "partial"
+    assert found["v_B"] == found["v_C"] == "partial"
+
+
+@pytest.mark.parametrize(("factor", "verdict", "mistake"), [(1.0, "full", None), (1.3, "none", "arithmetic")])
+def test_a_value_with_a_criterion_of_its_own_costs_there_and_nowhere_else(factor, verdict, mistake):
+    values = {"v_D": factor * abs(PUMP.real["v_D"])}
+    comparison = compare(PUMP, Submission(measured=measured(PUMP), values=values))
+    outcome = outcome_of(comparison, "v_D_value")
+    assert (outcome.verdict, outcome.mistake) == (verdict, mistake)
+    assert lost(comparison) == ([] if factor == 1.0 else ["v_D_value"])
+    # The page shows the drawn vector's own value beside it.
+    assert outcome_of(comparison, "v_D").measured.value == pytest.approx(abs(PUMP.real["v_D"]), rel=0.01)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.1], ids=["scale of the rule", "own scale"])
+def test_a_value_follows_from_the_own_segment_and_the_own_scale(scale):
+    own = {**rule_scales(PUMP), "kv": scale * rule_scales(PUMP)["kv"]}
+    reading = changed(measured(PUMP, own), "v_D", length_mm=70.0)
+    declared = {name: f"{value!r} {UNITS[name]}" for name, value in own.items()}
+    values = {"v_D": 70.0 * own["kv"]}
+    comparison = compare(PUMP, Submission(measured=reading, values=values, declared=declared))
+    outcome = outcome_of(comparison, "v_D_value")
+    assert lost(comparison) == ["v_D", "v_D_value"]
+    assert (outcome.verdict, codes(outcome)) == ("follow_through", ["follows", "value_too_large"])
+    strict = compare(with_criterion(PUMP, "v_D_value", follow_through=False), Submission(
+        measured=reading, values=values, declared=declared))  # fmt: skip
+    assert outcome_of(strict, "v_D_value").verdict == "none"
+
+
+def test_a_value_without_its_segment_earns_what_is_asked_of_the_value():
+    reading = without(measured(PUMP), "v_D")
+    found = verdicts(compare(PUMP, Submission(measured=reading, values={"v_D": abs(PUMP.real["v_D"])})))
+    assert (found["v_D"], found["v_D_value"]) == ("none", "full")
+
+
+def test_who_gives_no_values_has_the_share_of_the_score_that_they_had():
+    plain = with_rubric(PUMP, criterion=[one for one in PUMP.rubric.criterion if one.value is None])
+    submission = Submission(measured=changed(measured(PUMP), "v_D", length_mm=70.0))
+    shares = [judge(task, submission).score.total / task.rubric.max_score for task in (plain, PUMP)]
+    assert shares[0] < 1.0
+    assert shares[1] == pytest.approx(shares[0], abs=1e-6)
+
+
+def test_an_unusable_value_is_open_where_it_is_asked_for_and_nowhere_else():
+    gap = Unread("v_D", Reason("entry", {"entries": ("v_D_value: 'x'",)}))
+    reading = replace(measured(PUMP), unread=(gap,))
+    assert lost(compare(PUMP, Submission(measured=reading))) == ["v_D_value"]
+
+
+@pytest.mark.parametrize(
+    ("factor", "sure", "verdict"),
+    [
+        (1.0, 0.999, "full"),
+        (1.3, 0.999, "review"),
+        (1.3, 0.9, "review"),
+        (1.3, 0.4, "review"),
+        (1.0, 0.0, "review"),
+    ],
+)
+def test_a_value_in_a_sheets_cells_that_is_off_or_unsure_waits_for_a_person(factor, sure, verdict):
+    written = {"v_D_value": (factor * abs(PUMP.real["v_D"]), sure)}
+    reading = replace(sheet(PUMP), lengths=written)
+    comparison = compare(PUMP, Submission(readings=(reading,), declared=DECLARED))
+    assert outcome_of(comparison, "v_D_value").verdict == verdict
+    assert set(lost(comparison)) <= {"v_D_value", *PUMP.construction.rates}
+
+
+def test_a_value_in_the_cells_says_nothing_of_a_vector_that_could_not_be_read():
+    reading = replace(without(sheet(PUMP), "v_D"), lengths={"v_D_value": (abs(PUMP.real["v_D"]), 0.999)})
+    found = verdicts(compare(PUMP, Submission(readings=(reading,), declared=DECLARED)))
+    assert (found["v_D"], found["v_D_value"]) == ("review", "full")
 
 
 def test_a_value_right_by_the_own_wrong_drawing_costs_nothing_more():

@@ -224,7 +224,7 @@ def test_a_wrong_value_beside_a_right_drawing_is_told_as_a_slip():
     right = abs(PUMP.real["v_D"])
     submission = replace(handed_in(PUMP, nodes, "sheet"), values={"v_D": 10.0 * right})
     slip = judge(PUMP, submission).mistakes[0]
-    assert (slip.code, slip.at, slip.explains) == ("arithmetic", "v_D", ("v_D",))
+    assert (slip.code, slip.at, slip.explains) == ("arithmetic", "v_D", ("v_D_value",))
     assert slip.detail["factor"] == pytest.approx(10.0, rel=0.02)
 
 

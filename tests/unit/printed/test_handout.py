@@ -79,3 +79,22 @@ def test_many_vectors_take_several_pages(monkeypatch):
 def test_a_row_that_does_not_suit_the_assignment_is_told_with_its_line():
     with pytest.raises(AuthoredFileError, match="line 2, s07"):
         pages_of(load_assignment("pump"), RosterRow("s07", "Ana", 77, line=2))
+
+
+def test_a_student_with_several_positions_has_a_page_for_the_results_of_all():
+    assignment = load_assignment("press")
+    rows = [RosterRow("s07", "Ana", position=position, line=2) for position in (0, 1, 5)]
+    *_, table, other = pages_of(assignment, *rows, RosterRow("s08", "Ion", position=2, line=5))
+    assert "Results of all positions" in table
+    assert [line for line in table.splitlines() if line.strip() in {"0", "1", "5"}]
+    heads = " ".join(table.split())
+    for head in ("vB, mm", "vDC, mm", "vB, m/s", "vDC, m/s", "aBA n , mm"):
+        assert head in heads
+    assert "vA, mm" not in heads
+    assert "Results of all positions" not in other
+
+
+def test_a_sheet_says_which_values_are_to_be_computed():
+    (text,) = pages_of(load_assignment("press"), RosterRow("", position=1))
+    # Of the velocities v_A alone is not asked for as a value; of the accelerations no value is asked for.
+    assert text.count("–") == 1

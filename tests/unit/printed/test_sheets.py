@@ -27,6 +27,7 @@ from grader.printed.layout import (
 )
 from grader.printed.pdf import number, width_mm, wrap
 from grader.records import Page, Sheet
+from grader.rubric import rubric_of
 from grader.scan.register.registration import rectify
 from grader.scan.strokes.ink import find_ink
 from grader.tables.roster import RosterRow
@@ -345,3 +346,52 @@ def test_the_cells_of_a_scanned_page_are_those_that_were_printed(asked):
         figures = [name for name in page.zones if name != "fields"]
         assert cells_of(pump, figures, asked) == page.cells
     assert cells_of(pump, ["mechanism"], asked) == {}
+
+
+# Computed values ----------------------------------------------------------------------------------
+
+
+def values_on(name):
+    """The layout of an assignment's pages with all that its rubric asks for."""
+    assignment = load_assignment(name)
+    return page_layouts(assignment, rubric_of(assignment).entries).pages
+
+
+@pytest.mark.parametrize(
+    ("name", "velocities", "accelerations", "decimals"),
+    [("press", ["v_B", "v_BA", "v_C", "v_D", "v_DC"], [], 3), ("pump", ["v_D"], ["a_D"], 2)],
+)
+def test_values_asked_for_have_places_that_meet_nothing_else(name, velocities, accelerations, decimals):
+    pages = values_on(name)
+    assert [list(page.values) for page in pages] == [velocities, accelerations]
+    assert pages[0].values["v_D"].decimals == decimals
+    for page in pages:
+        markers = [(*marker.corners_mm[0], 12.0, 12.0) for marker in page.markers]
+        taken = [*boxes_of(page).values(), *markers]
+        for place in page.values.values():
+            x, y, wide, high = place.box
+            assert FRAME_MM[0] < x < x + wide < FRAME_MM[0] + FRAME_MM[2]
+            assert FRAME_MM[1] < y < y + high < FRAME_MM[1] + FRAME_MM[3]
+            assert min(min(cell[2:]) for cell in place.cells) >= LEAST_CELL_MM
+            others = [one.box for one in page.values.values() if one is not place]
+            assert not any(overlap(place.box, other, 0.5) for other in (*taken, *others))
+
+
+def test_values_leave_the_rest_of_a_sheet_as_it_is():
+    pump = load_assignment("pump")
+    rubric = rubric_of(pump)
+    with_values, without = (page_layouts(pump, asked).pages for asked in (rubric.entries, rubric.vectors))
+    assert [page.model_copy(update={"values": {}}) for page in with_values] == without
+    engine = load_assignment("engine")
+    asked = rubric_of(engine)
+    pdfs = [make_sheets(engine, rows_for(engine), asked=one).pdf for one in (asked.entries, asked.vectors)]
+    assert pdfs[0] == pdfs[1]
+
+
+def test_values_without_room_are_told_and_none_is_printed():
+    pump = load_assignment("pump")
+    asked = [*rubric_of(pump).vectors, "a_D_value", "a_C_value"]
+    sheets = make_sheets(pump, [ANA], asked=asked)
+    (problem,) = [one for one in sheets.problems if one.code == "sheet_values"]
+    assert problem.parameters["values"] == ("a_C", "a_D")
+    assert not any(page.values for page in sheets.layout.pages)

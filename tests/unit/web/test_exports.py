@@ -5,6 +5,7 @@ import os
 import pytest
 
 from grader.lms.grades import Person
+from grader.rubric import load_rubric
 from tests.unit.lms.test_moodle_imports import HELD, LANGUAGES, download, site_of
 
 
@@ -26,7 +27,7 @@ def test_a_colleagues_grade_stays_where_the_worksheet_went_through_the_web(grade
 
 SHEET = (
     "Identifier,Full name,Email address,Grade,Maximum grade,Marking workflow state,Grade can be changed,"
-    "Last modified (grade)\r\nParticipant 9,Student 9,-,,43.00,-,Yes,-\r\n"
+    f"Last modified (grade)\r\nParticipant 9,Student 9,-,,{load_rubric('pump').max_score:.2f},-,Yes,-\r\n"
 )
 REPORT = {
     "en": ("nobody in the platform's file has", "Moodle reports must be 1"),

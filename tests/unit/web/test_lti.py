@@ -7,6 +7,7 @@ import jwt
 import pytest
 from jwcrypto.jwk import JWK
 
+from grader.rubric import load_rubric
 from tests.unit.web.conftest import Browser
 from tests.unit.web.platform import CLAIM, CLIENT, ROLE, Platform
 
@@ -112,7 +113,7 @@ def test_deep_linking_answers_with_the_chosen_publication(platform, admin, app, 
     maximum = admin.get(f"/api/v1/publications/{key}/results").json()["reports"][0]["max_score"]
     title = admin.get(f"/api/v1/publications/{key}").json()["title"]
     told_item = {"scoreMaximum": maximum, "label": title, "resourceId": "pump", "tag": "grade"}
-    assert (item["lineItem"], maximum) == (told_item, 43.0)
+    assert (item["lineItem"], maximum) == (told_item, load_rubric("pump").max_score)
     assert teacher.act("POST", f"/lti/chosen/{name}?key={key}").status_code == 404
 
 

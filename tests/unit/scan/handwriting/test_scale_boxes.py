@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from grader.printed.answer_sheet import make_sheets
+from grader.printed.layout import values_of
 from grader.records import Page, Sheet, Written
-from grader.scan.handwriting.fields import moves, read_scale, start, written_scales
+from grader.rubric import rubric_of
+from grader.scan.handwriting.fields import moves, read_scale, start, written_lengths, written_scales
 from grader.scan.handwriting.model import lattice_of
 from grader.scan.register.registration import rectify
 from grader.tables.roster import RosterRow
@@ -125,3 +127,27 @@ def test_boxes_that_the_page_does_not_have_are_not_looked_at(sheets):
     for read, written in sheets:
         assert read.keys() <= written.keys()
         assert all(isinstance(one, Written) for one in read.values())
+
+
+def test_computed_values_written_in_a_sheets_cells_are_read_as_they_were_written():
+    press = load_assignment("press")
+    entries = rubric_of(press).entries
+    document = make_sheets(press, [RosterRow("s1", "Student 1", position=3)], "en", asked=entries)
+    printed = printed_sheets(document.pdf, document.layout)
+    settings = Settings(hand=CAREFUL, scan=CLEAN_SCAN, page=PageStyle(language="en"))
+    drawn = simulate(press, press.variant(None, 3), 3, settings, printed=printed)[0]
+    page = Page("s.png", 1, np.ascontiguousarray(drawn.image), (300.0, 300.0))
+    placed = rectify(page)
+    assert isinstance(placed, Sheet)
+    places = values_of(press, tuple(placed.zones), entries)
+    read = written_lengths(
+        page,
+        placed,
+        {name: place.cells for name, place in places.items()},
+        {name: place.decimals for name, place in places.items()},
+    )
+    written = {name: float(drawn.truth["fields"][f"{name}_value"]) for name in places}
+    right = [name for name, (value, _) in read.items() if value == pytest.approx(written[name])]
+    assert len(written) == 5
+    assert len(right) >= 4
+    assert all(read[name][1] < SURE for name in written.keys() - right)
