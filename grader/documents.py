@@ -75,8 +75,8 @@ class MeasurementsDocument(Document):
     segments_mm: dict[str, Annotated[float, Field(ge=0.0)]] = {}
     directions_deg: dict[str, float] = {}
     """Counter-clockwise from the assignment's +x."""
-    values: dict[str, float] = {}
-    """SI; angular values counter-clockwise positive."""
+    values: dict[str, float | str] = {}
+    """SI; angular values counter-clockwise positive, or with a sense: ``2.09 cw``, or ``omega_2_sense``."""
 
 
 # Reading: what was read on one sheet --------------------------------------------------------------

@@ -19,6 +19,8 @@ too_short_to_judge    length_mm, least_mm                                    no 
 value_too_large,      measured, expected, off, tolerance, unit               a computed value is off
 value_too_small
 value_reversed        measured, expected, unit                               its sign is wrong
+sense_wrong                                                                  the sense alone is wrong
+sense_missing                                                                a magnitude without sense
 not_measured                                                                 nothing was handed in
 optional                                                                     not handed in, not asked
 unread                reason                                                 asked for, not read
@@ -159,6 +161,8 @@ def _detail(mistake: Mistake) -> dict[str, float | str]:
             found: dict[str, float | str] = {"slip": slip}
             found |= {"axis" if slip == "axis" else "unit": one for one in more}
             return found if abs(factor) == 1.0 else {**found, "factor": factor}
+        case Mistake(code="rpm_not_converted", other=(slip, formula, right), factor=factor):
+            return {"factor": factor, "slip": slip, "formula": formula, "instead_of": right}
         case Mistake(code="scale_wrong" | "rpm_not_converted" | "arithmetic", factor=factor):
             return {} if factor == 1.0 else {"factor": factor}
         case Mistake(code="wrong_intersection", other=(name,)) if name[:2] in {"v_", "a_"}:

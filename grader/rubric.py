@@ -147,8 +147,9 @@ class WeightsTable(Authored):
 
 
 class CriterionTable(Authored):
-    """One criterion: a `vector`, a vector's computed `value`, an `angular` quantity, a `scale` or a `link`.
+    """One criterion: exactly one of what a rubric may ask for, and its points.
 
+    It is a `vector`, its computed `value`, an `angular` quantity, the `sense` of one, a `scale` or `link`.
     `optional`: not judged if it was not handed in. `direction = false`: only the length counts. `tolerance`
     replaces the rubric's for this criterion, so does `follow_through`.
     """
@@ -159,6 +160,7 @@ class CriterionTable(Authored):
     vector: str | None = None
     value: str | None = None
     angular: str | None = None
+    sense: str | None = None
     scale: Literal["kL", "kv", "ka"] | None = None
     link: str | None = None
     optional: bool = False
@@ -168,16 +170,22 @@ class CriterionTable(Authored):
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
-        kinds = (self.vector, self.value, self.angular, self.scale, self.link)
+        kinds = (self.vector, self.value, self.angular, self.sense, self.scale, self.link)
         if sum(kind is not None for kind in kinds) != 1:
-            raise ValueError("must have exactly one of vector, value, angular, scale and link")
+            raise ValueError("must have exactly one of vector, value, angular, sense, scale and link")
         return self
 
     @property
+    def turning(self) -> str | None:
+        """The angular quantity that is asked for, or whose sense is."""
+        return self.angular or self.sense
+
+    @property
     def name(self) -> str:
-        """The requested vector, angular quantity, scale or link; of a vector's value its column's name."""
+        """The requested vector, angular quantity, scale or link; of a value or a sense its column's name."""
         of_value = None if self.value is None else value_name(self.value)
-        return self.vector or of_value or self.angular or self.scale or self.link or ""
+        sense = self.sense and f"{self.sense}_sense"
+        return self.vector or of_value or self.angular or sense or self.scale or self.link or ""
 
     @property
     def section(self) -> Section:
@@ -186,7 +194,7 @@ class CriterionTable(Authored):
             return "mechanism"
         if self.scale is not None:
             return "scales"
-        if self.angular is not None:
+        if self.turning is not None:
             return "angular"
         return "velocity_plan" if self.name.startswith("v_") else "acceleration_plan"
 
@@ -322,6 +330,7 @@ def check_rubric(rubric: RubricFile, construction: Construction) -> list[Finding
         "vector": tuple(construction.vectors),
         "value": tuple(construction.vectors),
         "angular": tuple(construction.rates),
+        "sense": tuple(construction.rates),
         "link": tuple(construction.links),
     }
     return [

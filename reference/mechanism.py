@@ -21,7 +21,10 @@ Side = int | FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Crank:
-    """The driving link: pivot on the ground, pin at its end; `omega` may be negative (clockwise)."""
+    """The driving link: pivot on the ground, pin at its end; `omega` may be negative (clockwise).
+
+    `rpm` (rev/min, before the gear) and `gear_ratio` are those from which omega was computed, if it was.
+    """
 
     link: str
     pivot: str
@@ -32,6 +35,8 @@ class Crank:
     epsilon: FloatArray
     accelerated: bool
     """True if the crank has an angular acceleration: without one, a_A has no tangential part."""
+    rpm: FloatArray | None = None
+    gear_ratio: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True)

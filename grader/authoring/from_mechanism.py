@@ -77,7 +77,7 @@ _POINTS = {"scale": 1.0, "link": 0.5, "vector": 2.0, "angular": 0.5}
 _OPTIONAL = {"scale", "link", "angular"}
 """Items that a student may leave out without losing points."""
 KEYS_OF_A_CRITERION = """\
-# One for each thing judged: exactly one of vector, value, angular, scale and link. Of its other keys: points
+# One for each thing judged: exactly one of vector, value, angular, sense, scale and link. Of its other keys:
 # for full marks; optional = true: not judged where it was not handed in; direction = false: only the length
 # counts."""
 """Replaces the start's comments, which stand at keys that not every criterion has."""
@@ -306,7 +306,8 @@ def _rubric(
         *(("vector", name, *titled(name, construction)) for name in construction.vectors),
         *(
             ("angular", name, RATES[name.partition("_")[0]], {"name": name.partition("_")[2]})
-            for name in construction.rates
+            for name, rate in construction.rates.items()
+            if not rate.drives or (file.crank is not None and file.crank.rpm is not None)
         ),
     ]
     asked = [KEYS_OF_A_CRITERION, *(_criterion(*one) for one in criteria if one[1] not in unasked)]

@@ -117,6 +117,7 @@ def lint(assignment: Assignment, rubric: RubricFile) -> Lint:
         *room_findings(assignment, plan, rooms),
         *tie_findings(plan, ties_of(rubric, plan, asked)),
         *scale_findings(assignment, plan, scales),
+        *_told_results(assignment, rubric, plan),
     ]
     solved = _rows(plan, conditions, asked, rooms)
     rows |= dict(zip(sound, solved, strict=True))
@@ -342,6 +343,22 @@ def _not_told(assignment: Assignment) -> Iterator[LintFinding]:
     if missing:
         message = f"{', '.join(missing)}: sets the mechanism, and no [[given]] tells it to the student"
         yield LintFinding("hint", "not_told", "assignment", "$.given", message)
+
+
+OTHER_UNITS = frozenset({"m", "cm", "mm", "°", "rev/min"})
+"""Units of data that no result is in."""
+
+
+def _told_results(assignment: Assignment, rubric: RubricFile, plan: Plan) -> Iterator[LintFinding]:
+    """Report given data that are results: a student need not compute what the rubric asks for."""
+    values, results = assignment.values(list(plan.variants)), {**plan.rates, **plan.vectors_si}
+    driven = f"_{plan.mechanism.driver.pin}"
+    asked = [one.name for one in rubric.criterion if one.name in results and not one.name.endswith(driven)]
+    for index, datum in enumerate(assignment.file.given):
+        told = np.abs(datum.value(values)) if datum.unit not in OTHER_UNITS else np.nan
+        for name in (name for name in asked if np.allclose(told, np.abs(results[name]), rtol=1e-3)):
+            message = f"{name} is told here, and the rubric asks for it: tell what it is computed from"
+            yield LintFinding("warning", "result_told", "assignment", f"$.given[{index}]", message)
 
 
 def _unknown_names(assignment: Assignment, construction: Construction) -> Iterator[LintFinding]:

@@ -33,8 +33,8 @@ NOTHING = N_("nothing that this assignment asks for was measured")
 WRITTEN = N_("%(file)s: fill in what is below the comments, then check it by --measured %(file)s")
 HOW_TO_FILL_IN = N_(
     "# Drawn lengths in mm; _deg: directions counter-clockwise from the horizontal to the right; _value:"
-    " computed values, counter-clockwise positive; scales with their units. Blank cells are not checked;"
-    " lines that begin with # are ignored."
+    " computed values, counter-clockwise positive or with their sense (2.09 cw); scales with their units."
+    " Blank cells are not checked; lines that begin with # are ignored."
 )
 
 

@@ -33,6 +33,7 @@ from grader.comparison.task import Task, TaskSegment
 from grader.comparison.verdicts import (
     EVEN,
     FULL,
+    HALF,
     NONE,
     SHORT_MM,
     Expectation,
@@ -95,7 +96,7 @@ def compare(task: Task, submission: Submission, explain: Explain = nothing_expla
 def _outcome(charges: Charges, criterion: CriterionTable) -> Outcome:
     """The verdict on one criterion, open where it depends on an entry that cannot be used."""
     outcome, name, evidence = _judged(charges, criterion), criterion.name, charges.evidence
-    entry = evidence.refused.get(name)
+    entry = evidence.refused.get(criterion.turning or name)
     if entry is None and outcome.verdict in CHARGED:
         entry = _refused_below(charges, name)
     if entry is not None:
@@ -109,7 +110,9 @@ def _outcome(charges: Charges, criterion: CriterionTable) -> Outcome:
 def _refused_below(charges: Charges, name: str) -> tuple[str, ...] | None:
     """The entry for the scale, or for a node from which a vector is made, that cannot be used."""
     task, evidence = charges.task, charges.evidence
-    turned = task.construction.rates.get(name)
+    turned = task.construction.rates.get(name.removesuffix("_sense"))
+    if turned is not None and turned.drives:
+        return None
     segment = task.segments.get((vector_of_value(name) or name) if turned is None else turned.vector)
     if segment is None or not evidence.refused:
         return None
@@ -123,7 +126,7 @@ def _judged(charges: Charges, criterion: CriterionTable) -> Outcome:
     """The verdict on what can be used; its cost is recorded in the charges."""
     if criterion.scale is not None:
         return _scale(charges, criterion)
-    if criterion.angular is not None:
+    if criterion.turning is not None:
         return _rate(charges, criterion)
     if criterion.value is not None:
         return _computed(charges, criterion, criterion.value)
@@ -141,7 +144,7 @@ ORDER = ("length", "velocity", "omega", "acceleration", "epsilon")
 
 
 def _in_order(following: FollowThrough) -> list[CriterionTable]:
-    """The criteria as they are drawn: scales, sketch, velocities, omega, accelerations, epsilon.
+    """The criteria as they are drawn: the driving link's omega, scales, sketch, velocities, omega and so on.
 
     Of vectors that end at one node, those on wrong lines come first; a computed value comes after its vector.
     The rubric's order changes nothing.
@@ -152,6 +155,8 @@ def _in_order(following: FollowThrough) -> list[CriterionTable]:
 
     def place(criterion: CriterionTable) -> tuple[int, ...]:
         name = criterion.value or criterion.name
+        if criterion.turning in task.construction.driving:
+            return (-2,)
         if criterion.scale is not None:
             return -1, SCALE_NAMES.index(name)
         kind = ORDER.index("length" if criterion.link else kind_of(name).name)
@@ -258,8 +263,6 @@ LEAST_VALUES = 3
 """Number of values with one common factor that show a wrong scale; fewer may agree by chance."""
 SAME_FACTOR = 0.02
 """Relative difference up to which two factors are the same, with rounding on the way."""
-HALF = 0.5
-"""The share of a criterion that a right drawing keeps where the rubric has no band of partial points."""
 
 
 def _mark_of_value(
@@ -469,29 +472,43 @@ def _is_not_drawn(task: Task, evidence: Evidence, name: str, length_mm: float) -
 
 
 def _rate(charges: Charges, criterion: CriterionTable) -> Outcome:
-    """An angular quantity against the exact one, then against what the student's own vector gives."""
-    task, name, following, unit = charges.task, criterion.name, charges.following, unit_of(criterion.name)
-    right = task.rates[name]
-    if name not in charges.evidence.values:
-        return _absent(charges, criterion, Quantity(value=right, unit=unit))
-    value, source = charges.evidence.values[name], task.segments[task.construction.rates[name].vector]
-    held = HeldValue(task.rubric, criterion, value, following.used[source.scale] / task.lengths_m[name])
+    """An angular quantity, or its sense, against the exact one, then against what the own vector gives.
+
+    That of the driving link follows from the data alone.
+    """
+    task, following, values = charges.task, charges.following, charges.evidence.values
+    name, unit = criterion.turning or "", unit_of(criterion.turning or "")
+    rate, right, sense = task.construction.rates[name], task.rates[name], values.get(f"{name}_sense")
+    value = values.get(name)
+    if criterion.sense is not None:
+        # A magnitude alone has none.
+        value = sense or min(value or 0.0, 0.0) or None
+    if value is None:
+        expected = Quantity() if criterion.sense else Quantity(value=right, unit=unit)
+        return _absent(charges, criterion, expected)
+    source, table = task.segments[rate.vector], task.rubric.tolerance_of(criterion)
+    per_mm = following.used[source.scale] / task.lengths_m[name]
+    if rate.drives:
+        per_mm = table.scale_relative * abs(right) / table.length_mm or 1.0
+    held = HeldValue(task.rubric, criterion, value, per_mm, sense)
     exact, followed = Expectation(right / held.per_mm), False
     mark = held.against(exact)
-    if not mark.is_full:
+    if not mark.is_full and not rate.drives:
         # It is as uncertain as the vector that turns the link.
         uncertainty = following.uncertainty_of(source, source.drawn(following.used))
         exact = replace(exact, uncertainty=uncertainty)
         mark = held.against(exact)
-    charges.remember(name, mark)
-    follows = not mark.is_full and task.rubric.follows_through(criterion)
-    own = _own_rate(charges, task.construction.rates[name], value) if follows else None
+    charges.remember(criterion.name, mark)
+    follows = not mark.is_full and not rate.drives and task.rubric.follows_through(criterion)
+    own = _own_rate(charges, rate, value) if follows else None
     if own is not None:
         one = Expectation(own / held.per_mm, "vector", source.name, frozenset({source.head}))
         candidate, shown = charges.credited(one, held.against(one))
         charges.charged |= shown
         if candidate.is_better(mark):
             mark, right, followed = the_better(candidate, mark, *charges.why(one)), own, True
+    if criterion.sense is not None:
+        return outcome_of(criterion, mark, Quantity(), Quantity(), Tolerance(), followed=followed)
     measured, expected = Quantity(value=value, unit=unit), Quantity(value=right, unit=unit)
     return outcome_of(criterion, mark, measured, expected, held.allowed(exact), followed=followed)
 

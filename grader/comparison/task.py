@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from typing import TypeVar, cast
 
@@ -69,6 +69,7 @@ class Task:
     pin : of the driven link
     yardstick : the crank; where a slider drives, the first link of given length; None without any
     omega : of the crank, None where a slider drives
+    gear_ratio : of the gear before the crank, None where none is given
     cache : results, by everything on which they depend
     """
 
@@ -84,6 +85,7 @@ class Task:
     pin: str
     yardstick: Yardstick | None
     omega: float | None
+    gear_ratio: float | None
     ground: Mapping[str, complex]
     cache: dict[tuple[object, ...], object] = field(
         init=False, repr=False, compare=False, default_factory=dict
@@ -173,9 +175,22 @@ def task_of(assignment: Assignment, rubric: RubricFile, variant: Variant) -> Tas
     return task
 
 
+def tasks_at_speed(task: Task, speed: tuple[float, float]) -> tuple[Task, ...]:
+    """The task with a student's own omega and epsilon of the crank, at scales by these, or at the given ones.
+
+    Arguments: `speed` is factors of the right omega and epsilon.
+    """
+    own = replace(task.assignment, speed=speed)
+    kinds = (own, replace(own, is_at_given_scales=True))
+    return task.cached(
+        ("speed", speed), lambda: tuple(_made(one, task.rubric, task.variant) for one in kinds)
+    )
+
+
 def _made(assignment: Assignment, rubric: RubricFile, variant: Variant) -> Task:
     plan = exact_plan(assignment, [variant], accelerations=rubric.needs_accelerations)
     construction, driver = plan.construction, plan.mechanism.driver
+    ratio = driver.gear_ratio if isinstance(driver, Crank) else None
     parameters = {name: np.asarray(np.ravel(value)[0]) for name, value in plan.drawing.parameters.items()}
     real = {name: complex(vector[0]) for name, vector in plan.vectors_si.items()}
     places = {name: complex(np.ravel(place)[0]) for name, place in plan.motion.position.items()}
@@ -200,6 +215,7 @@ def _made(assignment: Assignment, rubric: RubricFile, variant: Variant) -> Task:
         pin=driver.pin,
         yardstick=_yardstick(plan.mechanism),
         omega=float(driver.omega[0]) if isinstance(driver, Crank) else None,
+        gear_ratio=None if ratio is None else float(ratio[0]),
         ground={name: complex(np.ravel(place)[0]) for name, place in plan.mechanism.ground_m.items()},
     )
 

@@ -14,6 +14,8 @@ from reference.construction.uncertainty import EndSpread
 from reference.quantities import unit_of
 
 FULL, NONE = 1.0, 0.0
+HALF = 0.5
+"""The share of a criterion that a part of it keeps where the rubric has no band of partial points."""
 ROUNDING = 1e-9
 """Relative excess over a tolerance that still counts as within it."""
 
@@ -341,12 +343,14 @@ class HeldValue:
     """A computed value, SI, judged by the rubric; `per_mm` is the value of a millimetre of its vector.
 
     A vector's value has no sign, an angular quantity's has: the real part of an expectation is its value.
+    `sense` is the one told beside an angular quantity: 1 counter-clockwise, -1, or 0 if it was left blank.
     """
 
     rubric: RubricFile
     criterion: CriterionTable
     value: float
     per_mm: float
+    sense: float | None = None
 
     def allowed(self, one: Expectation) -> Tolerance:
         """Return the tolerance of full marks: that of the length that the value stands for."""
@@ -356,20 +360,32 @@ class HeldValue:
 
     def expected(self, one: Expectation) -> float:
         """Return the expected value; nothing but rounding is zero."""
-        in_mm = one.vector.real if self.criterion.angular else abs(one.vector)
+        in_mm = one.vector.real if self.criterion.turning else abs(one.vector)
         return in_mm * self.per_mm if abs(in_mm) > ROUNDING else 0.0
 
     def against(self, one: Expectation) -> MarkRange:
-        """The mark by the tolerance alone."""
-        table, allowed = self.rubric.tolerance_of(self.criterion), self.allowed(one).value or 0.0
+        """The mark by the tolerance alone; a magnitude without its sense loses only the sense."""
         value, expected = self.value, self.expected(one)
+        if self.criterion.sense is not None:
+            return self._mark(one, math.copysign(expected, value), expected)
+        is_bare = self.criterion.turning is not None and value > 0.0 and not self.sense
+        if not is_bare or (expected >= 0.0 and self.sense is None):
+            return self._mark(one, value, expected)
+        size = self._mark(one, value, abs(expected))
+        bands = self.rubric.tolerance_of(self.criterion).all_bands
+        keeps = min(size.share, bands[0][1] if bands else HALF)
+        return MarkRange(keeps, keeps, keeps, (Reason("sense_missing"), *size.reasons), size.sure)
+
+    def _mark(self, one: Expectation, value: float, expected: float) -> MarkRange:
+        """The mark of a value by its tolerance."""
+        table, allowed = self.rubric.tolerance_of(self.criterion), self.allowed(one).value or 0.0
         residual = abs(value - expected)
         if residual <= allowed:
             return ALL_RIGHT
         params: dict[str, float | str]
         params = {"measured": value, "expected": expected, "unit": unit_of(self.criterion.name)}
         if value * expected < 0.0:
-            reason = Reason("value_reversed", params)
+            reason = Reason("sense_wrong") if self.criterion.sense else Reason("value_reversed", params)
         else:
             params |= {"off": residual, "tolerance": allowed}
             large = abs(value) > abs(expected)

@@ -48,8 +48,8 @@ MISTAKES: dict[str, Words] = {
     "rpm_not_converted": Words(
         N_("rev/min not converted"),
         N_("The drawing fits a crank speed that was not converted from rev/min to rad/s."),
-        N_("Compute ω = π·n/30 first, then the velocity and the acceleration of the crank pin,"
-           " then the scales."),
+        N_("Compute ω = π·n/30 first, divided by the gear's ratio if there is one, then the velocity and the"
+           " acceleration of the crank pin, then the scales."),
     ),
     "scale_wrong": Words(
         N_("wrong scale"),
@@ -211,10 +211,16 @@ _DRIVEN_ALONG: dict[str, Words] = {
            " then redo the plan."),
     ),
 }  # fmt: skip
+_DRIVING = Words(
+    N_("sense reversed"),
+    N_("%(at)s turns the other way."),
+    N_("Take the sense in which the driving link turns from the assignment."),
+)
 _BY_LINE = {ALONG_GUIDE: _ALONG_GUIDE, DRIVEN_ACROSS: _DRIVEN_ACROSS, DRIVEN_ALONG: _DRIVEN_ALONG}
 
 
 PRECISE: dict[str, tuple[str, ...]] = {
+    "rpm_not_converted": (N_("ω was computed as %(formula)s instead of %(instead_of)s."),),
     "parallel_for_perpendicular": (
         N_("The line from %(from)s to %(at)s was drawn along %(link)s instead of perpendicular to it."),
     ),
@@ -300,6 +306,8 @@ def words_of(code: str, at: str = "", line: str = "") -> Words:
         return _CORIOLIS.get(code, usual)
     if code == "units":
         return _UNITS.get(line, usual)
+    if code == "sense_reversed" and at.startswith(("omega", "epsilon")):
+        return _DRIVING
     return _BY_LINE.get(line, {}).get(code, usual)
 
 

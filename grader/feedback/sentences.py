@@ -25,7 +25,7 @@ OPEN_ONLY = frozenset({"near_limit", "hand_may_miss", "doubtful", UNSURE})
 RESIDUALS = frozenset(
     {
         "too_long", "too_short", "turned_left", "turned_right", "reversed", "should_be_zero",
-        "value_too_large", "value_too_small", "value_reversed", "scale_off", "not_drawn",
+        "value_too_large", "value_too_small", "value_reversed", "sense_wrong", "scale_off", "not_drawn",
         "not_certainly_within",
     }
 )  # fmt: skip

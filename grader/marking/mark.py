@@ -10,17 +10,18 @@ import numpy as np
 
 from grader.comparison.criteria import NOT_DRAWN, Comparison, compare
 from grader.comparison.evidence import DrawnVector, Submission, gather
+from grader.comparison.outcomes import settled_as
 from grader.comparison.scales import Scale
-from grader.comparison.task import Task
+from grader.comparison.task import Task, tasks_at_speed
 from grader.comparison.verdicts import FULL, NONE
 from grader.given_data.owner import Owner, owner_of
 from grader.marking.drawn import case_of, explain
 from grader.marking.lettering import exchanged_pair, letters_charged, with_letters_exchanged
-from grader.marking.naming import LEAST_CONFIDENCE, Lost, drawn_instead, named, not_explained
+from grader.marking.naming import LEAST_CONFIDENCE, Lost, drawn_instead, named, not_explained, speed_mistake
 from grader.marking.settling import at_stake, is_of, of_another, of_nothing, settled
 from grader.marking.units import EXCHANGED, Undone, undone, with_scales_exchanged
 from grader.outcomes import CHARGED, CREDITED, Judgement, NamedMistake, Outcome, Score
-from grader.records import Figure, FloatArray, ReadNode, ReadVector
+from grader.records import Figure, FloatArray, ReadNode, ReadVector, Reason
 from grader.rubric import CriterionTable, RubricFile
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.graph import evaluate
@@ -36,7 +37,75 @@ AGREES, BY_CHANCE = 0.95, 0.03
 
 
 def judge(task: Task, submission: Submission) -> Judgement:
-    """Verdicts, mistakes and points of one submission for one variant."""
+    """Verdicts, mistakes and points of one submission for one variant.
+
+    A wrong omega of the crank costs points once where more follows from it than from the right one.
+    """
+    best = judgement = _judged_as_entered(task, submission)
+    slips = _speed_slips(task, submission.values)
+    if not slips:
+        return judgement
+    by = {one.at.partition("_")[0]: one.factor for one in slips}
+    in_rpm = any(one.code == "units" and one.at == "values" for one in judgement.mistakes)
+    entered, charged = compare(task, submission).outcomes, [(one, SLIPPED) for one in slips]
+    for own in tasks_at_speed(task, (by.get("omega", 1.0), by.get("epsilon", 1.0))):
+        meant = _judged_as_entered(own, submission)
+        outcomes = _by_own_speed(task, judgement.outcomes, entered, meant.outcomes, slips[0].at)
+        found = with_slips_charged(task.rubric, replace(meant, outcomes=outcomes), entered, charged)
+        better = _earned(task.rubric, found) - _earned(task.rubric, best)
+        if better > 0.0 or (in_rpm and best is judgement and better == 0.0):
+            best = found
+    if best is not judgement or in_rpm:
+        return best
+    asked = {criterion.angular for criterion in task.rubric.criterion}
+    charged = [one for one in charged if one[0].at in asked]
+    return with_slips_charged(task.rubric, judgement, entered, charged)
+
+
+def _earned(rubric: RubricFile, judgement: Judgement) -> float:
+    """The points likely earned, whatever else was judged: at a wrong scale vectors seem too short."""
+    judged = (one for one in judgement.outcomes if one.verdict != "not_judged")
+    return round(sum(rubric.points[one.criterion] * one.proposed for one in judged), DECIMALS)
+
+
+MOST_SPEED = 1e4
+"""A speed wrong by a larger factor is no speed: nothing is drawn from it."""
+
+
+def _speed_slips(task: Task, values: Mapping[str, float]) -> list[Mistake]:
+    """Return the mistakes in the omega and epsilon of the crank that were entered."""
+    found = []
+    for name in sorted(task.construction.driving, reverse=True):
+        value, right = values.get(name, 0.0), task.rates[name]
+        # A magnitude without its sense has only lost that.
+        size = -value if value > 0.0 > right and not values.get(f"{name}_sense") else value
+        within, factor = task.rubric.tolerance_of(name).scale_relative, size / right if right else 0.0
+        if abs(factor - 1.0) > within and 1.0 / MOST_SPEED < abs(factor) < MOST_SPEED:
+            is_turned = abs(factor + 1.0) <= within
+            slip = Mistake("sense_reversed" if is_turned else "arithmetic", name, factor=factor)
+            is_speed = name.startswith("omega") and not is_turned
+            found.append(speed_mistake(slip, task.gear_ratio) if is_speed else slip)
+    return found
+
+
+def _by_own_speed(
+    task: Task, right: Sequence[Outcome], entered: Sequence[Outcome], own: Sequence[Outcome], of: str
+) -> tuple[Outcome, ...]:
+    """The outcomes by the student's own omega; that itself, as it was entered.
+
+    Arguments: `right` are those by the right omega, `of` is the quantity from which the others follow.
+    """
+    follows, found = (Reason("follows", {"what": "value", "of": of}),), []
+    for criterion, by_right, raw, meant in zip(task.rubric.criterion, right, entered, own, strict=True):
+        is_new = meant.verdict == "full" and raw.verdict != "full"
+        outcome = settled_as(meant, "follow_through", FULL, follows) if is_new else meant
+        outcome = outcome if task.rubric.follows_through(criterion) else by_right
+        found.append(raw if criterion.turning in task.construction.driving else outcome)
+    return tuple(found)
+
+
+def _judged_as_entered(task: Task, submission: Submission) -> Judgement:
+    """The judgement by the given data, slips of units undone."""
     owner = owner_of(task, gather(task, submission), submission.declared)
     comparison = compare(task, submission, partial(explain, owner=owner))
     slips: list[tuple[Mistake, float]] = []
@@ -158,7 +227,7 @@ def _explanations(task: Task, comparison: Comparison, owner: Owner | None) -> tu
     if (by_vector or is_other_scale) and not is_of_two:
         explanation = comparison.explanation or explain(task, comparison.evidence, scales, owner=owner)
         explanations = explanation.explanations
-    return explanations, Lost(by_vector, by_scale)
+    return explanations, Lost(by_vector, by_scale, task.gear_ratio)
 
 
 def _swapped_letters(task: Task, submission: Submission, known: Sequence[NamedMistake]) -> list[NamedMistake]:
@@ -242,7 +311,9 @@ def _slips(task: Task, comparison: Comparison, known: Sequence[NamedMistake]) ->
         slip = NamedMistake(Mistake("arithmetic", at, factor=factor), (one.criterion,), SLIPPED)
         if one.mistake == "arithmetic":
             of_vectors.append(slip)
-        elif rate is not None and rate.vector in sure and is_value_off and abs(factor - 1.0) >= LEAST_SLIP:
+        elif rate is None or rate.drives:
+            continue
+        elif rate.vector in sure and is_value_off and abs(factor - 1.0) >= LEAST_SLIP:
             of_rates.append(slip)
     # Several of them have one cause that is elsewhere.
     return of_vectors + (of_rates if len(of_rates) == 1 else [])
@@ -267,20 +338,21 @@ def with_slips_charged(
     Arguments: `as_entered` are the outcomes of what was entered.
     """
     outcomes, named_slips = list(judgement.outcomes), []
+    asked = {one.angular: index for index, one in enumerate(rubric.criterion)}
     for slip, probability in slips:
         places = (
             index
             for index, (meant, entered) in enumerate(zip(outcomes, as_entered, strict=True))
             if meant.verdict in CREDITED and _shows(slip, entered)
         )
-        index = next(places, None)
+        index = asked.get(slip.at, next(places, None))
         criteria = () if index is None else (outcomes[index].criterion,)
         one = NamedMistake(slip, criteria, probability)
         named_slips.append(one)
         if index is not None:
-            outcomes[index] = replace(
-                settled(as_entered[index], NONE, probability), mistake=one.code, cause=one
-            )
+            lost = as_entered[index]
+            lost = lost if slip.at in asked else settled(lost, NONE, probability)
+            outcomes[index] = replace(lost, mistake=one.code, cause=one)
     return replace(
         judgement,
         outcomes=tuple(outcomes),

@@ -7,6 +7,7 @@ does not distinguish from it is its rival.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from grader.marking.diagnosis import OF_THE_WHOLE, Case, Key, key_of
 from grader.outcomes import NamedMistake
@@ -62,10 +63,11 @@ slight to be named. (Below the first the mistake shows elsewhere.)"""
 
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """The criteria that lost points, or may lose some, by vector, link and scale."""
+    """The criteria that lost points, or may lose some, by vector, link and scale; and the crank's gear."""
 
     vectors: Mapping[str, str]
     scales: Mapping[str, str]
+    gear_ratio: float | None = None
 
 
 def named(
@@ -79,6 +81,7 @@ def named(
     known = all_thought_of if len(best.made) > 1 else 1.0
     slips = sum(one.code == SLIP for one in best.made)
     explains, mistakes = _losses_explained(best, construction, lost), []
+    record = partial(_record, construction, lost.gear_ratio)
     for mistake in _in_order(best.made, construction):
         key, share = key_of(mistake), shares.of(key_of(mistake))
         rivals = shares.rivals(key, {key_of(one) for one in best.made})
@@ -86,10 +89,8 @@ def named(
         is_sure = share >= LEAST_CONFIDENCE or (together >= SURE_TOGETHER and rivals)
         is_shown = explains[mistake] and (mistake.code != SLIP or slips <= MOST_SLIPS)
         if is_shown and is_sure and not _is_slight(mistake, best):
-            others = tuple(
-                _record(one, construction, (), known * shares.instead(key, key_of(one))) for one in rivals
-            )
-            mistakes.append(_record(mistake, construction, tuple(explains[mistake]), known * share, others))
+            others = tuple(record(one, (), known * shares.instead(key, key_of(one))) for one in rivals)
+            mistakes.append(record(mistake, tuple(explains[mistake]), known * share, others))
     return tuple(mistakes)
 
 
@@ -218,22 +219,35 @@ def _touches(mistake: Mistake, scale: str, ends: set[str], reach: frozenset[str]
     return bool(ends & reach)
 
 
-SPEED_FACTORS = (RPM_FACTOR, 60.0, 0.5 / math.pi)
-"""omega = n; 2 pi n, the minute's seconds forgotten; n / 60, the full turn's 2 pi forgotten."""
+SPEED_SLIPS: Mapping[str, tuple[str, float]] = {
+    "not_converted": ("n", RPM_FACTOR),
+    "seconds_forgotten": ("2π·n", 60.0),
+    "turn_forgotten": ("n/60", 0.5 / math.pi),
+    "half_turn": ("π·n/60", 0.5),
+    "sixty_forgotten": ("π·n", 30.0),
+    "turn_twice": ("2π·n/30", 2.0),
+    "pi_forgotten": ("n/30", 1.0 / math.pi),
+    "degrees": ("6·n", 180.0 / math.pi),
+}
+"""Wrong formulas for omega, with n in rev/min, and the factors by which it is wrong."""
+SHOWN_BY_SCALES = ("", "not_converted", "seconds_forgotten", "turn_forgotten")
+"""A scale that is half or twice the right one has other causes than omega."""
+RIGHT_SPEED = "π·n/30"
 RPM_WITHIN = 0.03
 """Relative: a scale wrong by such a factor (squared for accelerations) this nearly was computed from it."""
 LINE_MISTAKES = frozenset({"parallel_for_perpendicular", "wrong_link", "wrong_intersection"})
 
 
 def _record(
-    mistake: Mistake,
     construction: Construction,
+    ratio: float | None,
+    mistake: Mistake,
     explains: tuple[str, ...],
     confidence: float,
     rivals: tuple[NamedMistake, ...] = (),
 ) -> NamedMistake:
     if mistake.code == "scale_wrong":
-        mistake = replace(mistake, code=_code_of_scale(mistake.at, mistake.factor))
+        mistake = speed_mistake(mistake, ratio)
     is_line = mistake.code in LINE_MISTAKES
     line = _line_of(construction.step(mistake.at), mistake.slot) if is_line else {}
     return NamedMistake(mistake, explains, min(confidence, 1.0), line, rivals)
@@ -256,9 +270,24 @@ def _line_of(step: Step, slot: int) -> dict[str, str]:
     return params
 
 
-def _code_of_scale(name: str, factor: float) -> str:
-    power = {"kv": 1, "ka": 2}.get(name)
-    if power is None:
-        return "scale_wrong"
-    is_speed = any(abs(factor / one**power - 1.0) <= RPM_WITHIN for one in SPEED_FACTORS)
-    return "rpm_not_converted" if is_speed else "scale_wrong"
+def speed_mistake(mistake: Mistake, ratio: float | None) -> Mistake:
+    """Return a wrong omega, or a scale from it, as a mistake in the conversion of rev/min if it is one.
+
+    Arguments: `ratio` of the gear, that may be forgotten or multiplied by.
+    """
+    of_scale, power = mistake.at in SCALE_NAMES, 2 if mistake.at == "ka" else 1
+    gears = {"": (" / U" if ratio else "", 1.0)}
+    gears |= {"ratio_forgotten": ("", ratio), "ratio_multiplied": (" · U", ratio**2)} if ratio else {}
+    formulas = {"": (RIGHT_SPEED, 1.0), **SPEED_SLIPS}
+    residual = {
+        (slip, gear): abs(math.log(abs(mistake.factor)) - power * math.log(by * more))
+        for slip, (_, by) in formulas.items()
+        for gear, (_, more) in gears.items()
+        if (slip or gear) and not (of_scale and (slip not in SHOWN_BY_SCALES or (slip and gear)))
+    }
+    fitting = [(all(names), off, names) for names, off in residual.items() if off <= RPM_WITHIN]
+    if not fitting or mistake.at == "kL":
+        return mistake
+    slip, gear = min(fitting)[-1]
+    formula, instead_of = formulas[slip][0] + gears[gear][0], RIGHT_SPEED + gears[""][0]
+    return replace(mistake, code="rpm_not_converted", other=(f"{slip} {gear}".strip(), formula, instead_of))

@@ -65,6 +65,7 @@ VALUE = {
     "rate": N_("Look at the vector and the length that you divided, and at their units."),
     "": N_("Look at the drawn length, and at the scale that you multiplied it by."),
 }
+SENSE_OF_LINK = {"": N_("Look at your sketch: which way does the relative vector turn the link?")}
 ADVICE: dict[str, Mapping[str, str]] = {
     "too_long": SIZE,
     "too_short": SIZE,
@@ -73,7 +74,9 @@ ADVICE: dict[str, Mapping[str, str]] = {
     "reversed": SENSE,
     "value_too_large": VALUE,
     "value_too_small": VALUE,
-    "value_reversed": {"": N_("Look at your sketch: which way does the relative vector turn the link?")},
+    "value_reversed": SENSE_OF_LINK,
+    "sense_wrong": SENSE_OF_LINK,
+    "sense_missing": SENSE_OF_LINK,
     "should_be_zero": {"": N_("Look at which points stand still for an instant here.")},
     "not_measured": {"": N_("Measure what is missing, and enter it.")},
     "too_short_to_judge": {"": N_("Measure what is missing, and enter it.")},
@@ -108,7 +111,9 @@ LAWS: dict[str, str] = {
         "The direction of a relative vector is set by the link that joins the two points in its name."
     ),
     "sense_reversed": N_("A link turns with its ends: each end moves the way in which the link turns."),
-    "rpm_not_converted": N_("ω = π·n/30 with n in rev/min gives ω in rad/s."),
+    "rpm_not_converted": N_(
+        "ω = π·n/30 with n in rev/min gives ω in rad/s; behind a gear, n is divided by its ratio."
+    ),
     "scale_wrong": N_(
         "A scale is the real value divided by the drawn length, one and the same for the whole plan."
     ),

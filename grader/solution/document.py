@@ -158,13 +158,15 @@ def _columns(plan: Plan) -> _Columns:
         # Adding zero turns minus zero into zero.
         return {name: (np.broadcast_to(array, (count,)) + 0.0).tolist() for name, array in arrays.items()}
 
-    vectors = plan.construction.vectors
+    vectors, driver = plan.construction.vectors, plan.mechanism.driver
+    is_derived = isinstance(driver, Crank) and driver.rpm is not None
+    told: frozenset[str] = frozenset() if is_derived else plan.construction.driving
     numbers = {
         "value": lists({name: np.abs(plan.vectors_si[name]) for name in vectors}),
         "drawn_mm": lists({name: np.abs(plan.drawn_mm(name)) for name in vectors}),
         "direction_deg": lists({name: plan.direction_deg(name) for name in vectors}),
         "scale": lists({name: getattr(plan.scales, name) for name in SCALE_NAMES}),
-        "rate": lists(plan.rates),
+        "rate": lists({name: rate for name, rate in plan.rates.items() if name not in told}),
         "conditioning": lists(conditioning(plan)),
     }
     points = {"mechanism": lists(plan.motion.position), "centres": lists(_centres(plan))}

@@ -190,7 +190,7 @@ def _read_off(speaker: Speaker, step: Step) -> Iterator[Markup]:
         if (vector.tail, vector.head) != laid_off:
             yield _measured(speaker, vector)
         for rate in construction.rates.values():
-            if rate.vector == vector.name:
+            if rate.vector == vector.name and not rate.drives:
                 yield _turning(speaker, rate.name, vector)
 
 

@@ -2,9 +2,9 @@
 
 CSV for a class: ``student_id,n,position,kL,kv,ka``, then vector names (drawn millimetres),
 ``NAME_deg`` (directions counter-clockwise from the assignment's +x) and ``NAME_value`` (SI; angular
-quantities counter-clockwise positive). Semicolon-separated files have decimal commas; blank means
-not measured; a line that begins with ``#`` is a comment. JSON for one student:
-`grader.documents.MeasurementsDocument`.
+quantities counter-clockwise positive, or with a sense: ``2.09 cw``, or cw in ``NAME_sense``).
+Semicolon-separated files have decimal commas; blank means not measured; a line that begins with ``#``
+is a comment. JSON for one student: `grader.documents.MeasurementsDocument`.
 
 A fault of the whole file (no student_id, no CSV at all) raises TableError with all of them. A value
 that is refused costs that value alone, and so does a column that is not known: it is a problem of that
@@ -43,6 +43,7 @@ from grader.tables.reader import (
     real_number,
     refused_id,
     short,
+    turned,
     why_no_id,
 )
 from grader.tables.scale_text import MAX_LENGTH as LONGEST_SCALE
@@ -116,7 +117,8 @@ class Measurements:
                     entered[name] = vector.length_mm
                 if vector.direction_deg is not None:
                     entered[f"{name}_deg"] = vector.direction_deg
-        return entered | {f"{name}_value": value for name, value in self.values.items()}
+        ends = {name: "" if name.endswith("_sense") else "_value" for name in self.values}
+        return entered | {f"{name}{ends[name]}": value for name, value in self.values.items()}
 
 
 NOTHING_MEASURED = Measurements(None, None, None, {}, Reading({}), {}, "")
@@ -167,7 +169,7 @@ class Names:
     @property
     def values(self) -> tuple[str, ...]:
         """Names of the quantities with a computed value."""
-        return (*self.vectors, *self.rates)
+        return (*self.vectors, *self.rates, *(f"{name}_sense" for name in self.rates))
 
 
 def names_of(assignment: Assignment) -> Names:
@@ -198,6 +200,8 @@ def columns_of(rubric: RubricFile) -> dict[str, str]:
             columns[criterion.name] = unit_of(criterion.value)
         elif criterion.angular:
             columns[value_name(criterion.angular)] = unit_of(criterion.angular)
+        elif criterion.sense:
+            columns[criterion.name] = "cw/ccw"
     return columns
 
 
@@ -258,8 +262,10 @@ def students_in(path: Path) -> tuple[str, ...]:
 
 def _columns(names: Names) -> Mapping[str, tuple[str, str]]:
     """The columns of a CSV file that hold numbers: the table of each, and the name in it."""
-    known = {"segments_mm": names.vectors, "directions_deg": names.vectors, "values": names.values}
-    return {f"{name}{end}": (table, name) for table, end in TABLES.items() for name in known[table]}
+    vectors = tuple(names.vectors)
+    known = {"segments_mm": vectors, "directions_deg": vectors, "values": (*vectors, *names.rates)}
+    columns = {f"{name}{end}": (table, name) for table, end in TABLES.items() for name in known[table]}
+    return columns | {f"{name}_sense": ("values", name) for name in names.rates}
 
 
 def _faults_of(header: Sequence[str], columns: Mapping[str, object]) -> Iterator[Reason]:
@@ -308,6 +314,19 @@ class _Entries:
             self.unread.append(_entry(name, column, f"'{text}'"))
         else:
             self.tables[table][name] = found
+
+    def turning(self, path: str, name: str, cells: tuple[str, str], delimiter: str, *, asks: bool) -> None:
+        """Enter an angular quantity and its sense, told in the same cell, beside it, or by the sign.
+
+        Arguments: `asks` that there is a column for the sense, which may be blank.
+        """
+        text = " ".join(cells).strip()
+        found = turned(text, delimiter)
+        value, sense = found if isinstance(found, tuple) else (found, 0.0)
+        if value is not None:
+            self.number(path, f"{name}_value", short(text), value)
+        if sense or (asks and text):
+            self.tables["values"][f"{name}_sense"] = sense
 
     def unknown(self, column: str, text: str, meant: tuple[str, ...]) -> None:
         """Tell that a column is not known; what it may be meant for is not judged without it."""
@@ -373,8 +392,12 @@ def _line(row: Row, meant: Mapping[str, tuple[str, ...]], entries: _Entries, *, 
     n, position = row.whole("n"), row.whole("position")
     # Without its student, n and position nobody knows what it is held against.
     is_usable = not row.faults
+    for name in entries.names.rates:
+        cells = row[f"{name}_value"], row[f"{name}_sense"]
+        if any(cells):
+            entries.turning(f"{name}_value", name, cells, row.delimiter, asks=f"{name}_sense" in row.text)
     for column, text in row.text.items():
-        if text and column in entries.columns:
+        if text and column in entries.columns and entries.columns[column][1] not in entries.names.rates:
             entries.number(column, column, short(text), real_number(text, row.delimiter))
         elif text and column in meant:
             entries.unknown(column, short(text), meant[column])
@@ -433,7 +456,7 @@ def combined(sets: Sequence[Measurements]) -> Measurements:
     return replace(
         first,
         reading=replace(reading_of(plans, agreed, directions), unread=tuple(unread)),
-        values={_name_of(column): value for column, value in agreed.items() if column.endswith("_value")},
+        values={_name_of(name): one for name, one in agreed.items() if name.endswith(("_value", "_sense"))},
         problems=(*(problem for each in sets for problem in each.problems), *problems),
         further_scales=tuple(each.scales for each in others),
     )
@@ -523,7 +546,14 @@ def _is_number(value: object) -> TypeGuard[int | float]:
 def _enter(given: Mapping[str, object], table: str, end: str, entries: _Entries) -> None:
     """Enter the numbers of a table."""
     known = entries.names.values if table == "values" else tuple(entries.names.vectors)
+    pairs = {name: [given.get(name), given.get(f"{name}_sense")] for name in entries.names.rates}
+    told = {name: cells for name, cells in pairs.items() if table == "values" and str in map(type, cells)}
+    for name, cells in told.items():
+        first, second = (str(one) if isinstance(one, str) or _is_number(one) else "" for one in cells)
+        entries.turning(f"$.values.{name}", name, (first, second), ";", asks=f"{name}_sense" in given)
     for name, value in given.items():
+        if name.removesuffix("_sense") in told:
+            continue
         path, shown = f"$.{table}.{name[:40]}", _shown(value)
         if name not in known:
             meant = near(name, known, most=2) if len(entries.row.faults) < MOST_FINDINGS else {}

@@ -7,6 +7,7 @@ decimal commas. UTF-8, or UTF-16 with its mark. A fault is a `Reason` with the c
 
 import csv
 import io
+import math
 import re
 import stat
 from collections import Counter
@@ -251,6 +252,32 @@ def real_number(text: str, delimiter: str) -> float | Reason:
     return Reason(
         "no_decimal_point" if "," in text and delimiter == "," else "no_number", {"text": short(text)}
     )
+
+
+_SENSE = re.compile(
+    r"(?:[îi]n\s+)?(?:\bsens(?:ul)?\s+)?(?:(?P<ccw>\bccw\b|\b(?:counter|anti)[-\s]?clockwise\b|↺|⟲|⥀"
+    r"|\b(?:anti-?orar|trigonometric)\b|\bпротив\s+(?:хода\s+)?(?:час\w*(?:\s+стрел\w*)?|ч\.\s?с\.))"
+    r"|\bcw\b|\bclockwise\b|↻|⟳|⥁|\borar\b|\bпо\s+(?:ходу\s+)?(?:час\w*(?:\s+стрел\w*)?|ч\.\s?с\.))",
+    re.IGNORECASE,
+)
+"""A sense of rotation in words of the three languages, or as an arrow."""
+
+
+def turned(text: str, delimiter: str) -> tuple[float | None, float] | Reason:
+    """An angular quantity, counter-clockwise positive, and the sense told with it in words: 1, -1, or 0.
+
+    None for a sense alone. A sign is a sense as well: one that contradicts the words is a fault.
+    """
+    senses = {1.0 if found["ccw"] else -1.0 for found in _SENSE.finditer(text)}
+    plain = _SENSE.sub(" ", text).strip()
+    value = real_number(plain, delimiter) if plain else None
+    if isinstance(value, Reason):
+        return Reason(value.code, {"text": short(text)})
+    signs = {math.copysign(1.0, value)} if value and plain[0] in "+-\N{MINUS SIGN}" else set[float]()
+    if len(senses | signs) > 1:
+        return Reason("two_senses", {"text": short(text)})
+    told = next(iter(senses), 1.0 if plain.startswith("+") else 0.0)
+    return (abs(value) * told if value and told else value), told
 
 
 def why_no_id(text: str) -> Reason | None:

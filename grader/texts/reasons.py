@@ -26,6 +26,8 @@ HINTS: dict[str, str] = {
     "value_too_large": N_("The value is too large."),
     "value_too_small": N_("The value is too small."),
     "value_reversed": N_("The sign is wrong: counter-clockwise is positive."),
+    "sense_wrong": N_("It turns the other way."),
+    "sense_missing": N_("The sense is missing: write it as cw or ccw, or as a sign."),
     "not_measured": N_("Nothing was handed in for it."),
     "optional": N_("It was not handed in, and is not required."),
     "unread": N_("It could not be read on the sheet."),

@@ -87,7 +87,7 @@ def spoken(
     for key, value in parameters.items():
         stem, _, suffix = key.rpartition("_")
         if isinstance(value, str):
-            said[key] = value if key == "text" else place(value, speaker, names)  # as it was written
+            said[key] = value if key in {"text", "cell"} else place(value, speaker, names)  # as written
         elif key == "students":
             said[key] = _some(cast("Sequence[str]", value), speaker)
         elif not isinstance(value, int | float):

@@ -54,7 +54,7 @@ def form_of(assignment: Assignment, lang: str) -> dict[str, Any]:
         group = (
             "scales" if name in SCALE_UNITS
             else "directions" if column.endswith("_deg")
-            else "values" if column.endswith("_value") else "lengths"
+            else "values" if column.endswith(("_value", "_sense")) else "lengths"
         )  # fmt: skip
         shown = names.get(name, name)
         fields.append({"column": column, "name": shown, "group": group, "unit": speaker.unit(unit)})

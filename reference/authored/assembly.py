@@ -177,15 +177,19 @@ def _driver(file: MechanismFile, numbers: Numbers) -> Driver:
     if isinstance(table, CrankTable) and table.cylinder is not None:
         return _by_cylinder(table, table.cylinder, file, numbers)
     if isinstance(table, CrankTable):
+        rpm = None if table.rpm is None else numbers.number(table.rpm)
+        ratio = None if table.gear_ratio is None else numbers.number(table.gear_ratio)
         return Crank(
             link=table.link,
             pivot=table.pivot,
             pin=table.pin,
             length_m=numbers.length(table.length, "crank"),
             angle_rad=numbers.angle(cast("Formula", table.angle_deg)),
-            omega=_omega(table, numbers),
+            omega=_omega(table, numbers, rpm, ratio),
             epsilon=zero if table.epsilon is None else numbers.number(table.epsilon),
             accelerated=table.epsilon is not None,
+            rpm=rpm,
+            gear_ratio=ratio,
         )
     guide = cast("FixedGuide", _guide(table.guide, numbers, _LinkAxes()))
     return DrivenSlider(
@@ -224,17 +228,15 @@ def _by_cylinder(crank: CrankTable, cylinder: CylinderTable, file: MechanismFile
     return Crank(crank.link, crank.pivot, crank.pin, arm, np.angle(r), omega, epsilon, accelerated=True)
 
 
-def _omega(crank: CrankTable, numbers: Numbers) -> FloatArray:
+def _omega(
+    crank: CrankTable, numbers: Numbers, rpm: FloatArray | None, ratio: FloatArray | None
+) -> FloatArray:
     """The crank's angular velocity, rad/s, directly or from rev/min through a gear."""
-    if crank.omega is not None:
-        return numbers.number(crank.omega)
-    rpm = numbers.number(cast("Formula", crank.rpm))  # the table has one of the two
-    if crank.gear_ratio is not None:
-        ratio = numbers.number(crank.gear_ratio)
-        if np.any(ratio == 0.0):
-            raise FormulaError(f"'{crank.gear_ratio.text}' (gear_ratio) must not be zero")
-        rpm = rpm / ratio
-    return np.asarray(np.pi * rpm / 30.0)
+    if rpm is None:
+        return numbers.number(cast("Formula", crank.omega))  # the table has one of the two
+    if ratio is not None and np.any(ratio == 0.0):
+        raise FormulaError(f"'{cast('Formula', crank.gear_ratio).text}' (gear_ratio) must not be zero")
+    return np.asarray(np.pi * (rpm if ratio is None else rpm / ratio) / 30.0)
 
 
 def _guide(guide: GuideTable, numbers: Numbers, bodies: _LinkAxes) -> Guide:

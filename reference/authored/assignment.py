@@ -178,6 +178,10 @@ class Assignment:
     """Rows of the table of variants, if there is one."""
     signs: Mapping[str, Mapping[Variant, float]] = field(default_factory=dict)
     """-1 for each group and variant that has passed a flat position on its way from the first position."""
+    speed: tuple[float, float] = (1.0, 1.0)
+    """A student's own omega and epsilon of the crank, as factors of the given ones."""
+    is_at_given_scales: bool = False
+    """True if the rule for the scales takes the given omega nevertheless."""
 
     @property
     def id(self) -> str:
@@ -260,7 +264,7 @@ class Assignment:
         """
         mechanism = build_mechanism(self.mechanism_file, self.values(variants), len(variants))
         return with_signs(
-            mechanism,
+            replace(mechanism, driver=self._at_speed(mechanism.driver)),
             {node: np.array([sign[variant] for variant in variants]) for node, sign in self.signs.items()},
         )
 
@@ -278,7 +282,8 @@ class Assignment:
         A declared kL, or the drawn crank, replaces the proposed length of the crank.
         """
         known = self.values(variants)
-        known |= _speeds(build_driver(self.mechanism_file, known, len(variants)))
+        driver = build_driver(self.mechanism_file, known, len(variants))
+        known |= _speeds(driver if self.is_at_given_scales else self._at_speed(driver))
         rule = self.file.scales
         if crank_mm is not None:
             known["crank_mm"] = np.asarray(crank_mm, float)
@@ -292,6 +297,12 @@ class Assignment:
                 known["crank_mm"] = np.asarray(known["crank_m"]) / known[name]
         shape = (len(variants),)
         return Scales(*(np.broadcast_to(known[name], shape) for name in SCALE_NAMES))
+
+    def _at_speed(self, driver: Driver) -> Driver:
+        if not isinstance(driver, Crank):
+            return driver
+        omega, epsilon = self.speed
+        return replace(driver, omega=driver.omega * omega, epsilon=driver.epsilon * epsilon)
 
 
 def _speeds(driver: Driver) -> dict[str, Value]:

@@ -237,10 +237,10 @@ def absolute(draft: Draft, node: str) -> None:
     draft.vector(f"a_{node}", ACCELERATION_POLE, draft.image(node, primed=True))
 
 
-def rates_of(draft: Draft, link: str, about: str, joints: tuple[str, str]) -> None:
+def rates_of(draft: Draft, link: str, about: str, joints: tuple[str, str], *, drives: bool = False) -> None:
     """Add omega and epsilon of a link, from the first vector that turns it."""
     for name, vector in ((f"omega_{link}", f"v_{about}"), (f"epsilon_{link}", f"a_{about}_t")):
-        draft.rates.setdefault(name, AngularRate(name, vector, joints, pair(*joints)))
+        draft.rates.setdefault(name, AngularRate(name, vector, joints, pair(*joints), drives))
 
 
 # The whole construction ---------------------------------------------------------------------------
@@ -368,6 +368,7 @@ def _draw_crank(draft: Draft, crank: Crank) -> None:
     else:
         draft.acceleration.append(Given(a_primed, ACCELERATION_POLE, normal, inward))
     draft.vector(f"a_{pin}", ACCELERATION_POLE, a_primed)
+    rates_of(draft, crank.link, pin, (pivot, pin), drives=True)
 
 
 def _draw_group(draft: Draft, group: Group) -> None:

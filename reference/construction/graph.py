@@ -154,12 +154,16 @@ class Vector:
 
 @dataclass(frozen=True, slots=True)
 class AngularRate:
-    """omega_k or epsilon_k from the vector that turns a link: (link x vector) / |link|^2."""
+    """omega_k or epsilon_k from the vector that turns a link: (link x vector) / |link|^2.
+
+    The driving link's own `drives`: there the vector follows from it.
+    """
 
     name: str
     vector: str
     link: tuple[str, str]
     length: str
+    drives: bool = False
 
 
 @dataclass(frozen=True)
@@ -222,6 +226,11 @@ class Construction:
     def vectors_of(self, figure: str) -> tuple[Vector, ...]:
         """Return the vectors of one plan."""
         return tuple(v for v in self.vectors.values() if self._by_node[v.head][0] == figure)
+
+    @property
+    def driving(self) -> frozenset[str]:
+        """The names of the driving link's angular velocity and acceleration."""
+        return frozenset(name for name, rate in self.rates.items() if rate.drives)
 
     @property
     def links(self) -> Mapping[str, tuple[str, str]]:

@@ -324,3 +324,12 @@ def test_a_text_that_is_missing_in_one_language_is_told_with_its_path(tmp_path, 
 @pytest.mark.parametrize("name", built_in())
 def test_the_built_in_assignments_are_in_three_languages(name):
     assert not findings_of(name, "not_translated")
+
+
+def test_given_data_that_are_asked_for_are_told(tmp_path):
+    given = 'label = "n"\nvalue = 1350\nunit = "rev/min"'
+    told_omega = 'label = "ω1"\nvalue = 6.016\nunit = "rad/s"'
+    (told,) = findings_of(edited(tmp_path, "press", "assignment", given, told_omega), "result_told")
+    assert (told.severity, told.path) == ("warning", "$.given[1]")
+    assert told.message.startswith("omega_1")
+    assert not [name for name in built_in() if findings_of(name, "result_told")]

@@ -657,8 +657,8 @@ def test_an_angular_velocity_follows_from_the_own_vector():
     reading = measured(PUMP, mistakes=(WRONG_B,))
     own = reading.figures["velocity_plan"].vectors["v_BA"].length_mm
     per_mm = rule_scales(PUMP)["kv"] / 0.4
-    for sign, verdict in ((1.0, "follow_through"), (-1.0, "none")):
-        # The wrong line reverses v_BA here or not: its own sense counts.
+    for sign, verdict in ((1.0, "follow_through"), (-1.0, "partial")):
+        # The wrong line reverses v_BA here or not: its own sense counts. A number without a sign has none.
         right = PUMP.rates["omega_3"]
         values = {"omega_3": sign * own * per_mm * own_sense(reading) * (1 if right > 0 else -1)}
         outcome = outcome_of(compare(PUMP, Submission(measured=reading, values=values)), "omega_3")
@@ -893,3 +893,59 @@ def test_pivots_alone_tell_the_turn_where_the_mechanism_is_a_wrong_one():
     reading = sheet(PUMP, turn_deg=20.0, mistakes=(Mistake("other_assembly", "B"),))
     comparison = compare(PUMP, Submission(readings=(reading,)))
     assert outcome_of(comparison, "v_A").verdict == "full"
+
+
+# Senses of angular quantities ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("values", "share", "why"),
+    [
+        ({"omega_2": 1.0}, 0.5, "sense_missing"),
+        ({"omega_2": -1.0}, 1.0, "right"),
+        ({"omega_2": -1.0, "omega_2_sense": -1.0}, 1.0, "right"),
+        ({"omega_2": 1.0, "omega_2_sense": 1.0}, 0.0, "value_reversed"),
+        ({"omega_2": 1.5}, 0.0, "sense_missing"),
+        ({"omega_2": 1.03}, 0.5, "sense_missing"),
+    ],
+)
+def test_a_magnitude_without_its_sense_loses_only_the_sense(values, share, why):
+    assert PRESS.rates["omega_2"] < 0.0
+    size = abs(PRESS.rates["omega_2"])
+    values = {name: value if name.endswith("_sense") else value * size for name, value in values.items()}
+    outcome = outcome_of(compare(PRESS, Submission(values=values)), "omega_2")
+    assert (outcome.shares, outcome.reasons[0].code) == ((share, share), why)
+
+
+def test_a_sense_that_was_asked_for_and_left_blank_is_missing_whatever_the_sign():
+    right = PRESS.rates["omega_1"]
+    for sense, verdict in ((None, "full"), (0.0, "partial"), (1.0, "full")):
+        values = {"omega_1": right} | ({} if sense is None else {"omega_1_sense": sense})
+        assert outcome_of(compare(PRESS, Submission(values=values)), "omega_1").verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("values", "verdict"),
+    [
+        ({"omega_2_sense": -1.0}, "full"),
+        ({"omega_2_sense": 1.0}, "none"),
+        ({"omega_2": -9.0}, "full"),
+        ({"omega_2": 9.0}, "none"),
+        ({}, "none"),
+    ],
+)
+def test_a_criterion_may_ask_for_the_sense_alone(values, verdict):
+    asked = {"angular": None, "sense": "omega_2", "optional": False}
+    task = with_criterion(PRESS, "omega_2", **asked)
+    outcome = outcome_of(compare(task, Submission(values=values)), "omega_2")
+    assert (outcome.name, outcome.verdict) == ("omega_2_sense", verdict)
+
+
+def test_a_sense_follows_from_the_own_vector():
+    task = with_criterion(PUMP, "omega_3", angular=None, sense="omega_3")
+    reading = measured(task, mistakes=(WRONG_B,))
+    sense = own_sense(reading) * math.copysign(1.0, PUMP.rates["omega_3"])
+    outcome = outcome_of(
+        compare(task, Submission(measured=reading, values={"omega_3_sense": sense})), "omega_3"
+    )
+    assert outcome.verdict == ("full" if own_sense(reading) > 0.0 else "follow_through")

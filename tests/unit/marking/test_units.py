@@ -124,5 +124,8 @@ def test_values_in_centimetres_per_second_and_revolutions_are_told_as_such():
     (named,) = slips_of(judge(PUMP, Submission(measured=measured(PUMP), values=values)))
     assert named.detail == {"slip": "values", "unit": "cm/s", "factor": 100.0}
     rates = {name: RPM_FACTOR * rate for name, rate in PUMP.rates.items() if name.startswith("omega")}
+    (named,) = judge(PUMP, Submission(measured=measured(PUMP), values=rates)).mistakes
+    assert (named.code, named.at) == ("rpm_not_converted", "omega_1")
+    del rates["omega_1"]
     (named,) = slips_of(judge(PUMP, Submission(measured=measured(PUMP), values=rates)))
     assert named.detail["unit"] == "rev/min"

@@ -191,7 +191,8 @@ def test_a_student_reads_the_task_in_the_language_on_the_roster():
     assignment = load_assignment("press")
     text = text_of(make_sheets(assignment, rows_for(assignment, lang="ru"), "en").pdf)
     assert "Постройте механизм" in text
-    assert "6,01582" in text
+    assert "23,5" in text
+    assert "6,01" not in text
 
 
 def test_names_that_the_assignment_changes_are_printed_so():

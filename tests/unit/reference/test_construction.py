@@ -175,7 +175,7 @@ def test_the_pump_has_the_names_that_students_use():
             " a_CB_t a_D a_DC_n a_DC_t"
         ).split()
     )
-    assert list(construction.rates) == "omega_2 omega_3 omega_4 epsilon_2 epsilon_3 epsilon_4".split()
+    assert list(construction.rates) == "omega_1 omega_2 omega_3 omega_4 epsilon_2 epsilon_3 epsilon_4".split()
     assert {step.node for step in construction.figures["acceleration_plan"]} == set(
         "o' a' b' c' d' n_BA n_B n_CA n_CB n_DC".split()
     )

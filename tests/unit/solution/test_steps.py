@@ -75,6 +75,8 @@ def test_every_vector_and_every_rate_is_told_with_its_value(case, folder):
             told = abs(values[0]) if lines[0].startswith(f"{symbol} =") else abs(plan.drawn_mm(name)[0])
             assert value == pytest.approx(told, rel=1e-4, abs=ROUNDED)
     for name, values in plan.rates.items():
+        if name in plan.construction.driving:
+            continue
         line = next(line for line in text.split("\n") if line.startswith(f"{letters(subject, name)} ="))
         value = float(re.findall(r"= ([\d.]+)\srad", line)[0])
         assert value == pytest.approx(abs(values[0]), rel=1e-4, abs=1e-9)

@@ -389,3 +389,53 @@ def test_a_file_that_cannot_be_used_still_names_its_students(tmp_path, name, con
 
 def test_a_file_that_is_not_there_names_nobody(tmp_path):
     assert students_in(tmp_path / "none.csv") == ()
+
+
+# Senses -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("cell", "value", "sense"),
+    [
+        ("2.09 cw", -2.09, -1.0),
+        ("2.09 CCW", 2.09, 1.0),
+        ('"2,09 по часовой стрелке"', -2.09, -1.0),
+        ('"2,09 против ч. с."', 2.09, 1.0),
+        ("2.09 sens orar", -2.09, -1.0),
+        ("2.09 în sens trigonometric", 2.09, 1.0),
+        ("2.09 counter-clockwise", 2.09, 1.0),
+        ("2.09 ↻", -2.09, -1.0),
+        ("↺ 2.09", 2.09, 1.0),
+        ("-2.09 cw", -2.09, -1.0),
+        ("+2.09", 2.09, 1.0),
+        ("2.09", 2.09, None),
+        ("-2.09", -2.09, None),
+    ],
+)
+def test_an_angular_quantity_is_a_magnitude_with_its_sense_or_a_signed_value(entered, cell, value, sense):
+    mark = ";" if "," in cell else ","
+    (one,) = entered(f"student_id{mark}omega_2_value\ns01{mark}{cell}\n")
+    assert one.values == {"omega_2": value} | ({} if sense is None else {"omega_2_sense": sense})
+    assert one.problems == ()
+    (other,) = entered(json.dumps({"student_id": "s01", "values": {"omega_2": cell.strip('"')}}), "s01.json")
+    assert other.values == one.values
+
+
+def test_a_sense_may_stand_in_a_column_of_its_own(entered):
+    header = "student_id,omega_2_value,omega_2_sense,omega_3_sense\n"
+    first, second, third = entered(header + "s01,2.09,cw,\ns02,2.09,,ccw\ns03,-2.09,,\n")
+    assert first.values == {"omega_2": -2.09, "omega_2_sense": -1.0}
+    assert second.values == {"omega_2": 2.09, "omega_2_sense": 0.0, "omega_3_sense": 1.0}
+    assert third.values == {"omega_2": -2.09, "omega_2_sense": 0.0}
+    values = {"omega_2": 2.09, "omega_2_sense": "по часовой"}
+    (one,) = entered(json.dumps({"student_id": "s01", "values": values}), "s01.json")
+    assert one.values == first.values
+    assert combined([one, first]).values == first.values
+
+
+@pytest.mark.parametrize("cells", ["2.09 cw,ccw", "-2.09,ccw", "2.09 cw ccw,", "2.09 orarx,", "2.09,left"])
+def test_senses_that_contradict_each_other_or_are_none_are_refused(entered, cells):
+    (one,) = entered(f"student_id,omega_2_value,omega_2_sense\ns01,{cells}\n")
+    assert "omega_2" not in one.values
+    assert [gap.name for gap in one.reading.unread] == ["omega_2"]
+    assert "omega_2_value" in told(one)
