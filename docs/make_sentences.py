@@ -72,6 +72,7 @@ EXAMPLES: Mapping[str, str] = {
     "pages": "12", "left": "3", "known": "moodle, canvas", "endings": ".jpg, .pdf", "field": "key_set_url",
     "where": "message_type", "fault": "Field required",
     "error": "line 3", "fields": "5", "column": "v_BB", "columns": "4", "mark": ",", "point": "O1",
+    "title": "Pump mechanism, n = 30",
     "mechanism": "crank-rocker", "level": "all", "what": "n", "last": "30", "value": "31", "called": "7",
     "unfit": "14", "unit": "cm", "axis": "+y",
     "filed": "8", "areas": "lower left", "corners": "the lower left corner", "files": "38", "limit": "150",

@@ -141,7 +141,7 @@ class PlanOptions(VariantOptions):
     as_json: bool = option("Print the plan as JSON.", "--json", default=False)
     svg: Path | None = option("Draw the plan into this SVG file.")
     pdf: Path | None = option("Draw the plan into this PDF file; with --all the tables too.")
-    steps: Path | None = option("Write the construction step by step, in words and pictures: .html or .pdf.")
+    steps: Path | None = option("Write the construction step by step: .html, .pdf or .txt; - prints it.")
     altitude: bool = option(
         "Draw normal components by right triangles on the mechanism too.", "--altitude", default=False
     )

@@ -230,11 +230,17 @@ def handout(
     variant: VariantOptions,
     roster: RosterOption = None,
     lang: LanguageOption = "en",
+    example: Annotated[
+        int | None,
+        typer.Option(
+            "--example", help="Work out this n (position, if there is no n) of nobody's at the end."
+        ),
+    ] = None,
 ) -> None:
     """Make A4 task sheets for a class or for one --n: scheme, data, empty tables, no solution."""
     from grader.cli.sheets import print_handout
 
-    print_handout(assignment, roster, variant, out, lang)
+    print_handout(assignment, roster, variant, out, lang, example)
 
 
 @app.command()

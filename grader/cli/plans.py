@@ -1,5 +1,6 @@
 """``planmark plan``: one variant."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy as np
 from grader.cli import terminal
 from grader.cli.app import new_table
 from grader.files import write_whole
-from grader.language import tongue
+from grader.language import Tongue, tongue
 from grader.options import PlanOptions
 from grader.solution.document import plan_document
 from reference.authored.assignment import Assignment, load_assignment
@@ -15,7 +16,8 @@ from reference.errors import CallError
 from reference.plan import Plan, exact_plan
 from reference.quantities import SCALE_UNITS, unit_of
 
-STEP_FILES = (".html", ".pdf")
+STEP_FILES = (".html", ".pdf", ".txt")
+TERMINAL = Path("-")
 
 
 def show_plan(name: str, options: PlanOptions) -> None:
@@ -25,7 +27,7 @@ def show_plan(name: str, options: PlanOptions) -> None:
     """
     check_crank(options.crank_mm)
     steps = options.steps
-    if steps is not None and steps.suffix.lower() not in STEP_FILES:
+    if steps is not None and steps != TERMINAL and steps.suffix.lower() not in STEP_FILES:
         raise _refused("steps_file", "ending", option="--steps", file=steps, names=STEP_FILES)
     if options.altitude and options.svg is None and options.pdf is None:
         raise _refused("altitude")
@@ -37,7 +39,7 @@ def show_plan(name: str, options: PlanOptions) -> None:
         terminal.say(plan_document(assignment, plan).model_dump_json(indent=2))
         return
     _print_table(assignment, plan)
-    for file in options.drawn:
+    for file in (one for one in options.drawn if one != TERMINAL):
         terminal.say(f"Drawn in {file}")
 
 
@@ -76,10 +78,14 @@ def _draw(assignment: Assignment, plan: Plan, options: PlanOptions) -> None:
 
             written[options.pdf] = as_pdf(sheets, subject.title)
     if options.steps is not None:
-        from grader.solution.pages import html_page, pdf_pages
+        from grader.solution.pages import html_page, pdf_pages, text_page
 
-        printed = options.steps.suffix.lower() == ".pdf"
-        written[options.steps] = pdf_pages(subject, speaker) if printed else html_page(subject, speaker)
+        makers: dict[str, Callable[[Subject, Tongue], str | bytes]] = {".pdf": pdf_pages, ".html": html_page}
+        made = makers.get(options.steps.suffix.lower(), text_page)(subject, speaker)
+        if options.steps == TERMINAL:
+            terminal.say(str(made))
+        else:
+            written[options.steps] = made
     for file, content in written.items():
         write_whole(file, content)
 

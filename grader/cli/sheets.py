@@ -6,6 +6,8 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from reportlab.platypus import Flowable
+
 from grader.authoring.lint import lint
 from grader.authoring.round_scales import suggestions
 from grader.cli import terminal
@@ -16,6 +18,7 @@ from grader.files import write_whole
 from grader.folder.cache import PageCache
 from grader.folder.inventory import submissions, take_inventory
 from grader.folder.workers import Limits, Workers, result_of
+from grader.language import tongue
 from grader.options import VariantOptions
 from grader.owners.draft_roster import SURE, contact_sheet, draft_csv, suggest, thumbnail
 from grader.printed.answer_sheet import make_calibration, make_sheets
@@ -24,11 +27,15 @@ from grader.records import FloatArray, PageRef, Reason, Unread, as_error
 from grader.rubric import rubric_of
 from grader.scan.decode.pages import count_pages
 from grader.scan.register.calibration import ALL_IS_WELL, calibrate, residual_map
+from grader.solution.pages import EXAMPLE, printed_steps
+from grader.solution.sentences import wording_of
 from grader.tables.measurements import names_of
 from grader.tables.roster import RosterRow, read_roster
 from grader.texts.spoken import failure, message
-from reference.authored.assignment import Variant, load_assignment
+from reference.authored.assignment import Assignment, Variant, load_assignment
+from reference.drawing.subject import Subject
 from reference.errors import CallError, counted
+from reference.plan import exact_plan
 
 # calibrate ----------------------------------------------------------------------------------------
 
@@ -139,8 +146,13 @@ def _suggest_scales(name: str, roster: Path) -> None:
 # handout ------------------------------------------------------------------------------------------
 
 
-def print_handout(name: str, roster: Path | None, variant: VariantOptions, out: Path, lang: str) -> None:
-    """Write the PDF of task sheets, of a class or of one variant; of all positions if none is named."""
+def print_handout(
+    name: str, roster: Path | None, variant: VariantOptions, out: Path, lang: str, example: int | None = None
+) -> None:
+    """Write the PDF of task sheets, of a class or of one variant, and a worked example.
+
+    Without a roster, all positions are printed if none is named.
+    """
     if out.suffix.lower() != ".pdf":
         raise failure(CallError, "handout_file", "ending", option="--out", file=out, names=".pdf")
     if roster is not None and variant != VariantOptions():
@@ -152,8 +164,23 @@ def print_handout(name: str, roster: Path | None, variant: VariantOptions, out: 
     else:
         rows = read_roster(roster).rows
     file = "" if roster is None else roster.name
-    write_whole(out, make_handout(assignment, rubric_of(assignment), rows, lang, roster=file))
+    worked = [] if example is None else _example(assignment, rows, example, lang)
+    sheets = make_handout(assignment, rubric_of(assignment), rows, lang, roster=file, example=worked)
+    write_whole(out, sheets)
     note(f"{out}: {counted(len(rows), 'task sheet')} on A4, without the solution")
+
+
+def _example(assignment: Assignment, rows: Sequence[RosterRow], number: int, lang: str) -> list[Flowable]:
+    """Return the steps of a variant that no row has; `number` is its n, or its position if there is no n."""
+    by = "position" if assignment.numbers("n") is None else "n"
+    if number in {getattr(row, by) for row in rows}:
+        raise failure(CallError, "example_taken", option="--example", what=by, value=number)
+    position = next(iter(assignment.numbers("position") or ()), None) if by == "n" else number
+    variant = assignment.variant(number if by == "n" else None, position)
+    plan, speaker = exact_plan(assignment, [variant]), tongue(lang)
+    subject = Subject(assignment, plan, 0, wording_of(speaker))
+    title = speaker.gettext(EXAMPLE) % {"title": subject.title}
+    return [*printed_steps(subject, speaker, title)]
 
 
 # match --------------------------------------------------------------------------------------------

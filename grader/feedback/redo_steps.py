@@ -6,9 +6,8 @@ formula a length is found, but give no answer away.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from grader.documents import MistakeDocument, ReportDocument
 from grader.feedback.sentences import mistake_sentences
@@ -16,10 +15,13 @@ from grader.language import N_, Tongue, tongue
 from grader.options import Level
 from grader.outcomes import Judgement, NamedMistake
 from grader.solution import sentences
+from grader.solution.equations import grid_of
+from grader.solution.formulas import plain
 from grader.solution.sentences import Speaker, speaker_of, wording_of
 from grader.solution.steps import computed
 from reference.authored.assignment import Assignment, Variant
-from reference.construction.elements import Along, Coriolis, Normal
+from reference.construction.elements import Along, Coriolis
+from reference.construction.equations import equations
 from reference.construction.steps import Coincide, Divide, Given, Similar, Step, TwoLines
 from reference.drawing.subject import Subject
 from reference.plan import exact_plan
@@ -35,23 +37,6 @@ MOST_STEPS = 8
 THEN = N_("Then draw again what follows from it: %(nodes)s.")
 
 
-@dataclass(frozen=True, slots=True)
-class PlainSpeaker(Speaker):
-    """Writes names as they stand in reports."""
-
-    def name(self, *names: str) -> Markup:
-        """Return the name of a node, a vector, or several nodes side by side."""
-        return Markup("").join(self.subject.shown(name) for name in names)
-
-    def scale(self, scale: str) -> Markup:
-        """Return a scale's name."""
-        return Markup.escape(self.subject.shown(scale))
-
-    def rate(self, name: str) -> Markup:
-        """Return the name of an angular velocity or acceleration."""
-        return Markup.escape(self.subject.shown(name))
-
-
 def redo(subject: Subject, tongue: Tongue, node: str, *, with_numbers: bool) -> list[str]:
     """Return the steps from a node on: those of its figure in full, later figures' nodes by name.
 
@@ -62,16 +47,27 @@ def redo(subject: Subject, tongue: Tongue, node: str, *, with_numbers: bool) -> 
     order = [step.node for step in construction.steps]
     if node not in order:
         return []
-    usual = speaker_of(subject, tongue)
-    speaker = PlainSpeaker(usual.subject, usual.tongue, usual.view)
+    speaker = speaker_of(subject, tongue, lambda name: escape(name.plain))
     touched = _touched(construction.steps, node)
     figure = construction.figure_of(node)
     own = [step for step in touched if construction.figure_of(step.node) == figure]
-    told = [_text(speaker, step, with_numbers=with_numbers) for step in own[:MOST_STEPS]]
+    told = [*_told_steps(speaker, own[:MOST_STEPS], with_numbers=with_numbers)]
     later = [step.node for step in (*own[MOST_STEPS:], *(step for step in touched if step not in own))]
     if later:
         told.append(speaker.say(THEN, nodes=speaker.names(tuple(later))))
     return [line.unescape() for line in told if line]
+
+
+def _told_steps(speaker: Speaker, steps: Sequence[Step], *, with_numbers: bool) -> Iterator[Markup]:
+    """Yield each equation before the first step that draws a part of it: rows of cells, then the steps."""
+    known, written = equations(speaker.subject.plan.construction), set[str]()
+    for step in steps:
+        equation = known.get(step.node)
+        if equation is not None and equation.sums and equation.left.vector not in written:
+            written.add(equation.left.vector)
+            rows = grid_of(speaker, equation, with_numbers=with_numbers).rows
+            yield escape("\n".join("\t".join(map(plain, row)) for row in rows))
+        yield _text(speaker, step, with_numbers=with_numbers)
 
 
 def _touched(steps: tuple[Step, ...], node: str) -> list[Step]:
@@ -87,18 +83,17 @@ def _touched(steps: tuple[Step, ...], node: str) -> list[Step]:
 def _text(speaker: Speaker, step: Step, *, with_numbers: bool) -> Markup:
     if not with_numbers:
         return Markup(". ").join(_text_without_numbers(speaker, step))
-    computing = Markup("; ").join(computed(speaker, step))
+    computing = "; ".join(map(plain, computed(speaker, step)))
     drawing = sentences.sentence(speaker, step)
     return Markup("{}. {}").format(computing, drawing) if computing else drawing
 
 
 def _text_without_numbers(speaker: Speaker, step: Step) -> Iterator[Markup]:
-    """Describe a step without a number: its formula, then what is drawn."""
+    """Describe what is drawn in a step without a number."""
     match step:
         case TwoLines() | Coincide():
             yield sentences.sentence(speaker, step)
         case Given(along=Along()) | Given(length=Coriolis()):
-            yield from _formula(speaker, step)
             segment, direction = (step.start, step.node), sentences.direction_of(speaker, step)
             yield speaker.say(
                 LAY_OFF_UNMEASURED, start=step.start, node=step.node, segment=segment, direction=direction
@@ -107,17 +102,6 @@ def _text_without_numbers(speaker: Speaker, step: Step) -> Iterator[Markup]:
             yield speaker.say(SIMILAR_UNMEASURED, base=base, model=model, node=step.node)
         case Divide(base=(p, q)):
             yield speaker.say(DIVIDE_UNMEASURED, node=step.node, p=p, q=q)
-
-
-def _formula(speaker: Speaker, step: Given) -> Iterator[Markup]:
-    """Yield the formula of the component, in names alone."""
-    name = speaker.vector(step.start, step.node)
-    if isinstance(step.length, Normal):
-        speed = speaker.vector(step.length.tail, step.length.head)
-        yield Markup("{} = {}² / {}").format(name, speed, speaker.link_of(step.node))
-    if isinstance(step.length, Coriolis):
-        rate = speaker.rate(f"omega_{speaker.carrier_of(step.node)}")
-        yield Markup("{} = 2 · {} · {}").format(name, rate, speaker.vector(*step.length.slide))
 
 
 def with_mistakes_explained(

@@ -70,6 +70,7 @@ def make_handout(
     lang: str = "en",
     *,
     roster: str = "roster.csv",
+    example: Iterable[Flowable] = (),
 ) -> bytes:
     """Make A4 task sheets as PDF, in the rows' order; a row without a student has lines for a name.
 
@@ -79,6 +80,7 @@ def make_handout(
     ---------
     rows : their `lang`, if given, overrides `lang`
     roster : the file's name, for messages
+    example : a worked example, printed once after the sheets
 
     Raises AuthoredFileError with every row whose n or position the assignment does not have, and
     MechanismError if no variant assembles.
@@ -99,7 +101,8 @@ def make_handout(
         buffer, pagesize=A4, title=assignment.file.title.in_language(lang), creator="planmark", invariant=1,
         leftMargin=margin - FRAME_PT, rightMargin=margin - FRAME_PT, topMargin=12 * mm, bottomMargin=12 * mm,
     )  # fmt: skip
-    document.build(story[:-1])
+    worked = [*example]
+    document.build([*story, *worked] if worked else story[:-1])
     return buffer.getvalue()
 
 

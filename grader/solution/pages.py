@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 from reportlab.lib.pagesizes import A4
 from reportlab.lib.styles import ParagraphStyle
 from reportlab.lib.units import mm
@@ -21,9 +21,10 @@ from reportlab.platypus import (
     Table,
 )
 
-from grader.language import Tongue
+from grader.language import N_, Tongue
 from grader.printed.pdf import REGULAR, embed_fonts, put_shapes
-from grader.solution.steps import CENTRES, LENGTHS_MM, ExplainedStep, PlanSection, explain
+from grader.solution.formulas import Formula, grid_html, grid_shapes, mathml, plain, typeset, unicode_name
+from grader.solution.steps import CENTRES, NOTES, ExplainedStep, PlanSection, explain
 from reference.drawing import sheets
 from reference.drawing.canvas import (
     A3_MM,
@@ -58,6 +59,9 @@ def pdf(sheets: Sequence[Sequence[Shape]], title: str, page_mm: tuple[float, flo
 MARGIN_MM = 2.5
 LEAST_PICTURE_MM = (40.0, 12.0)
 COLUMN_MM, GAP_MM, TALLEST_MM = 88.0, 6.0, 105.0
+EXAMPLE = N_("Worked example: %(title)s")
+EQUATION_MM, FORMULA_MM, INDENT_MM = 3.2, 2.9, 4.0
+"""Size of letters in equations and formulas, and a formula's indent."""
 MODEL_SHARE, MODEL_TALLEST_MM = 0.45, 45.0
 """Largest share of its printed size, and largest height, of the mechanism beside a plan's step."""
 
@@ -165,10 +169,28 @@ def html_page(subject: Subject, tongue: Tongue) -> str:
         .render(
             lang=tongue.lang,
             title=subject.title,
-            note=tongue.gettext(LENGTHS_MM),
+            notes=[tongue.gettext(note) for note in NOTES],
             chapters=chapters(subject, tongue),
+            mathml=mathml,
+            grid_html=grid_html,
         )
     )
+
+
+# As text ------------------------------------------------------------------------------------------
+
+
+def text_page(subject: Subject, tongue: Tongue) -> str:
+    """Return the steps as text for a terminal."""
+    parts = [subject.title, *(tongue.gettext(note) for note in NOTES)]
+    for section in explain(subject, tongue, lambda name: escape(unicode_name(name))):
+        formulas, rates = (
+            [plain(one, in_unicode=True) for one in group] for group in (section.formulas, section.rates)
+        )
+        parts += [section.title.upper(), "\n".join((*formulas, section.introduction.unescape()))]
+        parts += [f"{step.number}.\n{step.text}" for step in section.steps]
+        parts.append("\n".join(rates))
+    return "\n\n".join(part for part in parts if part) + "\n"
 
 
 # As PDF -------------------------------------------------------------------------------------------
@@ -177,11 +199,17 @@ def html_page(subject: Subject, tongue: Tongue) -> str:
 class _Drawn(Flowable):  # type: ignore[misc]  # reportlab has no types
     """A picture on the printed page, true to size unless it is larger than its place."""
 
-    def __init__(self, picture: Cutout, share: float = 1.0, tallest_mm: float = TALLEST_MM) -> None:
+    def __init__(
+        self,
+        picture: Cutout,
+        share: float = 1.0,
+        tallest_mm: float = TALLEST_MM,
+        widest_mm: float = COLUMN_MM,
+    ) -> None:
         super().__init__()
         width, height = picture.size
         self.picture = picture
-        self.unit = mm * min(share, COLUMN_MM / width, tallest_mm / height)
+        self.unit = mm * min(share, widest_mm / width, tallest_mm / height)
         self.width, self.height = width * self.unit, height * self.unit
 
     def wrap(self, _width: float, _height: float) -> tuple[float, float]:
@@ -203,35 +231,58 @@ def pdf_pages(subject: Subject, tongue: Tongue) -> bytes:
         buffer, pagesize=A4, title=title, invariant=1,
         leftMargin=12 * mm, rightMargin=12 * mm, topMargin=14 * mm, bottomMargin=14 * mm,
     )  # fmt: skip
-    story: list[Flowable] = [_paragraph(title, 14)]
-    story += [Spacer(1, 2 * mm), _paragraph(tongue.gettext(LENGTHS_MM), 8.5)]
-    for chapter in chapters(subject, tongue):
-        story += _printed_chapter(chapter)
-    document.build(story)
+    document.build([*printed_steps(subject, tongue, title)])
     return buffer.getvalue()
 
 
+def printed_steps(subject: Subject, tongue: Tongue, title: str) -> Iterator[Flowable]:
+    """Yield the steps as parts of an A4 document."""
+    embed_fonts()
+    yield _paragraph(title, 14)
+    yield Spacer(1, 2 * mm)
+    yield from (_paragraph(tongue.gettext(note), 8.5) for note in NOTES)
+    for chapter in chapters(subject, tongue):
+        yield from _printed_chapter(chapter)
+
+
 def _printed_chapter(chapter: Chapter) -> Iterator[Flowable]:
+    section = chapter.section
     yield CondPageBreak(70 * mm)
     yield Spacer(1, 6 * mm)
-    yield _paragraph(chapter.section.title, 12)
-    yield _paragraph(chapter.section.introduction, 9)
+    yield _paragraph(section.title, 12)
+    yield Spacer(1, 1 * mm)
+    yield from map(_formula, section.formulas)
+    yield _paragraph(section.introduction, 9)
     for step in chapter.steps:
         yield Spacer(1, 4 * mm)
-        yield KeepTogether([_printed_step(step)])
+        yield KeepTogether([*_printed_step(step)])
+    yield Spacer(1, 4 * mm)
+    yield KeepTogether([*map(_formula, section.rates)])
 
 
-def _printed_step(step: Illustrated) -> Table:
+def _printed_step(step: Illustrated) -> Iterator[Flowable]:
     explanation = step.explanation
+    if explanation.equation is not None:
+        shapes = grid_shapes(explanation.equation, EQUATION_MM)
+        yield _Drawn(Cutout(shapes, bounds(shapes)), widest_mm=2 * COLUMN_MM + GAP_MM)
+        yield Spacer(1, 1 * mm)
     head = Markup("{}. {}").format(explanation.number, explanation.sentence)
-    words: list[Flowable] = [_paragraph(line, 8.5, indent=4) for line in explanation.before]
-    words += [_paragraph(head, 9.5), *(_paragraph(line, 8.5, indent=4) for line in explanation.after)]
+    words: list[Flowable] = [*map(_formula, explanation.before)]
+    words += [_paragraph(head, 9.5), *map(_formula, explanation.after)]
     if step.model is not None:
         words += [Spacer(1, 2 * mm), _Drawn(step.model, MODEL_SHARE, MODEL_TALLEST_MM)]
     widths = ((COLUMN_MM + GAP_MM) * mm, COLUMN_MM * mm)
     style = [("VALIGN", (0, 0), (-1, -1), "TOP"), ("LEFTPADDING", (0, 0), (-1, -1), 0)]
     picture = _Drawn(step.picture) if step.picture is not None else ""
-    return Table([[words, picture]], colWidths=widths, style=style)
+    yield Table([[words, picture]], colWidths=widths, style=style)
+
+
+def _formula(formula: Formula) -> Flowable:
+    """Return a formula as a line of the printed page, smaller if it is too long."""
+    found = typeset(formula, FORMULA_MM)
+    gap = 0.3 * FORMULA_MM
+    box = (-INDENT_MM, -found.rise - gap, max(found.width, 1.0), found.fall + gap)
+    return _Drawn(Cutout(found.shapes, box))
 
 
 PRINTED = {
@@ -240,16 +291,14 @@ PRINTED = {
     "<sub>": '<sub rise="2" size="70%">',
     "<sup>": '<super rise="3" size="70%">',
     "</sup>": "</super>",
+    "✓": "√",
 }
-"""Marks as reportlab reads them; the embedded font has no slanted letters."""
+"""Marks as reportlab reads them; the embedded font has no slanted letters and no tick."""
 
 
-def _paragraph(text: str, size: float, indent: float = 0.0) -> Paragraph:
-    """Return a text or markup as a printed paragraph; its size in points, its indent in millimetres."""
+def _paragraph(text: str, size: float) -> Paragraph:
+    """Return a text or markup as a printed paragraph; its size in points."""
     written = str(Markup.escape(text))
     for mark, printed in PRINTED.items():
         written = written.replace(mark, printed)
-    style = ParagraphStyle(
-        f"s{size}i{indent}", fontName=REGULAR, fontSize=size, leading=1.4 * size, leftIndent=indent * mm
-    )
-    return Paragraph(written, style)
+    return Paragraph(written, ParagraphStyle(f"s{size}", fontName=REGULAR, fontSize=size, leading=1.4 * size))

@@ -1,12 +1,13 @@
 """The steps of a construction in the words of the textbook, in each language."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from markupsafe import Markup, escape
 
 from grader.language import N_, SIDES, UNITS, Tongue
+from grader.solution.formulas import Name
 from reference import geometry
 from reference.construction.elements import (
     Along,
@@ -36,7 +37,7 @@ from reference.construction.steps import (
     TwoArcs,
     TwoLines,
 )
-from reference.drawing.canvas import Piece, pieces_of, scale_pieces
+from reference.drawing.canvas import pieces_of, scale_pieces
 from reference.drawing.subject import Subject, Wording
 from reference.mechanism import SlottedLink, Yoke, moving_guides
 from reference.quantities import unit_of
@@ -84,10 +85,10 @@ def wording_of(tongue: Tongue) -> Wording:
     )
 
 
-def markup_of(pieces: tuple[Piece, ...]) -> Markup:
+def markup_of(name: Name) -> Markup:
     """Return a name with its indices, its letter slanted."""
     marks = {0: "<i>{}</i>", -1: "<sub>{}</sub>", 1: "<sup>{}</sup>"}
-    return Markup("").join(Markup(marks[piece.height]).format(piece.text) for piece in pieces)  # noqa: S704
+    return Markup("").join(Markup(marks[piece.height]).format(piece.text) for piece in name.pieces)  # noqa: S704
 
 
 Value = Markup | str | tuple[str, ...] | complex | float
@@ -101,6 +102,8 @@ class Speaker:
     subject: Subject
     tongue: Tongue
     view: View
+    write: Callable[[Name], Markup] = markup_of
+    """Makes a name into markup of sentences."""
 
     def say(self, text: str, **values: Value) -> Markup:
         """Return a sentence of the catalogue with its values filled in, each as `Value` says."""
@@ -120,21 +123,23 @@ class Speaker:
             case _:
                 return self.mm(value)
 
+    def symbol(self, *names: str) -> Name:
+        """Return the name of a node, a vector or a rate, or of several nodes side by side."""
+        shown = [self.subject.shown(name) for name in names]
+        return Name(tuple(piece for name in shown for piece in pieces_of(name)), "".join(shown))
+
+    def scale(self, scale: str) -> Name:
+        """Return a scale's name."""
+        shown = self.subject.shown(scale)
+        return Name(scale_pieces(shown), shown)
+
     def name(self, *names: str) -> Markup:
-        """Return the name of a node, a vector, or several nodes side by side."""
-        return Markup("").join(markup_of(self.subject.letter(name)) for name in names)
+        """Return the name of a node, a vector, or several nodes side by side, as sentences show it."""
+        return self.write(self.symbol(*names))
 
     def names(self, names: tuple[str, ...]) -> Markup:
         """Return a list of nodes."""
         return Markup(", ").join(self.name(name) for name in names)
-
-    def scale(self, scale: str) -> Markup:
-        """Return a scale's name."""
-        return markup_of(scale_pieces(self.subject.shown(scale)))
-
-    def rate(self, name: str) -> Markup:
-        """Return the name of an angular velocity or acceleration."""
-        return markup_of(pieces_of(self.subject.shown(name)))
 
     def bare(self, value: float) -> str:
         """Format a number with five significant digits, or all of a shorter one."""
@@ -143,9 +148,9 @@ class Speaker:
             return self.tongue.trimmed(value, 12)
         return self.tongue.significant(value, DIGITS)
 
-    def real(self, value: float, unit: str) -> Markup:
+    def real(self, value: float, unit: str) -> str:
         """Format a real value with its unit."""
-        return escape(f"{self.bare(value)}\N{NO-BREAK SPACE}{self.tongue.unit(unit)}")
+        return f"{self.bare(value)}\N{NO-BREAK SPACE}{self.tongue.unit(unit)}"
 
     def mm(self, value: float) -> str:
         """Format a drawn length."""
@@ -170,17 +175,15 @@ class Speaker:
         size = float(np.max(np.abs(list(self.subject.nodes(figure).values()))))
         return abs(mm) <= NEXT_TO_NOTHING * size
 
-    def vector(self, tail: str, head: str) -> Markup:
-        """Return the vector between two nodes of a plan."""
+    def vector(self, tail: str, head: str) -> str:
+        """Return the name of the vector between two nodes of a plan."""
         vectors = self.subject.plan.construction.vectors.values()
-        return next(
-            self.name(vector.name) for vector in vectors if (vector.tail, vector.head) == (tail, head)
-        )
+        return next(vector.name for vector in vectors if (vector.tail, vector.head) == (tail, head))
 
-    def link_of(self, node: str) -> Markup:
+    def link_of(self, node: str) -> Name:
         """Return the link of the normal component that ends in a node."""
         vectors = self.subject.plan.construction.vectors.values()
-        return next(self.name(*vector.link) for vector in vectors if vector.head == node and vector.link)
+        return next(self.symbol(*vector.link) for vector in vectors if vector.head == node and vector.link)
 
     def carrier_of(self, node: str) -> str:
         """Return the link that carries the guide of the Coriolis component that ends in a node."""
@@ -194,14 +197,14 @@ class Speaker:
     def scale_with_value(self, scale: str) -> Markup:
         """Return a scale with its value."""
         value = self.real(self.scale_value(scale), unit_of(scale))
-        return Markup("{} = {}").format(self.scale(scale), value)
+        return Markup("{} = {}").format(self.write(self.scale(scale)), value)
 
     def line_direction(self, along: Direction) -> Markup:
         """Describe the direction of a line, without a sense."""
         if isinstance(along, Along):
             text = PERPENDICULAR if along.quarters % 2 else PARALLEL
             return self.say(text, link=(along.tail, along.head))
-        kind, joint = _guided(along)
+        kind, joint = guided(along)
         if kind == "slot":
             return self.say(SLOT, joint=joint)
         return self.say(ACROSS_GUIDE if along.quarters % 2 else GUIDE, joint=joint)
@@ -210,7 +213,7 @@ class Speaker:
         """Describe the direction of a vector: a negative length reverses it."""
         if not isinstance(along, Along):
             angle = complex(along.at(self.view)) * (-1.0 if sign < 0.0 else 1.0)
-            kind, joint = _guided(along)
+            kind, joint = guided(along)
             if kind == "guide":
                 return self.say(ALONG_GUIDE, joint=joint, angle=angle)
             return self.say(AT_ANGLE, angle=angle)
@@ -221,14 +224,14 @@ class Speaker:
         return self.say(text, link=(along.tail, along.head), tail=ends[0], head=ends[1])
 
 
-def speaker_of(subject: Subject, tongue: Tongue) -> Speaker:
+def speaker_of(subject: Subject, tongue: Tongue, write: Callable[[Name], Markup] = markup_of) -> Speaker:
     """Return the speaker for a variant's steps."""
     view = subject.view
     nodes = {**view.nodes, **{name: np.asarray(at) for name, at in subject.centres.items()}}
-    return Speaker(subject, tongue, View(nodes, view.parameters))
+    return Speaker(subject, tongue, View(nodes, view.parameters), write)
 
 
-def _guided(along: Fixed) -> tuple[str, str]:
+def guided(along: Fixed) -> tuple[str, str]:
     """Return guide or slot, and its joint, from the angle's name among the parameters."""
     kind, _, joint = along.angle.removeprefix("angle ").partition(" ")
     return kind, joint
@@ -347,7 +350,7 @@ def _direction(speaker: Speaker, line: AnyLine) -> complex:
 
 def _pivot(speaker: Speaker, node: str) -> Markup:
     at, scale = speaker.place(node), speaker.scale_value("kL")
-    real_x, real_y = (speaker.real(value * scale, "m") for value in (at.real, at.imag))
+    real_x, real_y = (escape(speaker.real(value * scale, "m")) for value in (at.real, at.imag))
     return speaker.say(PIVOT, node=node, x=at.real, y=at.imag, real_x=real_x, real_y=real_y)
 
 
@@ -365,7 +368,7 @@ def _given(speaker: Speaker, step: Given) -> Markup:
 def direction_of(speaker: Speaker, step: Given) -> Markup:
     """Describe the direction of a step's vector."""
     if isinstance(step.length, Coriolis):
-        rate = speaker.rate(f"omega_{speaker.carrier_of(step.node)}")
+        rate = f"omega_{speaker.carrier_of(step.node)}"
         return speaker.say(CORIOLIS_DIRECTION, slide=speaker.vector(*step.length.slide), rate=rate)
     return speaker.vector_direction(step.along, _length(speaker, step.length))
 

@@ -124,6 +124,9 @@ FAILURES: dict[str, str] = {
     "unknown_target": N_("'%(to)s' is no export target: known are %(names)s"),
     "unknown_thing": N_("%(to)s is given no '%(what)s': known are %(names)s"),
     "thing_elsewhere": N_("%(to)s is given no '%(what)s': known are %(names)s (or --to %(other)s)"),
+    "example_taken": N_(
+        "%(option)s: %(what)s = %(value)s is a student's own; choose one that no student has"
+    ),
     "option_unused": N_("%(option)s has no meaning for %(what)s: leave it out"),
     "form_unused": N_("a file to fill in has no meaning for %(what)s: leave it out"),
     "unused_beside": N_("%(option)s has no meaning beside %(other)s: leave it out"),

@@ -273,14 +273,23 @@ class Assignment:
         variants: list[Variant],
         *,
         crank_mm: float | FloatArray | None = None,
-        kL: float | FloatArray | None = None,  # noqa: N803
-        kv: float | FloatArray | None = None,
-        ka: float | FloatArray | None = None,
+        **declared: float | FloatArray | None,
     ) -> Scales:
-        """Return the scales: those declared, the others by the assignment's rule.
+        """Return the scales kL, kv and ka: those declared, the others by the assignment's rule.
 
         A declared kL, or the drawn crank, replaces the proposed length of the crank.
         """
+        known = self.scale_values(variants, crank_mm=crank_mm, **declared)
+        return Scales(*(np.broadcast_to(known[name], (len(variants),)) for name in SCALE_NAMES))
+
+    def scale_values(
+        self,
+        variants: list[Variant],
+        *,
+        crank_mm: float | FloatArray | None = None,
+        **declared: float | FloatArray | None,
+    ) -> dict[str, Value]:
+        """Return the values of `scales`, and those that its rule may use."""
         known = self.values(variants)
         driver = build_driver(self.mechanism_file, known, len(variants))
         known |= _speeds(driver if self.is_at_given_scales else self._at_speed(driver))
@@ -289,14 +298,12 @@ class Assignment:
             known["crank_mm"] = np.asarray(crank_mm, float)
         elif rule.crank_mm is not None:
             known["crank_mm"] = rule.crank_mm(known)
-        declared = {"kL": kL, "kv": kv, "ka": ka}
         for name in SCALE_NAMES:
-            given = declared[name]
+            given = declared.get(name)
             known[name] = getattr(rule, name)(known) if given is None else np.asarray(given, float)
             if name == "kL" and given is not None and "crank_m" in known:
                 known["crank_mm"] = np.asarray(known["crank_m"]) / known[name]
-        shape = (len(variants),)
-        return Scales(*(np.broadcast_to(known[name], shape) for name in SCALE_NAMES))
+        return known
 
     def _at_speed(self, driver: Driver) -> Driver:
         if not isinstance(driver, Crank):

@@ -4,6 +4,7 @@ import json
 import xml.etree.ElementTree as ET
 
 import jsonschema
+import pypdfium2
 import pytest
 import typer
 from typer.testing import CliRunner
@@ -146,6 +147,26 @@ def test_a_crank_alone_that_turns_clockwise_and_speeds_down_is_a_mechanism_too(p
     assert vectors["a_A_n"]["direction_deg"] == pytest.approx(210)
     assert vectors["a_A_t"]["direction_deg"] == pytest.approx(120)
     assert vectors["a_A_t"]["value"] == pytest.approx(0.3)
+
+
+def test_a_handout_has_a_worked_example_of_a_variant_that_nobody_has(planmark, tmp_path):
+    out = tmp_path / "tasks.pdf"
+    planmark("handout", "press", "--position", "2", "--example", "1", "--out", out)
+    document = pypdfium2.PdfDocument(out)
+    text = "".join(page.get_textpage().get_text_range() for page in document)
+    assert "Worked example: Press mechanism" in text
+    assert "46.40" in text
+    out.unlink()
+    refused = planmark("handout", "press", "--position", "1", "--example", "1", "--out", out)
+    assert refused.returncode == 2
+    assert "position = 1 is a student's own" in refused.stderr
+    assert not out.exists()
+
+
+def test_the_steps_are_printed_in_the_terminal(planmark):
+    printed = planmark("plan", "pump", "--n", "7", "--steps", "-").stdout
+    assert "v̅_B   = v̅_A    + v̅_BA" in printed
+    assert "⊥ O₂B" in printed
 
 
 def test_a_handout_is_written_for_one_number_and_nothing_for_a_wrong_one(planmark, tmp_path):

@@ -20,7 +20,9 @@ def subject(name="pump", n=12, position=None, lang="en"):
 
 
 def test_the_first_step_is_that_of_the_wrong_point():
-    first, *_ = redo(subject(), tongue("en"), "b", with_numbers=False)
+    equation, first, *_ = redo(subject(), tongue("en"), "b", with_numbers=False)
+    rows = ["\tv_B\t=\tv_A\t+\tv_BA", "size\t?\t\t✓\t\t?", "direction\t⊥ O2B\t\t✓\t\t⊥ AB"]
+    assert equation == "\n".join(rows)
     drawn = "Through a draw a line perpendicular to AB, and through o a line perpendicular to O2B."
     assert first == f"{drawn} They meet in b."
 
@@ -50,8 +52,9 @@ def test_without_numbers_no_step_says_one(name, n, position, lang):
 
 def test_with_numbers_the_lengths_are_those_of_the_plan():
     one = subject()
-    line = redo(one, tongue("en"), "n_BA", with_numbers=True)[0]
+    equation, line, *_ = redo(one, tongue("en"), "n_BA", with_numbers=True)
     length = abs(one.plan.drawn_mm("a_BA_n")[0])
+    assert f"\t{length:.2f}\t" in equation
     assert f"{length:.2f}\u00a0mm" in line
     assert line.startswith("a_BA_n = v_BA² / AB")
 

@@ -9,10 +9,14 @@ import pypdfium2
 import pytest
 
 from grader.language import LANGUAGES, tongue
+from grader.solution import formulas
+from grader.solution.equations import grid_of
+from grader.solution.formulas import mathml, typeset, unicode_name
 from grader.solution.pages import chapters, html_page, pdf, pdf_pages
 from grader.solution.sentences import sentence, speaker_of, wording_of
 from grader.solution.steps import explain
 from reference.authored.assignment import load_assignment
+from reference.construction.equations import equations
 from reference.construction.steps import Given, Pole
 from reference.drawing.canvas import Label, Ring, pieces_of, set_pieces
 from reference.drawing.sheets import BEFORE, NOW, reference_drawing
@@ -33,6 +37,10 @@ def subject_of(case, lang, folder):
 
 def plain(markup):
     return re.sub(r"<[^>]*>", "", str(markup)).replace("&#39;", "'").replace("&gt;", ">")
+
+
+def in_unicode(formula):
+    return formulas.plain(formula, in_unicode=True)
 
 
 def letters(subject, node):
@@ -64,10 +72,16 @@ def test_every_step_has_its_sentence_with_its_node(case, lang, folder):
 def test_every_vector_and_every_rate_is_told_with_its_value(case, folder):
     subject = subject_of(case, "en", folder)
     plan = subject.plan
-    text = "\n".join(plain(s.text) for section in explain(subject, tongue("en")) for s in section.steps)
+    sections, speaker = explain(subject, tongue("en")), speaker_of(subject, tongue("en"))
+    text = "\n".join(plain(s.text) for section in sections for s in section.steps)
+    rates = [in_unicode(rate) for section in sections for rate in section.rates]
     for name, values in plan.vectors_si.items():
-        symbol = letters(subject, name)
-        lines = [line for line in text.split("\n") if line.startswith((f"{symbol} =", f"{symbol} is zero"))]
+        symbol = unicode_name(speaker.symbol(name))
+        lines = [
+            line
+            for line in text.split("\n")
+            if line.startswith((f"{symbol} =", f"{letters(subject, name)} is zero"))
+        ]
         lines += [line for line in text.split("\n") if line.startswith(f"{symbol} / ")]
         assert lines, name
         if not subject.is_zero(name) and " = " in lines[0]:
@@ -77,7 +91,7 @@ def test_every_vector_and_every_rate_is_told_with_its_value(case, folder):
     for name, values in plan.rates.items():
         if name in plan.construction.driving:
             continue
-        line = next(line for line in text.split("\n") if line.startswith(f"{letters(subject, name)} ="))
+        line = next(line for line in rates if line.startswith(f"{unicode_name(speaker.symbol(name))} ="))
         value = float(re.findall(r"= ([\d.]+)\srad", line)[0])
         assert value == pytest.approx(abs(values[0]), rel=1e-4, abs=1e-9)
         if not subject.is_zero(plan.construction.rates[name].vector):
@@ -100,17 +114,86 @@ def test_what_is_laid_off_is_told_with_its_drawn_length(case, folder):
 def test_a_normal_component_is_told_with_its_formula_and_the_scale(folder):
     subject = subject_of("pump 7", "en", folder)
     steps = {s.step.node: s for section in explain(subject, tongue("en")) for s in section.steps}
-    first, second = (plain(line) for line in steps["n_BA"].before)
-    assert first == "aBAn = vBA² / AB = 4.5245² / 0.4 = 51.178\N{NO-BREAK SPACE}m/s²"
-    assert second == "aBAn / ka = 51.178 / 7.5064 = 6.82\N{NO-BREAK SPACE}mm"
+    first, second = map(in_unicode, steps["n_BA"].before)
+    assert first == "a_BAⁿ = v_BA² / AB = 4.5245² / 0.4 = 51.178\N{NO-BREAK SPACE}m/s²"
+    assert second == "a_BAⁿ / k_a = 51.178 / 7.5064 = 6.82\N{NO-BREAK SPACE}mm"
     assert plain(steps["n_BA"].sentence).endswith("parallel to BA, from B towards A; it ends in nBA.")
 
 
 def test_a_coriolis_component_is_told_with_its_formula(folder):
     subject = subject_of("shaper 5", "en", folder)
     steps = {s.step.node: s for section in explain(subject, tongue("en")) for s in section.steps}
-    assert plain(steps["k_A3A"].before[0]).startswith("aA3Ac = 2 · ω3 · vA3A = 2 · ")
+    assert in_unicode(steps["k_A3A"].before[0]).startswith("a_A3Aᶜ = 2 · ω₃ · v_A3A = 2 · ")
     assert "turned by 90° in the sense of ω3" in plain(steps["k_A3A"].sentence)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_every_equation_holds_on_the_plan_and_what_it_calls_known_is_drawn_or_computed_before(case, folder):
+    subject = subject_of(case, "en", folder)
+    construction, nodes = subject.plan.construction, subject.view.nodes
+    known, order = equations(construction), [step.node for step in construction.steps]
+    plans = [node for figure in construction.poles for node in nodes if node in subject.nodes(figure)]
+    assert known.keys() == set(plans) - set(construction.poles.values())
+    for equation in dict.fromkeys(known.values()):
+        left = complex(nodes[equation.left.head]) - complex(nodes[equation.left.tail])
+        for terms in equation.sums:
+            total = sum(complex(nodes[term.head]) - complex(nodes[term.tail]) for term in terms)
+            assert total == pytest.approx(left, abs=1e-9)
+        for term in equation.terms:
+            assert not term.is_drawn or order.index(term.head) < order.index(equation.left.head)
+            if term.along is not None:
+                vector = complex(nodes[term.head]) - complex(nodes[term.tail])
+                across = (np.conj(complex(term.along.at(subject.view))) * vector).imag
+                assert across == pytest.approx(0.0, abs=1e-7)
+        # A plan finds two unknowns: with the absolute vector's own, each equality of sums leaves no more.
+        unknown = sum(2 - term.known for term in equation.terms)
+        assert unknown == 2 * max(len(equation.sums), 1) * bool(equation.sums)
+
+
+def test_an_equation_tells_size_and_direction_of_each_term_and_its_numbers_only_where_asked(folder):
+    subject = subject_of("press 1", "en", folder)
+    speaker, equation = speaker_of(subject, tongue("en")), equations(subject.plan.construction)["n_B"]
+    grid = grid_of(speaker, equation, with_numbers=True)
+    rows = [[in_unicode(cell) for cell in row] for row in grid.rows]
+    assert "".join(rows[0]) == "a̅_B=a̅_Bⁿ+a̅_Bᵗ=a̅_A+a̅_BAⁿ+a̅_BAᵗ"
+    assert rows[1][1::2] == ["?", "v_B² / O₂B", "?", "✓", "v_BA² / AB", "?"]
+    assert rows[2][1::2] == ["", "3.5061", "", "10.857", "2.4159", ""]
+    assert rows[3][1::2] == ["", "32.29", "", "100.00", "22.25", ""]
+    assert rows[4][1::2] == ["?", "B → O₂", "⊥ O₂B", "✓", "B → A", "⊥ AB"]
+    assert grid.underlines[1::2] == (0, 2, 1, 2, 2, 1)
+    silent = grid_of(speaker, equation, with_numbers=False).rows
+    assert [[in_unicode(cell) for cell in row] for row in silent] == [rows[0], rows[1], rows[4]]
+
+
+@pytest.mark.parametrize(
+    ("case", "told"),
+    [
+        ("press 1", ["μ_l = O₁A / O₁A_drawn = 0.3 / 45 = 0.0066667 m/mm",
+                     "ω₁ = π · 1350 / (30 · 23.5) = 6.0158",
+                     "μ_v = v_A / pa = ω₁ · O₁A / 50 = 6.0158 · 0.3 / 50 = 0.036095 (m/s)/mm",
+                     "μ_a = a_A / πa' = ω₁² · O₁A / 100 = 6.0158² · 0.3 / 100 = 0.10857 (m/s²)/mm"]),
+        ("pump 7", ["ω₁ = π · n₁ / 30 = π · 370 / 30 = 38.746 rad/s",
+                    "k_v = v_A / oa = ω₁ · k_L = 38.746 · 0.005 = 0.19373 (m/s)/mm",
+                    "k_a = a_A / o'a' = ω₁² · k_L = 38.746² · 0.005 = 7.5064 (m/s²)/mm"]),
+        ("piston 5", ["k_L = 0.005 m/mm", "k_v = v_B / ob = v_B / 60 = 1.05 / 60 = 0.0175 (m/s)/mm"]),
+    ],
+)  # fmt: skip
+def test_scales_and_the_cranks_speed_follow_from_the_assignments_own_formulas(case, told, folder):
+    sections = explain(subject_of(case, "en", folder), tongue("en"))
+    found = "\n".join(
+        in_unicode(one).replace("\N{NO-BREAK SPACE}", " ") for s in sections for one in s.formulas
+    )
+    for formula in told:
+        assert formula in found
+
+
+@pytest.mark.parametrize("case", ["shaper 5", "press 1"])
+def test_formulas_are_well_formed_mathml_and_fit_the_printed_column(case, folder):
+    sections = explain(subject_of(case, "ru", folder), tongue("ru"))
+    steps = [step for section in sections for step in section.steps]
+    for formula in (line for step in steps for line in (*step.before, *step.after)):
+        ET.fromstring(f"<p>{mathml(formula)}</p>")
+        assert 0.0 < typeset(formula, 2.9).width < 95.0
 
 
 @pytest.mark.parametrize("case", ["pump 7", "shaper 5", "driven slider", "two crossed guides"])
