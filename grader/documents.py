@@ -264,13 +264,15 @@ class CriterionDocument(Document):
     """The link of the mechanism judged."""
     value: str | None = None
     """The vector whose computed value is judged."""
+    on_sketch: str | None = None
+    """The point judged (``J3``), or the vector drawn again on the sketch (``a_D_sketch``)."""
     section: str | None = None
     """The section of the rubric that it belongs to, if that has a weight of its own."""
 
     @property
     def drawn(self) -> str:
-        """The vector, angular quantity, link or ``NAME_value`` judged; empty for a scale."""
-        return self.vector or self.link or (value_name(self.value) if self.value else "")
+        """The vector, link, point, or ``NAME_value`` judged; empty for a scale."""
+        return self.vector or self.link or self.on_sketch or (value_name(self.value) if self.value else "")
 
 
 class RivalDocument(Document):

@@ -14,6 +14,8 @@ too_long, too_short   measured_mm, expected_mm, off_mm, tolerance_mm         the
 turned_left,          measured_deg, expected_deg, off_deg, tolerance_deg     the direction is off:
 turned_right                                                                 must turn back right/left
 reversed                                                                     points the opposite way
+place_off             off_mm, tolerance_mm                                   a point lies elsewhere
+off_sheet                                                                    a centre off the sheet
 should_be_zero        measured_mm, tolerance_mm                              a zero vector was drawn
 too_short_to_judge    length_mm, least_mm                                    no direction is asked of it
 value_too_large,      measured, expected, off, tolerance, unit               a computed value is off

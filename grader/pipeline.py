@@ -288,7 +288,7 @@ def pictures_of(
 ) -> tuple[Picture, ...]:
     """Each page with what was judged on it; without pages, the plans as the measurements draw them."""
     outcomes = {outcome.name: outcome for outcome in judgement.outcomes}
-    vectors, links = construction.vectors, construction.links
+    vectors, links = construction.vectors, construction.all_on_sketch
     shown = [(page.backdrop, page.reading) for page in pages if page.backdrop is not None]
     if not shown:
         source, reading = measured.source, measured.reading

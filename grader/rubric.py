@@ -16,7 +16,7 @@ from pydantic import Field, model_validator
 from grader.records import MECHANISM
 from reference.authored.assignment import Assignment, AssignmentFile, load_assignment, locate
 from reference.authored.toml_file import Authored, Identifier, Text, is_file, load
-from reference.construction.graph import Construction
+from reference.construction.graph import ON_SKETCH, Construction
 from reference.errors import AuthoredFileError, CallError, Faults, Finding, look_alikes
 from reference.plan import construction_for
 from reference.quantities import value_name
@@ -147,11 +147,13 @@ class WeightsTable(Authored):
 
 
 class CriterionTable(Authored):
-    """One criterion: exactly one of what a rubric may ask for, and its points.
+    """One criterion and its points: exactly one of what a rubric may ask for.
 
-    It is a `vector`, its computed `value`, an `angular` quantity, the `sense` of one, a `scale` or `link`.
-    `optional`: not judged if it was not handed in. `direction = false`: only the length counts. `tolerance`
-    replaces the rubric's for this criterion, so does `follow_through`.
+    It is a `vector`, its computed `value`, an `angular` quantity, the `sense` of one, a `scale`, `link` or
+    `point`. `figure = "mechanism"`: the vector as drawn again at its point on the sketch. A `point` of the
+    sketch is an instantaneous centre (``I3``) or an acceleration pole (``J3``). `optional`: not judged if it
+    was not handed in. `direction = false`: only the length counts. `tolerance` replaces the rubric's for this
+    criterion, so does `follow_through`.
     """
 
     id: Identifier
@@ -163,6 +165,8 @@ class CriterionTable(Authored):
     sense: str | None = None
     scale: Literal["kL", "kv", "ka"] | None = None
     link: str | None = None
+    point: str | None = None
+    figure: Literal["mechanism"] | None = None
     optional: bool = False
     direction: bool = True
     follow_through: bool | None = None
@@ -170,9 +174,13 @@ class CriterionTable(Authored):
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
-        kinds = (self.vector, self.value, self.angular, self.sense, self.scale, self.link)
+        kinds = (self.vector, self.value, self.angular, self.sense, self.scale, self.link, self.point)
         if sum(kind is not None for kind in kinds) != 1:
-            raise ValueError("must have exactly one of vector, value, angular, sense, scale and link")
+            raise ValueError("must have exactly one of vector, value, angular, sense, scale, link and point")
+        if self.figure and not self.vector:
+            raise ValueError("has a figure, which only a vector may have")
+        if self.point and not self.direction:
+            raise ValueError("must have a direction: a point's distance alone is not judged")
         return self
 
     @property
@@ -182,15 +190,22 @@ class CriterionTable(Authored):
 
     @property
     def name(self) -> str:
-        """The requested vector, angular quantity, scale or link; of a value or a sense its column's name."""
+        """The requested quantity by its column: ``a_D``, ``a_D_sketch``, ``v_D_value``, ``kL``, ``J3``."""
         of_value = None if self.value is None else value_name(self.value)
         sense = self.sense and f"{self.sense}_sense"
-        return self.vector or of_value or self.angular or sense or self.scale or self.link or ""
+        if self.vector and self.figure:
+            return f"{self.vector}{ON_SKETCH}"
+        return self.vector or of_value or self.angular or sense or self.scale or self.link or self.point or ""
+
+    @property
+    def is_on_sketch(self) -> bool:
+        """True for a point of the sketch, and for a vector drawn again on it."""
+        return bool(self.point or self.figure)
 
     @property
     def section(self) -> Section:
         """The part of the work that it belongs to."""
-        if self.link is not None:
+        if self.link is not None or self.is_on_sketch:
             return "mechanism"
         if self.scale is not None:
             return "scales"
@@ -228,8 +243,13 @@ class RubricFile(Authored):
 
     @property
     def vectors(self) -> tuple[str, ...]:
-        """The requested vectors."""
-        return tuple(criterion.vector for criterion in self.criterion if criterion.vector)
+        """The requested vectors of the plans."""
+        return tuple(one.vector for one in self.criterion if one.vector and not one.figure)
+
+    @property
+    def on_sketch(self) -> tuple[str, ...]:
+        """The requested points and vectors of the sketch."""
+        return tuple(one.name for one in self.criterion if one.is_on_sketch)
 
     @property
     def values(self) -> tuple[str, ...]:
@@ -244,7 +264,10 @@ class RubricFile(Authored):
     @property
     def needs_accelerations(self) -> bool:
         """True if any criterion needs the acceleration plan."""
-        return any(c.name.startswith(("a_", "epsilon_")) or c.scale == "ka" for c in self.criterion)
+        return any(
+            c.name.startswith(("a_", "epsilon_")) or c.scale == "ka" or (c.point or "").startswith("J")
+            for c in self.criterion
+        )
 
     def tolerance_of(self, asked: CriterionTable | str) -> ToleranceTable:
         """Return the tolerance of a criterion, or of the vector, angular quantity, scale or link so named.
@@ -299,7 +322,7 @@ class Asked:
     Attributes
     ----------
     figures : those that a rubric has criteria for, and the sketch
-    vectors : all vectors of these figures
+    vectors : all vectors of these figures, and what is asked for on the sketch
     entries : the vectors and values that have cells on the printed sheets of the `assignment`
     """
 
@@ -321,7 +344,7 @@ def asked_of(assignment: Assignment, rubric: RubricFile) -> Asked:
     plans = dict.fromkeys(construction.figure_of(vector.head) for vector in known)
     figures = frozenset({MECHANISM, *plans} if plans else ())
     vectors = tuple(vector.name for plan in plans for vector in construction.vectors_of(plan))
-    return Asked(figures, vectors, rubric.entries, assignment)
+    return Asked(figures, (*vectors, *rubric.on_sketch), rubric.entries, assignment)
 
 
 def check_rubric(rubric: RubricFile, construction: Construction) -> list[Finding]:
@@ -332,14 +355,17 @@ def check_rubric(rubric: RubricFile, construction: Construction) -> list[Finding
         "angular": tuple(construction.rates),
         "sense": tuple(construction.rates),
         "link": tuple(construction.links),
+        "point": tuple(construction.centres),
     }
+    on_sketch = tuple(name for name in construction.vectors if f"{name}{ON_SKETCH}" in construction.on_sketch)
     return [
         Finding(
             f"$.criterion[{index}].{key}",
             f"{name} is not in this mechanism{look_alikes(name)}: {', '.join(names)}",
         )
         for index, criterion in enumerate(rubric.criterion)
-        for key, names in known.items()
+        for key, all_names in known.items()
+        for names in (on_sketch if key == "vector" and criterion.figure else all_names,)
         if (name := getattr(criterion, key)) is not None and name not in names
     ]
 

@@ -77,9 +77,9 @@ _POINTS = {"scale": 1.0, "link": 0.5, "vector": 2.0, "angular": 0.5}
 _OPTIONAL = {"scale", "link", "angular"}
 """Items that a student may leave out without losing points."""
 KEYS_OF_A_CRITERION = """\
-# One for each thing judged: exactly one of vector, value, angular, sense, scale and link. Of its other keys:
-# for full marks; optional = true: not judged where it was not handed in; direction = false: only the length
-# counts."""
+# One for each thing judged: exactly one of vector, value, angular, sense, scale, link and point. Of its other
+# keys: points for full marks; optional = true: not judged where it was not handed in; direction = false: only
+# the length counts."""
 """Replaces the start's comments, which stand at keys that not every criterion has."""
 _PLANS_MM = 60.0
 """Length of a plan's first vector at the trial scales from which round ones are derived."""

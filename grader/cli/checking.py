@@ -34,7 +34,8 @@ WRITTEN = N_("%(file)s: fill in what is below the comments, then check it by --m
 HOW_TO_FILL_IN = N_(
     "# Drawn lengths in mm; _deg: directions counter-clockwise from the horizontal to the right; _value:"
     " computed values, counter-clockwise positive or with their sense (2.09 cw); scales with their units."
-    " Blank cells are not checked; lines that begin with # are ignored."
+    " Points I and J from the driving link's pivot; _sketch: as drawn on the mechanism. Blank cells are not"
+    " checked; lines that begin with # are ignored."
 )
 
 

@@ -99,12 +99,18 @@ def _print_table(assignment: Assignment, plan: Plan) -> None:
     console.print(f"[bold]{assignment.file.title.en}[/bold], {plan.variants[0]}", highlight=False)
     told = [f"{name} = {getattr(scales, name):.6g} {unit}" for name, unit in SCALE_UNITS.items()]
     console.print("   ".join(told), highlight=False)
-    table = new_table("vector", "drawn mm", "value", "unit", "direction deg", left=("unit",))
+    table = new_table("vector, point", "drawn mm", "value", "unit", "direction deg", left=("unit",))
     for vector, row in document.vectors.items():
         direction = "-" if row.direction_deg is None else f"{row.direction_deg:.2f}"
         table.add_row(vector, f"{row.drawn_mm:.2f}", f"{row.value:.4f}", row.unit, direction)
     for rate, value in document.angular.items():
         table.add_row(rate, "", f"{value + 0.0:.4f}", unit_of(rate), "")
+    pivot = plan.construction.pivot
+    for name in plan.construction.centres:
+        if (point := document.centres_m[name]) is not None:
+            at = complex(*point) - complex(*document.points_m[pivot])
+            real, mm, angle = abs(at), abs(at) / scales.kL, np.degrees(np.angle(at)) % 360.0
+            table.add_row(f"{name} from {pivot}", f"{mm:.2f}", f"{real:.4f}", "m", f"{angle:.2f}")
     console.print(table)
     worst = min((float(np.min(sine)) for sine in plan.motion.transmission.values()), default=1.0)
     if worst < 0.2:

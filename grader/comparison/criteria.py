@@ -17,6 +17,7 @@ from functools import partial
 from grader.comparison.charges import Charges, Choice, choose
 from grader.comparison.evidence import DrawnVector, Evidence, Submission, gather
 from grader.comparison.follow_through import Explain, FollowThrough, ReplayResult, nothing_explained
+from grader.comparison.on_sketch import judged_on_sketch
 from grader.comparison.outcomes import (
     both,
     entry_refused,
@@ -130,6 +131,8 @@ def _judged(charges: Charges, criterion: CriterionTable) -> Outcome:
         return _rate(charges, criterion)
     if criterion.value is not None:
         return _computed(charges, criterion, criterion.value)
+    if criterion.is_on_sketch:
+        return judged_on_sketch(charges, criterion) or _absent(charges, criterion, Quantity())
     sources = (charges.evidence.drawn.get(criterion.name), charges.evidence.measured.get(criterion.name))
     outcomes = [_segment(charges, criterion, drawn) for drawn in sources if drawn is not None]
     if len(outcomes) == 2:
@@ -144,7 +147,7 @@ ORDER = ("length", "velocity", "omega", "acceleration", "epsilon")
 
 
 def _in_order(following: FollowThrough) -> list[CriterionTable]:
-    """The criteria as they are drawn: the driving link's omega, scales, sketch, velocities, omega and so on.
+    """The criteria as they are drawn: the driving omega, scales, sketch, plans, what is added to the sketch.
 
     Of vectors that end at one node, those on wrong lines come first; a computed value comes after its vector.
     The rubric's order changes nothing.
@@ -159,6 +162,8 @@ def _in_order(following: FollowThrough) -> list[CriterionTable]:
             return (-2,)
         if criterion.scale is not None:
             return -1, SCALE_NAMES.index(name)
+        if criterion.is_on_sketch:
+            return (len(ORDER),)
         kind = ORDER.index("length" if criterion.link else kind_of(name).name)
         if name not in task.segments:
             return kind, 0

@@ -168,6 +168,7 @@ class _Sheets:
         if sketch:
             self.lengths.extend(_yardstick(self.task, sketch))
             self.add_vectors(_links(self.task, sketch, turn, se_turn))
+            self.add_vectors(_vectors(sketch, sketch.vectors, turn, se_turn))
             joints = _mechanism_nodes(self.task, sketch, turn)
             self.add_nodes(joints, sketch)
         for figure, read in reading.figures.items():

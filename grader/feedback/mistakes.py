@@ -243,6 +243,10 @@ PRECISE: dict[str, tuple[str, ...]] = {
     "scale_wrong": (
         N_("All lengths that depend on %(at)s are %(factor)s times what they should be."),
     ),
+    "image_mirrored": (
+        N_("At %(centre)s, the triangle on the mechanism is the mirror image of the one in the plan: their"
+           " letters follow in opposite senses."),
+    ),
     "labels_swapped": (N_("The letters %(first)s and %(second)s stand at each other's point."),),
     "figure_rotated": (
         N_("All of %(at)s is turned by %(degrees)s° counter-clockwise against the mechanism."),

@@ -40,14 +40,15 @@ THEN = N_("Then draw again what follows from it: %(nodes)s.")
 def redo(subject: Subject, tongue: Tongue, node: str, *, with_numbers: bool) -> list[str]:
     """Return the steps from a node on: those of its figure in full, later figures' nodes by name.
 
-    Empty if it is no node of the construction. Without numbers, steps of the mechanism are left out: they are
-    nothing but given lengths.
+    Of a link's centre, its own step. Empty if it is no node of the construction. Without numbers, steps of
+    the mechanism are left out: they are nothing but given lengths.
     """
     construction = subject.plan.construction
-    order = [step.node for step in construction.steps]
-    if node not in order:
-        return []
     speaker = speaker_of(subject, tongue, lambda name: escape(name.plain))
+    if node in construction.centres:
+        return [_text(speaker, construction.centres[node], with_numbers=with_numbers).unescape()]
+    if all(node != step.node for step in construction.steps):
+        return []
     touched = _touched(construction.steps, node)
     figure = construction.figure_of(node)
     own = [step for step in touched if construction.figure_of(step.node) == figure]

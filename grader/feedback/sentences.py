@@ -24,7 +24,7 @@ OPEN_ONLY = frozenset({"near_limit", "hand_may_miss", "doubtful", UNSURE})
 """Used only for open criteria: a verdict leaves no doubt."""
 RESIDUALS = frozenset(
     {
-        "too_long", "too_short", "turned_left", "turned_right", "reversed", "should_be_zero",
+        "too_long", "too_short", "turned_left", "turned_right", "reversed", "should_be_zero", "place_off",
         "value_too_large", "value_too_small", "value_reversed", "sense_wrong", "scale_off", "not_drawn",
         "not_certainly_within",
     }
@@ -215,6 +215,8 @@ def _known(mistake: NamedMistake, speaker: Tongue, level: Level, names: Mapping[
     }
     if mistake.at.startswith(NORMAL_END):
         told["vector"] = f"a_{mistake.at.removeprefix(NORMAL_END)}_n"
+    elif _CENTRE.fullmatch(mistake.at):
+        told["centre"] = place(mistake.at, speaker, names)
     elif _IMAGE.fullmatch(mistake.at):
         told["vector"] = (
             f"{'a' if mistake.at.endswith(ACCELERATED) else 'v'}_{mistake.at.rstrip(ACCELERATED).upper()}"
@@ -224,6 +226,8 @@ def _known(mistake: NamedMistake, speaker: Tongue, level: Level, names: Mapping[
 
 _IMAGE, ACCELERATED = re.compile("[a-z][0-9]?'?"), "'"
 """Names of images of joints in the plans, and the mark of those in the acceleration plan."""
+_CENTRE = re.compile("[IJ][0-9A-Za-z]+")
+"""Names of links' centres on the sketch, where a mirrored triangle is not one of the plan."""
 
 
 def line_of(mistake: NamedMistake) -> str:

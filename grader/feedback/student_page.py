@@ -35,6 +35,7 @@ from grader.outcomes import CHARGED
 from grader.overlay.closeup import PageView, detail, page_views, scan_element, svg
 from grader.overlay.scene import Picture
 from grader.texts.spoken import PLACES, place
+from reference.construction.graph import ON_SKETCH
 
 NUMBER, POSITION, PAGE = N_("number"), N_("position"), N_("page")
 WIDENED = N_("widened")
@@ -177,7 +178,7 @@ class StudentPage:
 
     def shown(self, name: str) -> str:
         """Return a vector, computed value, link or scale as students know it."""
-        return place(name, self.speaker, self.about.names)
+        return place(name, self.speaker, self.about.names).removesuffix(ON_SKETCH)
 
     # Criteria and scales --------------------------------------------------------------------------
 

@@ -292,7 +292,7 @@ SLIPPED = 0.95
 
 
 def _slips(task: Task, comparison: Comparison, known: Sequence[NamedMistake]) -> list[NamedMistake]:
-    """Values that were computed wrongly from a right vector.
+    """Values that were computed wrongly from a right vector, and centres of links from a mirrored triangle.
 
     Of angular quantities only where no mistake is known: they depend on links and senses, too.
     """
@@ -311,6 +311,8 @@ def _slips(task: Task, comparison: Comparison, known: Sequence[NamedMistake]) ->
         slip = NamedMistake(Mistake("arithmetic", at, factor=factor), (one.criterion,), SLIPPED)
         if one.mistake == "arithmetic":
             of_vectors.append(slip)
+        elif one.mistake == "image_mirrored":
+            of_vectors.append(replace(slip, mistake=Mistake("image_mirrored", one.name)))
         elif rate is None or rate.drives:
             continue
         elif rate.vector in sure and is_value_off and abs(factor - 1.0) >= LEAST_SLIP:

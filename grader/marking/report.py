@@ -92,7 +92,7 @@ def report_of(  # noqa: PLR0913 - what a report holds beside the judgement
             "expected_score": judgement.score.expected,
             "criteria": [
                 {
-                    **_criterion(outcome),
+                    **_criterion(outcome, on_sketch=outcome.name in task.rubric.on_sketch),
                     "title": titles[outcome.criterion],
                     "points": judgement.score.points[outcome.criterion],
                     "max_points": maxima[outcome.criterion],
@@ -164,16 +164,15 @@ def _head(assignment: Assignment, variant: Variant, student_id: str) -> dict[str
     }
 
 
-def _criterion(outcome: Outcome) -> dict[str, object]:
+def _criterion(outcome: Outcome, *, on_sketch: bool) -> dict[str, object]:
     """The fields of a criterion that come from its outcome."""
-    is_scale = outcome.name in SCALE_NAMES
+    kind = "on_sketch" if on_sketch else "vector" if "_" in outcome.name else "link"
     of_value = vector_of_value(outcome.name)
-    is_vector = not is_scale and not of_value and "_" in outcome.name
+    about = {"value": of_value} if of_value else {} if outcome.name in SCALE_NAMES else {kind: outcome.name}
     return {
         "id": outcome.criterion,
-        "vector": outcome.name if is_vector else None,
-        "link": outcome.name if not is_scale and not of_value and not is_vector else None,
-        "value": of_value,
+        "vector": None,
+        **about,
         "verdict": outcome.verdict,
         "measured": outcome.measured,
         "expected": outcome.expected,

@@ -14,9 +14,9 @@ import numpy as np
 
 from grader.documents import CriterionDocument
 from grader.outcomes import CHARGED, Outcome
-from grader.records import MECHANISM, Box, FloatArray, Reading, on_sheet
+from grader.records import MECHANISM, Box, FloatArray, Reading, ReadVector, on_sheet
 from grader.texts.spoken import NO_NAMES
-from reference.construction.graph import Vector
+from reference.construction.graph import ON_SKETCH, Vector
 from reference.drawing import symbols
 from reference.drawing.canvas import PAPER, Area, Curve, Label, Ring, Shape, Stroke, Text, pieces_of, width_of
 from reference.drawing.labels import lengths_inside
@@ -203,8 +203,6 @@ def _arrows(
     reading: Reading, vectors: Mapping[str, Vector], outcomes: Mapping[str, Judged]
 ) -> Iterator[Arrow]:
     for kind, figure in reading.figures.items():
-        if kind == MECHANISM:
-            continue
         for name, read in figure.vectors.items():
             ends = vectors.get(name)
             if ends is None or ends.tail not in figure.nodes or ends.head not in figure.nodes:
@@ -219,16 +217,24 @@ def _arrows(
 def _links(
     reading: Reading, links: Mapping[str, tuple[str, str]], outcomes: Mapping[str, Judged]
 ) -> Iterator[Arrow]:
-    """Yield the links of the sketch that were judged."""
+    """Yield the links of the sketch that were judged, and what was added to it."""
     sketch = reading.figures.get(MECHANISM)
     for name, (tail, head) in links.items():
         outcome = outcomes.get(name)
-        if sketch is None or outcome is None or tail not in sketch.nodes or head not in sketch.nodes:
+        if sketch is None or outcome is None or tail not in sketch.nodes:
             continue
-        if outcome.verdict != "not_judged":
-            ends = (on_sheet(sketch.nodes[tail].at), on_sheet(sketch.nodes[head].at))
-            doubtful = outcome.verdict == "review"
-            yield Arrow(name, MECHANISM, *ends, outcome.verdict, doubtful, is_link=True)
+        start, added = sketch.nodes[tail].at, _along(sketch.vectors.get(name))
+        end = start + added if added is not None else sketch.nodes[head].at if head in sketch.nodes else None
+        if end is not None and outcome.verdict != "not_judged":
+            is_link = not name.endswith(ON_SKETCH)
+            doubtful, ends = outcome.verdict == "review", (on_sheet(start), on_sheet(end))
+            yield Arrow(name, MECHANISM, *ends, outcome.verdict, doubtful, is_link=is_link)
+
+
+def _along(read: ReadVector | None) -> complex | None:
+    if read is None or read.length_mm is None or read.direction_deg is None:
+        return None
+    return cmath.rect(read.length_mm, math.radians(read.direction_deg))
 
 
 def ghosts_of(arrows: Iterable[Arrow], outcomes: Mapping[str, Judged]) -> Iterator[Ghost]:
@@ -312,7 +318,7 @@ def labels_of(
     labels = []
     for arrow in sorted(arrows, key=lambda one: -one.length):
         others = np.array([(*one.tail, *one.tip, 0.0) for one in arrows if one is not arrow]).reshape(-1, 5)
-        text = pieces_of(names.get(arrow.name, arrow.name))
+        text = pieces_of(names.get(arrow.name, arrow.name).removesuffix(ON_SKETCH))
         wide = BADGE_MM + 1.0 + BOLD_SHARE * width_of(text, NAME_MM)
         far, boxes = _candidates(arrow, within, size, wide)
         corners = np.hstack([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]])

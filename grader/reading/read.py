@@ -13,6 +13,7 @@ from grader.reading.expected import Edge
 from grader.reading.lettering import lettered, support
 from grader.reading.lines import Lines, lines_of
 from grader.reading.nodes import NodeFit
+from grader.reading.on_sketch import SketchPage, with_additions
 from grader.reading.page_scale import given_length
 from grader.reading.plans import EXPLAINED, PlanProblem, PlanReading, best_plan, regular_plans
 from grader.reading.sketch import SketchReading, drawings, find_sketch
@@ -108,10 +109,19 @@ def read_figures(
         for page in filter(_has_no_velocities, pages):
             page.plans.clear()
             _find_plan(pages, [drawing], ACCELERATION_PLAN, {}, renamed)
-    return [
+    readings = [
         lettered(reading, page.ink.letters, drawing.construction, renamed)
         for reading, page in zip(_readings(pages, drawing, wanted), pages, strict=True)
     ]
+    added = [name for name in wanted if name in drawing.construction.on_sketch]
+    return with_additions(readings, [*map(_sketch_page, pages)], drawing, added) if added else readings
+
+
+def _sketch_page(page: _PageReading) -> SketchPage:
+    circles = page.ink.circles[:, 0] - 1j * page.ink.circles[:, 1]
+    if page.sketch is None:
+        return SketchPage(page.lines, np.zeros(0, np.int64), circles, 0.0)
+    return SketchPage(lines_of(page.ink), page.sketch.members, circles, page.sketch.guide_turn_rad)
 
 
 # The drawing to look for ---------------------------------------------------------------------------
@@ -300,7 +310,8 @@ def _readings(pages: Sequence[_PageReading], drawing: Drawing, wanted: Collectio
 
 
 def _nowhere(drawing: Drawing, names: Sequence[str]) -> Iterator[Unread]:
-    for name in names:
+    on_sketch = drawing.construction.on_sketch
+    for name in (name for name in names if name not in on_sketch):
         vector = drawing.construction.vectors.get(name)
         if vector is None:
             yield Unread(name, Reason("not_of_assignment"))

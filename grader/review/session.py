@@ -687,7 +687,7 @@ class Session:
         judged = {criterion.drawn: criterion for criterion in student.report.criteria if criterion.drawn}
         return scene_of(
             page.sheet.page_mm, reading, construction.vectors, judged,
-            show_expected=False, links=construction.links,
+            show_expected=False, links=construction.all_on_sketch,
         )  # fmt: skip
 
     def ghost(self, student: Student, sheet: int, criterion: CriterionDocument) -> Ghost | None:
@@ -698,7 +698,7 @@ class Session:
         if construction is None or read is None or expected is None:
             return None
         vector = construction.vectors.get(criterion.drawn)
-        tail = construction.links[criterion.drawn][0] if vector is None else vector.tail
+        tail = construction.all_on_sketch[criterion.drawn][0] if vector is None else vector.tail
         node = read.nodes.get(tail)
         if node is None:
             return None
@@ -713,7 +713,7 @@ class Session:
 
     def figure_of(self, student: Student, criterion: CriterionDocument) -> str:
         """Return the figure of a criterion's vector or link; empty for a scale or an angular quantity."""
-        if criterion.link:
+        if criterion.link or criterion.on_sketch:
             return MECHANISM
         construction = self._construction(student)
         vector = construction.vectors.get(criterion.vector or "") if construction else None

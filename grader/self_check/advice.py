@@ -40,7 +40,9 @@ _LINES = N_(
 _LETTERS = N_("Look at the letters of its name: from which point of the plan to which does it run?")
 _ENTRY = N_("Look at this entry again: its number and its unit.")
 _SCALE = N_("Give the scale that you used with its unit, such as 1:5 or 0.005 m/mm.")
+_AS_IN_PLAN = N_("It must be parallel to the vector of the plan, of its sense, and as long.")
 SIZE = {
+    "sketch": _AS_IN_PLAN,
     "driven": N_("Look at the real value that you computed for it, and at the scale that you divided it by."),
     "n": N_("Look at v²/l again: which velocity, which length, and by which scale did you divide?"),
     "c": N_(
@@ -49,6 +51,7 @@ SIZE = {
     "": _LINES,
 }
 TURN = {
+    "sketch": _AS_IN_PLAN,
     "driven": N_("Look at the driving link on your sketch: how does this vector lie to it?"),
     "n": N_("Look at the link that it lies along."),
     "t": N_("Look at the link that it stands perpendicular to."),
@@ -56,6 +59,7 @@ TURN = {
     "": N_("Look at what sets the direction of its lines: which link, or which guide?"),
 }
 SENSE = {
+    "sketch": _AS_IN_PLAN,
     "driven": N_("Look at the sense in which the driving link moves."),
     "n": N_("Look at the point that it must point towards."),
     "c": N_("Look at the sense in which the guide turns."),
@@ -77,6 +81,9 @@ ADVICE: dict[str, Mapping[str, str]] = {
     "value_reversed": SENSE_OF_LINK,
     "sense_wrong": SENSE_OF_LINK,
     "sense_missing": SENSE_OF_LINK,
+    "place_off": {
+        "": N_("Look at the triangle of the plan that it is found by: which sides, and in which sense?")
+    },
     "should_be_zero": {"": N_("Look at which points stand still for an instant here.")},
     "not_measured": {"": N_("Measure what is missing, and enter it.")},
     "too_short_to_judge": {"": N_("Measure what is missing, and enter it.")},
@@ -231,13 +238,13 @@ def advice_on(reasons: Sequence[Reason], name: str, driven: str) -> str:
 
 
 def _kind(name: str, driven: str) -> str:
-    """Return the kind of a value: scale, rate, driven, part of an acceleration (n, t, c, r), or none."""
+    """Return the kind of a value: scale, rate, driven, sketch, part of an acceleration, or none."""
     if name in SCALE_NAMES:
         return "scale"
     if name.startswith(("omega", "epsilon")):
         return "rate"
     _, about, part = f"{name}__".split("_")[:3]
-    return "driven" if about == driven else part
+    return "driven" if about == driven and part != "sketch" else part
 
 
 def law_of(mistake: NamedMistake) -> str:

@@ -70,8 +70,8 @@ def certain_mistakes(judgement: Judgement) -> tuple[NamedMistake, ...]:
 def _is_handed_in(outcome: Outcome) -> bool:
     absent = {"not_measured", "optional", "unread", "scale_assumed"}
     if outcome.measured == Quantity() and outcome.name not in SCALE_NAMES:
-        # A value that depends only on a refused entry was not handed in.
-        absent.add("entry_refused")
+        # A value that depends only on a refused entry was not handed in, nor a centre off the sheet.
+        absent |= {"entry_refused", "off_sheet"}
     return outcome.verdict not in {"not_judged", "review", "none"} or not (
         absent & {reason.code for reason in outcome.reasons[:1]}
     )

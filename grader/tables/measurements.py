@@ -2,9 +2,10 @@
 
 CSV for a class: ``student_id,n,position,kL,kv,ka``, then vector names (drawn millimetres),
 ``NAME_deg`` (directions counter-clockwise from the assignment's +x) and ``NAME_value`` (SI; angular
-quantities counter-clockwise positive, or with a sense: ``2.09 cw``, or cw in ``NAME_sense``).
-Semicolon-separated files have decimal commas; blank means not measured; a line that begins with ``#``
-is a comment. JSON for one student: `grader.documents.MeasurementsDocument`.
+quantities counter-clockwise positive, or with a sense: ``2.09 cw``, or cw in ``NAME_sense``). On the sketch
+``a_D_sketch`` is a vector drawn again, ``J3`` and ``J3_deg`` are a centre's distance and direction from the
+driving link's pivot. Semicolon-separated files have decimal commas; blank means not measured; a line that
+begins with ``#`` is a comment. JSON for one student: `grader.documents.MeasurementsDocument`.
 
 A fault of the whole file (no student_id, no CSV at all) raises TableError with all of them. A value
 that is refused costs that value alone, and so does a column that is not known: it is a problem of that
@@ -23,6 +24,7 @@ from grader.documents import LikeDocument, MeasurementsDocument
 from grader.files import shown_text
 from grader.language import tongue
 from grader.records import (
+    MECHANISM,
     Figure,
     PageRef,
     Reading,
@@ -186,6 +188,7 @@ def names_of(assignment: Assignment) -> Names:
     possible += [f"a_{about}_{part}" for about in under for part in ("c", "r")]
     unused = frozenset(possible) - construction.vectors.keys()
     vectors = {name: kind_of(name).figure for name in (*construction.vectors, *sorted(unused))}
+    vectors |= dict.fromkeys(construction.on_sketch, MECHANISM)
     return Names(vectors, tuple(construction.rates), unused)
 
 
@@ -193,9 +196,9 @@ def columns_of(rubric: RubricFile) -> dict[str, str]:
     """The columns of a file with all that a rubric asks for, each with its unit."""
     columns = {name: unit for name, unit in SCALE_UNITS.items() if name != "ka" or rubric.needs_accelerations}
     for criterion in rubric.criterion:
-        if criterion.vector:
-            columns[criterion.vector] = "mm"
-            columns |= {f"{criterion.vector}_deg": "°"} if criterion.direction else {}
+        if criterion.vector or criterion.point:
+            columns[criterion.name] = "mm"
+            columns |= {f"{criterion.name}_deg": "°"} if criterion.direction else {}
         elif criterion.value:
             columns[criterion.name] = unit_of(criterion.value)
         elif criterion.angular:

@@ -21,6 +21,8 @@ HINTS: dict[str, str] = {
     "turned_left": N_("Its direction is off: it is turned too far counter-clockwise."),
     "turned_right": N_("Its direction is off: it is turned too far clockwise."),
     "reversed": N_("It points the opposite way."),
+    "place_off": N_("It lies in the wrong place."),
+    "off_sheet": N_("It lies off the sheet here, and is not asked for."),
     "should_be_zero": N_("Look at this position of the mechanism again: how large can it be here?"),
     "too_short_to_judge": N_("It is too short for its direction to be judged; only its length counts."),
     "value_too_large": N_("The value is too large."),
@@ -75,6 +77,7 @@ HINTS: dict[str, str] = {
 FULL: dict[str, str] = {
     "too_long": N_("It is too long by %(off)s (tolerance ±%(tolerance)s)."),
     "too_short": N_("It is too short by %(off)s (tolerance ±%(tolerance)s)."),
+    "place_off": N_("It lies %(off)s from its place (tolerance %(tolerance)s)."),
     "turned_left": N_("It is turned %(off)s too far counter-clockwise (tolerance ±%(tolerance)s)."),
     "turned_right": N_("It is turned %(off)s too far clockwise (tolerance ±%(tolerance)s)."),
     "should_be_zero": N_("It is zero in this position of the mechanism; %(measured)s were drawn."),

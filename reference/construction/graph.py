@@ -166,6 +166,10 @@ class AngularRate:
     drives: bool = False
 
 
+ON_SKETCH = "_sketch"
+"""Ends the name of a vector that is drawn again at its point on the sketch."""
+
+
 @dataclass(frozen=True)
 class Construction:
     """Steps in an order in which they can be drawn, with the figure that each belongs to.
@@ -233,6 +237,23 @@ class Construction:
         return frozenset(name for name, rate in self.rates.items() if rate.drives)
 
     @property
+    def pivot(self) -> str:
+        """The driving link's pivot; where a slider drives, the first fixed point."""
+        steps = self.figures["mechanism"]
+        return next((step.start for step in steps if isinstance(step, Given)), steps[0].node)
+
+    @property
+    def on_sketch(self) -> Mapping[str, str]:
+        """The joint from which each vector of the finished plans is drawn again (``a_D_sketch``).
+
+        Centres (``J3``) are told from the driving pivot.
+        """
+        joints = {step.node for step in self.figures["mechanism"]}
+        own = (one.name for one in self.vectors.values() if one.tail in self.poles.values())
+        vectors = {f"{name}{ON_SKETCH}": joint for name in own if (joint := name.partition("_")[2]) in joints}
+        return {**vectors, **dict.fromkeys(self.centres, self.pivot)}
+
+    @property
     def links(self) -> Mapping[str, tuple[str, str]]:
         """Pairs of joints that the sketch draws as links, by their joined names."""
         pairs = [vector.link for vector in self.vectors.values() if vector.link and vector.part != "r"]
@@ -242,6 +263,11 @@ class Construction:
             for tail, head in pairs
             if place.get(tail, tail) != place.get(head, head)
         }
+
+    @property
+    def all_on_sketch(self) -> Mapping[str, tuple[str, str]]:
+        """All links, and what is added to the sketch as a link without a joint at its end."""
+        return {**self.links, **{name: (joint, "") for name, joint in self.on_sketch.items()}}
 
     def with_step(self, changed: Step) -> "Construction":
         """Return the construction with the step of one node replaced."""

@@ -5,8 +5,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from reference.construction.elements import FixedLine, Line
-from reference.construction.graph import Vector, evaluate
+from reference.construction.elements import FixedLine, Line, View
+from reference.construction.graph import ON_SKETCH, Vector, evaluate
 from reference.construction.steps import ArcAndLine, Divide, Given, OnGuide, Similar, Step, TwoArcs, TwoLines
 from reference.mechanism import (
     Crank,
@@ -132,6 +132,8 @@ def draw_mechanism(sketch: SheetSketch, task: DrawingTask, nodes: Nodes, student
     _crank_extras(sketch, task, nodes)
     if student.vectors_on_mechanism:
         _vectors_at_pin(sketch, task, nodes)
+    if student.from_plans:
+        _from_plans(sketch, task, nodes)
     if student.altitude:
         _altitude(sketch, task, nodes)
     for joint in named:
@@ -209,6 +211,36 @@ def _vectors_at_pin(sketch: SheetSketch, task: DrawingTask, nodes: Nodes) -> Non
             sketch.lines[MECHANISM, name] = (p, q)
             height = 0.85 * sketch.page.letter_mm
             sketch.letter(q, _vector_text(sketch, name), height, names=name, distance_mm=1.5)
+
+
+POLE_MM, NEAR_POLE_MM = 1.2, 150.0
+"""Radius of the circle that marks a pole, and the longest way to one that is drawn."""
+
+
+def _from_plans(sketch: SheetSketch, task: DrawingTask, nodes: Nodes) -> None:
+    """Draw the last joint's acceleration at it, and the acceleration poles that lie near enough."""
+    construction = task.wrong.construction
+    plan = {name: complex(at) for name, at in evaluate(construction, task.wrong.parameters).items()}
+    accelerations = [name for name in construction.on_sketch if name.startswith("a_")]
+    for again in accelerations[-1:]:
+        name, joint = again.removesuffix(ON_SKETCH), nodes[construction.on_sketch[again]]
+        vector = construction.vectors[name]
+        p, q = sketch.redrawn(joint, joint + plan[vector.head] - plan[vector.tail])
+        pen = sketch.pen("line", plan=True)
+        sketch.line(pen, p, q)
+        symbols.arrowhead(sketch, pen, p, q, sketch.style.arrow_mm)
+        sketch.lines[MECHANISM, name] = (p, q)
+    for name, step in construction.centres.items():
+        joints = [nodes[joint] for joint in step.base]
+        corners = {**plan, **dict(zip(step.base, joints, strict=True))}
+        view = View({key: np.asarray(at) for key, at in corners.items()}, {})
+        at = complex(step.place(view))
+        if name.startswith("J") and max(abs(at - joint) for joint in joints) < NEAR_POLE_MM:
+            at += complex(*sketch.rng.normal(0.0, sketch.hand.reading_mm, 2))
+            for joint in joints:
+                sketch.line(sketch.pen("thin"), *sketch.redrawn(joint, at))
+            symbols.circle(sketch, at, POLE_MM, sketch.pen("line"))
+            sketch.lines[MECHANISM, f"J_{name[1:]}"] = (at, at)
 
 
 def _altitude(sketch: SheetSketch, task: DrawingTask, nodes: Nodes) -> None:

@@ -58,6 +58,7 @@ class Student:
     mistakes : codes of mistakes to make, each at a random step among those that admit it
     sheets : 1 for all figures on one sheet, 2 for velocities and accelerations apart
     vectors_on_mechanism : v_A and a_A drawn at the crank's pin as well
+    from_plans : a_D drawn at D, and the acceleration poles of links
     altitude : right-triangle construction of a normal component on the mechanism
     omitted : share of the pole-to-point vectors that are not drawn out
     abandoned : a figure begun and crossed out; with `abandoned_whole` drawn to its end before
@@ -74,6 +75,7 @@ class Student:
     mistakes: tuple[str, ...] = ()
     sheets: Literal[1, 2] = 1
     vectors_on_mechanism: bool = False
+    from_plans: bool = False
     altitude: bool = False
     omitted: float = 0.0
     abandoned: bool = False

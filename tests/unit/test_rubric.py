@@ -47,7 +47,9 @@ def test_what_needs_accelerations_is_known(rubric, text):
     [
         (criterion(""), r"$.criterion[0]", "exactly one of"),
         (criterion('vector = "v_A"\nangular = "omega_2"'), r"$.criterion[0]", "exactly one of"),
-        (criterion('vector = "v_A"\npoint = 3'), r"$.criterion[0].point", "did you mean points?"),
+        (criterion('vector = "v_A"\npoins = 3'), r"$.criterion[0].poins", "did you mean points?"),
+        (criterion('point = "J3"\nfigure = "mechanism"'), r"$.criterion[0]", "only a vector may have"),
+        (criterion('point = "J3"\ndirection = false'), r"$.criterion[0]", "must have a direction"),
         (criterion('scale = "kq"'), r"$.criterion[0].scale", "kL"),
         (criterion('vector = "v_A"').replace("1.0", "-1.0"), r"$.criterion[0].points", "greater than 0"),
         (criterion('vector = "v_A"') * 2, r"$.criterion[1].id", "there already"),

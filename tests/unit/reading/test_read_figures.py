@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from grader.reading.read import INKED, ON_IT_PX, read_figures
-from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, InkMap, Reading
-from reference.authored.assignment import Assignment, Variant, built_in
+from grader.records import ACCELERATION_PLAN, HEAD_AHEAD, MECHANISM, VELOCITY_PLAN, InkMap, Reading, Tips
+from reference.authored.assignment import Assignment, Variant, built_in, load_assignment
+from reference.construction.elements import View
 from reference.construction.mistakes import Mistake, commit
 from tests.examples import slow
 from tests.unit.reading.drawn import PLACES, Drawn, Pen, draw, ink_of, task
@@ -37,6 +38,11 @@ def vectors_read(reading: Reading) -> dict[str, tuple[complex, float]]:
             length, direction = vector.length_mm or 0.0, math.radians(vector.direction_deg or 0.0)
             found[name] = cmath.rect(length, direction), vector.confidence
     return found
+
+
+def built_in_variant(n: int) -> Variant:
+    """One of the pump's variants."""
+    return load_assignment("pump").variant(n)
 
 
 def right_share(drawn: Drawn, reading: Reading) -> float:
@@ -269,3 +275,44 @@ def test_a_wrong_drawing_of_a_slotted_link_is_read_as_wrong_as_it_is(mistake):
     reading = read(drawn, assignment, variant)
     assert right_share(drawn, reading) >= 0.8
     assert not silently_wrong(drawn, reading)
+
+
+# What is added to the sketch ----------------------------------------------------------------------
+
+ADDED = ("v_A_sketch", "a_D_sketch", "J4")
+
+
+def with_additions(mistake: str = "") -> tuple[dict[str, tuple[complex, float]], dict[str, complex]]:
+    """Vectors at joints, and a pole with lines from its joints: as read, and as drawn."""
+    assignment, variant, drawing = task("pump", built_in_variant(4))
+    plain = draw(drawing)
+    step = drawing.construction.centres["J4"]
+    nodes = {name: np.asarray(at) for name, at in plain.nodes.items()}
+    pole = complex(replace(step, mirrored=mistake == "mirrored").place(View(nodes, {})))
+    sense = -1.0 if mistake == "reversed" else 1.0
+    along = [plain.vectors["v_A"], sense * plain.vectors["a_D"]]
+    starts = [plain.nodes["A"], plain.nodes["D"]]
+    arrows = [(start, start + vector) for start, vector in zip(starts, along, strict=True)]
+    rays = [(plain.nodes[joint], pole) for joint in step.base]
+    drawn = draw(drawing, pen=Pen(extra=[*arrows, *rays]))
+    heads = np.full(2, HEAD_AHEAD)
+    tips = Tips(np.arange(2), np.abs(along) + 0.25, heads, np.full(2, 0.95))
+    ink = replace(drawn.ink, tips=tips)
+    wanted = (*drawn.vectors, *ADDED)
+    found = vectors_read(read_figures([(ink, drawn.sheet)], assignment, variant, None, wanted)[0])
+    return found, dict(zip(ADDED, (*along, pole - plain.nodes["O1"]), strict=True))
+
+
+@pytest.mark.parametrize("mistake", ["", "reversed", "mirrored"])
+def test_what_is_added_to_the_sketch_is_read_as_it_was_drawn(mistake):
+    found, truth = with_additions(mistake)
+    assert [name for name, at in truth.items() if abs(found[name][0] - at) >= SILENTLY_WRONG_MM] == []
+
+
+def test_nothing_is_read_where_nothing_was_added_and_nothing_else_changes():
+    assignment, variant, drawing = task("pump", built_in_variant(4))
+    drawn = draw(drawing)
+    names = tuple(drawn.vectors)
+    plain, asked = (read(drawn, assignment, variant, wanted) for wanted in (names, (*names, *ADDED)))
+    assert vectors_read(plain) == vectors_read(asked)
+    assert plain.unread == asked.unread

@@ -55,6 +55,18 @@ def test_a_class_file_is_read_line_by_line(entered):
     assert second.values == {}
 
 
+def test_points_and_vectors_of_the_sketch_have_columns_and_keys(entered):
+    (first,) = entered("student_id,n,a_D_sketch,a_D_sketch_deg,J3,J3_deg,J4\ns01,7,17.3,180,254,142,abc\n")
+    keyed = '{"segments_mm": {"a_D_sketch": 17.3, "J3": 254}, "directions_deg": {"J3": 142}}'
+    (by_key,) = entered(keyed, "a.json")
+    for one in (first, by_key):
+        vectors = one.reading.figures["mechanism"].vectors
+        assert vectors["a_D_sketch"].length_mm == 17.3
+        assert (vectors["J3"].length_mm, vectors["J3"].direction_deg) == (254.0, 142.0)
+    assert [gap.name for gap in first.reading.unread] == ["J4"]
+    assert told(first) == "line 2, J4: 'abc' is no number"
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
 def test_semicolons_come_with_decimal_commas(entered, encoding):
     text = "student_id;n;v_A;v_B\r\ns01;7,0;60,25;58.5\r\n"
