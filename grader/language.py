@@ -6,9 +6,12 @@ other languages. `docs/translating.md` says what to do after a text has changed.
 
 import gettext as gnu
 import math
+import re
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from importlib.resources import files
+
+from markupsafe import Markup, escape
 
 from reference.errors import CallError
 
@@ -107,3 +110,23 @@ def _catalogue(code: str) -> gnu.NullTranslations:
     compiled = files("grader") / "locale" / code / "LC_MESSAGES" / f"{DOMAIN}.mo"
     with compiled.open("rb") as stream:
         return gnu.GNUTranslations(stream)
+
+
+_GREEK = {"omega": "ω", "epsilon": "ε"}
+_NAME = re.compile(
+    r"\b(?:([vank])_([A-Z][A-Za-z0-9]{0,7})(?:_([ntcr])\b)?|(omega|epsilon)_(\w{1,4})|([kμ])([Llva])\b"
+    r"|(O)([0-9])(?=[A-Z]?\b)|(a)_([ntcr])\b|([ωε])([0-9]))"
+)
+"""A name in running text: its letter, its index below, and perhaps one above."""
+
+
+@lru_cache(4096)
+def symbols(text: str) -> Markup:
+    """Return text with names of vectors, rates and scales set with their indices; everything else escaped."""
+    return Markup(_NAME.sub(_symbol, str(escape(text))))  # noqa: S704 - escaped
+
+
+def _symbol(match: re.Match[str]) -> str:
+    letter, below, *above = filter(None, match.groups())
+    shown = letter if letter == "O" else f"<i>{_GREEK.get(letter, letter)}</i>"
+    return f"{shown}<sub>{below}</sub>" + "".join(f"<sup>{part}</sup>" for part in above)

@@ -130,7 +130,7 @@ class NamedMistake:
     explains : the criteria that lost points by it
     confidence : the probability that it was made
     line : how a line was drawn wrongly: ``from`` a node, the ``link`` that gives its direction, and ``line =
-        guide`` if it follows a guide, ``driven across`` or ``driven along`` for the driving link
+        guide`` if it follows a guide, ``driving across`` or ``driving along`` for the driving link
     rivals : mistakes that explain it nearly as well: the submission (lengths alone, say) cannot tell them
         apart
     """

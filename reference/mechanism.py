@@ -40,7 +40,7 @@ class Crank:
 
 
 @dataclass(frozen=True, slots=True)
-class DrivenSlider:
+class DrivingSlider:
     """The driving link is a slider: its `pin` lies at `displacement_m` along a fixed guide."""
 
     link: str
@@ -52,7 +52,7 @@ class DrivenSlider:
     acceleration: FloatArray
 
 
-Driver = Crank | DrivenSlider
+Driver = Crank | DrivingSlider
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,14 +215,14 @@ class Mechanism:
 
     @property
     def crank(self) -> Crank:
-        """The driven crank; raises ValueError if a slider drives."""
+        """The driving crank; raises ValueError if a slider drives."""
         if not isinstance(self.driver, Crank):
-            raise ValueError("this mechanism is driven by a slider, not by a crank")  # noqa: TRY004
+            raise ValueError("this mechanism has a driving slider, not a crank")  # noqa: TRY004
         return self.driver
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Names of all joints: ground pivots, the driven pin, then what each group adds."""
+        """Names of all joints: ground pivots, the driving pin, then what each group adds."""
         added = (joint for group in self.groups for joint in joints_of(group))
         return (*self.ground_m, self.driver.pin, *added)
 
@@ -246,14 +246,14 @@ def translated(mechanism: Mechanism, by: ComplexArray) -> Mechanism:
         return group
 
     driver = mechanism.driver
-    if isinstance(driver, DrivenSlider):
+    if isinstance(driver, DrivingSlider):
         driver = replace(driver, guide_m=driver.guide_m + by)
     ground = {joint: place + by for joint, place in mechanism.ground_m.items()}
     return Mechanism(ground, driver, tuple(carried(group) for group in mechanism.groups))
 
 
-def driven_of(driver: Driver) -> FloatArray:
-    """The driven coordinate: a crank's angle (rad), a slider's displacement (m)."""
+def driving_of(driver: Driver) -> FloatArray:
+    """The driving coordinate: a crank's angle (rad), a slider's displacement (m)."""
     return driver.angle_rad if isinstance(driver, Crank) else driver.displacement_m
 
 

@@ -95,9 +95,9 @@ length = 250
 guide = { joints = ["O2", "B"], coincident = "D3" }
 side = "behind"
 """,
-    "driven slider": """
+    "driving slider": """
 ground = { O2 = [0, 0] }
-[mechanism.driven_slider]
+[mechanism.driving_slider]
 pin = "A"
 guide = { through = [0, -50], angle_deg = 0 }
 displacement = -300

@@ -23,7 +23,7 @@ from reference.authored.formula import Formula
 from reference.authored.mechanism import (
     CrankTable,
     CylinderTable,
-    DrivenSliderTable,
+    DrivingSliderTable,
     DyadTable,
     MechanismFile,
     PlateTable,
@@ -146,7 +146,7 @@ def _too_short(assignment: Assignment, rubric: RubricFile) -> set[str]:
 
 
 def _first_speed(file: MechanismFile) -> str:
-    return "speed" if file.driven_slider else "omega * crank_m"
+    return "speed" if file.driving_slider else "omega * crank_m"
 
 
 # The assignment -----------------------------------------------------------------------------------
@@ -269,7 +269,7 @@ def _labels(table: object) -> dict[Any, str]:
         case CylinderTable(pivot=pivot):
             letters = {"length": "s", "speed": "v", "acceleration": "a", "side": "s"}
             return {key: f"{letter}({pivot})" for key, letter in letters.items()}
-        case DrivenSliderTable():
+        case DrivingSliderTable():
             return {"displacement": "s", "speed": "v", "acceleration": "a"}
         case DyadTable():
             side = f"{table.node}, {table.pins[0]}→{table.pins[1]}"

@@ -352,8 +352,8 @@ OTHER_UNITS = frozenset({"m", "cm", "mm", "°", "rev/min"})
 def _told_results(assignment: Assignment, rubric: RubricFile, plan: Plan) -> Iterator[LintFinding]:
     """Report given data that are results: a student need not compute what the rubric asks for."""
     values, results = assignment.values(list(plan.variants)), {**plan.rates, **plan.vectors_si}
-    driven = f"_{plan.mechanism.driver.pin}"
-    asked = [one.name for one in rubric.criterion if one.name in results and not one.name.endswith(driven)]
+    driving = f"_{plan.mechanism.driver.pin}"
+    asked = [one.name for one in rubric.criterion if one.name in results and not one.name.endswith(driving)]
     for index, datum in enumerate(assignment.file.given):
         told = np.abs(datum.value(values)) if datum.unit not in OTHER_UNITS else np.nan
         for name in (name for name in asked if np.allclose(told, np.abs(results[name]), rtol=1e-3)):

@@ -198,14 +198,14 @@ def _print(assignment: Assignment, variant: Variant, subject: CycleSubject, sele
 
 def _path_rows(subject: CycleSubject, point: str, table: "Table") -> None:
     """Add rows on the extent of a point's path, by its samples."""
-    place = np.broadcast_to(subject.cycle.motion.position[point], subject.cycle.driven.shape)
+    place = np.broadcast_to(subject.cycle.motion.position[point], subject.cycle.driving.shape)
     here = complex(subject.motion_at(np.array([subject.cycle.start])).position[point][0])
     for axis, values, own in (("x", place.real, here.real), ("y", place.imag, here.imag)):
         ends = [int(np.nanargmin(values)), int(np.nanargmax(values))]
         cells = [
             cell
             for end in ends
-            for cell in (f"{values[end] + 0.0:.6g}", _number(subject, float(subject.cycle.driven[end])))
+            for cell in (f"{values[end] + 0.0:.6g}", _number(subject, float(subject.cycle.driving[end])))
         ]
         table.add_row(f"{axis}_{point}", "m", *cells, f"{own + 0.0:.6g}")
 
@@ -219,27 +219,27 @@ def _extreme_cells(subject: CycleSubject, extreme: Extreme, size: float) -> tupl
     return text, ", ".join(_number(subject, at) for at in extreme.at)
 
 
-def _at(subject: CycleSubject, driven: float) -> str:
-    """A driven coordinate with its unit."""
-    return f"{_number(subject, driven)} {'deg' if subject.cycle.is_turned else 'mm'}"
+def _at(subject: CycleSubject, driving: float) -> str:
+    """A driving coordinate with its unit."""
+    return f"{_number(subject, driving)} {'deg' if subject.cycle.is_turned else 'mm'}"
 
 
-def _number(subject: CycleSubject, driven: float) -> str:
-    """A driven coordinate in degrees or millimetres, without a minus zero."""
+def _number(subject: CycleSubject, driving: float) -> str:
+    """A driving coordinate in degrees or millimetres, without a minus zero."""
     if subject.cycle.is_turned:
-        return f"{round(math.degrees(driven), 2) + 0.0:.2f}"
-    return f"{round(1e3 * driven, 3) + 0.0:.3f}"
+        return f"{round(math.degrees(driving), 2) + 0.0:.2f}"
+    return f"{round(1e3 * driving, 3) + 0.0:.3f}"
 
 
 def _range(subject: CycleSubject) -> Iterator[str]:
     """Yield lines on the range of the driving link, what stops it, and what it passes."""
     cycle = subject.cycle
-    what = "crank" if cycle.is_turned else "driven slider"
+    what = "crank" if cycle.is_turned else "driving slider"
     here = f"this variant: {_at(subject, cycle.start)}"
     if cycle.turns:
         yield f"the crank turns fully; {here}"
     else:
-        ends = [_at(subject, float(end)) for end in (cycle.driven[0], cycle.driven[-1])]
+        ends = [_at(subject, float(end)) for end in (cycle.driving[0], cycle.driving[-1])]
         yield f"the {what} moves from {ends[0]} to {ends[1]}; {here}"
         for stop in cycle.following.stops:
             where = "" if stop is None else f"{_at(subject, stop.at)}: {stop.node}, {stop.why}"

@@ -250,7 +250,7 @@ class FollowThrough:
 
     def turned_plan(self, segment: TaskSegment) -> Iterator[Expectation]:
         """The vector in a plan that is turned as a whole by quarter turns, as the crank's vector is."""
-        crank, basis = self.task.driven_vector(segment.name), self.turned_basis(segment.name)
+        crank, basis = self.task.driving_vector(segment.name), self.turned_basis(segment.name)
         if basis is not None and segment.head not in basis.wrong:
             quarters = basis.quarters
             turned = segment.drawn(self.followed) * 1j**quarters
@@ -260,8 +260,8 @@ class FollowThrough:
             yield replace(one, what="vector", of=crank, causes=basis.wrong)
 
     def turned_basis(self, name: str) -> PlanBasis | None:
-        """A vector's plan turned as a whole as the driven link's vector is; None where that is not turned."""
-        crank = self.task.driven_vector(name)
+        """Return a vector's plan turned whole like the driving link's vector, None where that is right."""
+        crank = self.task.driving_vector(name)
         return self._cached(("turned", crank), lambda: self._turned_basis(crank))
 
     def _turned_basis(self, crank: str) -> PlanBasis | None:

@@ -131,7 +131,7 @@ def _evidence_of(
         if task.yardstick is None or evidence.yardstick_mm is None or evidence.yardstick_mm[0] <= 0.0:
             return None
         return (task.yardstick.length_m, *evidence.yardstick_mm)
-    vector = task.driven_vector(name)
+    vector = task.driving_vector(name)
     drawn = evidence.vector(vector)
     if drawn is None or drawn.length_mm <= 0.0 or not task.real.get(vector):
         return None
@@ -157,7 +157,7 @@ def _contradiction(task: Task, evidence: Evidence, name: str, used: float) -> fl
 def _fitting(task: Task, evidence: Evidence, name: str, scale: float, least: float = 0.0) -> int:
     """Count the drawn vectors of such a confidence, without the crank's, with the right length at a scale."""
     vectors = [v for v in task.construction.vectors.values() if v.scale == name]
-    known = [(v.name, evidence.vector(v.name)) for v in vectors if v.name != task.driven_vector(name)]
+    known = [(v.name, evidence.vector(v.name)) for v in vectors if v.name != task.driving_vector(name)]
     return sum(
         _fits(drawn, abs(task.real[vector]) / scale, task.rubric.tolerance_of(vector))
         for vector, drawn in known
@@ -223,7 +223,7 @@ def _unseen(
 
     Arguments: `doubtful` is what shows it as read, where that contradicts it.
     """
-    unread = Reason("unread", {"why": "scale_vector_unsure", "vector": task.driven_vector(name)})
+    unread = Reason("unread", {"why": "scale_vector_unsure", "vector": task.driving_vector(name)})
     other = None if doubtful is None else doubtful[0] / doubtful[1]
     off = 0.0 if other is None else _is_off(task, evidence, name, scale.used, other)
     if other is None or off < EVEN:
@@ -242,7 +242,7 @@ def _is_off(task: Task, evidence: Evidence, name: str, declared: float, other: f
 
     Else that vector was misread; the other vectors of the plan fit one or the other.
     """
-    drawn = evidence.vector(task.driven_vector(name))
+    drawn = evidence.vector(task.driving_vector(name))
     confidence = 0.0 if drawn is None else drawn.confidence
     more = _fitting(task, evidence, name, other) - _fitting(task, evidence, name, declared)
     is_other, is_misread = WRONG_SCALE * confidence, FITS_BY_CHANCE**more * (1.0 - confidence)
@@ -303,7 +303,7 @@ def _ends(task: Task, name: str) -> tuple[str, str]:
     if name == "kL":
         yardstick = cast("Yardstick", task.yardstick)
         return yardstick.tail, yardstick.head
-    vector = task.construction.vectors[task.driven_vector(name)]
+    vector = task.construction.vectors[task.driving_vector(name)]
     return vector.tail, vector.head
 
 

@@ -66,7 +66,7 @@ class Task:
     segments : the vectors and the links of the sketch, by name
     rates : exact angular quantities, rad/s and rad/s^2
     lengths_m : by angular quantity, the real length of its link
-    pin : of the driven link
+    pin : of the driving link
     yardstick : the crank; where a slider drives, the first link of given length; None without any
     omega : of the crank, None where a slider drives
     gear_ratio : of the gear before the crank, None where none is given
@@ -94,8 +94,8 @@ class Task:
     def __repr__(self) -> str:
         return f"Task({self.assignment.file.id}, {self.variant})"
 
-    def driven_vector(self, name: str) -> str:
-        """The driven link's vector of the kind of a vector or scale: it shows the scale and the turn."""
+    def driving_vector(self, name: str) -> str:
+        """The driving link's vector of the kind of a vector or scale: it shows the scale and the turn."""
         return f"{kind_of(name).letter}_{self.pin}"
 
     def tolerance_at(self, node: str) -> ToleranceTable:

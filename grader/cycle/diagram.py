@@ -95,7 +95,7 @@ Box = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class CycleMark:
-    """A line through all panels at a driven coordinate (degrees or mm), with a text above it."""
+    """A line through all panels at a driving coordinate (degrees or mm), with a text above it."""
 
     at: float
     text: str
@@ -202,7 +202,7 @@ def _panels(
     """Draw the panels one below another; the marks pass through all of them, their texts stand above."""
     words, cycle = setting.words, subject.cycle
     all_axes = figure.subplots(len(kinds), 1, sharex=True, squeeze=False)[:, 0]
-    ends = _as_read(subject, cycle.driven[[0, -1]])
+    ends = _as_read(subject, cycle.driving[[0, -1]])
     margin = 0.0 if cycle.turns else MARGIN * float(np.ptp(ends))
     all_axes[0].set_xlim(ends[0] - margin, ends[1] + margin)
     steps = [1, 1.5, 3, 4.5, 9, 10] if cycle.is_turned else [1, 2, 2.5, 5, 10]
@@ -233,9 +233,9 @@ def _panel(
     """Draw curves of quantities of one kind with a legend; a ring marks the variant's own position."""
     words, kind = setting.words, quantities[0].kind
     start = np.array([subject.cycle.start])
-    driven = np.linspace(subject.cycle.driven[0], subject.cycle.driven[-1], POSITIONS)
-    driven = driven if subject.cycle.turns else driven[1:-1]
-    motion = subject.motion_at(driven)
+    driving = np.linspace(subject.cycle.driving[0], subject.cycle.driving[-1], POSITIONS)
+    driving = driving if subject.cycle.turns else driving[1:-1]
+    motion = subject.motion_at(driving)
     bounds = [(0.0, 0.0)]
     for quantity in quantities:
         values, own = subject.values(quantity, motion), subject.values_at(quantity, start)
@@ -244,7 +244,7 @@ def _panel(
             continue
         colour = colours[_owner(quantity)]
         axes.plot(
-            _as_read(subject, driven[defined]),
+            _as_read(subject, driving[defined]),
             values[defined],
             color=colour,
             linestyle=DASHES[quantity.axis],
@@ -316,23 +316,23 @@ def marks_of(subject: CycleSubject, words: Tongue) -> Iterator[CycleMark]:
     """Yield the variant's own position, dead points, flat positions and the ends of the range."""
     cycle = subject.cycle
     letter, own = "φ" if cycle.is_turned else "s", words.gettext("this variant")
-    yield _mark(subject, cycle.start, f"{own}: {letter} = {_driven(subject, cycle.start, words)}", OWN, "-.")
+    yield _mark(subject, cycle.start, f"{own}: {letter} = {_driving(subject, cycle.start, words)}", OWN, "-.")
     for title, colour, dash, places in (
         (words.gettext("dead point"), DEAD, "--", _dead_points(subject, words)),
         (words.gettext("flat position"), FLAT, ":", [(event.at, event.node) for event in cycle.passed]),
     ):
         for at, names in places:
-            yield _mark(subject, at, f"{title} ({names}): {_driven(subject, at, words)}", colour, dash)
+            yield _mark(subject, at, f"{title} ({names}): {_driving(subject, at, words)}", colour, dash)
             if cycle.turns and _as_read(subject, at) < SAME:
-                yield _mark(subject, float(cycle.driven[-1]), "", colour, dash)
+                yield _mark(subject, float(cycle.driving[-1]), "", colour, dash)
     for stop in () if cycle.turns else cycle.following.stops:
         if stop is not None:
-            text = f"{_driven(subject, stop.at, words)}, {stop.node}: {words.gettext(stop.why)}"
+            text = f"{_driving(subject, stop.at, words)}, {stop.node}: {words.gettext(stop.why)}"
             yield _mark(subject, stop.at, text, END, "-")
 
 
-def _mark(subject: CycleSubject, driven: float, text: str, colour: str, dash: str) -> CycleMark:
-    return CycleMark(float(_as_read(subject, driven)), text, colour, dash)
+def _mark(subject: CycleSubject, driving: float, text: str, colour: str, dash: str) -> CycleMark:
+    return CycleMark(float(_as_read(subject, driving)), text, colour, dash)
 
 
 def _dead_points(subject: CycleSubject, words: Tongue) -> list[tuple[float, str]]:
@@ -346,16 +346,16 @@ def _dead_points(subject: CycleSubject, words: Tongue) -> list[tuple[float, str]
     return [(at, ", ".join(names)) for at, names in dead.items()]
 
 
-def _as_read(subject: CycleSubject, driven: float | FloatArray) -> FloatArray:
-    """Return driven coordinates in degrees or millimetres."""
-    return np.asarray(np.degrees(driven) if subject.cycle.is_turned else 1e3 * np.asarray(driven))
+def _as_read(subject: CycleSubject, driving: float | FloatArray) -> FloatArray:
+    """Return driving coordinates in degrees or millimetres."""
+    return np.asarray(np.degrees(driving) if subject.cycle.is_turned else 1e3 * np.asarray(driving))
 
 
-def _driven(subject: CycleSubject, driven: float, words: Tongue) -> str:
-    """Write a driven coordinate with its unit."""
+def _driving(subject: CycleSubject, driving: float, words: Tongue) -> str:
+    """Write a driving coordinate with its unit."""
     if subject.cycle.is_turned:
-        return f"{words.trimmed(float(np.degrees(driven)), 2)}°"
-    return words.quantity(1e3 * driven, 2, "mm")
+        return f"{words.trimmed(float(np.degrees(driving)), 2)}°"
+    return words.quantity(1e3 * driving, 2, "mm")
 
 
 def _paths(
@@ -365,7 +365,7 @@ def _paths(
     cycle = subject.cycle
     here = subject.motion_at(np.array([cycle.start]))
     joints = {joint: complex(np.broadcast_to(at, (1,))[0]) for joint, at in here.position.items()}
-    paths = {p: np.array(np.broadcast_to(cycle.motion.position[p], cycle.driven.shape)) for p in colours}
+    paths = {p: np.array(np.broadcast_to(cycle.motion.position[p], cycle.driving.shape)) for p in colours}
     every = np.concatenate([*paths.values(), np.array(list(joints.values()))])
     axes, scale, unit, factor = _path_axes(figure, every[np.isfinite(every)], room_mm)
     links = _links(subject)
@@ -435,7 +435,7 @@ def _path_axes(figure: Figure, places: ComplexArray, room_mm: Box) -> tuple[Axes
 
 def _at_round_angles(subject: CycleSubject, point: str) -> ComplexArray:
     """Return a point's positions at every 30 degrees of the crank."""
-    low, high = np.degrees(subject.cycle.driven[[0, -1]])
+    low, high = np.degrees(subject.cycle.driving[[0, -1]])
     first, last = math.ceil(low / 30.0 - 1e-9), math.floor(high / 30.0 + 1e-9)
     angles = np.radians(30.0 * np.arange(first, last + (0 if subject.cycle.turns else 1)))
     places = subject.motion_at(angles).position[point]

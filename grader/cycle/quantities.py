@@ -110,13 +110,13 @@ class CycleSubject:
 
     @cached_property
     def fine(self) -> tuple[FloatArray, Motion]:
-        """Driven coordinates dense enough to find extremes and dead points, and the motion there."""
+        """Driving coordinates dense enough to find extremes and dead points, and the motion there."""
         cycle = self.cycle
-        if cycle.driven.size >= FINE:
-            return cycle.driven, cycle.motion
-        driven = np.linspace(cycle.driven[0], cycle.driven[-1], FINE)
-        driven = driven if cycle.turns else driven[1:-1]
-        return driven, self.motion_at(driven)
+        if cycle.driving.size >= FINE:
+            return cycle.driving, cycle.motion
+        driving = np.linspace(cycle.driving[0], cycle.driving[-1], FINE)
+        driving = driving if cycle.turns else driving[1:-1]
+        return driving, self.motion_at(driving)
 
     def values(self, quantity: CycleQuantity, motion: Motion | None = None) -> FloatArray:
         """Return a quantity over the cycle, or in another motion of the mechanism, SI, (N,).
@@ -152,13 +152,13 @@ class CycleSubject:
         with np.errstate(all="ignore"):
             return vectors_of(self.construction, self.structure, motion)[name]
 
-    def values_at(self, quantity: CycleQuantity, driven: FloatArray) -> FloatArray:
-        """Return a quantity at other driven coordinates, nan in singular ones."""
-        return self.values(quantity, self.motion_at(driven))
+    def values_at(self, quantity: CycleQuantity, driving: FloatArray) -> FloatArray:
+        """Return a quantity at other driving coordinates, nan in singular ones."""
+        return self.values(quantity, self.motion_at(driving))
 
-    def motion_at(self, driven: FloatArray) -> Motion:
-        """Return the motion at other driven coordinates, nan in singular ones."""
-        mechanism: Mechanism = self.cycle.following.at(driven)
+    def motion_at(self, driving: FloatArray) -> Motion:
+        """Return the motion at other driving coordinates, nan in singular ones."""
+        mechanism: Mechanism = self.cycle.following.at(driving)
         return move_where_possible(mechanism)
 
 
@@ -178,7 +178,7 @@ def _largest(kind: KindName, motion: Motion) -> FloatArray:
 
 
 def cycle_csv(subject: CycleSubject, selection: Selection, *, decimal_comma: bool = False) -> str:
-    """Return the driven coordinate and the selected quantities at each sample, or the reason for none.
+    """Return the driving coordinate and the selected quantities at each sample, or the reason for none.
 
     Numbers with all their digits (they read back as the same doubles), blank where there is none; the file
     begins as ``crank angle [deg],v_B [m/s],x_D [m]`` and ends with the column ``note``. With decimal commas
@@ -186,19 +186,19 @@ def cycle_csv(subject: CycleSubject, selection: Selection, *, decimal_comma: boo
     """
     cycle = subject.cycle
     first = (
-        ("crank angle [deg]", np.degrees(cycle.driven))
+        ("crank angle [deg]", np.degrees(cycle.driving))
         if cycle.is_turned
-        else ("displacement [m]", cycle.driven)
+        else ("displacement [m]", cycle.driving)
     )
     columns: list[tuple[str, FloatArray]] = [first]
     columns += [(f"{one.name} [{one.unit}]", subject.values(one)) for one in selection.quantities]
     for point in selection.points:
-        place = np.broadcast_to(cycle.motion.position[point], cycle.driven.shape)
+        place = np.broadcast_to(cycle.motion.position[point], cycle.driving.shape)
         columns += [(f"x_{point} [m]", place.real), (f"y_{point} [m]", place.imag)]
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\r\n", delimiter=";" if decimal_comma else ",")
     writer.writerow([*(guarded(heading) for heading, _ in columns), "note"])
-    for row in range(cycle.driven.size):
+    for row in range(cycle.driving.size):
         numbers = [_written(float(values[row]), decimal_comma) for _, values in columns]
         writer.writerow([*numbers, guarded(cycle.undetermined.get(row, ""))])
     return buffer.getvalue()
@@ -232,7 +232,7 @@ class OutputStroke:
     ----------
     name : the slider's point, or the link that rocks
     is_angle : whether `travel` is an angle (rad) or a length (m)
-    dead_points : driven coordinates at which it turns back, ascending
+    dead_points : driving coordinates at which it turns back, ascending
     travel : between its two ends, None if it turns back more than twice a cycle
     time_ratio : of the slower stroke to the faster one, at constant crank speed; None as above
     """
@@ -313,7 +313,7 @@ def _stroke(subject: CycleSubject, output: _Output) -> OutputStroke:
     if not cycle.turns or len(dead) != 2:
         return OutputStroke(output.name, output.is_angle, dead, None, None)
     first, second = dead
-    period = float(cycle.driven[-1] - cycle.driven[0])
+    period = float(cycle.driving[-1] - cycle.driving[0])
     ways = (second - first, period - (second - first))
     return OutputStroke(
         output.name, output.is_angle, dead, _travel(subject, output, dead), max(ways) / min(ways)
@@ -326,16 +326,16 @@ def _turning_points(subject: CycleSubject, output: _Output) -> Iterator[float]:
     samples, motion = subject.fine
     rate = output.rate(motion)
     told = np.isfinite(rate) & (np.abs(rate) > REST * np.nanmax(np.abs(rate), initial=0.0))
-    driven, signs = samples[told], np.sign(rate[told])
-    if cycle.turns and driven.size:
-        period = cycle.driven[-1] - cycle.driven[0]
-        driven, signs = np.append(driven, driven[0] + period), np.append(signs, signs[0])
+    driving, signs = samples[told], np.sign(rate[told])
+    if cycle.turns and driving.size:
+        period = cycle.driving[-1] - cycle.driving[0]
+        driving, signs = np.append(driving, driving[0] + period), np.append(signs, signs[0])
     for k in np.flatnonzero(signs[1:] != signs[:-1]):
 
         def holds(points: FloatArray, sign: float = signs[k]) -> np.ndarray:
             return np.asarray(output.rate(subject.motion_at(points)) * sign > 0.0)
 
-        at = change(holds, float(driven[k]), float(driven[k + 1]))[0]
+        at = change(holds, float(driving[k]), float(driving[k + 1]))[0]
         if cycle.turns:
             # A dead point at the cycle's end, but for rounding, is the one at its beginning.
             at = at % period
@@ -345,8 +345,8 @@ def _turning_points(subject: CycleSubject, output: _Output) -> Iterator[float]:
 
 def _travel(subject: CycleSubject, output: _Output, dead: tuple[float, ...]) -> float:
     """Return the travel between two dead points, an angle followed from sample to sample."""
-    driven, _ = subject.fine
-    between = driven[(driven > dead[0]) & (driven < dead[1])]
+    driving, _ = subject.fine
+    between = driving[(driving > dead[0]) & (driving < dead[1])]
     place = output.place(subject.motion_at(np.array([dead[0], *between, dead[1]])))
     if not output.is_angle:
         return abs(float((place[-1] - place[0]).real))
@@ -367,12 +367,12 @@ def extremes(subject: CycleSubject, quantity: CycleQuantity) -> tuple[Extreme, E
 
 
 def _refined(subject: CycleSubject, quantity: CycleQuantity, values: FloatArray, sign: float) -> Extreme:
-    driven, _ = subject.fine
+    driving, _ = subject.fine
     if not np.isfinite(values).any():
         return Extreme(np.nan, ())
     best = int(np.nanargmax(sign * values))
-    at, value = float(driven[best]), float(values[best])
-    low, high = driven[max(best - 1, 0)], driven[min(best + 1, driven.size - 1)]
+    at, value = float(driving[best]), float(values[best])
+    low, high = driving[max(best - 1, 0)], driving[min(best + 1, driving.size - 1)]
     if np.ptp(values[np.isfinite(values)]) <= REST * abs(value):
         return Extreme(value, (at,))
     for _ in range(ROUNDS):
@@ -388,7 +388,7 @@ def _refined(subject: CycleSubject, quantity: CycleQuantity, values: FloatArray,
 def unbounded_ends(subject: CycleSubject, quantity: CycleQuantity) -> Iterator[tuple[float, float]]:
     """Yield ends of the range towards which a quantity grows without bound, and its sign there."""
     cycle: Cycle = subject.cycle
-    low, high = float(cycle.driven[0]), float(cycle.driven[-1])
+    low, high = float(cycle.driving[0]), float(cycle.driving[-1])
     for stop, inward in zip(cycle.following.stops, (1.0, -1.0), strict=True):
         if stop is None or cycle.turns:
             continue

@@ -12,7 +12,7 @@ from grader.language import N_
 
 ALONG_GUIDE = "guide"
 """Value of a mistake's detail `line` for a line along a moving guide."""
-DRIVEN_ACROSS, DRIVEN_ALONG = "driven across", "driven along"
+DRIVING_ACROSS, DRIVING_ALONG = "driving across", "driving along"
 """Its values for the driving link's vectors: one is perpendicular to the link, one points along it."""
 CORIOLIS_END, NORMAL_END = "k_", "n_"
 """First letters of the nodes at the ends of Coriolis and normal components."""
@@ -173,7 +173,7 @@ _CORIOLIS: dict[str, Words] = {
     "normal_reversed": Words(
         N_("Coriolis component reversed"),
         N_("At %(at)s, the Coriolis component was laid off the wrong way round."),
-        N_("Turn the sliding velocity of the point of the guide about the block by 90° in the sense in"
+        N_("Turn the sliding velocity of the guide's point relative to the block by 90° in the sense in"
            " which the guide turns: that is its direction."),
     ),
     "arithmetic": Words(
@@ -195,7 +195,7 @@ _ALONG_GUIDE: dict[str, Words] = {
         N_("The block slides along its own guide: redraw the line by it."),
     ),
 }  # fmt: skip
-_DRIVEN_ACROSS: dict[str, Words] = {
+_DRIVING_ACROSS: dict[str, Words] = {
     "parallel_for_perpendicular": Words(
         N_("vector along the link instead of perpendicular to it"),
         N_("At %(at)s, the driving link's vector was drawn along the link instead of perpendicular to it."),
@@ -203,7 +203,7 @@ _DRIVEN_ACROSS: dict[str, Words] = {
            " off so, in the sense of rotation, then redo the plan."),
     ),
 }  # fmt: skip
-_DRIVEN_ALONG: dict[str, Words] = {
+_DRIVING_ALONG: dict[str, Words] = {
     "parallel_for_perpendicular": Words(
         N_("vector perpendicular to the link instead of along it"),
         N_("At %(at)s, the driving link's vector was drawn perpendicular to the link instead of along it."),
@@ -216,7 +216,8 @@ _DRIVING = Words(
     N_("%(at)s turns the other way."),
     N_("Take the sense in which the driving link turns from the assignment."),
 )
-_BY_LINE = {ALONG_GUIDE: _ALONG_GUIDE, DRIVEN_ACROSS: _DRIVEN_ACROSS, DRIVEN_ALONG: _DRIVEN_ALONG}
+_BY_LINE = {ALONG_GUIDE: _ALONG_GUIDE, DRIVING_ACROSS: _DRIVING_ACROSS, DRIVING_ALONG: _DRIVING_ALONG}
+_BY_LINE |= {"driven across": _DRIVING_ACROSS, "driven along": _DRIVING_ALONG}  # earlier versions
 
 
 PRECISE: dict[str, tuple[str, ...]] = {

@@ -29,7 +29,7 @@ from grader.feedback.numbers import (
 )
 from grader.feedback.words import ProblemText, environment, problem_sentence
 from grader.files import write_whole
-from grader.language import N_, Tongue, tongue
+from grader.language import N_, Tongue, symbols, tongue
 from grader.options import Level
 from grader.outcomes import CHARGED
 from grader.overlay.closeup import PageView, detail, page_views, scan_element, svg
@@ -213,7 +213,7 @@ class StudentPage:
         """List optional criteria that were not handed in, with the right value if it may be shown."""
         names = []
         for criterion in filter(_is_left_out, self.report.criteria):
-            name = words.symbols(self.shown(criterion.drawn or criterion.id))
+            name = symbols(self.shown(criterion.drawn or criterion.id))
             value = quantity_cells(criterion.expected, self.speaker)[-1:] if self.shows_expected else []
             names.append(Markup("{} ({})").format(name, *value) if value else name)
         return names
@@ -331,7 +331,7 @@ class StudentPage:
         if view.kind == "sheet":
             return Markup.escape(self._source(picture) + self._placed(picture))
         if view.kind == "detail":
-            return Markup("{}: {}").format(said, Markup(", ").join(map(words.symbols, view.names)))
+            return Markup("{}: {}").format(said, Markup(", ").join(map(symbols, view.names)))
         return Markup("{}: {}").format(said, self._source(picture))
 
     def _caption(self, view: PageView) -> str:

@@ -1,16 +1,14 @@
 """Verdicts, states, names and problems as written for people."""
 
-import re
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup, escape
 
 from grader.documents import ProblemDocument, UnmatchedDocument
 from grader.feedback.numbers import points_text
 from grader.feedback.sentences import BETWEEN_RIVALS, RIVALS
-from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
+from grader.language import N_, ROOT_LANGUAGE, Tongue, symbols, tongue
 from grader.overlay.scene import COLOURS, MARKS
 from grader.texts.spoken import Coded, sentence
 
@@ -51,36 +49,6 @@ STATE_TONES = {
     "graded": "v-full", "needs_review": "v-review", "unreadable": "v-none", "missing": "v-not_judged"
 }  # fmt: skip
 STATE_MARKS = {"graded": "✓", "needs_review": "?", "unreadable": "✗", "missing": "–"}
-
-_GREEK = {"omega": "ω", "epsilon": "ε"}
-_NAME = re.compile(
-    r"\b(?:(?P<vector>[vank])_(?P<points>[A-Z][A-Za-z0-9]{0,7})(?:_(?P<part>[ntcr])\b)?"
-    r"|(?P<rate>omega|epsilon)_(?P<link>\w{1,4})|(?P<letter>[kμ])(?P<scale>[Llva])\b"
-    r"|O(?P<pivot>[0-9])(?=[A-Z]?\b))"
-)
-
-
-@lru_cache(4096)
-def symbols(text: str) -> Markup:
-    """Return text with names of vectors, rates and scales set with their indices; everything else escaped."""
-    parts: list[Markup] = []
-    end = 0
-    for match in _NAME.finditer(text):
-        parts += [escape(text[end : match.start()]), _symbol(match)]
-        end = match.end()
-    return Markup("").join([*parts, escape(text[end:])])
-
-
-def _symbol(match: re.Match[str]) -> Markup:
-    if match["vector"]:
-        part = Markup("<sup>{}</sup>").format(match["part"]) if match["part"] else Markup("")
-        return Markup("<i>{}</i><sub>{}</sub>{}").format(match["vector"], match["points"], part)
-    if match["pivot"]:
-        return Markup("O<sub>{}</sub>").format(match["pivot"])
-    if match["rate"]:
-        return Markup("<i>{}</i><sub>{}</sub>").format(_GREEK[match["rate"]], match["link"])
-    return Markup("<i>{}</i><sub>{}</sub>").format(match["letter"], match["scale"])
-
 
 # Templates ----------------------------------------------------------------------------------------
 

@@ -142,8 +142,8 @@ def _crank_elsewhere(task: Task, drawn: DrawnParts) -> Owner | None:
     if link is None or task.omega is None:
         return None
     sketched = _turned_by(task, drawn, f"{link.tail}{link.head}")
-    followed = [_turned_by(task, drawn, task.driven_vector(kind)) for kind in ("v", "a")]
-    table = task.rubric.tolerance_of(task.driven_vector("v"))
+    followed = [_turned_by(task, drawn, task.driving_vector(kind)) for kind in ("v", "a")]
+    table = task.rubric.tolerance_of(task.driving_vector("v"))
     limit = math.radians(table.direction_deg) * table.farthest
     if abs(sketched) <= limit or not any(abs(one - sketched) < limit < abs(one) for one in followed):
         return None

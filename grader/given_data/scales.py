@@ -18,7 +18,7 @@ of the logarithm of the factor then."""
 AT_DECLARED, AT_OWN_RULE = 0.4, 0.4
 """Probability that a copied plan follows the scale declared beside it, or that of its original author."""
 SET_OFF_SHARE, SET_OFF_MM = 0.006, 0.4
-"""Standard errors of the driven vector's length: from its rounded scale, and from drawing it."""
+"""Standard errors of the driving vector's length: from its rounded scale, and from drawing it."""
 
 
 def declared_scales(task: Task, declared: Mapping[str, str]) -> dict[str, float]:
@@ -32,12 +32,12 @@ def declared_scales(task: Task, declared: Mapping[str, str]) -> dict[str, float]
     return found
 
 
-def _driven(
+def _driving(
     task: Task, drawn: Mapping[str, DrawnVector], scales: Mapping[str, float]
 ) -> tuple[str, float] | None:
     """Return the driving link's vector of a plan, and its declared scale; None if either is missing."""
     for scale in ("kv", "ka"):
-        name = task.driven_vector(scale)
+        name = task.driving_vector(scale)
         has_length = name in drawn and drawn[name].length_mm > 0.0
         if has_length and scale in scales and task.real.get(name):
             return name, scales[scale]
@@ -55,11 +55,11 @@ def _off_scale(drawn: DrawnVector, scale: float, real: FloatArray) -> tuple[Floa
 def by_scale(
     task: Task, drawn: Mapping[str, DrawnVector], scales: Mapping[str, float], exact: ExactDrawings
 ) -> FloatArray:
-    """Return the log probability of a plan's declared scale given its driven vector; (sets,).
+    """Return the log probability of a plan's declared scale given its driving vector; (sets,).
 
     A copy may have the copied scale or the student's own: the scale says little, and never hides a copy.
     """
-    found = _driven(task, drawn, scales)
+    found = _driving(task, drawn, scales)
     if found is None:
         return np.zeros(len(exact.data))
     name, declared = found

@@ -180,7 +180,7 @@ def mistakes_in_plans(task: Task) -> list[Mistake]:
         for figure in construction.poles
         for mistake in chain(
             single_mistakes(right, figure),
-            _driven_along(construction, figure),
+            _driving_along(construction, figure),
             _letters_swapped(construction, figure),
         )
         if mistake.code not in {"scale_wrong", "rpm_not_converted", "figure_rotated"}
@@ -215,7 +215,7 @@ def _letters_swapped(construction: Construction, figure: str) -> Iterator[Mistak
         yield Mistake("labels_swapped", pair[0], other=pair)
 
 
-def _driven_along(construction: Construction, figure: str) -> Iterator[Mistake]:
+def _driving_along(construction: Construction, figure: str) -> Iterator[Mistake]:
     """Yield the driving link's vector along the link instead of across it, or across instead of along."""
     for step in construction.figures[figure]:
         for mistake in rarer_mistakes_of_step(step, construction):
@@ -314,8 +314,8 @@ def _drawn_angles(task: Task, drawn: DrawnParts) -> dict[str, float]:
     found: dict[str, float] = {}
     for vectors in drawn.values():
         for name, one in vectors.items():
-            is_driven = task.segments[name].head in {task.pin, *_images(task)}
-            if is_driven and one.direction_rad is not None and one.length_mm >= LEAST_TURNED_MM:
+            is_driving = task.segments[name].head in {task.pin, *_images(task)}
+            if is_driving and one.direction_rad is not None and one.length_mm >= LEAST_TURNED_MM:
                 angle = float(given) + one.direction_rad - cmath.phase(task.segments[name].real)
                 if all(_apart(angle, other) > SAME_RAD for other in (*known, *found.values())):
                     found[f"{ELSEWHERE} {name}"] = angle
@@ -325,7 +325,7 @@ def _drawn_angles(task: Task, drawn: DrawnParts) -> dict[str, float]:
 def _images(task: Task) -> Iterable[str]:
     """Return the heads of the driving link's vectors."""
     vectors = task.construction.vectors
-    return [vectors[name].head for name in map(task.driven_vector, "va") if name in vectors]
+    return [vectors[name].head for name in map(task.driving_vector, "va") if name in vectors]
 
 
 def _apart(one: float, other: float) -> float:

@@ -238,7 +238,7 @@ def _may_be_assembled_otherwise(explanations: Sequence[Replay], case: Case) -> b
 
 
 def _scales_of_the_driver(case: Case, best: Replay) -> Iterator[Root]:
-    """Roots with the scale that the driven link's vector alone follows, where that vector is not explained.
+    """Roots with the scale that the driving link's vector alone follows, where that vector is not explained.
 
     Beside another mistake too little else fits a wrong scale for it to be seen before.
     """

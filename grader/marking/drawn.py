@@ -82,7 +82,7 @@ def _blamed(mistakes: Iterable[Mistake], construction: Construction) -> frozense
 def case_of(task: Task, evidence: Evidence, settled: Mapping[str, Scale], owner: Owner | None = None) -> Case:
     """The drawing to explain at the scales used, with the scales that the drawing follows instead.
 
-    A drawing by other data is held against these, at the scales at which its driven link's vectors are drawn.
+    A drawing by other data is held against these, at the scales of its driving link's vectors.
     """
     taken = None if owner is None else owner.of_whole
     assumed = frozenset(name for name, scale in settled.items() if scale.used.assumed or taken is not None)
@@ -128,10 +128,10 @@ def case_of(task: Task, evidence: Evidence, settled: Mapping[str, Scale], owner:
 def _scales_of_the_drawn_driver(
     task: Task, evidence: Evidence, parameters: Parameters
 ) -> dict[str, FloatArray]:
-    """The scales of the plans as they follow from the drawn lengths of the driven link's vectors."""
+    """The scales of the plans as they follow from the drawn lengths of the driving link's vectors."""
     found = {}
     for scale in ("kv", "ka"):
-        drawn = evidence.vector(task.driven_vector(scale))
+        drawn = evidence.vector(task.driving_vector(scale))
         size = math.hypot(
             *(float(one) for name, one in parameters.items() if name.startswith(f"{kind_of(scale).letter}_"))
         )

@@ -257,7 +257,7 @@ def _line_of(step: Step, slot: int) -> dict[str, str]:
     """The parameters that describe a step's line: ``from`` a node, its ``link``, ``line`` of which kind."""
     if isinstance(step, Given) and isinstance(step.along, Along):
         across = step.along.quarters % 2
-        return {"line": "driven across" if across else "driven along"}
+        return {"line": "driving across" if across else "driving along"}
     line = (step.first, step.second)[slot] if isinstance(step, TwoLines) else None
     if not isinstance(line, Line):
         return {}

@@ -1,12 +1,14 @@
 """Printable answer sheets of a class, and the calibration page."""
 
+import html
+import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import segno
 from reportlab.lib.units import mm
 
-from grader.language import N_, SIDES, Tongue, tongue
+from grader.language import N_, SIDES, Tongue, symbols, tongue
 from grader.printed.layout import (
     CALIBRATION,
     CODE_MM,
@@ -191,7 +193,7 @@ def _task(drawing: PdfDrawing, assignment: Assignment, identity: Identity, tongu
     _, lines = fitted([task], REGULAR, (size,), (wide, high - len(rows) * step))
     base = y + size * _PT
     for line in lines:
-        drawing.text((x, base), line, size)
+        drawing.pieces((x, base), _with_indices(line), size)
         base += step
     base += min(1.0, y + high - base)
     for row in rows:
@@ -202,6 +204,16 @@ def _task(drawing: PdfDrawing, assignment: Assignment, identity: Identity, tongu
 
 
 _SPACE_MM = 3.0
+
+
+def _with_indices(line: str) -> Iterator[Piece]:
+    """Yield the pieces of a line in which names of vectors and scales have their indices."""
+    height = 0
+    for part in re.split("(<[^>]*>)", str(symbols(line))):
+        if part.startswith("<"):
+            height = {"<sub>": -1, "<sup>": 1}.get(part, 0)
+        elif part:
+            yield Piece(html.unescape(part), height)
 
 
 def given_data(assignment: Assignment, variant: Variant, tongue: Tongue) -> list[tuple[Piece, ...]]:

@@ -12,9 +12,9 @@ from reportlab.lib.styles import ParagraphStyle
 from reportlab.lib.units import mm
 from reportlab.platypus import Flowable, PageBreak, Paragraph, SimpleDocTemplate, Spacer, Table
 
-from grader.language import N_, Tongue, tongue
+from grader.language import N_, Tongue, symbols, tongue
 from grader.printed.answer_sheet import given_data, variants_of
-from grader.printed.pdf import BOLD, REGULAR, embed_fonts, number, put_shapes
+from grader.printed.pdf import BOLD, REGULAR, embed_fonts, number, put_shapes, with_marks
 from grader.rubric import RubricFile
 from grader.tables.roster import RosterRow
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
@@ -23,7 +23,7 @@ from reference.drawing.sketch import scheme
 from reference.drawing.subject import Subject
 from reference.errors import MechanismError
 from reference.geometry import ComplexArray
-from reference.mechanism import DrivenSlider, FixedGuide, guides_of
+from reference.mechanism import DrivingSlider, FixedGuide, guides_of
 from reference.plan import exact_plan
 from reference.quantities import SCALE_OF, kind_of, unit_of
 
@@ -115,7 +115,7 @@ def _sheet(
     yield Spacer(1, 1.5 * mm)
     yield _text(_whose(row, variant, speaker), 10, BOLD)
     yield Spacer(1, 2.5 * mm)
-    yield _text(file.task.in_language(speaker.lang), 10)
+    yield _markup(with_marks(symbols(file.task.in_language(speaker.lang))), 10)
     yield Spacer(1, 2.5 * mm)
     drawn, title = _scheme(assignment, variant)
     caption = _text(speaker.gettext(title), 8)
@@ -225,7 +225,7 @@ def _fixed(assignment: Assignment, variant: Variant, speaker: Tongue) -> Iterato
         for guide in guides_of(group)
         if isinstance(guide, FixedGuide)
     ]
-    if isinstance(driver, DrivenSlider):
+    if isinstance(driver, DrivingSlider):
         guides.insert(0, (driver.pin, driver.guide_m, driver.guide_rad))
     for joint, through, angle in guides:
         degrees = number(float(np.degrees(np.ravel(angle)[0])), speaker.decimal_mark)

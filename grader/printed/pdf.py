@@ -1,6 +1,7 @@
 """Fonts, texts and shapes of printed PDFs."""
 
 import io
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -8,6 +9,7 @@ from importlib.resources import files
 
 import cv2
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import NDArray
 from reportlab.lib.colors import Color, HexColor
 from reportlab.lib.units import mm
@@ -66,12 +68,31 @@ def unprintable(text: str) -> str:
     )
 
 
+PRINTED = {
+    "<i>": "",
+    "</i>": "",
+    "<sub>": '<sub rise="2" size="70%">',
+    "<sup>": '<super rise="3" size="70%">',
+    "</sup>": "</super>",
+    "✓": "√",
+}
+"""Marks as reportlab reads them; the embedded font has no slanted letters and no tick."""
+
+
+def with_marks(text: str) -> str:
+    """Return a text, or markup with indices, as reportlab's paragraphs read it."""
+    written = str(Markup.escape(text))
+    for mark, printed in PRINTED.items():
+        written = written.replace(mark, printed)
+    return written
+
+
 def number(value: float, decimal_mark: str) -> str:
-    """Format a datum to six significant digits, with a language's decimal mark."""
+    """Format a datum to six significant digits, with a language's decimal mark and a real minus."""
     text = f"{value:.6g}"
     if "e" in text and 1e-6 < abs(value) < 1e9:
         text = f"{value:.6f}".rstrip("0").rstrip(".") if abs(value) < 1.0 else f"{value:.0f}"
-    return text.replace(".", decimal_mark)
+    return re.sub("^-", "−", text).replace(".", decimal_mark)
 
 
 def pieces_width_mm(pieces: Iterable[Piece], font: str, size_pt: float) -> float:

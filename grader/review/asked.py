@@ -8,8 +8,8 @@ from markupsafe import Markup
 
 from grader.documents import CriterionDocument, Quantity
 from grader.feedback.numbers import points_text, quantity_cells
-from grader.feedback.words import VERDICTS, symbols
-from grader.language import N_, Tongue
+from grader.feedback.words import VERDICTS
+from grader.language import N_, Tongue, symbols
 from grader.overlay.closeup import LEAST_LOOK_MM, LOOK_MARGIN_MM, box_around
 from grader.overlay.scene import MARKS
 from grader.printed.layout import SCALE_BOXES

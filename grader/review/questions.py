@@ -9,8 +9,8 @@ from markupsafe import Markup
 from grader.documents import CriterionDocument, FigureDocument, Quantity
 from grader.feedback.numbers import points_text, quantity_cells, score_text, tolerance_cells
 from grader.feedback.sentences import feedback_again
-from grader.feedback.words import VERDICTS, problem_sentence, symbols, unmatched_sentence
-from grader.language import N_, Tongue
+from grader.feedback.words import VERDICTS, problem_sentence, unmatched_sentence
+from grader.language import N_, Tongue, symbols
 from grader.overlay.closeup import LEAST_LOOK_MM, LOOK_MARGIN_MM, box_around, look
 from grader.overlay.scene import MARKS, ink_of
 from grader.printed.layout import PAGE_MM, values_of

@@ -6,7 +6,7 @@ A mistake that the diagnosis names with certainty is explained by the law that i
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from grader.feedback.mistakes import ALONG_GUIDE, CORIOLIS_END, DRIVEN_ACROSS, DRIVEN_ALONG
+from grader.feedback.mistakes import ALONG_GUIDE, CORIOLIS_END, DRIVING_ACROSS, DRIVING_ALONG
 from grader.feedback.sentences import line_of
 from grader.language import N_, Tongue
 from grader.options import Level
@@ -43,7 +43,9 @@ _SCALE = N_("Give the scale that you used with its unit, such as 1:5 or 0.005 m/
 _AS_IN_PLAN = N_("It must be parallel to the vector of the plan, of its sense, and as long.")
 SIZE = {
     "sketch": _AS_IN_PLAN,
-    "driven": N_("Look at the real value that you computed for it, and at the scale that you divided it by."),
+    "driving": N_(
+        "Look at the real value that you computed for it, and at the scale that you divided it by."
+    ),
     "n": N_("Look at v²/l again: which velocity, which length, and by which scale did you divide?"),
     "c": N_(
         "Look at 2·ω·v again: which link turns, what slides along it, and by which scale did you divide?"
@@ -52,7 +54,7 @@ SIZE = {
 }
 TURN = {
     "sketch": _AS_IN_PLAN,
-    "driven": N_("Look at the driving link on your sketch: how does this vector lie to it?"),
+    "driving": N_("Look at the driving link on your sketch: how does this vector lie to it?"),
     "n": N_("Look at the link that it lies along."),
     "t": N_("Look at the link that it stands perpendicular to."),
     "c": N_("Look at the sliding velocity that it is turned from."),
@@ -60,7 +62,7 @@ TURN = {
 }
 SENSE = {
     "sketch": _AS_IN_PLAN,
-    "driven": N_("Look at the sense in which the driving link moves."),
+    "driving": N_("Look at the sense in which the driving link moves."),
     "n": N_("Look at the point that it must point towards."),
     "c": N_("Look at the sense in which the guide turns."),
     "": _LETTERS,
@@ -154,13 +156,13 @@ _GUIDE = {
     "parallel_for_perpendicular": N_("A block can only move along its guide."),
     "wrong_link": N_("A block moves along its own guide."),
 }
-_DRIVEN = {
-    DRIVEN_ACROSS: {
+_DRIVING = {
+    DRIVING_ACROSS: {
         "parallel_for_perpendicular": N_(
             "A point that turns about a pivot moves across the line to the pivot."
         )
     },
-    DRIVEN_ALONG: {"parallel_for_perpendicular": N_("a_n lies along the link, towards the pivot.")},
+    DRIVING_ALONG: {"parallel_for_perpendicular": N_("a_n lies along the link, towards the pivot.")},
 }
 _SAME = N_("The same mistake as at %(name)s.")
 
@@ -191,14 +193,14 @@ def checked_lines(
 
     Arguments: `unread` are the vectors of a drawing that could not be read; None for entered measurements.
     """
-    names, driven = assignment.file.names, assignment.mechanism_file.driver.pin
+    names, driving = assignment.file.names, assignment.mechanism_file.driver.pin
     values = checked_values(judgement, level, unread or ())
     other = next((one for one in judgement.mistakes if one.code == "other_variant"), None)
     of_other = [one for one in values if any(reason.code == "other_variant" for reason in one.reasons[:1])]
     if other is not None and of_other and level == "hint":
         # Said once: the verdict on each value by those data is of no use here.
         hint = _hint(of_other[0].reasons[0], speaker, level, names)
-        advice = speaker.gettext(advice_on(of_other[0].reasons[:1], "", driven))
+        advice = speaker.gettext(advice_on(of_other[0].reasons[:1], "", driving))
         return [CheckedLine(of_other[0], ", ".join(other.detail), hint, advice)]
     laws: dict[str, str] = {}
     told: dict[str, str] = {}
@@ -219,7 +221,7 @@ def checked_lines(
                 advice = speaker.gettext(_SAME) % {"name": told[law]}
             else:
                 on_sheet = next((own[reason.code] for reason in one.reasons if reason.code in own), "")
-                advice = speaker.gettext(law or on_sheet or advice_on(one.reasons, one.name, driven))
+                advice = speaker.gettext(law or on_sheet or advice_on(one.reasons, one.name, driving))
             told.update({law: name} if law and law not in told else {})
         lines.append(CheckedLine(one, name, hint, advice))
     return lines
@@ -231,20 +233,20 @@ def _hint(reason: Reason, speaker: Tongue, level: Level, names: Mapping[str, str
     return reason_sentence(reason, speaker, level, names)
 
 
-def advice_on(reasons: Sequence[Reason], name: str, driven: str) -> str:
+def advice_on(reasons: Sequence[Reason], name: str, driving: str) -> str:
     """Return the advice, a key of the catalogues; empty if no reason has any."""
     known = next((ADVICE[reason.code] for reason in reasons if reason.code in ADVICE), {})
-    return known.get(_kind(name, driven), known.get("", ""))
+    return known.get(_kind(name, driving), known.get("", ""))
 
 
-def _kind(name: str, driven: str) -> str:
-    """Return the kind of a value: scale, rate, driven, sketch, part of an acceleration, or none."""
+def _kind(name: str, driving: str) -> str:
+    """Return the kind of a value: scale, rate, driving, sketch, part of an acceleration, or none."""
     if name in SCALE_NAMES:
         return "scale"
     if name.startswith(("omega", "epsilon")):
         return "rate"
     _, about, part = f"{name}__".split("_")[:3]
-    return "driven" if about == driven and part != "sketch" else part
+    return "driving" if about == driving and part != "sketch" else part
 
 
 def law_of(mistake: NamedMistake) -> str:
@@ -253,5 +255,5 @@ def law_of(mistake: NamedMistake) -> str:
     if mistake.at.startswith(CORIOLIS_END):
         return _CORIOLIS.get(mistake.code, usual)
     line = line_of(mistake)
-    others = _GUIDE if line == ALONG_GUIDE else _DRIVEN.get(line, {})
+    others = _GUIDE if line == ALONG_GUIDE else _DRIVING.get(line, {})
     return others.get(mistake.code, usual)

@@ -22,7 +22,7 @@ from reportlab.platypus import (
 )
 
 from grader.language import N_, Tongue
-from grader.printed.pdf import REGULAR, embed_fonts, put_shapes
+from grader.printed.pdf import REGULAR, embed_fonts, put_shapes, with_marks
 from grader.solution.formulas import Formula, grid_html, grid_shapes, mathml, plain, typeset, unicode_name
 from grader.solution.steps import CENTRES, NOTES, ExplainedStep, PlanSection, explain
 from reference.drawing import sheets
@@ -285,20 +285,7 @@ def _formula(formula: Formula) -> Flowable:
     return _Drawn(Cutout(found.shapes, box))
 
 
-PRINTED = {
-    "<i>": "",
-    "</i>": "",
-    "<sub>": '<sub rise="2" size="70%">',
-    "<sup>": '<super rise="3" size="70%">',
-    "</sup>": "</super>",
-    "✓": "√",
-}
-"""Marks as reportlab reads them; the embedded font has no slanted letters and no tick."""
-
-
 def _paragraph(text: str, size: float) -> Paragraph:
     """Return a text or markup as a printed paragraph; its size in points."""
-    written = str(Markup.escape(text))
-    for mark, printed in PRINTED.items():
-        written = written.replace(mark, printed)
-    return Paragraph(written, ParagraphStyle(f"s{size}", fontName=REGULAR, fontSize=size, leading=1.4 * size))
+    style = ParagraphStyle(f"s{size}", fontName=REGULAR, fontSize=size, leading=1.4 * size)
+    return Paragraph(with_marks(text), style)

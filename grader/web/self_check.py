@@ -11,8 +11,7 @@ from typing import Any
 
 from grader.comparison.task import task_of
 from grader.feedback.student_page import AS_MEASURED, SHEET
-from grader.feedback.words import symbols
-from grader.language import Tongue, tongue
+from grader.language import Tongue, symbols, tongue
 from grader.options import Level
 from grader.outcomes import Outcome
 from grader.overlay.closeup import page_views, scan_element, svg

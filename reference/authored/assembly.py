@@ -29,8 +29,8 @@ from reference.mechanism import (
     Array,
     Crank,
     CrossSlider,
-    DrivenSlider,
     Driver,
+    DrivingSlider,
     Dyad,
     FixedGuide,
     Group,
@@ -192,7 +192,7 @@ def _driver(file: MechanismFile, numbers: Numbers) -> Driver:
             gear_ratio=ratio,
         )
     guide = cast("FixedGuide", _guide(table.guide, numbers, _LinkAxes()))
-    return DrivenSlider(
+    return DrivingSlider(
         link=table.link,
         pin=table.pin,
         guide_m=guide.through_m,

@@ -16,7 +16,7 @@ from reference.mechanism import (
     Array,
     Crank,
     Mechanism,
-    driven_of,
+    driving_of,
     rows_of,
     with_arrays,
 )
@@ -31,18 +31,18 @@ def signs_of(mechanism: Mechanism, numbers: Sequence[int | None]) -> dict[str, F
     Arguments: the mechanism of N variants with the sides of its file; n of each, equal ones together. The
     first position that counts is one that is not flat itself. Groups that pass no flat position are left out.
     """
-    driven, sound = _driven(mechanism), _sound(mechanism)
+    driving, sound = _driving(mechanism), _sound(mechanism)
     signs: dict[str, FloatArray] = {}
     motions = [[*rows] for _, rows in groupby(range(len(numbers)), lambda row: numbers[row])]
     motions = [rows for rows in motions if sound[rows].any() and _is_one_motion(mechanism, rows)]
     if isinstance(mechanism.driver, Crank):
         for rows in motions:
-            driven[rows] = np.unwrap(driven[rows])
+            driving[rows] = np.unwrap(driving[rows])
     starts = [next(row for row in rows if sound[row]) for rows in motions]
-    low, high = (np.array([choose(driven[rows]) for rows in motions]) for choose in (np.min, np.max))
+    low, high = (np.array([choose(driving[rows]) for rows in motions]) for choose in (np.min, np.max))
     for index in np.flatnonzero(may_pass(rows_of(mechanism, starts), low, high)) if motions else ():
         rows, start = motions[index], starts[index]
-        passed = signs_between(rows_of(mechanism, [start]), driven[start], driven[rows])
+        passed = signs_between(rows_of(mechanism, [start]), driving[start], driving[rows])
         for node, sign in passed.items():
             signs.setdefault(node, np.ones(len(numbers)))[rows] = sign
     return {node: sign for node, sign in signs.items() if np.any(sign < 0.0)}
@@ -55,11 +55,11 @@ def other_assemblies(mechanism: Mechanism, chain: Sequence[int]) -> dict[str, li
     own position to its neighbour's, a crank the shorter way round: if a flat position lies between, the same
     assembly needs the other side. Variants that are flat themselves are skipped.
     """
-    driven, sound = _driven(mechanism), _sound(mechanism)
+    driving, sound = _driving(mechanism), _sound(mechanism)
     rows = np.array([row for row in chain if sound[row]], dtype=np.intp)
     if rows.size < 2:
         return {}
-    start, end = driven[rows[1:]], driven[rows[:-1]]
+    start, end = driving[rows[1:]], driving[rows[:-1]]
     if isinstance(mechanism.driver, Crank):
         end = start + (end - start + 0.5 * TURN) % TURN - 0.5 * TURN
     near = may_pass(rows_of(mechanism, rows[1:]), np.minimum(start, end), np.maximum(start, end))
@@ -70,7 +70,7 @@ def other_assemblies(mechanism: Mechanism, chain: Sequence[int]) -> dict[str, li
             reversals[node][index + 1] = sign[0]
     found: dict[str, list[int]] = {}
     for group in mechanism.groups:
-        side = np.broadcast_to(getattr(group, "side", 1), driven.shape)[rows]
+        side = np.broadcast_to(getattr(group, "side", 1), driving.shape)[rows]
         kept = np.append(1.0, side[1:] * side[:-1])
         other = np.cumprod(np.where(reversals[group.node] < 0.0, -kept, 1.0)) < 0.0
         if other.any():
@@ -87,14 +87,14 @@ def with_signs(mechanism: Mechanism, signs: Mapping[str, FloatArray]) -> Mechani
     return replace(mechanism, groups=groups)
 
 
-def _driven(mechanism: Mechanism) -> FloatArray:
-    return np.array(driven_of(mechanism.driver))
+def _driving(mechanism: Mechanism) -> FloatArray:
+    return np.array(driving_of(mechanism.driver))
 
 
 def _sound(mechanism: Mechanism) -> BoolArray:
     """(N,) whether a variant assembles and is not flat."""
     transmission = move_where_possible(mechanism, accelerations=False).transmission.values()
-    count = driven_of(mechanism.driver).size
+    count = driving_of(mechanism.driver).size
     return np.asarray(np.min([np.ones(count), *transmission], axis=0) > FLAT)
 
 

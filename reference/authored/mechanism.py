@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from itertools import permutations
 from typing import Annotated, Literal, Self, cast
 
-from pydantic import Field, model_validator
+from pydantic import AliasChoices, Field, model_validator
 
 from reference.authored.chain import GROUND, ONE_DRIVING_LINK, Chain, chain_of, refusal
 from reference.authored.toml_file import (
@@ -49,7 +49,7 @@ class CylinderTable(Authored):
 
 
 class CrankTable(Authored):
-    """The driven crank. Its speed is `omega` (rad/s), or `rpm` through a gear of `gear_ratio`.
+    """The driving crank. Its speed is `omega` (rad/s), or `rpm` through a gear of `gear_ratio`.
 
     Counter-clockwise positive. With a `cylinder`, its length gives angle, speed and acceleration.
     """
@@ -104,8 +104,8 @@ class GuideTable(Authored):
         )
 
 
-class DrivenSliderTable(Authored):
-    """The driven slider, in place of a crank: its position along its fixed guide, and its rates.
+class DrivingSliderTable(Authored):
+    """The driving slider, in place of a crank: its position along its fixed guide, and its rates.
 
     In `length_unit`, `length_unit`/s and `length_unit`/s^2, along the guide's direction.
     """
@@ -121,7 +121,7 @@ class DrivenSliderTable(Authored):
     def _has_a_fixed_guide(self) -> Self:
         if self.guide.joints is not None:
             raise ValueError(
-                "a driven slider's guide is fixed; a cylinder that turns drives the link at its rod's end:"
+                "a driving slider's guide is fixed; a cylinder that turns drives the link at its rod's end:"
                 " [crank] with cylinder = { pivot, length, speed, side }"
             )
         return self
@@ -256,20 +256,23 @@ class MechanismFile(Authored):
     length_unit: Literal["m", "cm", "mm"]
     ground: Annotated[dict[Joint, Point], Field(min_length=1)]
     crank: CrankTable | None = None
-    driven_slider: DrivenSliderTable | None = None
+    driving_slider: DrivingSliderTable | None = Field(
+        default=None, validation_alias=AliasChoices("driving_slider", "driven_slider")
+    )
+    """Older files say `driven_slider`."""
     group: list[GroupTable] = Field(default=[])
 
     @model_validator(mode="after")
     def _has_one_driver(self) -> Self:
-        if (self.crank is None) == (self.driven_slider is None):
+        if (self.crank is None) == (self.driving_slider is None):
             two = f"; two have 2 degrees of freedom: {ONE_DRIVING_LINK}" if self.crank else ""
-            raise ValueError(f"needs one driving link: either [crank] or [driven_slider]{two}")
+            raise ValueError(f"needs one driving link: either [crank] or [driving_slider]{two}")
         return self
 
     @property
-    def driver(self) -> CrankTable | DrivenSliderTable:
+    def driver(self) -> CrankTable | DrivingSliderTable:
         """The driving link."""
-        return cast("CrankTable | DrivenSliderTable", self.crank or self.driven_slider)
+        return cast("CrankTable | DrivingSliderTable", self.crank or self.driving_slider)
 
     @property
     def in_order(self) -> list[tuple[int, AnyGroupTable]]:
@@ -421,7 +424,7 @@ def _check_driver(file: MechanismFile, bodies: _CarriedJoints) -> Iterator[Findi
         bodies.links[file.crank.link] = {file.crank.pivot, file.crank.pin}
     pin = file.driver.pin
     if pin in file.ground:
-        where = "$.crank.pin" if file.crank else "$.driven_slider.pin"
+        where = "$.crank.pin" if file.crank else "$.driving_slider.pin"
         yield Finding(where, f"{pin} is a ground pivot already")
 
 

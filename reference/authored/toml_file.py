@@ -267,7 +267,7 @@ def findings_of(error: ValidationError, model: type[BaseModel]) -> Iterator[Find
         yield Finding("$", f"and {counted(len(faults) - MOST_FINDINGS, 'more fault')}")
 
 
-DRIVING = ("crank", "driven_slider")
+DRIVING = ("crank", "driving_slider", "driven_slider")
 _EQUIVALENT = "by its equivalent linkage for the instant, see Cams and gears in docs/assignments.md"
 _OTHER_KINDS = {
     ".*(cam(?!e)|follower|tappet).*": f"replace a cam {_EQUIVALENT}",
@@ -283,7 +283,7 @@ _OTHER_KINDS = {
     "cylinder|slott?ed.*|quick.?return": 'a block in the slot of a turning link is type = "RPR"',
     "prr|slider|piston|slider.?crank": 'a rod with a slider on a guide is type = "RRP"',
     "triangle|coupler|ternary|body": 'a third point of a link is type = "plate" or "point"',
-    "(crank|driven.?slider|driver|motor|second).?([2-9]|crank|driver|motor)":
+    "(crank|driv(en|ing).?slider|driver|motor|second).?([2-9]|crank|driver|motor)":
         f"a second driving link makes 2 degrees of freedom: {ONE_DRIVING_LINK}",
 }  # fmt: skip
 """Advice about kinds of parts that no file has, or has by another name; the names as regular expressions."""

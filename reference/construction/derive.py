@@ -42,8 +42,8 @@ from reference.construction.steps import (
 from reference.mechanism import (
     Crank,
     CrossSlider,
-    DrivenSlider,
     Driver,
+    DrivingSlider,
     Dyad,
     FixedGuide,
     Group,
@@ -336,10 +336,10 @@ def _draw_driver(draft: Draft, driver: Driver) -> None:
     if isinstance(driver, Crank):
         _draw_crank(draft, driver)
     else:
-        _draw_driven_slider(draft, driver)
+        _draw_driving_slider(draft, driver)
 
 
-def _draw_driven_slider(draft: Draft, slider: DrivenSlider) -> None:
+def _draw_driving_slider(draft: Draft, slider: DrivingSlider) -> None:
     pin, guide = slider.pin, FixedLine(f"guide {slider.pin}")
     draft.sketch.append(OnGuide(pin, guide, Scaled(f"s {pin}", "kL")))
     a, a_primed = draft.image(pin), draft.image(pin, primed=True)

@@ -86,7 +86,7 @@ class Given(FromNodes):
 
 @dataclass(frozen=True, slots=True)
 class OnGuide(FromNodes):
-    """The driven slider: a length along a fixed guide from its point (a negative one backwards)."""
+    """The driving slider: a length along a fixed guide from its point (a negative one backwards)."""
 
     reads = ("length",)
     node: str

@@ -13,7 +13,7 @@ from reference.drawing.subject import PLAN_COLOURS, DrawnFigure, Part, Subject
 from reference.drawing.symbols import HAIR_MM, LINK_MM, THIN_MM, Bar, bars, blocks, hinged_on, point, unit
 from reference.drawing.triangles import altitudes
 from reference.geometry import FloatArray
-from reference.mechanism import Crank, DrivenSlider, Mechanism, Plate, PointOnLine, SlotPoint, SlottedLink
+from reference.mechanism import Crank, DrivingSlider, Mechanism, Plate, PointOnLine, SlotPoint, SlottedLink
 
 LETTER_MM, SMALL_LETTER_MM = 4.2, 3.2
 LINK_NUMBER_MM = 3.0
@@ -184,9 +184,9 @@ def _welds(
 
 
 def _link_numbers(subject: Subject, nodes: dict[str, complex]) -> Iterator[Wanted]:
-    """Place a number at the longest stretch of each link, in a plate's middle, at a driven slider."""
+    """Place a number at the longest stretch of each link, in a plate's middle, at a driving slider."""
     driver = subject.plan.mechanism.driver
-    if isinstance(driver, DrivenSlider):
+    if isinstance(driver, DrivingSlider):
         yield Wanted(
             driver.pin, point(nodes[driver.pin]), driver.link, LINK_NUMBER_MM, INK, symbols.BLOCK_MM[1],
             italic=False,
@@ -229,7 +229,7 @@ def drive_arrow(subject: Subject, nodes: dict[str, complex]) -> Iterator[Shape]:
     driver = subject.plan.mechanism.driver
     if _stands_still(subject):
         return
-    if isinstance(driver, DrivenSlider):
+    if isinstance(driver, DrivingSlider):
         yield from symbols.arrow(*_thrust(subject, driver, nodes), THIN_MM, INK)
     else:
         yield from symbols.turning(nodes[driver.pivot], *_turn(subject, driver, nodes))
@@ -240,7 +240,7 @@ def drive_letter(subject: Subject, nodes: dict[str, complex]) -> Iterator[Wanted
     driver = subject.plan.mechanism.driver
     if _stands_still(subject):
         return
-    if isinstance(driver, DrivenSlider):
+    if isinstance(driver, DrivingSlider):
         at = point(sum(_thrust(subject, driver, nodes)) / 2.0)
         yield Wanted(driver.pin, at, subject.letter(f"v_{driver.pin}"), DRIVE_LETTER_MM, INK, 0.6)
     else:
@@ -251,16 +251,16 @@ def drive_letter(subject: Subject, nodes: dict[str, complex]) -> Iterator[Wanted
 
 
 def _rate(subject: Subject) -> float:
-    """Return the crank's angular velocity, or the driven slider's speed."""
+    """Return the crank's angular velocity, or the driving slider's speed."""
     driver = subject.plan.mechanism.driver
-    return subject.number(np.asarray(driver.speed if isinstance(driver, DrivenSlider) else driver.omega))
+    return subject.number(np.asarray(driver.speed if isinstance(driver, DrivingSlider) else driver.omega))
 
 
 def _stands_still(subject: Subject) -> bool:
     return _rate(subject) == 0.0
 
 
-def _thrust(subject: Subject, driver: DrivenSlider, nodes: dict[str, complex]) -> tuple[complex, complex]:
+def _thrust(subject: Subject, driver: DrivingSlider, nodes: dict[str, complex]) -> tuple[complex, complex]:
     """Return an arrow beside the block, in the sense of its velocity, where it meets the fewest links."""
     block = next(block for block in blocks(subject, nodes) if block.node == driver.pin)
     along = block.along * float(np.sign(_rate(subject)))

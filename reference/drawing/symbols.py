@@ -14,7 +14,7 @@ from reference.drawing.subject import Subject
 from reference.mechanism import (
     Crank,
     CrossSlider,
-    DrivenSlider,
+    DrivingSlider,
     Dyad,
     FixedGuide,
     Group,
@@ -261,7 +261,7 @@ def slot_of_yoke(subject: Subject, group: Yoke, nodes: dict[str, complex]) -> tu
 def blocks(subject: Subject, nodes: dict[str, complex]) -> Iterator[Block]:
     """Yield the sliding blocks of the driving link and of every group."""
     driver = subject.plan.mechanism.driver
-    if isinstance(driver, DrivenSlider):
+    if isinstance(driver, DrivingSlider):
         along = _along(subject, FixedGuide(driver.guide_m, driver.guide_rad), nodes)
         yield Block(driver.pin, nodes[driver.pin], along, grounded=True)
     for group in subject.plan.mechanism.groups:

@@ -1,6 +1,6 @@
 """Continuation of a mechanism from one position: how far its driving link goes, and where branches cross.
 
-Each Assur group closes while its closures, smooth functions of the driven coordinate, are positive.
+Each Assur group closes while its closures, smooth functions of the driving coordinate, are positive.
 Where one changes its sign the driving link is stopped. Where one only touches zero (a parallelogram
 stretched along its ground, a kite folded, an isosceles slider-crank at its guide's end) both branches
 meet, and the motion goes on smoothly on the other branch: the group's side is reversed.
@@ -20,7 +20,7 @@ from reference.kinematics.solving import Joint, Rail, Solution, rail_of, solve
 from reference.mechanism import (
     Crank,
     CrossSlider,
-    DrivenSlider,
+    DrivingSlider,
     Dyad,
     Group,
     Mechanism,
@@ -53,7 +53,7 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """An event of a group: the driven coordinate (rad or m), the group's node, and the reason."""
+    """An event of a group: the driving coordinate (rad or m), the group's node, and the reason."""
 
     at: float
     node: str
@@ -75,7 +75,7 @@ class Continuation:
 
     Attributes
     ----------
-    start : the driven coordinate that it is followed from: crank angle (rad) or displacement (m)
+    start : the driving coordinate that it is followed from: crank angle (rad) or displacement (m)
     low, high : how far the closures were followed
     stops : what ends the motion at `low` and at `high`, None where nothing does
     changes : flat positions that are passed, by the group's node, ascending
@@ -88,9 +88,9 @@ class Continuation:
     stops: tuple[Event | None, Event | None]
     changes: Mapping[str, tuple[float, ...]]
 
-    def at(self, driven: FloatArray) -> Mechanism:
-        """Return the mechanism at some driven coordinates, shape (N,), each group on its side there."""
-        return _driven_at(self.mechanism, driven, self.start, self.changes)
+    def at(self, driving: FloatArray) -> Mechanism:
+        """Return the mechanism at some driving coordinates, shape (N,), each group on its side there."""
+        return _driving_at(self.mechanism, driving, self.start, self.changes)
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -111,8 +111,8 @@ def follow(mechanism: Mechanism, start: float, low: float, high: float) -> Conti
     for count, group in enumerate(mechanism.groups):
         before = replace(mechanism, groups=mechanism.groups[:count])
 
-        def closures(driven: FloatArray, before: Mechanism = before, group: Group = group) -> list[Closure]:
-            return closures_of(_unit_speed(_driven_at(before, driven, start, changes)), group)
+        def closures(driving: FloatArray, before: Mechanism = before, group: Group = group) -> list[Closure]:
+            return closures_of(_unit_speed(_driving_at(before, driving, start, changes)), group)
 
         touched: set[float] = set()
         for index in range(len(closures(np.array([start])))):
@@ -130,7 +130,7 @@ def follow(mechanism: Mechanism, start: float, low: float, high: float) -> Conti
 def signs_between(mechanism: Mechanism, start: float, ends: FloatArray) -> dict[str, FloatArray]:
     """Return by node -1 where a group passes an odd number of flat positions on its way to an end, else +1.
 
-    Arguments: a mechanism of one variant, which assembles at `start`; driven coordinates, shape (N,). Only
+    Arguments: a mechanism of one variant, which assembles at `start`; driving coordinates, shape (N,). Only
     groups that pass flat positions are included; ends that the driving link cannot reach have +1.
     """
     following = follow(mechanism, start, min(start, *ends), max(start, *ends))
@@ -143,16 +143,16 @@ def signs_between(mechanism: Mechanism, start: float, ends: FloatArray) -> dict[
 
 
 def may_pass(mechanism: Mechanism, low: FloatArray, high: FloatArray) -> BoolArray:
-    """Return whether some group comes near a flat position between two driven coordinates, shape (N,) each.
+    """Return whether some group comes near a flat position between two driving coordinates, shape (N,) each.
 
     A quick look at many variants at once: where it says no, `follow` finds no flat position.
     """
     count = low.size
-    driven = np.linspace(low, high, GLANCES, axis=1).ravel()
+    driving = np.linspace(low, high, GLANCES, axis=1).ravel()
     wide = with_arrays(mechanism, lambda values: np.repeat(np.broadcast_to(values, (count,)), GLANCES))
     near = np.zeros(count, dtype=np.bool_)
     for index, group in enumerate(wide.groups):
-        before = _driven_at(replace(wide, groups=wide.groups[:index]), driven, 0.0, {})
+        before = _driving_at(replace(wide, groups=wide.groups[:index]), driving, 0.0, {})
         for closure in closures_of(_unit_speed(before), group):
             value = np.abs(closure.value.reshape(count, GLANCES))
             with np.errstate(invalid="ignore"):
@@ -165,37 +165,37 @@ def _why(group: Group) -> str:
     return WHAT_IS_IN_LINE.get(type(group), "its base has no length")
 
 
-def _driven_at(
-    mechanism: Mechanism, driven: FloatArray, start: float, changes: Mapping[str, tuple[float, ...]]
+def _driving_at(
+    mechanism: Mechanism, driving: FloatArray, start: float, changes: Mapping[str, tuple[float, ...]]
 ) -> Mechanism:
     if isinstance(mechanism.driver, Crank):
-        driver: Crank | DrivenSlider = replace(mechanism.driver, angle_rad=driven)
+        driver: Crank | DrivingSlider = replace(mechanism.driver, angle_rad=driving)
     else:
-        driver = replace(mechanism.driver, displacement_m=driven)
+        driver = replace(mechanism.driver, displacement_m=driving)
     groups = tuple(
-        _on_its_side(group, driven, start, changes.get(group.node, ())) for group in mechanism.groups
+        _on_its_side(group, driving, start, changes.get(group.node, ())) for group in mechanism.groups
     )
     return replace(mechanism, driver=driver, groups=groups)
 
 
-def _on_its_side(group: Group, driven: FloatArray, start: float, changes: tuple[float, ...]) -> Group:
+def _on_its_side(group: Group, driving: FloatArray, start: float, changes: tuple[float, ...]) -> Group:
     """Return the group on the side that it has after so many flat positions, counted from the start."""
     if not changes or not isinstance(group, Dyad | Slider | SlottedLink):
         return group
-    return replace(group, side=np.asarray(group.side * _sign(changes, driven, start)))
+    return replace(group, side=np.asarray(group.side * _sign(changes, driving, start)))
 
 
-def _sign(changes: tuple[float, ...], driven: FloatArray, start: float) -> FloatArray:
-    """-1 if the number of flat positions between the start and a driven coordinate is odd, else +1."""
-    passed = np.searchsorted(changes, driven) - np.searchsorted(changes, start)
+def _sign(changes: tuple[float, ...], driving: FloatArray, start: float) -> FloatArray:
+    """-1 if the number of flat positions between the start and a driving coordinate is odd, else +1."""
+    passed = np.searchsorted(changes, driving) - np.searchsorted(changes, start)
     return np.where(passed % 2 == 0, 1.0, -1.0)
 
 
 def _unit_speed(mechanism: Mechanism) -> Solution:
-    """Return positions and their derivatives by the driven coordinate."""
+    """Return positions and their derivatives by the driving coordinate."""
     one = np.ones(1)
     if isinstance(mechanism.driver, Crank):
-        driver: Crank | DrivenSlider = replace(mechanism.driver, omega=one)
+        driver: Crank | DrivingSlider = replace(mechanism.driver, omega=one)
     else:
         driver = replace(mechanism.driver, speed=one)
     with np.errstate(all="ignore"):
@@ -258,7 +258,7 @@ def _closure(value: Complex, slope: Number, slack: Number) -> Closure:
 # Zeros and minima ---------------------------------------------------------------------------------
 
 Closures = Callable[[FloatArray], list[Closure]]
-"""A group's closures as functions of the driven coordinate."""
+"""A group's closures as functions of the driving coordinate."""
 
 
 @dataclass(slots=True)
@@ -275,8 +275,8 @@ def _walk(closures: Closures, index: int, span: tuple[float, float], *, may_pass
     Samples are denser at both ends, where the mechanism moves fastest near a stop.
     """
 
-    def curve(driven: FloatArray) -> Closure:
-        return closures(driven)[index]
+    def curve(driving: FloatArray) -> Closure:
+        return closures(driving)[index]
 
     start, limit = span
     steps = start + (limit - start) * (0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, SCANNED)))

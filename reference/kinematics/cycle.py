@@ -16,7 +16,7 @@ from reference.kinematics.motion import Motion, move, move_where_possible
 from reference.kinematics.solving import one_variant, solve
 from reference.mechanism import (
     Crank,
-    DrivenSlider,
+    DrivingSlider,
     Dyad,
     FixedGuide,
     Group,
@@ -42,18 +42,18 @@ class Cycle:
     Attributes
     ----------
     following : how far the mechanism can go and where it passes flat positions; makes the mechanism at
-        any other driven coordinate
-    driven : crank angle, rad, or displacement of the driven slider, m; ascending
+        any other driving coordinate
+    driving : crank angle, rad, or displacement of the driving slider, m; ascending
     mechanism : at every sample, each group with the side it is on
     motion : SI; nan in singular samples
-    start : the variant's own driven coordinate
+    start : the variant's own driving coordinate
     turns : of the crank until all is as before: 1, seldom 2; 0 where it cannot turn fully
     elsewhere : other ranges in which the mechanism assembles with its authored sides
     undetermined : why a sample has no rates, by its index
     """
 
     following: Continuation
-    driven: FloatArray
+    driving: FloatArray
     mechanism: Mechanism
     motion: Motion
     start: float
@@ -63,13 +63,13 @@ class Cycle:
 
     @property
     def is_turned(self) -> bool:
-        """True if a crank drives, so that driven coordinates are angles."""
+        """True if a crank drives, so that driving coordinates are angles."""
         return isinstance(self.mechanism.driver, Crank)
 
     @property
     def passed(self) -> tuple[Event, ...]:
         """Flat positions on the cycle; one at the start of a full cycle is not repeated at its end."""
-        low, high = float(self.driven[0]), float(self.driven[-1])
+        low, high = float(self.driving[0]), float(self.driving[-1])
         slack = AT_IT * (high - low)
         last = high - slack if self.turns else high + slack
         return tuple(event for event in self.following.events if low - slack <= event.at < last)
@@ -78,7 +78,7 @@ class Cycle:
 def cycle(mechanism: Mechanism, samples: int = 361) -> Cycle:
     """Return the motion of one variant over 0..360 degrees of its crank, or over the range it can reach.
 
-    A crank that returns to another assembly after one turn is followed over two turns; a driven slider over
+    A crank that returns to another assembly after one turn is followed over two turns; a driving slider over
     the range in which the mechanism assembles. A group stays on its authored side except at flat positions,
     which it passes smoothly (by velocity). Singular samples have no rates.
 
@@ -89,12 +89,12 @@ def cycle(mechanism: Mechanism, samples: int = 361) -> Cycle:
     move(mechanism, accelerations=False)
     following, turns = _followed(mechanism)
     low, high = (0.0, turns * TURN) if turns else (following.low, following.high)
-    driven = np.linspace(low, high, samples)
-    undetermined = _singular(following, driven)
-    at_samples = following.at(driven)
-    motion = _motion(following, at_samples, driven, undetermined)
+    driving = np.linspace(low, high, samples)
+    undetermined = _singular(following, driving)
+    at_samples = following.at(driving)
+    motion = _motion(following, at_samples, driving, undetermined)
     elsewhere = () if turns else _elsewhere(following)
-    return Cycle(following, driven, at_samples, motion, following.start, turns, elsewhere, undetermined)
+    return Cycle(following, driving, at_samples, motion, following.start, turns, elsewhere, undetermined)
 
 
 def _followed(mechanism: Mechanism) -> tuple[Continuation, int]:
@@ -117,7 +117,7 @@ def _followed(mechanism: Mechanism) -> tuple[Continuation, int]:
 
 
 def _shifted(following: Continuation, by: float) -> Continuation:
-    """Shift the driven coordinates by an angle, so that the range lies about the first turn."""
+    """Shift the driving coordinates by an angle, so that the range lies about the first turn."""
     if by == 0.0:
         return following
     low, high = (stop and replace(stop, at=stop.at + by) for stop in following.stops)
@@ -131,8 +131,8 @@ def _shifted(following: Continuation, by: float) -> Continuation:
     )
 
 
-def _largest_travel(mechanism: Mechanism, driver: DrivenSlider) -> float:
-    """Upper bound of a driven slider's travel, m: all lengths in line, plus all distances on the ground."""
+def _largest_travel(mechanism: Mechanism, driver: DrivingSlider) -> float:
+    """Upper bound of a driving slider's travel, m: all lengths in line, plus all distances on the ground."""
     take = one_variant(0)
     places = [complex(take(place)) for place in mechanism.ground_m.values()]
     guides = [guide for group in mechanism.groups for guide in guides_of(group)]
@@ -151,27 +151,27 @@ def _lengths(group: Group) -> float:
     return 0.0
 
 
-def _singular(following: Continuation, driven: FloatArray) -> dict[int, str]:
+def _singular(following: Continuation, driving: FloatArray) -> dict[int, str]:
     """Return samples in a flat position or at a stop, by index, with the reason why they have no rates."""
-    within = AT_IT * float(driven[-1] - driven[0])
+    within = AT_IT * float(driving[-1] - driving[0])
     stops = tuple(stop for stop in following.stops if stop is not None)
     undetermined: dict[int, str] = {}
     for event in (*following.events, *stops):
-        for index in np.flatnonzero(np.abs(driven - event.at) <= within):
+        for index in np.flatnonzero(np.abs(driving - event.at) <= within):
             undetermined.setdefault(int(index), f"{event.node}: {event.why}")
     return undetermined
 
 
 def _motion(
-    following: Continuation, at_samples: Mechanism, driven: FloatArray, undetermined: dict[int, str]
+    following: Continuation, at_samples: Mechanism, driving: FloatArray, undetermined: dict[int, str]
 ) -> Motion:
     """Return the motion at all samples; at singular ones, positions only."""
-    singular = np.zeros(driven.size, dtype=np.bool_)
+    singular = np.zeros(driving.size, dtype=np.bool_)
     singular[list(undetermined)] = True
-    motion = move_where_possible(following.at(np.where(singular, following.start, driven)))
+    motion = move_where_possible(following.at(np.where(singular, following.start, driving)))
     with np.errstate(all="ignore"):
         for name, joint in solve(at_samples, accelerations=False).joints.items():
-            place = np.broadcast_to(joint.position, driven.shape)
+            place = np.broadcast_to(joint.position, driving.shape)
             motion.position[name][singular] = place[singular]
     for index in np.flatnonzero(~np.isfinite(motion.predicted_error)):
         undetermined.setdefault(int(index), "too near to a singular position to be determined")
@@ -195,10 +195,10 @@ def _elsewhere(following: Continuation) -> tuple[tuple[float, float], ...]:
             (following.high, following.start + reach),
         ]
 
-    def assembles(driven: FloatArray) -> BoolArray:
+    def assembles(driving: FloatArray) -> BoolArray:
         with np.errstate(all="ignore"):
-            joints = solve(authored.at(driven), accelerations=False).joints.values()
-        closed = [np.broadcast_to(np.isfinite(joint.position), driven.shape) for joint in joints]
+            joints = solve(authored.at(driving), accelerations=False).joints.values()
+        closed = [np.broadcast_to(np.isfinite(joint.position), driving.shape) for joint in joints]
         return np.asarray(np.all(closed, axis=0))
 
     ranges: list[tuple[float, float]] = []

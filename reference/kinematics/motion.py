@@ -108,7 +108,7 @@ def move_where_possible(mechanism: Mechanism, *, accelerations: bool = True) -> 
 
 
 def _origin(mechanism: Mechanism) -> ComplexArray:
-    """The driven crank's pivot, or a point of the driven slider's guide."""
+    """The driving crank's pivot, or a point of the driving slider's guide."""
     driver = mechanism.driver
     return mechanism.ground_m[driver.pivot] if isinstance(driver, Crank) else driver.guide_m
 
@@ -318,7 +318,7 @@ def reason_at(mechanism: Mechanism, index: int, where: str = "") -> MechanismErr
     """Return the error for the variant at an index, from the first group that fails there."""
     take = one_variant(index, _quiet)
     groups = mechanism.groups
-    driven = "crank angle" if isinstance(mechanism.driver, Crank) else "displacement of the driven slider"
+    driving = "crank angle" if isinstance(mechanism.driver, Crank) else "displacement of the driving slider"
     with np.errstate(all="ignore"):
         for count, group in enumerate(groups):
             before = solve(replace(mechanism, groups=groups[:count]), take)
@@ -331,13 +331,13 @@ def reason_at(mechanism: Mechanism, index: int, where: str = "") -> MechanismErr
                 gap, reach = _gap(group, before), max(abs(one.position) for one in before.joints.values())
                 # The gap is only rounding: the group is flat, as exactly as its data can be.
                 if gap > ROUNDING * reach:
-                    return _does_not_close(group, gap, where, driven)
-                return _singular(group, where, driven)
+                    return _does_not_close(group, gap, where, driving)
+                return _singular(group, where, driving)
             if not np.isfinite(node.amplification * np.abs(node.acceleration + node.velocity)):
                 break
         else:
             group = min(groups, key=lambda one: float(after.transmission.get(one.node, 1.0)))
-    return _singular(group, where, driven)
+    return _singular(group, where, driving)
 
 
 def _quiet(number: complex) -> np.generic:
@@ -346,18 +346,18 @@ def _quiet(number: complex) -> np.generic:
     return scalar
 
 
-def _does_not_close(group: Group, gap_m: float, where: str, driven: str) -> MechanismError:
+def _does_not_close(group: Group, gap_m: float, where: str, driving: str) -> MechanismError:
     return MechanismError(
         "does_not_assemble",
         f"the group of {group.node} does not assemble: its links miss each other by {{gap}}{where};"
-        f" check the lengths, the {driven}, and the sides of the groups before it",
+        f" check the lengths, the {driving}, and the sides of the groups before it",
         group=group.node,
         gap_m=gap_m,
     )
 
 
-def _singular(group: Group, where: str, driven: str) -> MechanismError:
-    advice = "give slot and guide two directions" if isinstance(group, Yoke) else f"choose another {driven}"
+def _singular(group: Group, where: str, driving: str) -> MechanismError:
+    advice = "give slot and guide two directions" if isinstance(group, Yoke) else f"choose another {driving}"
     why = WHAT_IS_IN_LINE.get(type(group), "its base has no length")
     message = f"the velocities of the group of {group.node} are not determined: {why}{where}; {advice}"
     return MechanismError("singular", message, group=group.node)

@@ -280,12 +280,12 @@ def test_the_equivalent_linkage_of_a_gear_pair_has_the_gears_ratio():
 def test_an_elliptic_trammels_rod_turns_as_its_ends_slide_on_crossed_guides():
     """A rod of length l between two guides at right angles: its point at l/2 runs on a circle."""
     length, place, speed, growth = 0.5, 0.3, 0.7, -1.1
-    driven = {"pin": "B", "guide": {"through": [0, 0], "angle_deg": 0}}
-    driven |= {"displacement": place, "speed": speed, "acceleration": growth}
+    driving = {"pin": "B", "guide": {"through": [0, 0], "angle_deg": 0}}
+    driving |= {"displacement": place, "speed": speed, "acceleration": growth}
     rod = {"type": "RRP", "node": "D", "pin": "B", "length": length, "link": "2", "side": "ahead"}
     rod |= {"guide": {"through": [0, 0], "angle_deg": 90}}
     middle = {"type": "point_on_line", "node": "E", "base": ["B", "D"], "link": "2", "ratio": 0.5}
-    motion = motion_of({"ground": {"A": [0, 0]}, "driven_slider": driven, "group": [rod, middle]})
+    motion = motion_of({"ground": {"A": [0, 0]}, "driving_slider": driving, "group": [rod, middle]})
     y = math.sqrt(length**2 - place**2)
     y_speed = -place * speed / y
     y_growth = -(speed**2 + place * growth + y_speed**2) / y

@@ -160,8 +160,8 @@ def test_published_double_precision_results_are_met_to_rounding(identity, shared
     inputs = case["inputs"]
     initial = Initial(inputs["initial_joints"])
     ground, groups = groups_of(identity, initial, inputs["guide_axis"])
-    driven = crank("A", "B", initial.length("A", "B"), inputs["input_angle_rad"], inputs["omega_rad_s"])
-    motion = solved({"ground": initial.ground(*ground), "crank": driven, "group": groups})
+    driving = crank("A", "B", initial.length("A", "B"), inputs["input_angle_rad"], inputs["omega_rad_s"])
+    motion = solved({"ground": initial.ground(*ground), "crank": driving, "group": groups})
     errors = dict(compared(motion, case["published"]))
     assert len(errors) == len(case["published"])
     assert max(errors.values()) <= DOUBLE_PRECISION, errors
@@ -214,17 +214,17 @@ def slider_crank(told: dict) -> Motion:
     rod = {"type": "RRP", "node": "B", "pin": "A", "link": "rod", "length": told["l"], "side": "ahead"}
     rod["guide"] = {"through": [0, 0], "angle_deg": 0}
     middle = {"type": "point_on_line", "node": "D", "base": ["A", "B"], "link": "rod", "ratio": 0.5}
-    driven = crank("O1", "A", told["r"], math.radians(told["crank_deg"]), math.pi * told["rpm"] / 30)
-    return solved({"ground": {"O1": [0, 0]}, "crank": driven, "group": [rod, middle]})
+    driving = crank("O1", "A", told["r"], math.radians(told["crank_deg"]), math.pi * told["rpm"] / 30)
+    return solved({"ground": {"O1": [0, 0]}, "crank": driving, "group": [rod, middle]})
 
 
 def four_bar(spans, angle_deg, omega, epsilon=0.0) -> Motion:
     """Crank OA, coupler AB, rocker BQ, the rocker's pin above the base as in the books' pictures."""
     first, second, third, base = spans
-    driven = crank("O1", "A", first, math.radians(angle_deg), omega, epsilon=epsilon)
+    driving = crank("O1", "A", first, math.radians(angle_deg), omega, epsilon=epsilon)
     coupler = {"type": "RRR", "node": "B", "pins": ["A", "O2"], "links": ["3", "2"]}
     coupler |= {"lengths": [second, third], "side": "left"}
-    return solved({"ground": {"O1": [0, 0], "O2": [base, 0]}, "crank": driven, "group": [coupler]})
+    return solved({"ground": {"O1": [0, 0], "O2": [base, 0]}, "crank": driving, "group": [coupler]})
 
 
 def magnitudes(told: dict) -> dict[str, float]:

@@ -76,10 +76,10 @@ def task(mechanism: dict, size_mm: float = FIGURE_MM):
 def four_bar(spans: list[float], angle_deg: float, omega: float, epsilon: float = 0.0) -> dict:
     first, second, third, base = spans
     coupler = {"type": "RRR", "node": "B", "pins": ["A", "O2"], "links": ["3", "2"], "side": "left"}
-    driven = {"pivot": "O1", "pin": "A", "length": first, "angle_deg": angle_deg, "omega": omega}
+    driving = {"pivot": "O1", "pin": "A", "length": first, "angle_deg": angle_deg, "omega": omega}
     return {
         "ground": {"O1": [0, 0], "O2": [base, 0]},
-        "crank": {**driven, "epsilon": epsilon},
+        "crank": {**driving, "epsilon": epsilon},
         "group": [{**coupler, "lengths": [second, third]}],
     }
 
@@ -96,14 +96,14 @@ def slider_crank(told: dict) -> dict:
         "guide": guide,
     }
     middle = {"type": "point_on_line", "node": "D", "base": ["A", "B"], "link": "3", "ratio": 0.5}
-    driven = {
+    driving = {
         "pivot": "O1",
         "pin": "A",
         "length": told["r"],
         "angle_deg": told["crank_deg"],
         "rpm": told["rpm"],
     }
-    return {"ground": {"O1": [0, 0]}, "crank": driven, "group": [rod, middle]}
+    return {"ground": {"O1": [0, 0]}, "crank": driving, "group": [rod, middle]}
 
 
 def mechanism_of(told: dict) -> dict:

@@ -88,7 +88,7 @@ def ends_of(construction: Construction) -> dict[str, Ends]:
     return {**vectors, **construction.links}
 
 
-def is_driven(construction: Construction, node: str) -> bool:
+def is_driving(construction: Construction, node: str) -> bool:
     """Return whether a node of a plan is laid off from the data alone: the driving link's."""
     step = construction.step(node)
     is_of_plan = node not in {one.node for one in construction.figures["mechanism"]}
@@ -149,8 +149,8 @@ class Held:
         declared = evaluate(construction, self.work.task.right.parameters)
         named = self.work.named(own, self.source)
         heads = {head for _, head in ends.values()}
-        driven = {head for head in heads if is_driven(construction, head)}
-        due_at = {head: _head(self.right if head in driven else self.following, own, head) for head in heads}
+        driving = {head for head in heads if is_driving(construction, head)}
+        due_at = {head: _head(self.right if head in driving else self.following, own, head) for head in heads}
         named_at = due_at if named == own else {head: _head(self.following, named, head) for head in heads}
         made_at = {head: _head(self.work.task.wrong, own, head) for head in heads}
         forms = {}
@@ -159,7 +159,7 @@ class Held:
             forms[name] = Forms(
                 named=named[head] - named[tail],
                 drawn=own[head] - own[tail],
-                due=exactly if of_data and head in driven else due_at[head] - own[tail],
+                due=exactly if of_data and head in driving else due_at[head] - own[tail],
                 due_as_named=named_at[head] - named[tail],
                 made=made_at[head] - own[tail],
                 exact=exactly,
@@ -236,7 +236,7 @@ def charged_once(work: StudentWork, due: Mapping[str, Due], said: Mapping[str, s
             for one in work.rubric.criterion
             if (vector := vectors.get(one.name)) is not None
             and vector.scale == scale.scale
-            and is_driven(work.construction, vector.head)
+            and is_driving(work.construction, vector.head)
         ]
         if said[scale.id] == "full" and any(said[name] in {"none", "partial"} for name in first):
             found.update(dict.fromkeys([scale.id, *first], "either"))
@@ -255,7 +255,7 @@ def _scale_due(work: StudentWork, source: Source, name: str, by_vector: Mapping[
     if name in _scales_of_another(work):
         return "either"
     vectors = work.construction.vectors
-    tells = {one for one in by_vector if one in vectors and is_driven(work.construction, vectors[one].head)}
+    tells = {one for one in by_vector if one in vectors and is_driving(work.construction, vectors[one].head)}
     misses = any(vectors[one].scale == name and by_vector[one] == "missed" for one in tells)
     is_sketch = name == "kL" and source in ON_SHEETS
     return "missed" if misses or (is_sketch and _is_yardstick_off(work)) else "right"
@@ -297,7 +297,7 @@ def _scales_of_another(work: StudentWork) -> set[str]:
     return {
         vector.scale
         for vector in right.construction.vectors.values()
-        if is_driven(right.construction, vector.head)
+        if is_driving(right.construction, vector.head)
         and off(_between(meant, vector), _between(exact, vector), tolerance, directed=False) > PLAIN
     }
 
@@ -383,9 +383,9 @@ class _Drawn:
         ends = ends_of(self.work.construction)
         if any(one == "wrong" and ends[name][1] == node for name, one in self.due.items()):
             return True
-        driven = {name for name in self.due if is_driven(self.work.construction, ends[name][1])}
+        driving = {name for name in self.due if is_driving(self.work.construction, ends[name][1])}
         of_another = mistake.code == "other_variant"
-        return of_another and any(self.due[name] in {"wrong", "either"} for name in driven)
+        return of_another and any(self.due[name] in {"wrong", "either"} for name in driving)
 
 
 def _touches_swap(work: StudentWork, name: str) -> bool:
@@ -396,9 +396,9 @@ def _is_charged_before(work: StudentWork, name: str, *, data_charged: bool) -> b
     """Return whether another student's data are charged before: at the crank, the first vector or a scale."""
     vectors = work.construction.vectors
     of_another = any(one.code == "other_variant" for one in work.task.mistakes)
-    if not of_another or name not in vectors or not is_driven(work.construction, vectors[name].head):
+    if not of_another or name not in vectors or not is_driving(work.construction, vectors[name].head):
         return False
-    first = next(one for one in vectors.values() if is_driven(work.construction, one.head))
+    first = next(one for one in vectors.values() if is_driving(work.construction, one.head))
     by_scale = work.declares and vectors[name].scale in _scales_of_another(work)
     return data_charged or vectors[name].head != first.head or by_scale
 
@@ -409,7 +409,7 @@ def _is_scale_unknown(work: StudentWork, name: str) -> bool:
     vector = work.construction.vectors.get(name)
     if vector is None or work.declares or vector.scale not in wrong:
         return False
-    return is_driven(work.construction, vector.head)
+    return is_driving(work.construction, vector.head)
 
 
 def _node_of(construction: Construction, mistake: StudentMistake) -> str | None:

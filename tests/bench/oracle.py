@@ -109,7 +109,7 @@ class ExactMotion:
         key = time, mp.prec
         if key not in self._known:
             at = dict(self._data.ground_m)
-            at[self._data.driver.pin] = _driven(self._data.driver, at, time)
+            at[self._data.driver.pin] = _driving(self._data.driver, at, time)
             for group in self._data.groups:
                 self._assemble(group, at)
             self._known[key] = at
@@ -172,7 +172,7 @@ class ExactMotion:
 Equation = Callable[[Any], Any]
 
 
-def _driven(driver: Driver, at: Mapping[str, Any], time: Any) -> Any:
+def _driving(driver: Driver, at: Mapping[str, Any], time: Any) -> Any:
     if isinstance(driver, Crank):
         angle = driver.angle_rad + (driver.omega + driver.epsilon * time / 2) * time
         return at[driver.pivot] + driver.length_m * mp.expj(angle)

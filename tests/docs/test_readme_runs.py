@@ -92,6 +92,28 @@ def test_every_command_of_the_readme_does_what_it_says(desk):
     assert (desk / "marks" / "s07" / "feedback.html").is_file()
 
 
+def test_every_command_of_the_page_of_the_source_texts_does_what_it_says(desk):
+    page = (ROOT / "docs" / "sources.md").read_text(encoding="utf-8")
+    commands = sorted(set(re.findall(r"`(planmark [^`]+)`", page)))
+    assert len(commands) > 10
+    for command in commands:
+        _run(command, desk, {0, 1} if command.split()[1] == "lint" else {0})
+    assert {"steps.html", "press.html", "task.pdf", "pump.csv", "press.csv"} <= {
+        one.name for one in desk.iterdir()
+    }
+
+
+def test_every_equation_and_figure_of_the_source_texts_has_its_row():
+    page = (ROOT / "docs" / "sources.md").read_text(encoding="utf-8")
+    cells = [line.split("|")[1] for line in page.splitlines() if line.startswith("|")]
+    named = [
+        range(int(first), int(last or first) + 1)
+        for first, last in re.findall(r"(?<!below )(?<!above )\((\d+)\)(?:–\((\d+)\))?", " ".join(cells))
+    ]
+    assert sorted(number for numbers in named for number in numbers) == [*range(1, 29)]
+    assert re.findall(r"figure (\d)", " ".join(cells)) == list("12345")
+
+
 def test_the_walk_from_scans_to_moodle_ends_with_a_worksheet_of_grades(tmp_path):
     shutil.copytree(ROOT / "samples" / "pump", tmp_path / "samples" / "pump")
     shutil.copytree(ROOT / "docs" / "assets", tmp_path / "docs" / "assets")

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from reference.mechanism import (
     Crank,
     CrossSlider,
-    DrivenSlider,
+    DrivingSlider,
     Dyad,
     FixedGuide,
     Mechanism,
@@ -286,7 +286,7 @@ def random_mechanism(
         along, reach = turn_to(sketch.number(-np.pi, np.pi)), sketch.number(-1, 1)
         rates = (array(sketch.number(-3, 3)), array(sketch.number(-20, 20)))
         guide = (array(pin - along * reach), array(float(np.angle(along))))
-        driver = DrivenSlider("1", "A", *guide, array(reach), *rates)
+        driver = DrivingSlider("1", "A", *guide, array(reach), *rates)
         sketch.links["1"] = []
     else:
         pivot = sketch.near(pin)
@@ -330,7 +330,7 @@ def authored(mechanism: Mechanism) -> dict:
             "epsilon": float(driver.epsilon[0]),
         }
     else:
-        table["driven_slider"] = {
+        table["driving_slider"] = {
             "pin": driver.pin,
             "guide": fixed_table(FixedGuide(driver.guide_m, driver.guide_rad)),
             "displacement": float(driver.displacement_m[0]),

@@ -182,8 +182,8 @@ def test_a_panel_shows_each_quantity_by_name_with_its_unit_and_the_value_of_the_
     curves = [line for line in panel.get_lines() if len(line.get_xdata()) > 1000]
     rings = [line.get_ydata()[0] for line in panel.get_lines() if line.get_marker() == "o"]
     for quantity, curve, ring in zip(subject.select(["v_B_x", "v_B"]).quantities, curves, rings, strict=True):
-        driven = np.radians(curve.get_xdata())
-        assert curve.get_ydata() == pytest.approx(subject.values_at(quantity, driven), abs=1e-9)
+        driving = np.radians(curve.get_xdata())
+        assert curve.get_ydata() == pytest.approx(subject.values_at(quantity, driving), abs=1e-9)
         assert ring == pytest.approx(subject.values_at(quantity, np.array([subject.cycle.start]))[0])
 
 

@@ -85,10 +85,12 @@ def test_a_reversed_vector_is_named(at, vector):
 
 
 @pytest.mark.parametrize(("at", "line", "words"), [
-    ("a", "driven across", "along the link instead of perpendicular"),
+    ("a", "driving across", "along the link instead of perpendicular"),
+    ("a'", "driving along", "perpendicular to the link instead of along"),
+    ("a", "driven across", "along the link instead of perpendicular"),  # as in results of earlier versions
     ("a'", "driven along", "perpendicular to the link instead of along"),
 ])  # fmt: skip
-def test_the_driven_links_vector_is_told_as_it_should_lie(at, line, words):
+def test_the_driving_links_vector_is_told_as_it_should_lie(at, line, words):
     assert words in mistake_feedback(named("parallel_for_perpendicular", at, {"line": line}), "en")
 
 

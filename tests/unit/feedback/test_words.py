@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.feedback.words import symbols
+from grader.language import symbols
 
 
 @pytest.mark.parametrize(
@@ -22,6 +22,8 @@ from grader.feedback.words import symbols
         ("along O2B", "along O<sub>2</sub>B"),
         ("from O1", "from O<sub>1</sub>"),
         ("μv", "<i>μ</i><sub>v</sub>"),
+        ("a_n = v²/l", "<i>a</i><sub>n</sub> = v²/l"),
+        ("2·ω3·v_A3A", "2·<i>ω</i><sub>3</sub>·<i>v</i><sub>A3A</sub>"),
         ("the end of v_A.", "the end of <i>v</i><sub>A</sub>."),
     ],
 )

@@ -8,7 +8,7 @@ from reference.authored.mechanism import MechanismFile, check_mechanism
 from reference.authored.toml_file import validate
 from reference.errors import AuthoredFileError, MechanismError
 from reference.kinematics.motion import Motion, move
-from reference.mechanism import DrivenSlider, joints_of
+from reference.mechanism import DrivingSlider, joints_of
 from tests.every_group import mechanism_table
 
 MISSING = object()
@@ -64,15 +64,16 @@ def test_a_crank_behind_a_gear_turns_by_its_ratio_more_slowly():
     assert moved(mechanism_table()).omega["1"][0] == pytest.approx(3.141592653589793 * 90 / 30 / 1.5)
 
 
-def test_a_slider_may_drive_in_place_of_the_crank():
-    table = edited(("crank", MISSING), ("driven_slider", A_SLIDER))
+@pytest.mark.parametrize("name", ["driving_slider", "driven_slider"])  # the second is its older name
+def test_a_slider_may_drive_in_place_of_the_crank(name):
+    table = edited(("crank", MISSING), (name, A_SLIDER))
     file = validate(MechanismFile, table, "the file")
     assert not list(check_mechanism(file))
     mechanism = build_mechanism(file, {"n": 1}, 1)
-    assert isinstance(mechanism.driver, DrivenSlider)
+    assert isinstance(mechanism.driver, DrivingSlider)
     velocity = move(mechanism).velocity["A"][0]
     assert (velocity.real, velocity.imag) == pytest.approx((0.75**0.5, 0.5))
-    with pytest.raises(ValueError, match="driven by a slider, not by a crank"):
+    with pytest.raises(ValueError, match="a driving slider, not a crank"):
         _ = mechanism.crank
 
 
@@ -185,11 +186,11 @@ def test_nothing_is_hinged_to_a_point_that_lies_under_a_slider_for_an_instant(jo
         ),
         ([("crank", "omega", 3)], "$.crank", "needs one speed: either omega (rad/s) or rpm (rev/min)"),
         ([("crank", "rpm", MISSING)], "$.crank", "needs one speed"),
-        ([("crank", MISSING)], "$", "needs one driving link: either [crank] or [driven_slider]"),
-        ([("driven_slider", A_SLIDER)], "$", "needs one driving link"),
+        ([("crank", MISSING)], "$", "needs one driving link: either [crank] or [driving_slider]"),
+        ([("driving_slider", A_SLIDER)], "$", "needs one driving link"),
         (
-            [("crank", MISSING), ("driven_slider", {**A_SLIDER, "speed": "1e"})],
-            "$.driven_slider.speed",
+            [("crank", MISSING), ("driving_slider", {**A_SLIDER, "speed": "1e"})],
+            "$.driving_slider.speed",
             "'1e'",
         ),
         ([("group", 6, "guide", {"joints": ["O3", "B"]})], "$.group[6].guide", "or joints and coincident"),
@@ -273,8 +274,8 @@ def test_a_plate_in_line_needs_no_side():
 
 
 def test_where_a_slider_drives_its_displacement_is_what_to_check():
-    table = edited(("crank", MISSING), ("driven_slider", A_SLIDER), ("group", 3, "lengths", [35, 25]))
-    with pytest.raises(MechanismError, match="check the lengths, the displacement of the driven slider"):
+    table = edited(("crank", MISSING), ("driving_slider", A_SLIDER), ("group", 3, "lengths", [35, 25]))
+    with pytest.raises(MechanismError, match="check the lengths, the displacement of the driving slider"):
         moved(table)
 
 

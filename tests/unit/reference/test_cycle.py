@@ -15,7 +15,7 @@ from reference.kinematics.motion import move
 from reference.mechanism import (
     Crank,
     CrossSlider,
-    DrivenSlider,
+    DrivingSlider,
     Dyad,
     FixedGuide,
     Mechanism,
@@ -65,7 +65,7 @@ def whitworth(first, ground, angle_deg=40.0, offset=0.0):
 
 def told(found: Cycle):
     """The samples at which something is told."""
-    return np.array([index not in found.undetermined for index in range(found.driven.size)])
+    return np.array([index not in found.undetermined for index in range(found.driving.size)])
 
 
 def moving_with_their_links(found: Cycle):
@@ -80,7 +80,7 @@ def assert_no_jump(found: Cycle):
     """Between told neighbours every joint goes on as its velocity says, up to its acceleration (Taylor)."""
     here = told(found)
     both = here[1:] & here[:-1]
-    step = np.diff(found.driven) / found.mechanism.crank.omega[0]
+    step = np.diff(found.driving) / found.mechanism.crank.omega[0]
     for joint in moving_with_their_links(found):
         place = found.motion.position[joint]
         v, a = found.motion.velocity[joint], found.motion.acceleration[joint]
@@ -127,7 +127,7 @@ def test_a_kite_turns_its_rocker_once_in_two_turns():
     """Crank = ground = 1, coupler = rocker = 2: the axis of symmetry turns by half the crank's angle."""
     found = cycle(four_bar(1.0, (1.0, 2.0, 2.0), 70.0, 1), 721)
     here = told(found)
-    phi = found.driven
+    phi = found.driving
     assert found.turns == 2
     assert phi[-1] == pytest.approx(4 * np.pi)
     assert list(found.undetermined) == [0, 360, 720]
@@ -144,8 +144,8 @@ def test_an_isosceles_slider_crank_passes_its_middle():
     found = cycle(slider_crank(1.0, 1.0, 20.0, side=1))
     here = told(found)
     assert list(found.undetermined) == [90, 270]
-    assert np.max(np.abs(found.motion.position["B"] - 2.0 * np.cos(found.driven))[here]) < NEAR_FLAT
-    assert np.max(np.abs(found.motion.velocity["B"] + 2.0 * np.sin(found.driven))[here]) < NEAR_FLAT
+    assert np.max(np.abs(found.motion.position["B"] - 2.0 * np.cos(found.driving))[here]) < NEAR_FLAT
+    assert np.max(np.abs(found.motion.velocity["B"] + 2.0 * np.sin(found.driving))[here]) < NEAR_FLAT
     assert found.turns == 1
 
 
@@ -230,26 +230,26 @@ def test_a_range_is_told_about_the_first_turn_whichever_turn_the_variant_is_in(a
     assert found.start == pytest.approx(np.radians((angle_deg + 180.0) % 360.0 - 180.0))
 
 
-def test_a_driven_slider_goes_as_far_as_rod_and_crank_reach():
-    driver = DrivenSlider("1", "B", one(0j), one(0.0), one(2.5), one(0.5), one(0.0))
+def test_a_driving_slider_goes_as_far_as_rod_and_crank_reach():
+    driver = DrivingSlider("1", "B", one(0j), one(0.0), one(2.5), one(0.5), one(0.0))
     dyad = Dyad("A", ("B", "O"), ("2", "3"), (one(2.0), one(1.0)), 1)
     found = cycle(Mechanism({"O": one(0j)}, driver, (dyad,)), 101)
-    assert (found.driven[0], found.driven[-1]) == pytest.approx((1.0, 3.0), abs=1e-12)
+    assert (found.driving[0], found.driving[-1]) == pytest.approx((1.0, 3.0), abs=1e-12)
     assert not found.is_turned
     assert found.elsewhere[0] == pytest.approx((-3.0, -1.0), abs=1e-12)
 
 
-def driven(*groups, at=0.3, **ground):
-    """A slider B driven along the x axis at 0.5 m/s."""
-    driver = DrivenSlider("1", "B", one(0j), one(0.0), one(at), one(0.5), one(0.0))
+def driving(*groups, at=0.3, **ground):
+    """A slider B that drives along the x axis at 0.5 m/s."""
+    driver = DrivingSlider("1", "B", one(0j), one(0.0), one(at), one(0.5), one(0.0))
     return Mechanism({name: one(place) for name, place in ground.items()}, driver, groups)
 
 
 def test_a_trammel_goes_from_end_to_end_of_its_rod():
     """Both ends of a rod on crossed guides: x^2 + y^2 = l^2."""
     upright = FixedGuide(one(0j), one(np.pi / 2))
-    found = cycle(driven(Slider("D", "B", "2", one(1.0), upright, 1)), 101)
-    x = found.driven
+    found = cycle(driving(Slider("D", "B", "2", one(1.0), upright, 1)), 101)
+    x = found.driving
     assert (x[0], x[-1]) == pytest.approx((-1.0, 1.0), abs=END_RAD)
     middle = slice(1, -1)
     assert found.motion.position["D"][middle] == pytest.approx(1j * np.sqrt(1 - x[middle] ** 2), abs=1e-9)
@@ -257,26 +257,26 @@ def test_a_trammel_goes_from_end_to_end_of_its_rod():
     assert found.motion.velocity["D"][middle].imag == pytest.approx(speed, abs=1e-9)
 
 
-def test_a_driven_slider_that_nothing_stops_is_followed_some_way():
+def test_a_driving_slider_that_nothing_stops_is_followed_some_way():
     slotted = SlottedLink("B3", "B", "O2", "3", one(0.0), None, 1)
-    found = cycle(driven(slotted, O2=-1j), 101)
+    found = cycle(driving(slotted, O2=-1j), 101)
     assert found.following.stops == (None, None)
     assert found.elsewhere == ()
-    assert found.driven[0] < found.start < found.driven[-1]
-    assert found.motion.omega["3"] == pytest.approx(-0.5 / (1.0 + found.driven**2), abs=1e-12)
+    assert found.driving[0] < found.start < found.driving[-1]
+    assert found.motion.omega["3"] == pytest.approx(-0.5 / (1.0 + found.driving**2), abs=1e-12)
     yoke = Yoke("D", "B", one(1.0), FixedGuide(one(0j), one(0.5)))
-    assert cycle(driven(yoke), 5).following.stops == (None, None)
-    alone = cycle(driven(at=0.0), 5)
-    assert alone.driven == pytest.approx([-1.0, -0.5, 0.0, 0.5, 1.0])
+    assert cycle(driving(yoke), 5).following.stops == (None, None)
+    alone = cycle(driving(at=0.0), 5)
+    assert alone.driving == pytest.approx([-1.0, -0.5, 0.0, 0.5, 1.0])
 
 
-def test_crossed_guides_of_a_driven_slider():
-    """The crossing of a line through the driven slider and a pivot with an upright guide: y = 1 - 1 / x."""
+def test_crossed_guides_of_a_driving_slider():
+    """The crossing of a line through the driving slider and a pivot with an upright guide: y = 1 - 1 / x."""
     rod = SlottedLink("B3", "B", "O2", "3", one(0.0), None, 1)
     guides = (FixedGuide(one(1.0 + 0j), one(np.pi / 2)), MovingGuide("3", ("O2", "B3"), "D3"))
-    found = cycle(driven(rod, CrossSlider("D", guides), at=2.0, O2=1j), 101)
+    found = cycle(driving(rod, CrossSlider("D", guides), at=2.0, O2=1j), 101)
     assert found.following.low == pytest.approx(0.0, abs=1e-9)
-    assert found.motion.position["D"][1:].imag == pytest.approx(1.0 - 1.0 / found.driven[1:], rel=1e-9)
+    assert found.motion.position["D"][1:].imag == pytest.approx(1.0 - 1.0 / found.driving[1:], rel=1e-9)
 
 
 def test_samples_very_near_a_flat_position_are_right_or_untold():
@@ -306,7 +306,7 @@ def test_guides_that_become_parallel_end_the_range():
     assert (found.following.low, found.following.high) == pytest.approx((-np.pi / 2, np.pi / 2), abs=END_RAD)
     assert "parallel" in found.following.stops[1].why
     middle = slice(1, -1)
-    assert found.motion.position["D"][middle].imag == pytest.approx(np.tan(found.driven[middle]), rel=1e-9)
+    assert found.motion.position["D"][middle].imag == pytest.approx(np.tan(found.driving[middle]), rel=1e-9)
 
 
 def test_guides_that_become_parallel_and_part_again_end_the_range_as_well():
@@ -336,7 +336,7 @@ def test_what_comes_to_rest_in_its_flat_position_goes_back_on_its_own_side():
 def test_a_yoke_moves_harmonically():
     yoke = Yoke("B", "A", one(np.pi / 2), FixedGuide(one(0j), one(0.0)))
     found = cycle(Mechanism({"O1": one(0j)}, crank(0.3, 10.0, 2.0), (yoke,)))
-    assert found.motion.velocity["B"].real == pytest.approx(-0.6 * np.sin(found.driven), abs=1e-12)
+    assert found.motion.velocity["B"].real == pytest.approx(-0.6 * np.sin(found.driving), abs=1e-12)
     assert not found.undetermined
 
 
@@ -350,7 +350,7 @@ def test_a_link_on_a_moving_guide_passes_as_on_a_fixed_one():
     found = cycle(replace(parallelogram, groups=groups))
     here = told(found)
     # The guide stays level at the height sin(phi); the rod of 2 from O1 reaches x = sqrt(4 - sin^2).
-    expected = np.sqrt(4.0 - np.sin(found.driven) ** 2) + 1j * np.sin(found.driven)
+    expected = np.sqrt(4.0 - np.sin(found.driving) ** 2) + 1j * np.sin(found.driving)
     assert np.max(np.abs(found.motion.position["D"] - expected)[here]) < NEAR_FLAT
 
 
@@ -439,7 +439,7 @@ def check_following(mechanism):
         v, a = found.motion.velocity[node], found.motion.acceleration[node]
         calm = (sine > 0.2) & here
         both = calm[1:] & calm[:-1]
-        step = np.diff(found.driven)
+        step = np.diff(found.driving)
         off = np.abs(np.diff(place) - 0.5 * step * (v[1:] + v[:-1]))[both]
         bound = step**2 * np.maximum(np.abs(a[1:]), np.abs(a[:-1]))
         assert np.all(off <= bound[both] + ROUNDING * (1.0 + np.nanmax(np.abs(place))))

@@ -196,7 +196,7 @@ def test_rarer_mistakes_move_nothing_upstream_and_are_none_of_the_usual_ones(nam
         assert moved <= affected(mistake, plan.construction), mistake
 
 
-def test_the_driven_links_vector_may_lie_along_the_link():
+def test_the_driving_links_vector_may_lie_along_the_link():
     plan = a_plan()
     mistake = Mistake("parallel_for_perpendicular", "a", quarters=1)
     assert mistake in rarer(plan)

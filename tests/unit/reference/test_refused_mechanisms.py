@@ -139,7 +139,7 @@ def test_mechanisms_that_are_not_of_the_second_class_are_refused_with_their_mobi
     ("table", "words"),
     [
         (mechanism(crank=[CRANK, CRANK | {"pivot": "O2"}]), f"$.crank: 2 degrees of freedom: {ONE}"),
-        (mechanism(driven_slider=SLIDER), f"or [driven_slider]; two have 2 degrees of freedom: {ONE}"),
+        (mechanism(driving_slider=SLIDER), f"or [driving_slider]; two have 2 degrees of freedom: {ONE}"),
         (
             mechanism(crank2=CRANK),
             f"$.crank2: 'crank2': a second driving link makes 2 degrees of freedom: {ONE}",
@@ -160,8 +160,8 @@ def test_mechanisms_that_are_not_of_the_second_class_are_refused_with_their_mobi
         (mechanism({"type": "RRR-RRR", "node": "B"}), "only groups of the second class are solved"),
         (mechanism({"type": "oldham_coupling", "node": "B"}), 'a block in a yoke on a guide is type = "RPP"'),
         (
-            mechanism(driven_slider=SLIDER | {"guide": MOVING}, crank=None),
-            "$.driven_slider: a driven slider's guide is fixed",
+            mechanism(driving_slider=SLIDER | {"guide": MOVING}, crank=None),
+            "$.driving_slider: a driving slider's guide is fixed",
         ),
         (
             mechanism(crank=CRANK | {"cylinder": {"pivot": "O2", "length": 1, "speed": 1, "side": "left"}}),
@@ -230,7 +230,7 @@ def test_sliding_pairs_count_as_hinges_do():
     table = mechanism(slider, two("C", "B O3", "3 4"), yoke, crossed, slotted)
     assert told(table)[0].startswith("$.group: 2 degrees of freedom (11 links with the ground, 14 joints)")
     driven = {key: value for key, value in table.items() if key != "crank"}
-    assert told(driven | {"driven_slider": SLIDER})[0].startswith("$.group: 2 degrees of freedom (11 links")
+    assert told(driven | {"driving_slider": SLIDER})[0].startswith("$.group: 2 degrees of freedom (11 links")
 
 
 def test_a_yoke_on_a_moving_guide_is_accepted_and_nothing_is_hinged_to_it():

@@ -154,11 +154,11 @@ def test_the_arrow_at_the_crank_turns_as_the_crank_does(omega, folder):
     assert np.sign((complex(x0, -y0).conjugate() * complex(x1, -y1)).imag) == np.sign(omega)
 
 
-@pytest.mark.parametrize("case", ["pump 7", "driven slider"])
-def test_a_driven_link_that_stands_still_has_no_arrow(case, folder):
+@pytest.mark.parametrize("case", ["pump 7", "driving slider"])
+def test_a_driving_link_that_stands_still_has_no_arrow(case, folder):
     assignment, plan = planned(case, folder)
     driver = plan.mechanism.driver
-    rate = "speed" if case == "driven slider" else "omega"
+    rate = "speed" if case == "driving slider" else "omega"
     still = replace(plan.mechanism, driver=replace(driver, **{rate: np.array([0.0])}))
     moving, stopped = (
         labels_of(figures_of(Subject(assignment, one))["mechanism"].shapes)

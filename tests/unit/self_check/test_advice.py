@@ -5,7 +5,7 @@ import re
 import pytest
 
 from grader.comparison.evidence import Submission
-from grader.feedback.mistakes import ALONG_GUIDE, DRIVEN_ACROSS, DRIVEN_ALONG, MISTAKES
+from grader.feedback.mistakes import ALONG_GUIDE, DRIVING_ACROSS, DRIVING_ALONG, MISTAKES
 from grader.language import tongue
 from grader.marking.mark import judge
 from grader.outcomes import NamedMistake
@@ -80,8 +80,8 @@ def test_every_mistake_but_a_missing_vector_has_a_law():
     [
         (Mistake("normal_missing", "k_A3"), "", "2·ω·v"),
         (Mistake("parallel_for_perpendicular", "d"), ALONG_GUIDE, "along its guide"),
-        (Mistake("parallel_for_perpendicular", "a"), DRIVEN_ACROSS, "across the line to the pivot"),
-        (Mistake("parallel_for_perpendicular", "a'"), DRIVEN_ALONG, "along the link"),
+        (Mistake("parallel_for_perpendicular", "a"), DRIVING_ACROSS, "across the line to the pivot"),
+        (Mistake("parallel_for_perpendicular", "a'"), DRIVING_ALONG, "along the link"),
         (Mistake("wrong_link", "d"), ALONG_GUIDE, "its own guide"),
     ],
 )

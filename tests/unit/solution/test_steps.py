@@ -169,7 +169,7 @@ def test_an_equation_tells_size_and_direction_of_each_term_and_its_numbers_only_
     ("case", "told"),
     [
         ("press 1", ["μ_l = O₁A / O₁A_drawn = 0.3 / 45 = 0.0066667 m/mm",
-                     "ω₁ = π · 1350 / (30 · 23.5) = 6.0158",
+                     "ω₁ = π · n / (30 · U) = π · 1350 / (30 · 23.5) = 6.0158 rad/s",
                      "μ_v = v_A / pa = ω₁ · O₁A / 50 = 6.0158 · 0.3 / 50 = 0.036095 (m/s)/mm",
                      "μ_a = a_A / πa' = ω₁² · O₁A / 100 = 6.0158² · 0.3 / 100 = 0.10857 (m/s²)/mm"]),
         ("pump 7", ["ω₁ = π · n₁ / 30 = π · 370 / 30 = 38.746 rad/s",
@@ -196,7 +196,7 @@ def test_formulas_are_well_formed_mathml_and_fit_the_printed_column(case, folder
         assert 0.0 < typeset(formula, 2.9).width < 95.0
 
 
-@pytest.mark.parametrize("case", ["pump 7", "shaper 5", "driven slider", "two crossed guides"])
+@pytest.mark.parametrize("case", ["pump 7", "shaper 5", "driving slider", "two crossed guides"])
 def test_directions_told_for_vectors_are_those_of_the_plan(case, folder):
     subject = subject_of(case, "en", folder)
     nodes = subject.view.nodes
