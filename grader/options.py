@@ -163,8 +163,8 @@ class CycleOptions(VariantOptions):
     """The options of ``planmark cycle``."""
 
     of: list[str] | None = option(
-        "Quantities: v_B, a_B, v_BA, a_BA_n (with _x or _y a component), omega_3, epsilon_3, D (the path of"
-        " point D); several with commas. All speeds and accelerations if absent."
+        "Quantities: v_B, a_B, v_BA, a_BA, a_BA_n (with _x or _y a component), omega_3, epsilon_3, D (the"
+        " path of point D); several with commas. All speeds and accelerations if absent."
     )
     samples: int = option("Positions over the cycle.", default=361)
     csv: Path | None = option("Write every position to this CSV file.")

@@ -303,7 +303,11 @@ def _rubric(
     criteria = [
         *(("scale", name, phrase, {}) for name, phrase in SCALES.items()),
         *(("link", name, LINK, {"name": name}) for name in construction.links),
-        *(("vector", name, *titled(name, construction)) for name in construction.vectors),
+        *(
+            ("vector", name, *titled(name, construction))
+            for name, vector in construction.vectors.items()
+            if not vector.is_sum
+        ),
         *(
             ("angular", name, RATES[name.partition("_")[0]], {"name": name.partition("_")[2]})
             for name, rate in construction.rates.items()

@@ -459,7 +459,8 @@ def _is_nothing(charges: Charges, criterion: CriterionTable) -> bool:
 
 def _leave_out(charges: Charges, segment: TaskSegment | None, verdict: Verdict) -> None:
     """Record what was not handed in: a component left out has cost its points, all else stays in doubt."""
-    if segment is None:
+    vector = None if segment is None else charges.task.construction.vectors.get(segment.name)
+    if segment is None or (vector is not None and vector.is_sum):
         return
     is_component = isinstance(charges.task.construction.step(segment.head), Given)
     (charges.charged if is_component and verdict == "none" else charges.doubtful).add(segment.head)

@@ -286,7 +286,7 @@ def _outlines(assignment: Assignment, variants: list[Variant]) -> list[ComplexAr
 def _pairs(construction: Construction) -> list[list[tuple[str, str]]]:
     """Return the lines of each figure by their ends."""
     plans = [
-        [(vector.tail, vector.head) for vector in construction.vectors_of(plan)]
+        [(vector.tail, vector.head) for vector in construction.polygon_of(plan)]
         for plan in construction.poles
     ]
     return [list(bars(construction)), *plans]

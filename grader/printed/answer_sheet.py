@@ -406,7 +406,7 @@ def _forms(
         figures = list(dict.fromkeys(table.figures))
         fit = best_template(assignment, figures)
         construction = page_construction(assignment, figures)
-        names = [vector.name for figure in figures for vector in construction.vectors_of(figure)]
+        names = [vector.name for figure in figures for vector in construction.polygon_of(figure)]
         boxes = boxes_of(names, asked)
         if names and not boxes and (asked is None or set(names) & set(asked)):
             known: dict[str, Value] = {"form": table.kind, "lengths": len(names)}

@@ -233,7 +233,7 @@ def cells_of(
         return {}
     construction = page_construction(assignment, table.figures)
     ordered = dict.fromkeys(table.figures)
-    return combs_of(boxes_of([v.name for figure in ordered for v in construction.vectors_of(figure)], asked))
+    return combs_of(boxes_of([v.name for figure in ordered for v in construction.polygon_of(figure)], asked))
 
 
 def boxes_of(names: Sequence[str], asked: Collection[str] | None) -> dict[str, Box]:

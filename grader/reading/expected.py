@@ -84,11 +84,15 @@ class Slack:
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """A straight piece of a figure between two of its nodes, by their index in the figure's list."""
+    """A straight piece of a figure between two of its nodes, by their index in the figure's list.
+
+    An optional one, the sum of components, is drawn by few students.
+    """
 
     name: str
     tail: int
     head: int
+    optional: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +113,11 @@ class Expected:
     cov: FloatArray
     edges: tuple[Edge, ...]
     tied: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def required(self) -> list[int]:
+        """Indices of the edges that have to be drawn."""
+        return [index for index, edge in enumerate(self.edges) if not edge.optional]
 
     def length_mm(self, edge: Edge) -> float:
         """Return the expected length of an edge."""
@@ -174,12 +183,12 @@ def links_of(construction: Construction) -> tuple[Edge, ...]:
 
 
 def vectors_of(construction: Construction, figure: str, absent: Iterable[str] = ()) -> tuple[Edge, ...]:
-    """Return the vectors of a plan, without those at nodes that are not drawn."""
+    """Return the vectors of a plan, optional ones last, without those at nodes that are not drawn."""
     index = {step.node: row for row, step in enumerate(construction.figures[figure])}
     gone = set(absent)
     return tuple(
-        Edge(vector.name, index[vector.tail], index[vector.head])
-        for vector in construction.vectors_of(figure)
+        Edge(vector.name, index[vector.tail], index[vector.head], vector.is_sum)
+        for vector in sorted(construction.vectors_of(figure), key=lambda vector: vector.is_sum)
         if not {vector.tail, vector.head} & gone and vector.tail in index
     )
 
@@ -339,15 +348,16 @@ def poses(expected: Expected, lines: Lines, search: Search, count: int = 3) -> l
     # The longest edges on long strokes give few proposals, which are then checked in full.
     rough = _scores(expected, lines, proposed, longest)
     proposed = proposed[np.argsort(-rough)[:SHORT_LIST]]
-    scores = _scores(expected, lines, proposed, range(len(expected.edges)))
+    scores = _scores(expected, lines, proposed, expected.required)
     return _apart(proposed, scores, float(np.abs(expected.at).max()), count)
 
 
 def _longest(expected: Expected) -> list[int]:
     """Return indices of the longest edges."""
-    size = np.nan_to_num([expected.length_mm(edge) for edge in expected.edges], posinf=0.0)
+    edges = np.array(expected.required)
+    size = np.nan_to_num([expected.length_mm(expected.edges[edge]) for edge in edges], posinf=0.0)
     order = np.argsort(-size)[:PROPOSING_EDGES]
-    return [int(edge) for edge in order if size[edge] >= LEAST_EDGE_MM]
+    return [int(edges[row]) for row in order if size[row] >= LEAST_EDGE_MM]
 
 
 def _proposals(expected: Expected, lines: Lines, search: Search, edges: Sequence[int]) -> FloatArray:

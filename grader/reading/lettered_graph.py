@@ -135,7 +135,7 @@ def lettered_graphs(
         return []
     exact = evaluate(drawing.construction, drawing.parameters, given=given)
     known = {name: exact[name].ravel() for name in exact.keys() - {step.node for step in steps}}
-    vectors = [v for v in drawing.construction.vectors_of(figure) if not {v.tail, v.head} & set(left_out)]
+    vectors = [v for v in drawing.construction.polygon_of(figure) if not {v.tail, v.head} & set(left_out)]
     search = _GraphSearch(drawing, known, vectors, junctions)
     pole, *others = steps
     every = np.arange(len(junctions.at))

@@ -219,7 +219,8 @@ def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) 
         return None
     best, *rivals = _with_letters(problem, everything)
     rivals = [*rivals[: RIVALS - 1], *_without_each_stroke(best)]
-    by_ink = problem.look and held_against_ink(best.fit, best.placed.edges, problem.look)
+    drawn = [best.placed.edges[index] for index in best.placed.required]
+    by_ink = problem.look and held_against_ink(best.fit, drawn, problem.look)
     return replace(best, rivals=tuple(rivals), by_ink=by_ink)
 
 
@@ -241,7 +242,7 @@ def _poses(expected: Expected, lines: Lines) -> list[Pose]:
 
     Each search has its own poses: a plan of nearly parallel vectors fits a bundle at any size.
     """
-    largest = max(expected.length_mm(edge) for edge in expected.edges)
+    largest = max(expected.length_mm(expected.edges[index]) for index in expected.required)
     if largest < SPECK_MM:
         return []
     # The student chose the length of the first vector so that it can be measured.
@@ -281,7 +282,7 @@ def _suspects(plan: PlanReading) -> frozenset[str]:
     """Return the nodes at which a mistake could explain edges without a stroke, and large residuals."""
     fit, expected = plan.fit, plan.assignment.expected
     odd: set[str] = set()
-    for index, edge in enumerate(expected.edges):
+    for index, edge in ((index, expected.edges[index]) for index in expected.required):
         size = abs(fit.at[edge.head] - fit.at[edge.tail])
         bare = plan.assignment.stroke[index] < 0 or plan.assignment.shared[index]
         residual = fit.residual_mm[index]

@@ -326,6 +326,9 @@ BLANK = 0.25
 """Share of a vector's length that other lines may ink if the vector itself is not drawn."""
 INKED = 0.9
 """Share from which it is drawn, even if its stroke is another's too; it is read from its nodes."""
+DASHED = 0.75
+"""Share under which a sum of components is not drawn: 68 dashed ones had 0.83 and more, 36 of 38 not drawn
+had less."""
 ON_IT_PX = 1
 """Offset at which such a stroke's ink may begin: of vectors a degree apart only one may be drawn."""
 LEAST_VECTOR_MM = 2.0
@@ -400,10 +403,11 @@ def _vectors(
         if row < 0 and abs(span) > LEAST_VECTOR_MM:
             ends = {"start": expected.names[edge.tail], "end": expected.names[edge.head]}
             at = complex(fit.at[edge.tail]), complex(fit.at[edge.head])
-            if where.share_inked(*at) <= BLANK:
+            on_it = where.share_inked(*at, ON_IT_PX)
+            if on_it < DASHED if edge.optional else where.share_inked(*at) <= BLANK:
                 unread.append(Unread(edge.name, Reason("blank", ends), is_blank=True))
                 continue
-            if where.share_inked(*at, ON_IT_PX) < INKED:
+            if not edge.optional and on_it < INKED:
                 unread.append(Unread(edge.name, Reason("no_stroke", ends)))
                 continue
         cov = _difference_cov(fit, edge, span, scale_se)

@@ -148,8 +148,17 @@ def turning(draft: Draft, link: tuple[str, str], length: Normal) -> Condition:
     draft.acceleration.append(Given(end, start, length, Along(node, pin)))
     draft.vector(f"a_{about}_n", start, end, link, "n")
     draft.vector(f"a_{about}_t", end, draft.image(node, primed=True), link, "t")
-    draft.vector(f"v_{about}", draft.image(pin), draft.image(node), link)
+    relative(draft, link)
     return Line(draft.image(pin), across), Line(end, across)
+
+
+def relative(draft: Draft, link: tuple[str, str]) -> None:
+    """Add velocity and full acceleration of a joint relative to another: v_BA, a_BA; v_B to the ground."""
+    pin, node = link
+    about = draft.relative(node, pin)
+    draft.vector(f"v_{about}", draft.image(pin), draft.image(node), link)
+    if not draft.mechanism.is_ground(pin):
+        draft.vector(f"a_{about}", draft.image(pin, primed=True), draft.image(node, primed=True), link)
 
 
 def slides(draft: Draft, node: str, guides: Sequence[Guide], at: str = "") -> list[Condition]:
@@ -187,7 +196,7 @@ def sliding(
     draft.acceleration.append(Given(end, start, length, replace(guide, quarters=guide.quarters + 1)))
     draft.vector(f"a_{about}_c", start, end, link, "c", name)
     draft.vector(f"a_{about}_r", end, draft.image(node, primed=True), link, "r")
-    draft.vector(f"v_{about}", draft.image(other), draft.image(node), link)
+    relative(draft, link)
     return Line(draft.image(other), guide), Line(end, guide)
 
 
@@ -384,7 +393,7 @@ def _draw_group(draft: Draft, group: Group) -> None:
                 rigid_images(draft, node, (p, q))
                 for pin in (p, q):
                     if not draft.mechanism.is_ground(pin):
-                        draft.vector(f"v_{node}{pin}", draft.image(pin), draft.image(node), (pin, node))
+                        relative(draft, (pin, node))
             else:
                 images_at(draft, node, rotations(draft, node, {p: link, q: link}))
         case PointOnLine(node=node, base=(p, q)):

@@ -151,6 +151,11 @@ class Vector:
     part: Part = ""
     turning: str | None = None
 
+    @property
+    def is_sum(self) -> bool:
+        """Return whether it is a full relative acceleration, such as a_BA, the sum of its components."""
+        return self.scale == "ka" and self.link is not None and not self.part
+
 
 @dataclass(frozen=True, slots=True)
 class AngularRate:
@@ -230,6 +235,10 @@ class Construction:
     def vectors_of(self, figure: str) -> tuple[Vector, ...]:
         """Return the vectors of one plan."""
         return tuple(v for v in self.vectors.values() if self._by_node[v.head][0] == figure)
+
+    def polygon_of(self, figure: str) -> tuple[Vector, ...]:
+        """Return the vectors of one plan that have to be drawn: without the sums of components."""
+        return tuple(v for v in self.vectors_of(figure) if not v.is_sum)
 
     @property
     def driving(self) -> frozenset[str]:

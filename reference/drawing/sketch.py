@@ -318,6 +318,8 @@ OVERRUN_MM = 5.0
 """Length by which a construction line extends past its foot and past the node that it finds."""
 ABSOLUTE_MM, RELATIVE_MM = 0.5, 0.3
 """Widths of vectors from the pole, and of all others."""
+SUM_DASH, SUM_HEAD_MM = (2.2, 1.2), (2.4, 0.45)
+"""Dash and arrowhead of a full relative acceleration, a thin line between the ends of other vectors."""
 
 
 def polygon(subject: Subject, figure: str) -> DrawnFigure:
@@ -356,5 +358,6 @@ def _vectors(subject: Subject, figure: str, nodes: dict[str, complex]) -> Iterat
         if subject.is_zero(vector.name):
             continue
         width = ABSOLUTE_MM if vector.tail == pole else RELATIVE_MM
-        for shape in symbols.arrow(nodes[vector.tail], nodes[vector.head], width, colour):
+        style = (THIN_MM, colour, SUM_HEAD_MM, SUM_DASH) if vector.is_sum else (width, colour)
+        for shape in symbols.arrow(nodes[vector.tail], nodes[vector.head], *style):
             yield Part(vector.head, shape)

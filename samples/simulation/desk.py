@@ -142,7 +142,7 @@ class Desk:
         taken.append((*place, w, h))
         origin = complex(place[0] + 6, -place[1] - 6) - complex(low.real, high.imag)
         whole = self.settings.student.abandoned_whole
-        for vector in self.task.wrong.construction.vectors_of(plan.name)[: None if whole else 3]:
+        for vector in self.task.wrong.construction.polygon_of(plan.name)[: None if whole else 3]:
             p, q = (origin + plan.nodes[node] for node in (vector.tail, vector.head))
             slip = complex(*sketch.rng.normal(0.0, 0.5 if whole else 2.0, 2))
             sketch.line(sketch.pen("line"), p, q + slip)

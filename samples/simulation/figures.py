@@ -280,18 +280,21 @@ def draw_plan(
     missing = {name: "mistake" for name in task.missing if name in _names(task, figure)}
     _construction_lines(sketch, task, figure, nodes)
     _unnamed_sides(sketch, task, figure, nodes)
-    for vector in task.wrong.construction.vectors_of(figure):
+    for vector in task.wrong.construction.polygon_of(figure):
         reason = _left_out(sketch, task, vector, nodes, student)
         if reason:
             missing[vector.name] = reason
         else:
             _vector(sketch, task, figure, vector, nodes)
+    for vector in task.wrong.construction.vectors_of(figure) if sketch.style.sums != "none" else ():
+        if vector.is_sum and abs(nodes[vector.head] - nodes[vector.tail]) >= TOO_SHORT_MM:
+            _vector(sketch, task, figure, vector, nodes, DASHES if sketch.style.sums == "dashed" else None)
     _letters(sketch, task, figure, nodes)
     return missing
 
 
 def _names(task: DrawingTask, figure: str) -> set[str]:
-    return {vector.name for vector in task.right.construction.vectors_of(figure)}
+    return {vector.name for vector in task.right.construction.polygon_of(figure)}
 
 
 def _left_out(
@@ -312,11 +315,17 @@ def _is_result(task: DrawingTask, vector: Vector) -> bool:
     return vector.link is None and not isinstance(step, Given)
 
 
-def _vector(sketch: SheetSketch, task: DrawingTask, figure: str, vector: Vector, nodes: Nodes) -> None:
+def _vector(
+    sketch: SheetSketch,
+    task: DrawingTask,
+    figure: str,
+    vector: Vector,
+    nodes: Nodes,
+    dash: Dash | None = None,
+) -> None:
     p, q = sketch.redrawn(nodes[vector.tail], nodes[vector.head])
     pen = sketch.pen("line", plan=True)
-    dash = None
-    if sketch.style.dashed_absolutes and abs(q - p) > 12 and _is_result(task, vector):
+    if not vector.is_sum and sketch.style.dashed_absolutes and abs(q - p) > 12 and _is_result(task, vector):
         dash = DASHES
     sketch.line(pen, p, q, dash)
     if dash is None and sketch.chance(sketch.style.doubled):
@@ -378,7 +387,7 @@ def draw_helpers(sketch: SheetSketch, task: DrawingTask, mechanism: Nodes, plan:
 
 def _unnamed_sides(sketch: SheetSketch, task: DrawingTask, figure: str, nodes: Nodes) -> None:
     """Draw the sides of a similar triangle that no named vector draws."""
-    drawn = {frozenset((v.tail, v.head)) for v in task.wrong.construction.vectors_of(figure)}
+    drawn = {frozenset((v.tail, v.head)) for v in task.wrong.construction.polygon_of(figure)}
     for step in task.wrong.construction.figures[figure]:
         if isinstance(step, Similar | Divide):
             for end in step.base:

@@ -242,7 +242,7 @@ def _speed_unconverted(occasion: Occasion) -> Iterator[StudentMistake]:
 
 def _vector_left_out(occasion: Occasion) -> Iterator[StudentMistake]:
     for name, vector in occasion.construction.vectors.items():
-        if vector.part not in {"n", "c"}:
+        if vector.part not in {"n", "c"} and not vector.is_sum:
             yield StudentMistake("vector_missing", name)
 
 

@@ -54,7 +54,8 @@ def any_settings(
         # At this student's own scales a mistake may put a node off the paper.
         able = possible_mistakes(*work, student, student.mistakes)
         student = replace(student, mistakes=able)
-    settings = Settings(hand, student, any_pen(rng, hand), page, any_scan(rng, device, dpi))
+    pen = replace(any_pen(rng, hand), sums=_any_sums(np.random.default_rng([seed, 11])))
+    settings = Settings(hand, student, pen, page, any_scan(rng, device, dpi))
     return with_hardships(settings, np.random.default_rng([seed, 8]), hardship)
 
 
@@ -181,6 +182,11 @@ def any_pen(rng: Rng, hand: HandStyle) -> PenStyle:
         arrow_half_deg=float(rng.uniform(9.0, 21.0)),
         node_dots=float(rng.choice([0.0, 0.4, 1.0], p=[0.6, 0.2, 0.2])),
     )
+
+
+def _any_sums(rng: Rng) -> Literal["none", "dashed", "full"]:
+    """Return how a random student draws full relative accelerations; one in eight does."""
+    return ("none", "dashed", "full")[rng.choice(3, p=[0.875, 0.09, 0.035])]
 
 
 def any_page(rng: Rng) -> PageStyle:

@@ -102,6 +102,7 @@ class PenStyle:
     ghost_dark : share of light that a badly erased line still takes
     smear : soft lead rubbed along by the hand: share of light beside strokes, 0 for none
     dashed_absolutes : vectors that only join two known points are dashed
+    sums : how full relative accelerations, such as a_BA, are drawn
     """
 
     line_mm: float = 0.5
@@ -119,6 +120,7 @@ class PenStyle:
     overrun_mm: float = 8.0
     construction_lines: float = 0.7
     dashed_absolutes: bool = False
+    sums: Literal["none", "dashed", "full"] = "none"
     node_circles: float = 0.3
     node_dots: float = 0.0
     support: Literal["triangle", "arch", "fork"] = "triangle"

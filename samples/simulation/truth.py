@@ -98,7 +98,7 @@ def _figure(
         return {**truth, "links": {n: line for n, line in lines.items() if n not in extras}, "extras": extras}
     vectors = {}
     for vector in task.right.construction.vectors_of(figure.name):
-        if vector.name in missing:
+        if vector.name in missing or (vector.is_sum and vector.name not in lines):
             continue
         drawn = nodes[vector.head] - nodes[vector.tail]
         meant = figure.intended[vector.head] - figure.intended[vector.tail]

@@ -155,6 +155,8 @@ PAPER_SCENES = tuple(
         ReadingScene("erased", "vectors rubbed out", changed=_left("erased")),
         ReadingScene("struck", "a vector anew beside a struck one", changed=_left("struck")),
         ReadingScene("double", "lines drawn twice", changed=_drawn(doubled=1.0)),
+        ReadingScene("sums", "full relative accelerations, dashed", changed=_drawn(sums="dashed")),
+        ReadingScene("sums-full", "full relative accelerations", changed=_drawn(sums="full")),
         ReadingScene("helpers", "helper lines to the edge", changed=_left("long helpers")),
         ReadingScene("dimensions", "dimension lines", changed=_left("dimensions")),
         ReadingScene("sections", "hatched sections", changed=_left("hatched sections")),

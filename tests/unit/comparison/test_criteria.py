@@ -808,6 +808,33 @@ def test_a_criterion_may_have_its_own_tolerance():
     assert isinstance(task.rubric.criterion[0], CriterionTable)
 
 
+def asking_for(task, name, **change):
+    """The same task with one criterion more, for a vector."""
+    title = task.rubric.criterion[0].title
+    one = CriterionTable(id=name, vector=name, title=title, points=1.0, **change)
+    return with_rubric(task, criterion=[*task.rubric.criterion, one])
+
+
+def test_a_full_relative_acceleration_is_judged_by_itself_and_puts_nothing_else_in_doubt():
+    task = asking_for(PUMP, "a_BA")
+    reading = measured(task)
+    assert lost(compare(task, Submission(measured=reading))) == []
+    length = reading.figures["acceleration_plan"].vectors["a_BA"].length_mm
+    wrong = changed(reading, "a_BA", length_mm=2.0 * length)
+    assert lost(compare(task, Submission(measured=wrong))) == ["a_BA"]
+    assert lost(compare(task, Submission(measured=without(reading, "a_BA")))) == ["a_BA"]
+    left = compare(asking_for(PUMP, "a_BA", optional=True), Submission(measured=without(reading, "a_BA")))
+    assert outcome_of(left, "a_BA").verdict == "not_judged"
+
+
+def test_a_full_relative_acceleration_follows_from_the_students_own_components():
+    task = asking_for(PUMP, "a_BA")
+    reading = measured(task, mistakes=(Mistake("normal_reversed", "n_BA"),))
+    comparison = compare(task, Submission(measured=reading))
+    assert outcome_of(comparison, "a_BA_n").verdict == "none"
+    assert outcome_of(comparison, "a_BA").verdict == "follow_through"
+
+
 OWN_TOLERANCES = [
     (Mistake("wrong_link", "b", 1, other=("C", "D")),),
     (Mistake("normal_missing", "n_BA"), Mistake("sense_reversed", "a")),

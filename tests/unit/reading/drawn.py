@@ -30,11 +30,12 @@ class Drawn:
 
 @dataclass
 class Pen:
-    """A hand that redraws lines with small errors, and what it leaves out."""
+    """A hand that redraws lines with small errors, what it leaves out, and whether it draws the sums."""
 
     redraw_mm: float = 0.08
     seed: int = 1
     left_out: frozenset[str] = frozenset()
+    sums: bool = False
     extra: list[tuple[complex, complex]] = field(default_factory=list)
 
 
@@ -70,7 +71,7 @@ def draw(drawing: Drawing, figures: Mapping[str, complex] | None = None, pen: Pe
                 short = JOINT_MM * (head - tail) / abs(head - tail)
                 lines.append((tail + short, head - short))
             continue
-        for vector in construction.vectors_of(figure):
+        for vector in construction.vectors_of(figure) if pen.sums else construction.polygon_of(figure):
             tail, head = nodes[vector.tail], nodes[vector.head]
             if vector.name not in pen.left_out:
                 vectors[vector.name] = head - tail

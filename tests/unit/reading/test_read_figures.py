@@ -208,6 +208,35 @@ def test_every_vector_asked_for_is_read_or_unread():
     assert set(wanted) <= told
 
 
+def test_a_full_relative_acceleration_is_read_where_it_is_drawn_and_else_missed_only_if_asked_for():
+    assignment, variant, drawing = task("press")
+    sums = {name for name, vector in drawing.construction.vectors.items() if vector.is_sum}
+    drawn = draw(drawing, pen=Pen(sums=True))
+    found = vectors_read(read(drawn, assignment, variant))
+    assert sums == {"a_BA", "a_DC"}
+    assert {name for name in found if abs(found[name][0] - drawn.vectors[name]) < ALONG_MM} >= sums
+    plain = draw(drawing)
+    assert not sums & vectors_read(read(plain, assignment, variant)).keys()
+    asked = read(plain, assignment, variant, ("a_B", "a_BA"))
+    assert [(one.name, one.reason.code) for one in asked.unread] == [("a_BA", "blank")]
+
+
+def test_the_strokes_of_full_relative_accelerations_are_not_taken_for_others():
+    assignment, _, _ = task()
+    lost = []
+    for variant in assignment.variants()[::6]:
+        _, _, drawing = task("pump", variant)
+        drawn = draw(drawing, pen=Pen(redraw_mm=0.15, seed=2, sums=True))
+        found = vectors_read(read(drawn, assignment, variant))
+        asked = [name for name, vector in drawn.vectors.items() if abs(vector) >= MEASURABLE_MM]
+        lost += [
+            name
+            for name in asked
+            if name not in found or abs(found[name][0] - drawn.vectors[name]) > ALONG_MM
+        ]
+    assert len(lost) <= 2, lost
+
+
 def test_the_position_is_complex_with_y_up():
     assignment, variant, drawing = task()
     drawn = draw(drawing)

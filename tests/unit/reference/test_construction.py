@@ -171,14 +171,29 @@ def test_the_pump_has_the_names_that_students_use():
     assert (
         list(construction.vectors)
         == (
-            "v_A v_B v_BA v_C v_CA v_CB v_D v_DC a_A a_B a_BA_n a_BA_t a_B_n a_B_t a_C a_CA_n a_CA_t a_CB_n"
-            " a_CB_t a_D a_DC_n a_DC_t"
+            "v_A v_B v_BA v_C v_CA v_CB v_D v_DC a_A a_B a_BA a_BA_n a_BA_t a_B_n a_B_t a_C a_CA a_CA_n"
+            " a_CA_t a_CB a_CB_n a_CB_t a_D a_DC a_DC_n a_DC_t"
         ).split()
     )
     assert list(construction.rates) == "omega_1 omega_2 omega_3 omega_4 epsilon_2 epsilon_3 epsilon_4".split()
     assert {step.node for step in construction.figures["acceleration_plan"]} == set(
         "o' a' b' c' d' n_BA n_B n_CA n_CB n_DC".split()
     )
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_a_full_relative_acceleration_is_the_difference_of_two_and_the_sum_of_its_components(name):
+    plan = plan_of(name)
+    sums = [vector for vector in plan.construction.vectors.values() if vector.is_sum]
+    assert sums
+    for vector in sums:
+        pin, node = vector.link
+        size = plan.size_mm("acceleration_plan") * plan.scales.ka
+        full, of = plan.vectors_si[vector.name], plan.motion.acceleration
+        assert np.max(np.abs(full - (of[node] - of[pin])) / size) <= SHARE_OF_PLAN
+        parts = [f"{vector.name}_{part}" for part in "ntcr" if f"{vector.name}_{part}" in plan.vectors_si]
+        added = sum(plan.vectors_si[part] for part in parts)
+        assert not parts or np.max(np.abs(full - added) / size) <= SHARE_OF_PLAN
 
 
 def test_a_turned_sketch_turns_the_plans_with_it():
