@@ -30,7 +30,7 @@ from grader.overlay.backdrop import backdrop
 from grader.overlay.measured import measured_picture
 from grader.overlay.picture import overlay
 from grader.overlay.scene import Picture
-from grader.printed.layout import cells_of, values_of
+from grader.printed.layout import cells_of, position_zones, values_of
 from grader.reading import page_scale
 from grader.reading.corrected import corrected
 from grader.reading.read import read_figures
@@ -75,15 +75,26 @@ def read_submission(
     submission: StudentSubmission, pages: Sequence[ScannedPage], assignment: Assignment, asked: Asked
 ) -> list[ScannedPage]:
     """The submission's pages with every vector of the figures that are asked for."""
-    pages = [_with_captions(page, assignment, missing_scales(submission)) for page in pages]
+    own = partial(_of_position, assignment=assignment, variant=submission.variant)
+    pages = [own(_with_captions(page, assignment, missing_scales(submission))) for page in pages]
     read = read_pages(pages, assignment, submission.variant, submission.declared, asked.vectors)
     drawn = {figure for page in read for figure in page.reading.figures}
     if any(page.narrowed for page in pages) and not asked.figures <= drawn:
         # A figure is not in its zone: people draw where they like.
         all_of_it = replace(asked, figures=frozenset())
-        whole = [scan(page.ref, all_of_it) if page.narrowed else page for page in pages]
+        whole = [own(scan(page.ref, all_of_it)) if page.narrowed else page for page in pages]
         read = read_pages(whole, assignment, submission.variant, submission.declared, asked.vectors)
     return [_with_number_compared(page, submission.variant, assignment) for page in read]
+
+
+def _of_position(page: ScannedPage, assignment: Assignment, variant: Variant | None) -> ScannedPage:
+    """The page with what is drawn for the variant's position, if a printed sheet has a zone for each."""
+    zones = {} if page.sheet is None else position_zones(assignment, page.sheet.zones)
+    zone = None if variant is None else zones.get(variant.position or 0)
+    if zone is None or page.ink is None or page.sheet is None:
+        return page
+    sheet = replace(page.sheet, zones=dict.fromkeys(page.sheet.zones, zone))
+    return replace(page, ink=page.ink.within(zone), sheet=sheet)
 
 
 def _with_number_compared(page: ScannedPage, variant: Variant | None, assignment: Assignment) -> ScannedPage:
@@ -92,7 +103,8 @@ def _with_number_compared(page: ScannedPage, variant: Variant | None, assignment
         return page
     if not page_scale.is_drawn_otherwise(page.reading, drawings(assignment, [variant], None)[0]):
         return page
-    for which, words in (("n", captions.NUMBER_WORDS), ("position", captions.POSITION_WORDS)):
+    told = {"n": captions.NUMBER_WORDS, "position": captions.POSITION_WORDS}
+    for which, words in list(told.items())[: 1 if assignment.shared_positions else None]:
         numbers = {getattr(other, which) for other in assignment.variants()} - {None}
         for closely in (False, True) if len(numbers) > 1 else ():
             read = captions.written_number(writing_on(page, closely=closely), sorted(numbers), words)

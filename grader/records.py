@@ -6,9 +6,9 @@ difference is the direction counter-clockwise from the sheet's +x, as in `refere
 """
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -409,6 +409,29 @@ class Ink:
     tips: Tips = NO_TIPS
     problems: tuple[Reason, ...] = ()
 
+    def within(self, box: Box) -> "Ink":
+        """Return the ink of a zone: strokes that begin, end or have their middle in it; the map is whole."""
+        slack = np.array([-ZONE_SLACK_MM, ZONE_SLACK_MM])
+        x, y = box[0] + slack + (0.0, box[2]), box[1] + slack + (0.0, box[3])
+
+        def inside(at: FloatArray) -> NDArray[np.bool_]:
+            return np.asarray(np.all((at > (x[0], y[0])) & (at < (x[1], y[1])), axis=-1))
+
+        def middle(boxes: FloatArray) -> FloatArray:
+            return np.asarray(boxes[:, :2] + boxes[:, 2:4] / 2.0)
+
+        ends, letters, tips = self.strokes.ends, self.letters, self.tips
+        drawn = inside(ends).any(axis=1) | inside(ends.mean(axis=1))
+        row, pointed = np.cumsum(drawn) - 1, drawn[tips.stroke]
+        return replace(
+            self,
+            strokes=_rows(self.strokes, drawn),
+            circles=self.circles[inside(self.circles[:, :2])],
+            marks=self.marks[inside(middle(self.marks))],
+            letters=letters and _rows(letters, inside(middle(letters.box_mm))),
+            tips=replace(_rows(tips, pointed), stroke=row[tips.stroke[pointed]]),
+        )
+
     def longer(self, factor: float) -> "Ink":
         """Return the ink with every length scaled by a factor."""
         strokes, letters = self.strokes, self.letters
@@ -424,6 +447,16 @@ class Ink:
             letters=None if letters is None else replace(letters, box_mm=factor * letters.box_mm),
             tips=replace(self.tips, along=factor * self.tips.along),
         )  # fmt: skip
+
+
+_Columns = TypeVar("_Columns", Strokes, Tips, Letters)
+
+
+def _rows(columns: _Columns, chosen: NDArray[np.bool_]) -> _Columns:
+    """Return a record of arrays with the chosen rows of each."""
+    arrays: dict[str, Any] = {one.name: getattr(columns, one.name) for one in fields(columns)}
+    rows = {name: of[chosen] for name, of in arrays.items() if isinstance(of, np.ndarray)}
+    return replace(columns, **rows)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, slots=True)

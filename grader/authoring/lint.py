@@ -108,7 +108,10 @@ def lint(assignment: Assignment, rubric: RubricFile) -> Lint:
         return Lint(assignment, tuple(rows.values()), _sorted(findings))
     plan = exact_plan(assignment, sound, accelerations=accelerations)
     conditions, asked, extents = conditions_of(plan), asked_vectors(rubric, plan), extents_of(plan)
-    rooms = {index: room_of(figures, extents) for index, figures in pages_of(assignment, plan)}
+    rooms = {
+        index: room_of(figures, extents, assignment.file.page[index].grid)
+        for index, figures in pages_of(assignment, plan)
+    }
     scales = proposals(assignment, plan, extents, asked, rooms)
     findings += [
         *assembly_findings(assignment, sound),

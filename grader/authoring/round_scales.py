@@ -169,12 +169,12 @@ def pages_of(assignment: Assignment, plan: Plan) -> list[tuple[int, tuple[str, .
     return [(index, figures) for index, figures in pages if figures]
 
 
-def room_of(figures: Sequence[str], extents: Extents) -> PageRoom:
+def room_of(figures: Sequence[str], extents: Extents, grid: Sequence[int] | None = None) -> PageRoom:
     """Return the room for a page's figures, in the layout of the answer sheet printed for them."""
     largest = {
         figure: (float(extents[figure][0].max()), float(extents[figure][1].max())) for figure in figures
     }
-    template = template_for(largest).template
+    template = template_for(largest, grid).template.of_one(grid)
     zones = {figure: growth(template.zones[figure], *extents[figure]) for figure in figures}
     return PageRoom(zones, _frame_growth([extents[figure] for figure in figures]))
 
@@ -281,9 +281,11 @@ def proposals(
     """Return the assignment's own scales, round ones for all, and round ones for each variant."""
     factors = [factor for room in rooms.values() for factor in room.zones.values()]
     own_room = min((float(np.min(factor)) for factor in factors), default=np.inf)
-    pages = [figures for _, figures in pages_of(assignment, plan)]
     links = _shortest_link_m(plan)
-    templates = [_best_template(figures, plan, extents, links) for figures in pages]
+    templates = [
+        _best_template(figures, plan, extents, links).of_one(assignment.file.page[index].grid)
+        for index, figures in pages_of(assignment, plan)
+    ]
     proposed = [_judged("proposed", plan.scales, plan, asked, own_room)]
     names: tuple[ProposalName, ...] = ("round", "round_each")
     for name in names:

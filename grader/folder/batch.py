@@ -285,6 +285,7 @@ def _submissions(
         batch.assignment.id,
         pages_per_student=batch.pages_per_student,
         student_ids=[row.student_id for row in measured if row.student_id],
+        shared_positions=batch.assignment.shared_positions,
         decided=decisions.owners(roster),
     )
     owners = assigned()

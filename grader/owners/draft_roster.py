@@ -87,7 +87,10 @@ def suggest(
     strokes_of : returns the strokes of a page whose owner is not certain, to compare it with variants
     pages_per_student : how many pages each student has, if the file is in the roster's order
     """
-    known = assign_pages(pages, roster, assignment.id, pages_per_student=pages_per_student)
+    known = assign_pages(
+        pages, roster, assignment.id, pages_per_student=pages_per_student,
+        shared_positions=assignment.shared_positions,
+    )  # fmt: skip
     settled = {owned.source: _certain(owned, roster) for owned in known.owned}
     reasons = {loose.source: loose.problem for loose in known.unmatched}
     if pages_per_student is None:

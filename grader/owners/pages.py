@@ -19,7 +19,7 @@ Codes of the problems:
 """
 
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import PurePath
 from types import MappingProxyType
@@ -104,6 +104,7 @@ def assign_pages(  # noqa: PLR0913 - a source of owners each
     *,
     pages_per_student: int | None = None,
     student_ids: Iterable[str] = (),
+    shared_positions: Sequence[int] = (),
     decided: Mapping[tuple[str, int], RosterRow] = MappingProxyType({}),
     written: Mapping[tuple[str, int], str] = MappingProxyType({}),
 ) -> PageOwners:
@@ -114,6 +115,7 @@ def assign_pages(  # noqa: PLR0913 - a source of owners each
     roster : None if there is none; students are then those named by codes, file names and `student_ids` (of
         measurement files, for example)
     pages_per_student : pages that each student has in the one class file, blank ones not counted
+    shared_positions : all positions, where a sheet may have all of them: it then belongs to each
     decided : the owners that a person gave, by file and page
     written : the students whose names stand on pages, by file and page
     """
@@ -121,9 +123,10 @@ def assign_pages(  # noqa: PLR0913 - a source of owners each
     named = owners_by_platform(dict.fromkeys(page.file for page in pages), roster)
     listed = roster
     if listed is None:
-        listed = _improvised([page for page in pages if page.file not in named], [*student_ids, *owners])
+        unnamed = [page for page in pages if page.file not in named]
+        listed = _improvised(unnamed, [*student_ids, *owners], shared_positions)
     certain = [_certain_claims(page, listed, named.get(page.file)) for page in pages]
-    order, refusals = _order_claims(pages, listed, certain, pages_per_student)
+    order, refusals = _order_claims(pages, listed, certain, pages_per_student, shared=bool(shared_positions))
     refusals |= {file: found for file, found in named.items() if isinstance(found, Reason)}
     owned: list[Owned] = []
     unmatched: list[Unmatched] = []
@@ -133,7 +136,9 @@ def assign_pages(  # noqa: PLR0913 - a source of owners each
         if row is not None:
             own = page.identity is not None and page.identity.student_id == row.student_id
             n = page.identity.n if own and row.n is None and page.identity is not None else row.n
-            owned.append(Owned(page, row.student_id, n, row.position, (How.PERSON,)))
+            of_all = shared_positions and listed.rows_of(row.student_id)
+            positions = [one.position for one in of_all or (row,)]
+            owned += [Owned(page, row.student_id, n, position, (How.PERSON,)) for position in positions]
             continue
         if page.blank and page.identity is None:
             blank.append(page)
@@ -143,12 +148,21 @@ def assign_pages(  # noqa: PLR0913 - a source of owners each
         if name is not None and not claims:
             claims = [_Claim(How.WRITTEN, listed.rows_of(name), name)]
         settled = _settle(page, claims, listed, assignment_id, refusals.get(page.file))
+        students = dict.fromkeys(row.student_id for claim in claims for row in claim.rows)
         if isinstance(settled, Owned):
             owned.append(settled)
+        elif settled.code == "owner_ambiguous" and shared_positions:
+            owned += _each_owned(page, claims)
         else:
-            students = dict.fromkeys(row.student_id for claim in claims for row in claim.rows)
             unmatched.append(Unmatched(page, settled, tuple(students)))
     return PageOwners(tuple(owned), tuple(unmatched), tuple(blank), tuple(_missing_scans(pages, listed)))
+
+
+def _each_owned(page: PageRef, claims: Sequence[_Claim]) -> Iterable[Owned]:
+    """Yield a page with all positions as each position's."""
+    n, how = None if page.identity is None else page.identity.n, tuple(claim.how for claim in claims)
+    for row in _common(claims):
+        yield Owned(page, row.student_id, row.n if n is None else n, row.position, how)
 
 
 def student_of_name(file: str, student_ids: Container[str]) -> str | None:
@@ -161,7 +175,9 @@ def student_of_name(file: str, student_ids: Container[str]) -> str | None:
     return None
 
 
-def _improvised(pages: Sequence[PageRef], student_ids: Iterable[str]) -> Roster:
+def _improvised(
+    pages: Sequence[PageRef], student_ids: Iterable[str], shared_positions: Sequence[int] = ()
+) -> Roster:
     """Return a roster made from the pages, for a folder that has none.
 
     Students whose id could not name a folder are left out.
@@ -174,7 +190,9 @@ def _improvised(pages: Sequence[PageRef], student_ids: Iterable[str]) -> Roster:
         other = spelled.setdefault(row.student_id.lower(), row.student_id)
         ids.add(other)
         if other == row.student_id and why_no_id(row.student_id) is None:
-            rows[row.student_id, row.position] = row
+            positions = shared_positions if row.position is None else ()
+            for position in positions or (row.position,):
+                rows[row.student_id, position] = replace(row, position=position)
 
     for page in pages:
         if page.identity is not None:
@@ -225,7 +243,12 @@ def _code_claim(identity: Identity, roster: Roster) -> _Claim:
 
 
 def _order_claims(
-    pages: Sequence[PageRef], roster: Roster, certain: Sequence[Sequence[_Claim]], each: int | None
+    pages: Sequence[PageRef],
+    roster: Roster,
+    certain: Sequence[Sequence[_Claim]],
+    each: int | None,
+    *,
+    shared: bool = False,
 ) -> tuple[dict[int, _Claim], dict[str, Reason]]:
     """Return the claims of the roster's order on the class file's pages, by index; or why not, by file."""
     if each is None:
@@ -245,6 +268,7 @@ def _order_claims(
         if page.file == file and not any(claim.how is How.SCANS for claim in certain[index])
     ]
     rows = [row for row in roster.rows if all(ref.file != file for ref in row.scans)]
+    rows = list({row.student_id: row for row in rows}.values()) if shared else rows
     elsewhere = {
         row.line
         for page, claims in zip(pages, certain, strict=True)
@@ -260,7 +284,10 @@ def _order_claims(
     )
     if isinstance(dealt, Reason):
         return {}, {file: dealt}
-    claims_by_index = {indices[place]: _Claim(How.ORDER, (row,), who(row)) for place, row in dealt.items()}
+    claims_by_index = {
+        indices[place]: _Claim(How.ORDER, roster.rows_of(row.student_id) if shared else (row,), who(row))
+        for place, row in dealt.items()
+    }
     for index, claim in claims_by_index.items():
         for other in certain[index]:
             if not pages[index].blank and not _common([claim, other]):

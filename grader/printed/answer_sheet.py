@@ -28,6 +28,7 @@ from grader.printed.layout import (
     marker_places,
     page_construction,
     poles_mm,
+    position_zones,
     values_of,
 )
 from grader.printed.pdf import (
@@ -58,6 +59,7 @@ FIGURES = {
     ACCELERATION_PLAN: N_("Acceleration plan"),
 }
 KINDS = {
+    "mechanism": N_("Mechanism"),
     "all": N_("Mechanism, velocities and accelerations"),
     "velocity": N_("Velocities"),
     "acceleration": N_("Accelerations"),
@@ -101,15 +103,17 @@ class PageText:
 
     Attributes
     ----------
+    variants : of the drawings on the page
     sheet, sheets : this page's number among the student's, from 1, and how many there are
-    poles : best position of each plan's pole, x, y in sheet mm by figure
+    poles : the names and best positions of the plans' poles, x, y in sheet mm
     """
 
     identity: Identity
     name: str
+    variants: Sequence[Variant]
     sheet: int
     sheets: int
-    poles: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    poles: Sequence[tuple[str, tuple[float, float]]] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +127,7 @@ class PageForm:
     fields : boxes to write in, by scale or vector
     poles : the names of the plans' poles, by figure
     values : places of computed values, by vector
+    positions : the zone of each position where the page has all of them, else empty
     """
 
     kind: PageKind
@@ -130,6 +135,7 @@ class PageForm:
     fields: dict[str, Box]
     poles: dict[str, str]
     values: dict[str, ValuePlace] = field(default_factory=dict)
+    positions: Mapping[int, Box] = field(default_factory=dict)
 
 
 def draw_page(
@@ -144,13 +150,14 @@ def draw_page(
     drawing.markers(form.template)
     _code(drawing, text.identity)
     _student(drawing, assignment, text, tongue)
-    _task(drawing, assignment, text.identity, tongue)
+    _task(drawing, assignment, text.variants, tongue)
     _advice(drawing, tongue)
     for figure, zone in form.template.zones.items():
-        _zone(drawing, zone, tongue.gettext(FIGURES[figure]))
-    for figure, at in text.poles.items():
-        pole = form.poles[figure]
-        _pole(drawing, at, assignment.file.names.get(pole, pole))
+        title, apart = tongue.gettext(FIGURES[figure]), set(form.positions.values()) - {zone}
+        for position, cell in form.positions.items() if apart else ((None, zone),):
+            _zone(drawing, cell, title if position is None else f"{title}, {_position(position, tongue)}")
+    for name, at in text.poles:
+        _pole(drawing, at, name)
     _fields(drawing, assignment, form.fields, tongue)
     _values(drawing, assignment, form.values, tongue)
     draw_ruler(drawing, tongue)
@@ -170,8 +177,9 @@ def _student(drawing: PdfDrawing, assignment: Assignment, text: PageText, tongue
     identity = text.identity
     title = [assignment.file.title.in_language(tongue.lang)]
     drawing.paragraphs((x, y + 3.5, wide, 9.0), title, (10.0, 9.0, 8.0), BOLD)
-    numbers = Variant(identity.n, identity.position).numbers
-    variant = [f"{tongue.gettext(name)} = {value}" for name, value in numbers.items()]
+    positions = [one.position for one in text.variants if one.position is not None]
+    variant = [] if identity.n is None else [f"n = {identity.n}"]
+    variant += [_position(", ".join(map(str, positions)), tongue)] if positions else []
     sheet = tongue.gettext(N_("sheet {number} of {count}")).format(number=text.sheet, count=text.sheets)
     name = wrap(text.name, BOLD, 12.0, wide)[:1] or [""]
     drawing.text((x, y + 13.5), name[0], 12.0, BOLD)
@@ -180,11 +188,19 @@ def _student(drawing: PdfDrawing, assignment: Assignment, text: PageText, tongue
     drawing.text((x, y + 23.6), f"{tongue.gettext(KINDS[identity.kind])}, {sheet}", 9.0)
 
 
-def _task(drawing: PdfDrawing, assignment: Assignment, identity: Identity, tongue: Tongue) -> None:
-    """Draw the task in words at the largest size that leaves room for the data below it."""
+def _position(position: object, tongue: Tongue) -> str:
+    return f"{tongue.gettext(N_('position'))} = {position}"
+
+
+def _task(drawing: PdfDrawing, assignment: Assignment, variants: Sequence[Variant], tongue: Tongue) -> None:
+    """Draw the task in words at the largest size that leaves room for the data below it.
+
+    Of several positions on a page, the data that they have in common.
+    """
     x, y, wide, high = _TASK_MM
     task = assignment.file.task.in_language(tongue.lang)
-    data = given_data(assignment, Variant(identity.n, identity.position), tongue)
+    data, *others = [given_data(assignment, variant, tongue) for variant in variants]
+    data = [datum for datum in data if all(datum in other for other in others)]
     for size in (8.5, 8.0, 7.5, 7.0, 6.5, 6.0):
         step = 1.3 * size * _PT
         rows = _flow(data, size, wide)
@@ -365,14 +381,32 @@ def make_sheets(
     forms, problems = _forms(assignment, asked)
     poles = [poles_mm(assignment, form.template, variants) for form in forms]
     drawing = PdfDrawing.begin(assignment.file.title.in_language(lang))
+    of_student: dict[tuple[str, int | None], list[int]] = {}
+    for index, row in enumerate(rows):
+        of_student.setdefault((row.student_id, row.n), []).append(index)
     for index, (row, variant) in enumerate(zip(rows, variants, strict=True)):
+        together = of_student[row.student_id, row.n]
         for page, form in enumerate(forms, start=1):
-            identity = Identity(assignment.id, row.student_id, variant.n, variant.position, form.kind)
-            own = {figure: places[index] for figure, places in poles[page - 1].items()}
-            text = PageText(identity, row.name, page, len(forms), own)
+            if form.positions and index != together[0]:
+                continue
+            meant = together if form.positions else [index]
+            position = None if form.positions else variant.position
+            identity = Identity(assignment.id, row.student_id, variant.n, position, form.kind)
+            own = [
+                (_pole_name(assignment, form, figure, variants[k]), places[k])
+                for figure, places in poles[page - 1].items()
+                for k in meant
+            ]
+            text = PageText(identity, row.name, [variants[k] for k in meant], page, len(forms), own)
             draw_page(drawing, assignment, text, form, tongue(row.lang or lang))
     layout = Layout(pages=[_layout(form) for form in forms])
     return Sheets(drawing.finish(), layout, (*problems, *_unprintable(rows, roster)))
+
+
+def _pole_name(assignment: Assignment, form: PageForm, figure: str, variant: Variant) -> str:
+    """Return the pole's letter, with the position's number where the page has all of them."""
+    pole = form.poles[figure]
+    return f"{assignment.file.names.get(pole, pole)}{variant.position if form.positions else ''}"
 
 
 def _unprintable(rows: Sequence[RosterRow], roster: str) -> Iterator[Reason]:
@@ -404,9 +438,10 @@ def _forms(
     problems: list[Reason] = []
     for table in assignment.file.page:
         figures = list(dict.fromkeys(table.figures))
-        fit = best_template(assignment, figures)
+        fit = best_template(assignment, figures, table.grid)
         construction = page_construction(assignment, figures)
-        names = [vector.name for figure in figures for vector in construction.polygon_of(figure)]
+        vectors = [] if table.grid else [construction.polygon_of(figure) for figure in figures]
+        names = [vector.name for several in vectors for vector in several]
         boxes = boxes_of(names, asked)
         if names and not boxes and (asked is None or set(names) & set(asked)):
             known: dict[str, Value] = {"form": table.kind, "lengths": len(names)}
@@ -418,7 +453,10 @@ def _forms(
             problems.append(Reason("sheet_values", known, str(assignment.path)))
         problems.extend(_too_small(assignment, table, fit))
         scales = {SCALE_OF[figure]: SCALE_BOXES[SCALE_OF[figure]] for figure in figures}
-        forms.append(PageForm(table.kind, fit.template, scales | boxes, dict(construction.poles), values))
+        cells = position_zones(assignment, fit.template.zones) if table.grid else {}
+        forms.append(
+            PageForm(table.kind, fit.template, scales | boxes, dict(construction.poles), values, cells)
+        )
     return forms, tuple(problems)
 
 
@@ -428,7 +466,7 @@ def _too_small(assignment: Assignment, table: PageTable, fit: TemplateFit) -> li
         if share >= 1.0:
             continue
         wide, high = fit.need_mm[figure]
-        _, _, zone_wide, zone_high = fit.template.zones[figure]
+        _, _, zone_wide, zone_high = fit.template.of_one(table.grid).zones[figure]
         sides = {"wide": wide, "high": high, "zone_wide": zone_wide, "zone_high": zone_high}
         known: dict[str, Value] = {f"{name}_mm": round(side) for name, side in sides.items()}
         known |= {"form": table.kind, "figure": figure, "fits_percent": round(100 * share)}
@@ -439,8 +477,10 @@ def _too_small(assignment: Assignment, table: PageTable, fit: TemplateFit) -> li
 def _layout(form: PageForm) -> PageLayout:
     zones: dict[str, Box | dict[str, Box]] = {**form.template.zones, "fields": form.fields}
     markers = marker_places(form.template)
-    cells = combs_of(form.fields)
-    return PageLayout(kind=form.kind, markers=markers, zones=zones, cells=cells, values=form.values)
+    cells, positions = combs_of(form.fields), dict(form.positions)
+    return PageLayout(
+        kind=form.kind, markers=markers, zones=zones, cells=cells, values=form.values, positions=positions
+    )
 
 
 # The calibration page -----------------------------------------------------------------------------

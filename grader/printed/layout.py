@@ -6,7 +6,7 @@ sheet's top left corner, x right, y down.
 
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import accumulate
 from typing import Literal, get_args
 
@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, FloatArray, Identity
-from reference.authored.assignment import SCALE_NAMES, Assignment, PageKind, Scales, Variant
+from reference.authored.assignment import SCALE_NAMES, Assignment, PageKind, PageTable, Scales, Variant
 from reference.construction.graph import Construction, evaluate, parameters_of
 from reference.drawing.canvas import A3_MM
 from reference.geometry import ComplexArray
@@ -117,6 +117,10 @@ class Template:
         first = self.number * MARKERS_PER_TEMPLATE
         return range(first, first + MARKERS_PER_TEMPLATE)
 
+    def of_one(self, grid: Sequence[int] | None) -> "Template":
+        """Return the template with the zones of the first position in a grid."""
+        return replace(self, zones={figure: _grid(box, grid)[0] for figure, box in self.zones.items()})
+
 
 def _marker_corners() -> FloatArray:
     """Return (8, 4, 2) corners from the top left, clockwise on the sheet: the upper row, then the lower."""
@@ -139,6 +143,26 @@ def _cut(box: Box, shares: Iterable[float], *, across: bool) -> list[Box]:
     if across:
         return [(round(x + start, 3), y, size, h) for start, size in zip(starts, sizes, strict=True)]
     return [(x, round(y + start, 3), w, size) for start, size in zip(starts, sizes, strict=True)]
+
+
+def _grid(box: Box, grid: Sequence[int] | None) -> list[Box]:
+    """Divide a box into equal zones, from the left, row after row."""
+    columns, rows = grid or (1, 1)
+    return [
+        cell
+        for row in _cut(box, [1.0 / rows] * rows, across=False)
+        for cell in _cut(row, [1.0 / columns] * columns, across=True)
+    ]
+
+
+def position_zones(assignment: Assignment, zones: Mapping[str, Box]) -> dict[int, Box]:
+    """Return the zone of each position on a page with these zones; empty where the page has one position."""
+    page = next((one for one in assignment.file.page if one.grid and set(one.figures) == set(zones)), None)
+    if page is None:
+        return {}
+    cells = _grid(zones[page.figures[0]], page.grid)
+    positions = assignment.shared_positions
+    return dict(zip(positions, cells * (len(positions) if len(cells) == 1 else 1), strict=False))
 
 
 def _zones(figures: tuple[str, ...], box: Box, shares: tuple[float, ...], across: bool) -> dict[str, Box]:
@@ -228,12 +252,18 @@ def cells_of(
     assignment: Assignment, figures: Sequence[str], asked: Collection[str] | None = None
 ) -> dict[str, tuple[Box, ...]]:
     """Return the cells for measured lengths on a page with these figures, by vector, in zone order."""
-    table = next((page for page in assignment.file.page if set(page.figures) == set(figures)), None)
+    table = _single(assignment, figures)
     if table is None:
         return {}
     construction = page_construction(assignment, table.figures)
     ordered = dict.fromkeys(table.figures)
     return combs_of(boxes_of([v.name for figure in ordered for v in construction.polygon_of(figure)], asked))
+
+
+def _single(assignment: Assignment, figures: Sequence[str]) -> PageTable | None:
+    """Return the page with these figures, if it has them for one position."""
+    known = (page for page in assignment.file.page if set(page.figures) == set(figures) and not page.grid)
+    return next(known, None)
 
 
 def boxes_of(names: Sequence[str], asked: Collection[str] | None) -> dict[str, Box]:
@@ -302,7 +332,8 @@ class PageLayout(_Document):
     """The positions of everything on the pages of one kind. `zones` holds the figures' boxes and `fields`.
 
     `cells` holds, for each box of `fields` in which a measured length is written (millimetres), its cells
-    from the left: three digits, then the tenths. `values` holds the places of computed values, by vector.
+    from the left: three digits, then the tenths; `values` the places of computed values, by vector;
+    `positions` the zone of each position where one sheet has all.
     """
 
     kind: PageKind | Literal["calibration"]
@@ -310,6 +341,7 @@ class PageLayout(_Document):
     zones: dict[str, Box | dict[str, Box]]
     cells: dict[str, tuple[Box, ...]] = {}
     values: dict[str, ValuePlace] = {}
+    positions: dict[int, Box] = {}
 
 
 class Layout(_Document):
@@ -393,10 +425,10 @@ def values_of(
 
     Arguments: `asked` as `RubricFile.entries`, ``v_B_value`` for the value of v_B.
     """
-    if not any(map(vector_of_value, asked)):
+    if _single(assignment, figures) is None or not any(map(vector_of_value, asked)):
         return {}
     construction, variants = page_construction(assignment, figures), assignment.variants()
-    vectors = {v.name: v for figure in dict.fromkeys(figures) for v in construction.vectors_of(figure)}
+    vectors = {v.name: v for figure in dict.fromkeys(figures) for v in construction.polygon_of(figure)}
     wanted = [name for name in vectors if value_name(name) in asked]
     boxes = field_boxes(tuple(vectors)) if wanted and len(vectors) <= EASY_FIELDS else {}
     below = max((y + high for _, y, _, high in boxes.values()), default=np.inf) + _FIELD_GAP_MM
@@ -434,34 +466,42 @@ def poles_mm(
 ) -> dict[str, list[tuple[float, float]]]:
     """Return the best positions of the poles of a template's plans, sheet millimetres for each variant.
 
-    A plan begun there is in the middle of its zone. A plan that is larger than its zone in some variant has
-    none: the student will choose another scale.
+    A plan begun there is in the middle of its zone, or of its position's. A plan that is larger than its
+    zone in some variant has none: the student will choose another scale.
     """
     plans = [figure for figure in template.zones if figure != MECHANISM]
     poles = {}
     for figure, places in places_mm(assignment, plans, variants).items():
-        x, y, wide, high = template.zones[figure]
+        zone, own = template.zones[figure], position_zones(assignment, template.zones)
+        x, y, wide, high = np.array([own.get(variant.position or 0, zone) for variant in variants]).T
         low = places.real.min(axis=0) + 1j * places.imag.min(axis=0)
         top = places.real.max(axis=0) + 1j * places.imag.max(axis=0)
-        room = complex(wide - 2 * MARGIN_MM, high - 2 * MARGIN_MM)
-        if np.all((top - low).real <= room.real) and np.all((top - low).imag <= room.imag):
-            pole = complex(x + wide / 2.0, -y - high / 2.0) - (low + top) / 2.0
+        size, room = top - low, wide + 1j * high - complex(2 * MARGIN_MM, 2 * MARGIN_MM)
+        if np.all(size.real <= room.real) and np.all(size.imag <= room.imag):
+            pole = x + wide / 2.0 - 1j * (y + high / 2.0) - (low + top) / 2.0
             poles[figure] = [(float(at.real), float(-at.imag)) for at in pole]
     return poles
 
 
-def best_template(assignment: Assignment, figures: Sequence[str]) -> TemplateFit:
+def best_template(
+    assignment: Assignment, figures: Sequence[str], grid: Sequence[int] | None = None
+) -> TemplateFit:
     """Return the division with the most room for the tightest figure; a sketch may be drawn smaller."""
-    return template_for(extents_mm(assignment, figures, assignment.variants()))
+    return template_for(extents_mm(assignment, figures, assignment.variants()), grid)
 
 
-def template_for(extents: Mapping[str, tuple[float, float]]) -> TemplateFit:
-    """Return that division for figures whose largest width and height (mm) are known already."""
+def template_for(
+    extents: Mapping[str, tuple[float, float]], grid: Sequence[int] | None = None
+) -> TemplateFit:
+    """Return that division for figures whose largest width and height (mm) are known already.
+
+    Arguments: `grid` of the positions on the sheet; the room is that of one of its zones.
+    """
     figures = tuple(extents)
     need = {figure: (wide + 2 * MARGIN_MM, high + 2 * MARGIN_MM) for figure, (wide, high) in extents.items()}
 
     def room(template: Template, figure: str) -> float:
-        _, _, wide, high = template.zones[figure]
+        _, _, wide, high = template.of_one(grid).zones[figure]
         return min(wide / need[figure][0], high / need[figure][1])
 
     def worth(template: Template) -> tuple[float, float]:

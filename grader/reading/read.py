@@ -46,6 +46,8 @@ SURE_PLAN = 40.0
 """Nats from which a plan's strokes belong to no other plan."""
 MOST_SHARED = 0.5
 """Share of a plan's strokes that another plan may take as well: both may use a line or two."""
+APART_MM = 15.0
+"""Strokes as near to a node of another position's plan belong to it, unless the own plan has some there."""
 LEAST_DRAWN_MM, MOST_DRAWN_MM = 15.0, 200.0
 """Lengths of the vectors given at the start of a plan: they fit on a sheet and can be measured."""
 SAME_SCALE = 0.95
@@ -64,6 +66,8 @@ class _PageReading:
     ink: Ink
     sheet: Sheet
     look: Look | None
+    beside: Sequence[Drawing] = ()
+    """Drawings of other positions, whose plans may stand on the sheet as well."""
     sketch: SketchReading | None = None
     plans: dict[str, PlanReading] = field(default_factory=dict)
 
@@ -88,8 +92,12 @@ def read_figures(
 
     Returns one Reading per sheet.
     """
+    beside = _other_positions(assignment, variant, scales)
     pages = [
-        _PageReading(lines_of(ink), ink, sheet, places and partial(places, ink.where)) for ink, sheet in drawn
+        _PageReading(
+            lines_of(ink), ink, sheet, places and partial(places, ink.where), () if sheet.zones else beside
+        )
+        for ink, sheet in drawn
     ]
     own, others = _drawings(assignment, variant, scales)
     renamed = assignment.file.names
@@ -100,6 +108,10 @@ def read_figures(
             page.sketch = sketch
     followed = [page.sketch.drawing for page in pages if page.sketch is not None] if variant is None else []
     drawing = _measurable((followed or own)[0], assignment, variant)
+    if beside and any(page.sketch is None for page in pages):
+        # Such a sheet has one figure: the mechanisms, or the plans.
+        for page in (one for one in pages if one.sketch is not None):
+            page.lines = page.lines.take(np.zeros(0, np.int64))
     velocity = _find_plan(pages, [drawing], VELOCITY_PLAN, {}, renamed)
     if _asks_accelerations(wanted, drawing):
         _set_apart(pages, velocity)
@@ -134,8 +146,18 @@ def _drawings(
     everybody = assignment.variants()
     if variant is None:
         return drawings(assignment, everybody, scales), list
-    others = [other for other in everybody if other != variant]
+    # Drawn beside the student's own, another position is no mistake.
+    same = {variant.position} if assignment.shared_positions else {one.position for one in everybody}
+    others = [other for other in everybody if other != variant and other.position in same]
     return drawings(assignment, [variant], scales), cache(lambda: drawings(assignment, others, None))
+
+
+def _other_positions(assignment: Assignment, variant: Variant | None, scales: Scales | None) -> list[Drawing]:
+    """Return the drawings of the student's other positions, if a sheet may have all of them."""
+    if variant is None:
+        return []
+    positions = [one for one in assignment.shared_positions if one != variant.position]
+    return drawings(assignment, [replace(variant, position=position) for position in positions], scales)
 
 
 def _measurable(drawing: Drawing, assignment: Assignment, variant: Variant | None) -> Drawing:
@@ -199,6 +221,7 @@ def _find_plan(
         problem = PlanProblem(page.lines, figure, given, page.ink.letters, renamed, links, page.look)
         for drawing in at_scales:
             turned = Drawing(drawing.construction, {**drawing.parameters, "turn": np.asarray(guide_turn)})
+            problem = _without_others(problem, turned, page.beside)
             laid.append(_LaidPlan(page, problem, turned, regular_plans(problem, turned)))
         if figure in page.sheet.zones and any(one.is_explained for one in laid):
             break
@@ -237,6 +260,26 @@ class _LaidPlan:
     def is_explained(self) -> bool:
         """True if the best one is taken as drawn."""
         return bool(self.plans) and self.plans[0].pose.score > EXPLAINED
+
+
+def _without_others(problem: PlanProblem, drawing: Drawing, beside: Sequence[Drawing]) -> PlanProblem:
+    """Leave out the strokes in and about a plan that another position explains better than the own one."""
+    exact, lines = replace(problem, given={}), problem.lines
+    own = next(iter(regular_plans(exact, drawing)), None) if beside else None
+    taken = np.zeros(len(lines), dtype=bool)
+    for other in beside:
+        plan = next(iter(regular_plans(exact, other)), None)
+        if plan is None or plan.score < LEAST_PLAN:
+            continue
+        same = own is not None and np.isin(own.members, plan.members).mean() > MOST_SHARED
+        if same and own is not None and own.score >= plan.score:
+            continue
+        taken |= np.isin(lines.members, plan.members).any(axis=1)
+        off = np.abs(lines.middle[:, None] - plan.fit.at[np.isfinite(plan.fit.at)])
+        about = (off.min(axis=1, initial=np.inf) < APART_MM) | taken
+        if own is None or same or not np.isin(own.members, lines.members[about]).any():
+            taken |= about
+    return replace(problem, lines=lines.take(np.flatnonzero(~taken)))
 
 
 def _without_accelerations(laid: _LaidPlan) -> _LaidPlan:

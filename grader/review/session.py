@@ -34,6 +34,7 @@ from grader.reading.corrected import snapped
 from grader.records import MECHANISM, PageRef, ScannedPage, on_sheet
 from grader.review.doubts import Doubt, doubts_of, figures_read, in_order, reading_of
 from grader.review.scans import Scans
+from grader.scan.page import NO_DRAWINGS
 from grader.tables.decisions import ClashError, Decision, DecisionFile, Key
 from grader.tables.measurements import StudentSubmission
 from grader.tables.reader import TableError, at
@@ -658,7 +659,7 @@ class Session:
                 found.setdefault((page.file, page.page), problem)
         for student in self.students:
             for sheet in student.report.reading.sheets:
-                if sheet.sheet is None and sheet.problems and sheet.problems[0].code != "page_blank":
+                if sheet.sheet is None and sheet.problems and sheet.problems[0].code not in NO_DRAWINGS:
                     found.setdefault((sheet.source, sheet.page), sheet.problems[0])
         refs = {(ref.file, ref.page): ref for ref in self.pages}
         return [(refs[place], problem) for place, problem in found.items() if place in refs]

@@ -7,7 +7,7 @@ from dataclasses import replace
 from hashlib import blake2b
 
 from grader.records import PageRef, Reading, Reason, ScannedPage, Sheet, Unread, of_error
-from grader.scan.decode.pages import decode, is_blank
+from grader.scan.decode.pages import decode, is_blank, is_writing
 from grader.scan.handwriting.captions import Spotter, spotters
 from grader.scan.handwriting.fields import writing, written_scales
 from grader.scan.handwriting.letters import STAND_UPRIGHT, find_letters, upright_nats
@@ -16,6 +16,10 @@ from grader.scan.register.distortion import straighten
 from grader.scan.register.registration import register
 from grader.scan.strokes.ink import find_ink
 from reference.errors import InputFileError
+
+CALCULATIONS = "page_calculations"
+NO_DRAWINGS = ("page_blank", CALCULATIONS)
+"""Problems of pages on which nothing is to be read: no person is asked about them."""
 
 
 def open_page(
@@ -46,6 +50,10 @@ def open_page(
     with timed(timing, "sheet"):
         sheet, identity = register(image, ref.corners_px)
         page = replace(page, ref=replace(ref, identity=identity))
+        is_printed = isinstance(sheet, Sheet) and bool(sheet.zones)
+        # A person who gives the corners has seen a drawing.
+        if not (is_printed or image.damage or ref.corners_px) and is_writing(image):
+            return _refused(page, Reason(CALCULATIONS))
         if isinstance(sheet, Sheet) and not image.damage:
             image, sheet = straighten(image, sheet)
         page = replace(page, flaws=flaws(image, sheet if isinstance(sheet, Sheet) else None))

@@ -92,6 +92,9 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
         N_("The document has too many pages; split it."),
     ),
     "page_blank": (N_("The page is blank and was skipped."),),
+    "page_calculations": (
+        N_("The page has calculations and no drawing: it is kept, and read by people only."),
+    ),
     "page_not_a_drawing": (
         N_("The page is no drawing: %(why)s. Scan it in greyscale, dark lines on white paper."),
         N_(

@@ -42,6 +42,9 @@ def owners(
     assigned = assign_pages(pages, roster, assignment, pages_per_student=publication.pages_per_student)
     for owned in assigned.owned:
         known[owned.source.file][owned.student_id] = None
+    for page in assigned.unmatched:
+        if page.problem.code == "owner_ambiguous":
+            known[page.source.file] |= dict.fromkeys(page.students)
     for path, name in called.items():
         if path.suffix.lower() in MEASUREMENT_TYPES and not known[name]:
             known[name] = dict.fromkeys(one for one in students_in(path) if one in roster.by_student)

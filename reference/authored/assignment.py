@@ -84,14 +84,26 @@ class ScalesTable(Authored):
     """The unit of a scale that a student writes as a bare number, where the assignment says one."""
 
 
-PageKind = Literal["all", "velocity", "acceleration"]
+PageKind = Literal["all", "velocity", "acceleration", "mechanism"]
+GridSide = Annotated[int, Field(ge=1, le=6)]
 
 
 class PageTable(Authored):
-    """A sheet that a student hands in, with the figures drawn on it."""
+    """A sheet that a student hands in, with the figures drawn on it.
+
+    With a `grid` (columns, rows) it has one figure in all positions: each in a zone of its own, from the
+    left, row after row; all in one zone where it is 1 by 1, as a mechanism about its fixed pivots.
+    """
 
     kind: PageKind
     figures: Annotated[list[Literal["mechanism", "velocity_plan", "acceleration_plan"]], Field(min_length=1)]
+    grid: Annotated[list[GridSide], Field(min_length=2, max_length=2)] | None = None
+
+    @model_validator(mode="after")
+    def _has_one_figure_in_a_grid(self) -> Self:
+        if self.grid is not None and len(self.figures) > 1:
+            raise ValueError("a page with a grid has one figure, in all positions")
+        return self
 
 
 class GivenTable(Authored):
@@ -129,6 +141,17 @@ class AssignmentFile(Authored):
     tradition: Literal["o", "p"] = "o"
     names: dict[str, str] = Field(default={})
     assumptions: list[str] = Field(default=[])
+
+    @model_validator(mode="after")
+    def _has_a_zone_for_each_position(self) -> Self:
+        position = self.variant.position
+        for page in self.page:
+            columns, rows = page.grid or (1, 1)
+            if page.grid and position is None:
+                raise ValueError("a page with a grid needs [variant] position = { from, to }")
+            if position and 1 < columns * rows < len(position.values):
+                raise ValueError(f"a grid of {columns} by {rows} has no zone for some of the positions")
+        return self
 
     @model_validator(mode="before")
     @classmethod
@@ -193,6 +216,12 @@ class Assignment:
         """The assignment's file, and the CSV of its variants where it has one."""
         table = self.file.variant.table
         return (self.path, *([self.path.parent / table.file] if table and table.file else []))
+
+    @property
+    def shared_positions(self) -> tuple[int, ...]:
+        """The positions, where a sheet has all of them; else none."""
+        is_shared = any(page.grid for page in self.file.page)
+        return tuple(self.numbers("position") or ()) if is_shared else ()
 
     def variants(self) -> list[Variant]:
         """Return every variant, by number, then by position."""

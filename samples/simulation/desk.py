@@ -29,6 +29,7 @@ class PrintedSheet:
     fields : boxes to write in, by scale (``kL``) or vector (``v_A``)
     cells : of the boxes that have one for each digit, the last for the tenths
     values : by vector, the cells of its computed value, and how many of them are for decimals
+    positions : the zone of each position, where the sheet has all of them
     """
 
     background: Background
@@ -36,6 +37,7 @@ class PrintedSheet:
     fields: Mapping[str, Box] = field(default_factory=dict)
     cells: Mapping[str, Sequence[Box]] = field(default_factory=dict)
     values: Mapping[str, tuple[Sequence[Box], int]] = field(default_factory=dict)
+    positions: Mapping[int, Box] = field(default_factory=dict)
 
 
 Printed = Mapping[str, PrintedSheet]

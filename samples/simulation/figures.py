@@ -124,6 +124,8 @@ def draw_mechanism(sketch: SheetSketch, task: DrawingTask, nodes: Nodes, student
             symbols.inside_hatching(sketch, corners, sketch.rng.uniform(2.5, 5.0))
     _sliders(sketch, task, nodes, turn)
     named = [joint for joint in task.mechanism.joints if joint not in coincident(task)]
+    if not sketch.with_supports:
+        named = [joint for joint in named if not task.mechanism.is_ground(joint)]
     for joint in named:
         if task.mechanism.is_ground(joint):
             symbols.support(sketch, nodes[joint], turn)
@@ -137,7 +139,8 @@ def draw_mechanism(sketch: SheetSketch, task: DrawingTask, nodes: Nodes, student
     if student.altitude:
         _altitude(sketch, task, nodes)
     for joint in named:
-        text = joint[0] + (f"_{{{joint[1:]}}}" if joint[1:] else "")
+        index = joint[1:] or sketch.index
+        text = joint[0] + (f"_{{{index}}}" if index else "")
         sketch.letter(nodes[joint], text, sketch.page.letter_mm, names=joint, distance_mm=2.0)
 
 
@@ -414,6 +417,7 @@ def _letters(sketch: SheetSketch, task: DrawingTask, figure: str, nodes: Nodes) 
             symbols.dot(sketch, at, sketch.rng.uniform(0.35, 0.55))
         is_pole = node == task.wrong.construction.poles[figure]
         text = pole_text(task, figure) if is_pole else re.sub(r"(\d+)", r"_{\1}", letter)
+        text += f"_{{{sketch.index}}}" if sketch.index else ""
         sketch.letter(at, text, sketch.page.letter_mm, names=node, distance_mm=1.2)
 
 

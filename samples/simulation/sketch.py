@@ -36,6 +36,8 @@ class SheetSketch:
     labels : letters and texts
     lines : the strokes of named vectors and links, as ruled, by figure and name
     construction : thin construction lines, as ruled, by figure
+    index : written behind each letter, where a sheet has several positions
+    with_supports : the fixed pivots' symbols are drawn, not there already
     """
 
     rng: Rng
@@ -47,6 +49,8 @@ class SheetSketch:
     labels: list[WrittenLabel] = field(default_factory=list)
     lines: dict[tuple[str, str], Segment] = field(default_factory=dict)
     construction: dict[str, list[Segment]] = field(default_factory=dict)
+    index: str = ""
+    with_supports: bool = True
 
     def pen(self, kind: str, *, plan: bool = False) -> PenWidth:
         """The student's pen for a kind of line: line, thin, text or print."""

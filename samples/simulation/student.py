@@ -146,7 +146,7 @@ def simulate(
     cannot be made.
     """
     desk, drawn = drawn_by(assignment, variant, seed, settings, student_id=student_id, printed=printed)
-    return [_scanned(desk, sheet, (number, len(drawn))) for number, sheet in enumerate(drawn, start=1)]
+    return [scanned(desk, sheet, (number, len(drawn))) for number, sheet in enumerate(drawn, start=1)]
 
 
 def drawn_by(
@@ -193,7 +193,7 @@ def _split(sheet: DrawnSheet) -> list[DrawnSheet]:
     return [DrawnSheet("velocity", first), DrawnSheet("acceleration", rest)]
 
 
-def _scanned(desk: Desk, sheet: DrawnSheet, number: tuple[int, int]) -> SimulatedSheet:
+def scanned(desk: Desk, sheet: DrawnSheet, number: tuple[int, int]) -> SimulatedSheet:
     """Draw the sheet and scan it."""
     settings = desk.settings
     sketch, told, frame = desk.draw_out(sheet, number)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from grader.records import Page, PageRef
 from grader.scan.decode import heic, pdf, pictures, tiff
@@ -33,6 +34,15 @@ _RIM = 0.03
 """Share of the long side: scanners leave shadows there."""
 _ENOUGH = 0.1
 """Share of the long side (42 mm): all long marks together on a page that is drawn on."""
+_SIGN, _MANY_SIGNS = (0.004, 0.04), 100
+"""Extent of a sign or word, shares of the long side; the least number of them on a page of writing."""
+_LONG_STROKE, _RULED = 0.04, 0.5
+"""Shares of the long side: longer straight lines belong to a drawing, but for fraction bars and underlining;
+upright and level ones longer than the second are rulings, margins or frames."""
+_SQUARE_WITHIN = 0.05
+"""Sine of the largest turn of an upright or level line."""
+_BESIDE, _MOSTLY = 0.012, 0.7
+"""A fraction bar has signs within this share of the long side along so much of its length."""
 
 
 def pages_of(source: InputFile | Path | str) -> Iterator[Page]:
@@ -97,24 +107,54 @@ def _as_input_error(file: InputFile, door: Door) -> Iterator[None]:
         raise InputFileError(door.code, error=reason, file=file.name) from error
 
 
+def is_writing(page: Page) -> bool:
+    """True for a page of calculations: many signs, and no long straight line without signs along it.
+
+    Lines too faint for a stroke count as well, so that a pale drawing beside writing remains a drawing.
+    """
+    share, long_side = _share_of_light(page)
+    labels, boxes = connected(np.ascontiguousarray(share < (1.0 - _DARK) * 255).astype(np.uint8))
+    extent = boxes[:, 2:].max(axis=1, initial=0) / long_side
+    is_sign = (extent > _SIGN[0]) & (extent < _SIGN[1])
+    if np.count_nonzero(is_sign) < _MANY_SIGNS:
+        return False
+    found = cv2.createLineSegmentDetector(cv2.LSD_REFINE_STD).detect(share)[0]
+    start, end = np.split(np.reshape([] if found is None else found, (-1, 4)), 2, axis=1)
+    long = np.hypot(*(end - start).T) / long_side
+    is_square = np.abs(end - start).min(axis=1) < _SQUARE_WITHIN * long * long_side
+    drawn = (long > _LONG_STROKE) & ~(is_square & (long > _RULED))
+    if np.any(drawn & ~is_square):
+        return False
+    reach = 2 * round(_BESIDE * long_side) + 1
+    near = cv2.dilate(np.r_[False, is_sign][labels].astype(np.uint8), np.ones((reach, reach), np.uint8))
+    along = np.linspace(0.0, 1.0, 25)[:, None, None]
+    x, y = np.moveaxis((start[drawn] + along * (end - start)[drawn]).astype(int), -1, 0)
+    return bool(
+        np.all(near[y.clip(0, near.shape[0] - 1), x.clip(0, near.shape[1] - 1)].mean(axis=0) > _MOSTLY)
+    )
+
+
 def is_blank(page: Page) -> bool:
     """True for a page that nobody drew on: the back of a duplex scan, with show-through, dust and holes.
 
     Sums the extents of dark marks of at least 5 mm, away from the page's rim; a sheet with a single
     short line is not blank.
     """
+    share, long_side = _share_of_light(page)
+    dotted = is_dotted(page.grey)
+    inner = np.ascontiguousarray(share < (1.0 - (_DOTTED_DARK if dotted else _DARK)) * 255).astype(np.uint8)
+    if dotted:
+        inner = np.asarray(cv2.dilate(inner, np.ones((_DOT_GAP_PX, _DOT_GAP_PX), np.uint8)), dtype=np.uint8)
+    extent = np.hypot(*connected(inner)[1][:, 2:].T)
+    return bool(extent[extent > _LONG * long_side].sum() < _ENOUGH * long_side)
+
+
+def _share_of_light(page: Page) -> tuple[NDArray[np.uint8], int]:
+    """Return the light that the ink leaves, 255 for paper, without the page's rim; and its long side, px."""
     scale = min(1.0, _LONG_SIDE_PX / max(page.grey.shape))
     small = shrink(page.grey, scale)
     paper = cv2.morphologyEx(small, cv2.MORPH_CLOSE, np.ones((31, 31), np.uint8))
     share = np.asarray(cv2.divide(small, paper, scale=255), dtype=np.uint8)
     # A strip narrower than two rims has no more than its middle.
     rim = min(int(_RIM * max(small.shape)), (min(small.shape) - 1) // 2)
-    if rim > 0:
-        share = share[rim:-rim, rim:-rim]
-    dotted = is_dotted(page.grey)
-    inner = np.ascontiguousarray(share < (1.0 - (_DOTTED_DARK if dotted else _DARK)) * 255).astype(np.uint8)
-    if dotted:
-        inner = np.asarray(cv2.dilate(inner, np.ones((_DOT_GAP_PX, _DOT_GAP_PX), np.uint8)), dtype=np.uint8)
-    extent = np.hypot(*connected(inner)[1][:, 2:].T)
-    long_side = max(small.shape)
-    return bool(extent[extent > _LONG * long_side].sum() < _ENOUGH * long_side)
+    return share[rim : small.shape[0] - rim, rim : small.shape[1] - rim], max(small.shape)

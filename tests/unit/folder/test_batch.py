@@ -46,7 +46,7 @@ def run(folder, out, **changes):
 def test_perfect_measurements_have_full_marks_and_nothing_handed_in_is_missing(class_folder, tmp_path):
     results, _ = run(class_folder, tmp_path / "out")
     states = {report.student_id: (report.status, report.score) for report in results.reports}
-    assert states == {"s1": ("graded", 20.0), "s2": ("graded", 20.0), "s3": ("missing", None)}
+    assert states == {"s1": ("graded", 20.5), "s2": ("graded", 20.5), "s3": ("missing", None)}
     assert needs_person(results)
     for name in ("results.json", "summary.csv", "index.html", "s1/report.json", "s1/feedback.html"):
         assert (tmp_path / "out" / name).is_file()

@@ -148,9 +148,9 @@ def test_what_moved_is_told_with_the_standing_before_and_after(class_folder, tmp
     assert run(class_folder, out).moved == []
     again = run(class_folder, out, wider(RUBRIC))
     assert {one.student_id for one in again.moved} == {"s1", "s2"}
-    before = {"16.25", "16.25..18.125 needs review"}
+    before = {"16.66", "16.66..18.58 needs review"}
     assert {standing_text(one.before) for one in again.moved} == before
-    assert {standing_text(one.after) for one in again.moved} == {"20"}
+    assert {standing_text(one.after) for one in again.moved} == {"20.5"}
     assert json.loads((out / "results.json").read_text())["moved"][0]["after"]["status"] == "graded"
     assert run(class_folder, out, wider(RUBRIC)).moved == []
     scan(class_folder / "s3.png", 130)

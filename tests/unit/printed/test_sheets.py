@@ -24,6 +24,7 @@ from grader.printed.layout import (
     field_boxes,
     places_mm,
     poles_mm,
+    position_zones,
 )
 from grader.printed.pdf import number, width_mm, wrap
 from grader.records import Page, Sheet
@@ -170,15 +171,33 @@ def test_a_plan_begun_at_the_printed_cross_is_in_the_middle_of_its_zone(name):
     for table in assignment.file.page:
         template = best_template(assignment, table.figures).template
         for figure, poles in poles_mm(assignment, template, variants).items():
-            x, y, w, h = template.zones[figure]
+            own = position_zones(assignment, template.zones)
             places = places_mm(assignment, [figure], variants)[figure]
             for column, (px, py) in enumerate(poles):
+                x, y, w, h = own.get(variants[column].position, template.zones[figure])
                 drawn = complex(px, -py) + places[:, column]
                 left, right = drawn.real.min() - x, x + w - drawn.real.max()
                 above, below = -y - drawn.imag.max(), drawn.imag.min() + y + h
                 assert left == pytest.approx(right, abs=0.01)
                 assert above == pytest.approx(below, abs=0.01)
                 assert min(left, above) >= 11.99
+
+
+def test_one_sheet_has_the_numbered_zones_and_poles_of_all_positions():
+    assignment = load_assignment("press-all")
+    rows = [RosterRow("s01", "Ana", position=position) for position in assignment.shared_positions]
+    sheets = make_sheets(assignment, [*rows, RosterRow("s02", "Ion", position=3)])
+    mechanism, velocity = sheets.layout.pages
+    assert len(pypdfium2.PdfDocument(sheets.pdf)) == 4
+    assert set(mechanism.positions.values()) == {mechanism.zones["mechanism"]}
+    boxes = list(velocity.positions.values())
+    assert list(velocity.positions) == list(range(8))
+    assert not any(overlap(*pair, gap=3.9) for pair in itertools.combinations(boxes, 2))
+    text = text_of(sheets.pdf, 1)
+    assert all(f"p{position}" in text and f"position = {position}" in text for position in range(8))
+    # The crank's angle is another in each position: it is no datum of the sheet.
+    assert "φ" not in text
+    assert "φ" in text_of(sheets.pdf, 3)
 
 
 def test_the_students_data_are_printed_in_words():
