@@ -4,9 +4,9 @@
          -> judgement (verdicts, mistakes, points) -> report and pictures
 
 `scan` takes one page as far as its ink and needs to know nothing of its owner. `read_submission` names
-what is on the pages of one student. `mark` judges it, together with measurements that were entered by
-hand: they are a reading, too. Only this module knows the order of the stages. A bad file or drawing
-becomes a problem of its page or report, never an error.
+what is on the pages of one student. `mark` judges it, with entered measurements, which are a reading, too.
+Only this module knows the order of the stages. A bad file or drawing becomes a problem of its page or
+report, never an error.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -30,7 +30,7 @@ from grader.overlay.backdrop import backdrop
 from grader.overlay.measured import measured_picture
 from grader.overlay.picture import overlay
 from grader.overlay.scene import Picture
-from grader.printed.layout import cells_of, position_zones, values_of
+from grader.printed.layout import position_zones, written_cells
 from grader.reading import page_scale
 from grader.reading.corrected import corrected
 from grader.reading.read import read_figures
@@ -43,11 +43,10 @@ from grader.scan.page import open_page, timed, turned, writing_on
 from grader.scan.strokes.nodes import node_places
 from grader.tables.measurements import NOTHING_MEASURED, Measurements, StudentSubmission
 from grader.tables.scale_text import SURE, declared_scales, sure_texts, understood_scales
-from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
+from reference.authored.assignment import Assignment, Variant
 from reference.construction.graph import Construction
 from reference.construction.mistakes import Drawing
 from reference.errors import MechanismError
-from reference.quantities import value_name
 
 # One page: pixels to strokes ----------------------------------------------------------------------
 
@@ -59,12 +58,8 @@ def scan(ref: PageRef, asked: Asked) -> ScannedPage:
         return page
     reading = page.reading
     if page.sheet is not None and page.sheet.zones and asked.assignment is not None:
-        zones = tuple(page.sheet.zones)
-        values = values_of(asked.assignment, zones, asked.entries)
-        cells = cells_of(asked.assignment, zones, asked.entries)
-        cells |= {value_name(name): place.cells for name, place in values.items()}
-        decimals = {value_name(name): place.decimals for name, place in values.items()}
-        reading = replace(reading, lengths=written_lengths(page.image, page.sheet, cells, decimals))
+        cells = written_cells(asked.assignment, tuple(page.sheet.zones), asked.entries)
+        reading = replace(reading, lengths=written_lengths(page.image, page.sheet, *cells))
     return replace(page, image=None, reading=reading, backdrop=backdrop(page.image, page.sheet))
 
 
@@ -76,7 +71,7 @@ def read_submission(
 ) -> list[ScannedPage]:
     """The submission's pages with every vector of the figures that are asked for."""
     own = partial(_of_position, assignment=assignment, variant=submission.variant)
-    pages = [own(_with_captions(page, assignment, missing_scales(submission))) for page in pages]
+    pages = [own(_with_captions(page, assignment, submission.undeclared)) for page in pages]
     read = read_pages(pages, assignment, submission.variant, submission.declared, asked.vectors)
     drawn = {figure for page in read for figure in page.reading.figures}
     if any(page.narrowed for page in pages) and not asked.figures <= drawn:
@@ -89,12 +84,12 @@ def read_submission(
 
 def _of_position(page: ScannedPage, assignment: Assignment, variant: Variant | None) -> ScannedPage:
     """The page with what is drawn for the variant's position, if a printed sheet has a zone for each."""
-    zones = {} if page.sheet is None else position_zones(assignment, page.sheet.zones)
+    zones = position_zones(assignment, page.sheet.zones) if page.sheet else {}
     zone = None if variant is None else zones.get(variant.position or 0)
     if zone is None or page.ink is None or page.sheet is None:
         return page
-    sheet = replace(page.sheet, zones=dict.fromkeys(page.sheet.zones, zone))
-    return replace(page, ink=page.ink.within(zone), sheet=sheet)
+    own = dict.fromkeys(page.sheet.zones, zone)
+    return replace(page, ink=page.ink.within(zone), sheet=replace(page.sheet, zones=own))
 
 
 def _with_number_compared(page: ScannedPage, variant: Variant | None, assignment: Assignment) -> ScannedPage:
@@ -116,12 +111,6 @@ def _with_number_compared(page: ScannedPage, variant: Variant | None, assignment
                 page = replace(page, problems=(*page.problems, differs))
             break
     return page
-
-
-def missing_scales(submission: StudentSubmission) -> tuple[str, ...]:
-    """The scales that neither the roster nor measurements declare: those are looked for on plain paper."""
-    measured = {} if submission.measured is None else submission.measured.scales
-    return tuple(name for name in SCALE_NAMES if name not in submission.declared and name not in measured)
 
 
 def _with_captions(page: ScannedPage, assignment: Assignment, names: Collection[str]) -> ScannedPage:
@@ -224,8 +213,7 @@ def mark(
             "unreadable" if is_there else "missing", problems=(*problems, answer), sheets=sheets,
         )  # fmt: skip
         plain = [(page.backdrop, page.reading) for page in pages if page.backdrop]
-        report = with_decisions(report, submission)
-        return report, lambda _level: tuple(overlay(scan, reading, {}, {}) for scan, reading in plain)
+        return with_decisions(report, submission), lambda _: tuple(overlay(*one, {}, {}) for one in plain)
     task, own, declared = answer
     learnt, judgement = answers_of(task, own, pages, submission.decided), own
     if learnt:

@@ -119,7 +119,7 @@ def sheet(
     turn = cmath.rect(1.0, math.radians(turn_deg))
     places = {"mechanism": 100 - 90j, "velocity_plan": 300 - 90j, "acceleration_plan": 200 - 220j}
     found = {}
-    for figure in figures:
+    for figure in (figure for figure in figures if figure in task.construction.figures):
         names = [step.node for step in task.construction.figures[figure]]
         read = {
             name: ReadNode(places[figure] + shift[name] * turn, np.eye(2) * se_mm**2, confidence)

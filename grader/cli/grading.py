@@ -18,7 +18,7 @@ from grader.cli import terminal
 from grader.cli.app import new_table, progress
 from grader.cli.checking import checked_level
 from grader.cli.terminal import note, tell_next
-from grader.documents import AlikeDocument, MovedDocument, ReadingDocument, ResultsDocument
+from grader.documents import AlikeDocument, MovedDocument, ReadingDocument, ReportDocument, ResultsDocument
 from grader.feedback.class_page import CAUSES, SIGNS, trust_sentences, write_demo_page
 from grader.feedback.class_statistics import waiting
 from grader.feedback.words import STATES
@@ -312,13 +312,16 @@ def _waiting(results: ResultsDocument) -> Iterator[str]:
         report = wait.report
         count = f"{len(wait.criteria)} {'criterion' if len(wait.criteria) == 1 else 'criteria'}"
         about = f", {count}, {wait.points:.4g} points at stake" if wait.criteria else ""
-        problem = f"; {report.problems[0].message}" if report.problems else ""
-        who = _who(report.student_id, report.position)
-        yield f"{who}: {STATES[report.status]}{about}{problem}"
+        yield f"{_who(report.student_id, report.position)}: {STATES[report.status]}{about}{_first(report)}"
     for report in results.reports:
         if report.status == "missing":
-            problem = f"; {report.problems[0].message}" if report.problems else ""
-            yield f"{_who(report.student_id, report.position)}: missing{problem}"
+            yield f"{_who(report.student_id, report.position)}: missing{_first(report)}"
+
+
+def _first(report: ReportDocument) -> str:
+    """The first problem of a report, behind its file; empty if there is none."""
+    told = [": ".join(filter(None, (one.file, one.message))) for one in report.problems[:1]]
+    return "".join(f"; {problem}" for problem in told)
 
 
 def _change_line(change: MovedDocument) -> str:

@@ -58,7 +58,7 @@ from grader.options import ClassOptions, taken
 from grader.overlay.scene import Picture
 from grader.owners.pages import Unmatched, assign_pages
 from grader.owners.title_block import with_written_numbers, written_owners
-from grader.pipeline import mark, missing_scales, read_submission
+from grader.pipeline import mark, read_submission
 from grader.records import PageRef, Reason, ScannedPage
 from grader.rubric import RubricFile, asked_of, rubric_of
 from grader.similarity.groups import by_chance, compared_together, find_similar
@@ -443,7 +443,7 @@ def _job(submission: StudentSubmission, folder: str, depends: tuple[str, str]) -
         (page.file, page.page, page.digest, page.problem, page.turn_deg, page.corners_px)
         for page in submission.pages
     ]
-    declared = (sorted(submission.declared.items()), missing_scales(submission))
+    declared = (sorted(submission.declared.items()), submission.undeclared)
     reading_key = digest_of((read, submission.variant, declared, pages))
     key = digest_of((marked, reading_key, replace(submission, pages=())))
     return Job(submission, folder, reading_key, key)

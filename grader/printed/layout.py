@@ -260,6 +260,15 @@ def cells_of(
     return combs_of(boxes_of([v.name for figure in ordered for v in construction.polygon_of(figure)], asked))
 
 
+def written_cells(
+    assignment: Assignment, figures: Sequence[str], asked: Collection[str]
+) -> tuple[dict[str, tuple[Box, ...]], dict[str, int]]:
+    """Return the cells of lengths and values on a page with these figures, and the decimals of values."""
+    values = {value_name(name): one for name, one in values_of(assignment, figures, asked).items()}
+    cells = cells_of(assignment, figures, asked) | {name: one.cells for name, one in values.items()}
+    return cells, {name: one.decimals for name, one in values.items()}
+
+
 def _single(assignment: Assignment, figures: Sequence[str]) -> PageTable | None:
     """Return the page with these figures, if it has them for one position."""
     known = (page for page in assignment.file.page if set(page.figures) == set(figures) and not page.grid)

@@ -154,6 +154,12 @@ class StudentSubmission:
     opened: tuple[LikeDocument, ...] = ()
 
     @property
+    def undeclared(self) -> tuple[str, ...]:
+        """The scales that neither the roster nor measurements declare: looked for on plain paper."""
+        measured = {} if self.measured is None else self.measured.scales
+        return tuple(name for name in SCALE_NAMES if name not in self.declared and name not in measured)
+
+    @property
     def position(self) -> int | None:
         """The variant's position; None where there is none or it is not known."""
         return None if self.variant is None else self.variant.position

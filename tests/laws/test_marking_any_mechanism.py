@@ -17,6 +17,7 @@ from reference.authored.toml_file import validate
 from reference.construction.mistakes import Drawing, Mistake, single_mistakes
 from reference.kinematics.motion import move
 from reference.mechanism import Mechanism
+from reference.plan import construction_for
 from tests.examples import examples
 from tests.hands import drawn_nodes, measured, sheet
 from tests.laws.mechanisms import authored
@@ -54,7 +55,7 @@ def asked_of(mechanism: Mechanism) -> tuple[Assignment, RubricFile]:
     assert not isinstance(file.mechanism, str)
     assignment = Assignment(file, file.mechanism, Path("random"))
     names = names_of(assignment)
-    asked = [("vector", name) for name in names.vectors if name not in names.unused]
+    asked = [("vector", name) for name in construction_for(assignment).vectors if name not in names.unused]
     asked += [("angular", name) for name in names.rates]
     criteria = [{"id": name, kind: name, "points": 1.0, "title": {"en": name}} for kind, name in asked]
     rubric = {"schema_version": 1, "id": "random", "title": {"en": "random"}, "criterion": criteria}

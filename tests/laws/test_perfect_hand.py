@@ -52,21 +52,18 @@ def perturbations(task, share):
     for criterion in task.rubric.criterion:
         if criterion.vector is None:
             continue
-        tolerance = task.rubric.tolerance_of(criterion)
-        drawn = next(
-            f.vectors[criterion.vector] for f in reading.figures.values() if criterion.vector in f.vectors
-        )
+        tolerance, name = task.rubric.tolerance_of(criterion), criterion.name
+        drawn = next((f.vectors[name] for f in reading.figures.values() if name in f.vectors), None)
+        if drawn is None:
+            continue  # drawn again on the sketch
         step = share * tolerance.length_at(drawn.length_mm)
         turn = tolerance.direction_at(drawn.length_mm)
         for sign in (1.0, -1.0):
             if drawn.length_mm + sign * step >= 0.0:
-                yield (
-                    criterion.id,
-                    changed(reading, criterion.vector, length_mm=drawn.length_mm + sign * step),
-                )
+                yield criterion.id, changed(reading, name, length_mm=drawn.length_mm + sign * step)
             if turn is not None:
                 degrees = (drawn.direction_deg + sign * share * turn) % 360.0
-                yield criterion.id, changed(reading, criterion.vector, direction_deg=degrees)
+                yield criterion.id, changed(reading, name, direction_deg=degrees)
 
 
 @pytest.mark.parametrize("name", built_in())

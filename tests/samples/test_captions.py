@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from grader.pipeline import missing_scales, read_submission
+from grader.pipeline import read_submission
 from grader.records import PageRef
 from grader.rubric import Asked
 from grader.scan.handwriting.captions import NUMBER_WORDS, captioned_scales, written_number
@@ -69,6 +69,6 @@ def test_nothing_is_looked_for_that_the_roster_says(pages, monkeypatch):
     declared = {name: f"{value} m/mm" for name, value in sheet.truth["scales"]["declared"].items()}
     submission = StudentSubmission("m01", variant, (page.ref,), declared=declared)
     monkeypatch.setattr("grader.scan.page.spotters", None)
-    assert missing_scales(submission) == ()
+    assert submission.undeclared == ()
     (read,) = read_submission(submission, [page], PUMP, Asked())
     assert read.reading.written == {}
