@@ -315,8 +315,8 @@ def _value(charges: Charges, criterion: CriterionTable) -> Outcome:
 def _computed(charges: Charges, criterion: CriterionTable, name: str) -> Outcome:
     """The outcome of a computed value with a criterion of its own, beside its vector's.
 
-    It is right by the data, by the length that was drawn times the scale used, and by what follows. A number
-    read in a sheet's cells that is off goes to a person: a digit may have been misread.
+    It is right by the data, and by the length that was drawn times the scale used, or, where none was, by what
+    follows. A number read in a sheet's cells that is off goes to a person: a digit may have been misread.
     """
     one, rubric, evidence = charges.task.segments[name], charges.task.rubric, charges.evidence
     following, follows = charges.following, rubric.follows_through(criterion)
@@ -330,7 +330,8 @@ def _computed(charges: Charges, criterion: CriterionTable, name: str) -> Outcome
     value, drawn, sure = evidence.values[name], evidence.vector(name), evidence.sure.get(name, 1.0)
     held = HeldValue(rubric, criterion, abs(value), following.used[one.scale])
     wrong = charges.charged | charges.doubtful
-    choice = choose(charges, one, following.expectations(one, wrong, follows_through=follows), held)
+    by_nodes = follows and drawn is None
+    choice = choose(charges, one, following.expectations(one, wrong, follows_through=by_nodes), held)
     charges.charged |= choice.shown
     if not choice.mark.is_full and follows and drawn is not None:
         own = Expectation(complex(drawn.length_mm), "vector", name, frozenset({one.head}))

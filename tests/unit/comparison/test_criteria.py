@@ -392,6 +392,14 @@ def test_a_value_follows_from_the_own_segment_and_the_own_scale(scale):
     assert outcome_of(strict, "v_D_value").verdict == "none"
 
 
+def test_a_value_beside_its_own_segment_does_not_follow_from_another_node():
+    turned = measured(PUMP).figures["velocity_plan"].vectors["v_C"].direction_deg + 30.0
+    reading = changed(measured(PUMP), "v_C", direction_deg=turned)
+    for given, verdict in ((reading, "none"), (without(reading, "v_D"), "follow_through")):
+        found = verdicts(compare(PUMP, Submission(measured=given, values={"v_D": 7.95})))
+        assert found["v_D_value"] == verdict
+
+
 def test_a_value_without_its_segment_earns_what_is_asked_of_the_value():
     reading = without(measured(PUMP), "v_D")
     found = verdicts(compare(PUMP, Submission(measured=reading, values={"v_D": abs(PUMP.real["v_D"])})))
