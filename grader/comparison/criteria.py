@@ -315,7 +315,7 @@ def _value(charges: Charges, criterion: CriterionTable) -> Outcome:
 def _computed(charges: Charges, criterion: CriterionTable, name: str) -> Outcome:
     """The outcome of a computed value with a criterion of its own, beside its vector's.
 
-    It is right by the data, and by the length that was drawn times the scale used, or, where none was, by what
+    It is right by the data, by the length that was drawn times the scale used, or, where none was, by what
     follows. A number read in a sheet's cells that is off goes to a person: a digit may have been misread.
     """
     one, rubric, evidence = charges.task.segments[name], charges.task.rubric, charges.evidence
