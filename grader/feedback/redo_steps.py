@@ -7,6 +7,7 @@ formula a length is found, but give no answer away.
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
 from markupsafe import Markup, escape
 
 from grader.documents import MistakeDocument, ReportDocument
@@ -24,6 +25,7 @@ from reference.construction.elements import Along, Coriolis
 from reference.construction.equations import equations
 from reference.construction.steps import Coincide, Divide, Given, Similar, Step, TwoLines
 from reference.drawing.subject import Subject
+from reference.drawing.triangles import triangles
 from reference.plan import exact_plan
 
 LAY_OFF_UNMEASURED = N_("From %(start)s lay off %(segment)s, %(direction)s; it ends in %(node)s.")
@@ -35,6 +37,11 @@ DIVIDE_UNMEASURED = N_("Take %(node)s on the line through %(p)s and %(q)s as the
 MOST_STEPS = 8
 """Number of a figure's steps that are described in full; later ones are only named."""
 THEN = N_("Then draw again what follows from it: %(nodes)s.")
+HALF_TURN = N_(
+    "If it was found by the right triangle on the sketch, the half turn about %(joint)s is missing."
+)
+RATIO_WITHIN = 0.02
+"""Relative: scales at which the right triangle holds, as students round them."""
 
 
 def redo(subject: Subject, tongue: Tongue, node: str, *, with_numbers: bool) -> list[str]:
@@ -122,16 +129,23 @@ def with_mistakes_explained(
         return report
     speaker, names = tongue(lang), assignment.file.names
     subject = _subject(judgement, assignment, variant, speaker)
-    told = [
-        document.model_copy(
-            update={
-                **_told(document, mistake_sentences(mistake, speaker, level, names)),
-                "redo": _redo(subject, mistake, speaker, level),
-            }
-        )
-        for document, mistake in zip(report.mistakes, judgement.mistakes, strict=True)
-    ]
+    told = []
+    for document, mistake in zip(report.mistakes, judgement.mistakes, strict=True):
+        said, *rivals = mistake_sentences(mistake, speaker, level, names)
+        said += _half_turn(subject, mistake, speaker)
+        redrawn = {"redo": _redo(subject, mistake, speaker, level)}
+        told.append(document.model_copy(update={**_told(document, [said, *rivals]), **redrawn}))
     return report.model_copy(update={"mistakes": told})
+
+
+def _half_turn(subject: Subject, mistake: NamedMistake, speaker: Tongue) -> str:
+    """Return what the right triangle has to do with a reversed normal component; empty if nothing."""
+    scales = subject.plan.scales
+    is_by_triangle = np.all(np.abs(scales.kL * scales.ka / scales.kv**2 - 1.0) <= RATIO_WITHIN)
+    known = triangles(subject.plan.construction) if is_by_triangle else ()
+    joint = next((one.joint for one in known if mistake.at in (one.vector.head, one.vector.name)), "")
+    reversed_at = joint if mistake.code == "normal_reversed" else ""
+    return " " + speaker.gettext(HALF_TURN) % {"joint": reversed_at} if reversed_at else ""
 
 
 def _told(document: MistakeDocument, sentences: Sequence[str]) -> dict[str, object]:

@@ -4,11 +4,17 @@ import re
 
 import pytest
 
+from grader.comparison.evidence import Submission
 from grader.feedback.mistakes import PRECISE, PRECISE_ALONG_GUIDE
+from grader.feedback.redo_steps import with_mistakes_explained
 from grader.feedback.sentences import mistake_feedback, question
 from grader.language import LANGUAGES, tongue
+from grader.marking.mark import judge
+from grader.marking.report import report_of
 from grader.outcomes import NamedMistake
+from reference.authored.assignment import load_assignment
 from reference.construction.mistakes import CODES, Mistake
+from tests.hands import measured, task_for
 
 BY_O2B = Mistake("wrong_link", "d'", other=("O2", "B"))
 LINE = {"from": "n_DC", "link": "CD"}
@@ -108,3 +114,17 @@ def test_every_precise_text_is_filled_in_every_language(lang):
             told = mistake_feedback(named(code, "n_DC", {**LINE, **guide}, **details), lang)
             assert "%(" not in told
             assert len(told) > 40
+
+
+@pytest.mark.parametrize(("name", "n", "position"), [("pump", 7, None), ("press", None, 1)])
+@pytest.mark.parametrize("level", ["hint", "full"])
+def test_a_reversed_normal_names_the_half_turn_where_the_right_triangle_holds(name, n, position, level):
+    """It holds for the pump; for the press kL ka is 0.556 kv^2."""
+    task = task_for(name, n, position)
+    reading = measured(task, directions=True, mistakes=(Mistake("normal_reversed", "n_DC"),))
+    judgement = judge(task, Submission(measured=reading))
+    report = report_of(task, judgement, "s01", language="en", sentences={})
+    explained = with_mistakes_explained(report, judgement, load_assignment(name), task.variant, "en", level)
+    (mistake,) = explained.mistakes
+    assert mistake.code == "normal_reversed"
+    assert ("the half turn about D is missing" in mistake.feedback) == (name == "pump")
