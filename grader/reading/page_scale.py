@@ -77,15 +77,17 @@ def turn_doubts(page: ScannedPage) -> tuple[Reason, ...]:
 
 def no_surer_than_turn(reading: Reading, page: ScannedPage) -> Reading:
     """Limit the confidences of a page whose plans alone showed which way up it is."""
-    if page.ref.turn_deg is None or not turn_doubts(page):
-        return reading
+    is_sure = page.ref.turn_deg is None or not turn_doubts(page)
+    return reading if is_sure else no_surer(reading, BY_PLANS)
+
+
+def no_surer(reading: Reading, most: float) -> Reading:
+    """Return the reading with no node or vector of a higher confidence."""
     figures = {}
     for name, figure in reading.figures.items():
-        nodes = {
-            key: replace(one, confidence=min(one.confidence, BY_PLANS)) for key, one in figure.nodes.items()
-        }
+        nodes = {key: replace(one, confidence=min(one.confidence, most)) for key, one in figure.nodes.items()}
         vectors = {
-            key: replace(one, confidence=min(one.confidence, BY_PLANS)) for key, one in figure.vectors.items()
+            key: replace(one, confidence=min(one.confidence, most)) for key, one in figure.vectors.items()
         }
         figures[name] = Figure(nodes, vectors)
     return replace(reading, figures=figures)

@@ -14,7 +14,7 @@ from grader.reading.lettering import lettered, support
 from grader.reading.lines import Lines, lines_of
 from grader.reading.nodes import NodeFit
 from grader.reading.on_sketch import SketchPage, with_additions
-from grader.reading.page_scale import given_length
+from grader.reading.page_scale import given_length, no_surer
 from grader.reading.plans import EXPLAINED, PlanProblem, PlanReading, best_plan, regular_plans
 from grader.reading.sketch import SketchReading, drawings, find_sketch
 from grader.records import (
@@ -46,6 +46,9 @@ SURE_PLAN = 40.0
 """Nats from which a plan's strokes belong to no other plan."""
 MOST_SHARED = 0.5
 """Share of a plan's strokes that another plan may take as well: both may use a line or two."""
+BESIDE_OTHERS = 0.85
+"""Most confidence on a plain sheet of several positions, told apart by their directions alone: of 139 vectors
+read with 0.9 and more 2 were off, none of 160 on printed sheets."""
 APART_MM = 15.0
 """Strokes as near to a node of another position's plan belong to it, unless the own plan has some there."""
 LEAST_DRAWN_MM, MOST_DRAWN_MM = 15.0, 200.0
@@ -122,7 +125,10 @@ def read_figures(
             page.plans.clear()
             _find_plan(pages, [drawing], ACCELERATION_PLAN, {}, renamed)
     readings = [
-        lettered(reading, page.ink.letters, drawing.construction, renamed)
+        no_surer(
+            lettered(reading, page.ink.letters, drawing.construction, renamed),
+            BESIDE_OTHERS if page.beside else 1.0,
+        )
         for reading, page in zip(_readings(pages, drawing, wanted), pages, strict=True)
     ]
     added = [name for name in wanted if name in drawing.construction.on_sketch]

@@ -24,6 +24,7 @@ FLOORS = {
     "sharpened": (EASY, 14), "faint": (OTHER, 12), "dithered": (OTHER, 16), "curled": (OTHER, 10),
     "office": (EASY, 19), "office-hard": (EASY, 7), "cropped": (EASY, 19), "office-printed": (EASY, 17),
     "pencil-5": (EASY, 18), "pencil-1": (EASY, 18), "pencil-7": (EASY, 18),
+    "sums": (EASY, 19), "sums-full": (EASY, 19),
 }  # fmt: skip
 """Student, and vectors of 5 mm and more that are right at least, of 21."""
 MOST_MISREAD = 0
