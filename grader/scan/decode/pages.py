@@ -41,6 +41,8 @@ _LONG_STROKE, _RULED = 0.04, 0.5
 upright and level ones longer than the second are rulings, margins or frames."""
 _SQUARE_WITHIN = 0.05
 """Sine of the largest turn of an upright or level line."""
+_FIGURE = 0.08
+"""Share of the long side: wider and higher connected ink, and no ruling, is a figure; no line is searched."""
 _BESIDE, _MOSTLY = 0.012, 0.7
 """A fraction bar has signs within this share of the long side along so much of its length."""
 
@@ -114,9 +116,11 @@ def is_writing(page: Page) -> bool:
     """
     share, long_side = _share_of_light(page)
     labels, boxes = connected(np.ascontiguousarray(share < (1.0 - _DARK) * 255).astype(np.uint8))
-    extent = boxes[:, 2:].max(axis=1, initial=0) / long_side
+    wide, high = boxes[:, 2:].T / long_side
+    extent = np.maximum(wide, high)
     is_sign = (extent > _SIGN[0]) & (extent < _SIGN[1])
-    if np.count_nonzero(is_sign) < _MANY_SIGNS:
+    is_figure = (np.minimum(wide, high) > _FIGURE) & (extent < _RULED)
+    if np.count_nonzero(is_sign) < _MANY_SIGNS or np.any(is_figure):
         return False
     found = cv2.createLineSegmentDetector(cv2.LSD_REFINE_STD).detect(share)[0]
     start, end = np.split(np.reshape([] if found is None else found, (-1, 4)), 2, axis=1)
