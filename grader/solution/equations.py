@@ -159,8 +159,9 @@ def driving_speed(speaker: Speaker) -> Iterator[Formula]:
     value = speaker.real(abs(subject.number(np.asarray(driver.omega))), unit_of(name))
     known = subject.assignment.values([subject.plan.variants[subject.index]])
     if crank.rpm is None:
-        written = _both(speaker, crank.omega, known) if crank.omega.names or "/" in crank.omega.text else ()
-        yield (speaker.symbol(name), *written, " = ", value)
+        rule = crank.omega  # none where a cylinder turns the crank
+        is_computed = rule is not None and (rule.names or "/" in rule.text)
+        yield (speaker.symbol(name), *(_both(speaker, rule, known) if is_computed else ()), " = ", value)
         return
     ratio = crank.gear_ratio
     turns = [(crank.rpm, "n"), *([(ratio, "U")] if ratio is not None else [])]

@@ -329,8 +329,9 @@ class _Entries:
 
         Arguments: `asks` that there is a column for the sense, which may be blank.
         """
-        text = " ".join(cells).strip()
-        found = turned(text, delimiter)
+        text, beside = " ".join(cells).strip(), turned(cells[1], delimiter)
+        is_sense = not cells[1] or (isinstance(beside, tuple) and beside[1])
+        found = turned(text, delimiter) if is_sense else Reason("no_sense", {"text": short(cells[1])})
         value, sense = found if isinstance(found, tuple) else (found, 0.0)
         if value is not None:
             self.number(path, f"{name}_value", short(text), value)
@@ -404,7 +405,8 @@ def _line(row: Row, meant: Mapping[str, tuple[str, ...]], entries: _Entries, *, 
     for name in entries.names.rates:
         cells = row[f"{name}_value"], row[f"{name}_sense"]
         if any(cells):
-            entries.turning(f"{name}_value", name, cells, row.delimiter, asks=f"{name}_sense" in row.text)
+            path = f"{name}_{'value' if cells[0] else 'sense'}"
+            entries.turning(path, name, cells, row.delimiter, asks=f"{name}_sense" in row.text)
     for column, text in row.text.items():
         if text and column in entries.columns and entries.columns[column][1] not in entries.names.rates:
             entries.number(column, column, short(text), real_number(text, row.delimiter))

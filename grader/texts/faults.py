@@ -44,6 +44,7 @@ FAULTS: dict[str, tuple[str, ...]] = {
     "no_decimal_point": (
         N_("'%(text)s' is no number; write a decimal point, or separate fields by semicolons"),
     ),
+    "no_sense": (N_("'%(text)s' is no sense; write cw or ccw"),),
     "two_senses": (N_("'%(text)s' tells two senses; write one: cw or ccw"),),
     "not_finite": (N_("'%(text)s' is no finite number"),),
     "length_range": (N_("'%(text)s': a drawn length is from 0 to %(most)s"),),

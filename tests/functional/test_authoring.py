@@ -135,6 +135,8 @@ def test_a_cylinder_of_driven_length_is_given_to_students_and_has_no_cycle(planm
         told.items()
         >= {"s(O1)": ("280 + 8*n", "mm"), "v(O1)": (200, "mm/s"), "a(O1)": (300, "mm/s²")}.items()
     )
+    ran = planmark("plan", "mine.assignment.toml", "--n", "1", "--steps", "-")
+    assert (ran.returncode, "ω₁ = " in ran.stdout) == (0, True), ran.stderr
     ran = planmark("cycle", "mine.assignment.toml", "--n", "1")
     assert (ran.returncode, ran.stdout) == (2, "")
     assert "known at the variant's position alone; use planmark plan --all" in ran.stderr

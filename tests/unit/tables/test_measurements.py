@@ -451,3 +451,9 @@ def test_senses_that_contradict_each_other_or_are_none_are_refused(entered, cell
     assert "omega_2" not in one.values
     assert [gap.name for gap in one.reading.unread] == ["omega_2"]
     assert "omega_2_value" in told(one)
+
+
+def test_a_sense_that_is_none_is_told_in_its_own_column(entered):
+    (one,) = entered("student_id,omega_2_value,omega_2_sense\ns01,,sideways\n")
+    assert [gap.name for gap in one.reading.unread] == ["omega_2"]
+    assert told(one) == "line 2, omega_2_sense: 'sideways' is no sense; write cw or ccw"
