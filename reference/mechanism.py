@@ -7,7 +7,7 @@ right (behind); an array where it differs between variants.
 """
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import NoneType
 from typing import Any
 
@@ -206,12 +206,59 @@ Group = Dyad | Slider | SlottedLink | CrossSlider | Yoke | Plate | PointOnLine |
 
 
 @dataclass(frozen=True, slots=True)
+class Body:
+    """The mass of a link.
+
+    Attributes
+    ----------
+    link : its name; a slider has that of its joint (``slider_B``)
+    centre : the joint, or the further point of the link, that is its centre of mass
+    mass : kg, shape (N,)
+    inertia : moment of inertia about the centre, kg m^2; zero where it is neglected
+    """
+
+    link: str
+    centre: str
+    mass: FloatArray
+    inertia: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """A given force on a link at one of its points, or a given couple.
+
+    Attributes
+    ----------
+    name : the force's subscript (``D`` of F_D)
+    force : N, complex; where it follows a slider's motion its real part is the force, positive in the
+        motion's sense, negative against it
+    slider : the joint of that slider; None for a force of given direction
+    couple : N m, counter-clockwise positive; zero where there is none
+    """
+
+    name: str
+    link: str
+    point: str
+    force: ComplexArray
+    couple: FloatArray
+    slider: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Mechanism:
-    """Ground pivots (complex metres), the driving link, and the groups in order of assembly."""
+    """Ground pivots (complex metres), the driving link, and the groups in order of assembly.
+
+    For its forces: the bodies' masses, the given loads, the acceleration of gravity (m/s^2, downwards, None
+    where weight is neglected), and `pins`: the link that carries the pin of a joint that three links share.
+    """
 
     ground_m: Mapping[str, ComplexArray]
     driver: Driver
     groups: tuple[Group, ...]
+    bodies: tuple[Body, ...] = ()
+    loads: tuple[Load, ...] = ()
+    gravity: FloatArray | None = None
+    pins: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def crank(self) -> Crank:
@@ -249,7 +296,8 @@ def translated(mechanism: Mechanism, by: ComplexArray) -> Mechanism:
     if isinstance(driver, DrivingSlider):
         driver = replace(driver, guide_m=driver.guide_m + by)
     ground = {joint: place + by for joint, place in mechanism.ground_m.items()}
-    return Mechanism(ground, driver, tuple(carried(group) for group in mechanism.groups))
+    groups = tuple(carried(group) for group in mechanism.groups)
+    return replace(mechanism, ground_m=ground, driver=driver, groups=groups)
 
 
 def driving_of(driver: Driver) -> FloatArray:
@@ -282,6 +330,51 @@ def joints_of(group: Group) -> tuple[str, ...]:
     """The joints that a group adds: its node, the points that coincide with it, a guide's foot."""
     foot = (group.foot,) if isinstance(group, SlottedLink) and group.foot else ()
     return (*foot, group.node, *(guide.coincident for guide in moving_guides(group)))
+
+
+# Links and the joints that they carry --------------------------------------------------------------
+
+GROUND, SLIDER = "0", "slider_"
+"""The frame's name among the links, and the start of a slider's."""
+
+
+def links_of(group: Group) -> tuple[str, ...]:
+    """Return the links that a group adds, in the order of its outer pins; a slider by its joint.
+
+    A point of a link adds none.
+    """
+    match group:
+        case Dyad(links=links):
+            return links
+        case Slider(link=link, node=node):
+            return link, SLIDER + node
+        case SlottedLink(link=link, pin=pin):
+            return link, SLIDER + pin
+        case CrossSlider(node=node):
+            return SLIDER + node, f"{SLIDER}{node}2"
+        case Yoke(link=link, node=node, pin=pin):
+            return link or SLIDER + node, SLIDER + pin
+    return ()
+
+
+def carriers(mechanism: Mechanism) -> dict[str, str]:
+    """Return the link that carries the pin of each joint, to which later groups are hinged.
+
+    Of a joint of two links it is the second one (of a slider, the slider), unless `pins` says otherwise.
+    """
+    found = {**dict.fromkeys(mechanism.ground_m, GROUND), mechanism.driver.pin: mechanism.driver.link}
+    for group in mechanism.groups:
+        found |= {guide.coincident: guide.link for guide in moving_guides(group)}
+        match group:
+            case SlottedLink(link=link):
+                found |= dict.fromkeys(joints_of(group), link)
+            case Yoke() | CrossSlider():
+                found[group.node] = links_of(group)[0]
+            case Dyad() | Slider():
+                found[group.node] = links_of(group)[1]
+            case _:
+                found[group.node] = group.link
+    return {**found, **mechanism.pins}
 
 
 # A mechanism apart from its numbers ----------------------------------------------------------------
