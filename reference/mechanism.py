@@ -214,13 +214,13 @@ class Body:
     link : its name; a slider has that of its joint (``slider_B``)
     centre : the joint, or the further point of the link, that is its centre of mass
     mass : kg, shape (N,)
-    inertia : moment of inertia about the centre, kg m^2; zero where it is neglected
+    inertia : moment of inertia about the centre, kg m^2; None where it is neglected
     """
 
     link: str
     centre: str
     mass: FloatArray
-    inertia: FloatArray
+    inertia: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,14 +233,14 @@ class Load:
     force : N, complex; where it follows a slider's motion its real part is the force, positive in the
         motion's sense, negative against it
     slider : the joint of that slider; None for a force of given direction
-    couple : N m, counter-clockwise positive; zero where there is none
+    couple : N m, counter-clockwise positive; a load has a force or a couple
     """
 
     name: str
     link: str
     point: str
-    force: ComplexArray
-    couple: FloatArray
+    force: ComplexArray | None = None
+    couple: FloatArray | None = None
     slider: str | None = None
 
 
@@ -341,7 +341,7 @@ GROUND, SLIDER = "0", "slider_"
 def links_of(group: Group) -> tuple[str, ...]:
     """Return the links that a group adds, in the order of its outer pins; a slider by its joint.
 
-    A point of a link adds none.
+    A point of a link adds none. Unique names are those of `links_by_group`.
     """
     match group:
         case Dyad(links=links):
@@ -351,10 +351,39 @@ def links_of(group: Group) -> tuple[str, ...]:
         case SlottedLink(link=link, pin=pin):
             return link, SLIDER + pin
         case CrossSlider(node=node):
-            return SLIDER + node, f"{SLIDER}{node}2"
+            return SLIDER + node, SLIDER + node
         case Yoke(link=link, node=node, pin=pin):
             return link or SLIDER + node, SLIDER + pin
     return ()
+
+
+def links_by_group(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
+    """Return `links_of` each group by its node; the second slider at a joint is ``slider_B2``."""
+    found: dict[str, tuple[str, ...]] = {}
+    taken: set[str] = set()
+    for group in mechanism.groups:
+        names = []
+        for link in links_of(group):
+            name, count = link, 1
+            while link.startswith(SLIDER) and name in taken:
+                count += 1
+                name = f"{link}{count}"
+            taken.add(name)
+            names.append(name)
+        found[group.node] = tuple(names)
+    return found
+
+
+def short_names(mechanism: Mechanism) -> dict[str, str]:
+    """Return each link as it stands in names of forces: a slider by its joint, unless a link has that name."""
+    links = [link for added in links_by_group(mechanism).values() for link in added]
+    names = {GROUND: GROUND, mechanism.driver.link: mechanism.driver.link}
+    names |= {link: link for link in links if not link.startswith(SLIDER)}
+    taken = set(names)
+    for link in links:
+        short = link.removeprefix(SLIDER)
+        names.setdefault(link, link if short in taken else short)
+    return names
 
 
 def carriers(mechanism: Mechanism) -> dict[str, str]:
@@ -363,15 +392,16 @@ def carriers(mechanism: Mechanism) -> dict[str, str]:
     Of a joint of two links it is the second one (of a slider, the slider), unless `pins` says otherwise.
     """
     found = {**dict.fromkeys(mechanism.ground_m, GROUND), mechanism.driver.pin: mechanism.driver.link}
+    links = links_by_group(mechanism)
     for group in mechanism.groups:
         found |= {guide.coincident: guide.link for guide in moving_guides(group)}
         match group:
             case SlottedLink(link=link):
                 found |= dict.fromkeys(joints_of(group), link)
             case Yoke() | CrossSlider():
-                found[group.node] = links_of(group)[0]
+                found[group.node] = links[group.node][0]
             case Dyad() | Slider():
-                found[group.node] = links_of(group)[1]
+                found[group.node] = links[group.node][1]
             case _:
                 found[group.node] = group.link
     return {**found, **mechanism.pins}

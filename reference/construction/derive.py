@@ -23,6 +23,7 @@ from reference.construction.elements import (
     Side,
     VariantSide,
 )
+from reference.construction.forces import Accelerations, slot_axis, with_force_plans
 from reference.construction.graph import AngularRate, Construction, Part, Vector, pair
 from reference.construction.steps import (
     ArcAndLine,
@@ -260,7 +261,11 @@ _cache: dict[Hashable, Construction] = {}
 
 
 def construction_of(
-    mechanism: Mechanism, *, accelerations: bool = True, plate_by_similarity: bool = False
+    mechanism: Mechanism,
+    *,
+    accelerations: bool = True,
+    plate_by_similarity: bool = False,
+    forces: Accelerations | None = None,
 ) -> Construction:
     """Return how the mechanism and its plans are drawn, step by step.
 
@@ -269,12 +274,14 @@ def construction_of(
     accelerations : without it, only the mechanism and the velocity plan
     plate_by_similarity : images of plate points by similar triangles instead of perpendiculars
         (collinear plates always are: their perpendiculars coincide)
+    forces : with force plans, the accelerations being ``given`` (then the other plans are left out), or
+        the student's ``own``, as drawn
     """
-    form = (_form_of(mechanism), accelerations, plate_by_similarity)
+    form = (_form_of(mechanism), accelerations, plate_by_similarity, forces)
     if form not in _cache:
         if len(_cache) >= CACHED:
             _cache.clear()
-        _cache[form] = _write_down(mechanism, accelerations, plate_by_similarity)
+        _cache[form] = _write_down(mechanism, accelerations, plate_by_similarity, forces)
     return _cache[form]
 
 
@@ -288,7 +295,9 @@ def _form_of(mechanism: Mechanism) -> Hashable:
     return (form_of(mechanism), in_line)
 
 
-def _write_down(mechanism: Mechanism, accelerations: bool, plate_by_similarity: bool) -> Construction:
+def _write_down(
+    mechanism: Mechanism, accelerations: bool, plate_by_similarity: bool, forces: Accelerations | None
+) -> Construction:
     draft = Draft(mechanism, plate_by_similarity)
     draft.velocity.append(Pole(VELOCITY_POLE))
     draft.acceleration.append(Pole(ACCELERATION_POLE))
@@ -309,7 +318,10 @@ def _write_down(mechanism: Mechanism, accelerations: bool, plate_by_similarity: 
     ordered = sorted(draft.rates.values(), key=lambda rate: (rate.name.startswith("epsilon"), rate.name))
     rates = {rate.name: rate for rate in ordered if rate.vector in vectors}
     images = {node: step for node, step in draft.images.items() if node in keep}
-    return Construction(figures, poles, vectors, rates, images, _centres(draft, rates))
+    links = [draft.vectors[name] for name in _in_order(draft) if name in draft.vectors]
+    pairs = tuple(dict.fromkeys(one.link for one in links if one.link and one.part != "r"))
+    whole = Construction(figures, poles, vectors, rates, images, _centres(draft, rates), pairs)
+    return whole if forces is None else with_force_plans(mechanism, whole, forces)
 
 
 def _centres(draft: Draft, rates: Mapping[str, AngularRate]) -> dict[str, Similar]:
@@ -450,12 +462,6 @@ def _draw_yoke(draft: Draft, group: Yoke) -> None:
     images_at(draft, node, [*along, lines])
 
 
-def _slot_axis(group: SlottedLink) -> Along:
-    """Return the direction of a slotted link's guide on the sketch."""
-    axis, side = Along(group.foot or group.pivot, group.pin), _side(group)
-    return replace(axis, quarters=1 - side) if isinstance(side, int) else replace(axis, side=side)
-
-
 def _draw_slotted_link(draft: Draft, group: SlottedLink) -> None:
     node, pin, pivot = group.node, group.pin, group.pivot
     if group.foot is not None:
@@ -466,7 +472,7 @@ def _draw_slotted_link(draft: Draft, group: SlottedLink) -> None:
     turn = (draft.image(pivot), draft.image(node))
     conditions = (
         turning(draft, (pivot, node), length),
-        sliding(draft, (pin, node), _slot_axis(group), turn, (group.link, pivot, node)),
+        sliding(draft, (pin, node), slot_axis(group), turn, (group.link, pivot, node)),
     )
     images_at(draft, node, conditions)
     rates_of(draft, group.link, draft.relative(node, pivot), (pivot, node))
@@ -475,11 +481,12 @@ def _draw_slotted_link(draft: Draft, group: SlottedLink) -> None:
 
 
 def _is_used(mechanism: Mechanism, joint: str) -> bool:
-    """Return whether another group is attached to a joint."""
+    """Return whether another group is attached to a joint, or it is a centre of mass."""
     several = [getattr(group, key, ()) for group in mechanism.groups for key in ("pins", "base")]
     single = [getattr(group, key, "") for group in mechanism.groups for key in ("pin", "pivot")]
     guides = [guide.base for group in mechanism.groups for guide in moving_guides(group)]
-    return any(joint in joints for joints in (*several, single, *guides))
+    centres = [body.centre for body in mechanism.bodies]
+    return any(joint in joints for joints in (*several, single, *guides, centres))
 
 
 def _draw_slot_point(draft: Draft, group: SlotPoint) -> None:
@@ -490,5 +497,5 @@ def _draw_slot_point(draft: Draft, group: SlotPoint) -> None:
         if isinstance(link, SlottedLink) and link.node == group.slotted
     )
     x, y = Scaled(f"x {node}", "kL"), Scaled(f"y {node}", "kL")
-    draft.sketch.append(Local(node, slotted.pivot, _slot_axis(slotted), x, y))
+    draft.sketch.append(Local(node, slotted.pivot, slot_axis(slotted), x, y))
     rigid_images(draft, node, (slotted.pivot, slotted.node))

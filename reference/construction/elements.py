@@ -126,7 +126,22 @@ class Fixed(FromNodes):
         return np.asarray(geometry.direction(view.parameters[self.angle] + turn) * 1j**self.quarters)
 
 
-Direction = Along | Fixed
+@dataclass(frozen=True, slots=True)
+class Parallel(FromNodes):
+    """The direction of a vector of a plan as drawn, turned by quarters ccw; of a zero vector that of +x."""
+
+    reads = ("tail", "head")
+    tail: str
+    head: str
+    quarters: int = 0
+
+    def at(self, view: View) -> ComplexArray:
+        """Return the unit vector."""
+        vector = view.nodes[self.head] - view.nodes[self.tail]
+        return np.where(vector == 0.0, 1.0, geometry.unit(vector)) * 1j**self.quarters
+
+
+Direction = Along | Fixed | Parallel
 
 # Lengths ------------------------------------------------------------------------------------------
 
@@ -213,7 +228,115 @@ class Component(FromNodes):
         return geometry.dot(view.nodes[self.head] - view.nodes[self.tail], self.along.at(view))
 
 
-Length = Scaled | Normal | Coriolis | Component
+# Forces -------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Same(FromNodes):
+    """The length of a vector that is drawn already, at the same scale."""
+
+    reads = ("tail", "head")
+    tail: str
+    head: str
+
+    def at(self, view: View) -> FloatArray:
+        """Return the length in drawn millimetres."""
+        return np.abs(view.nodes[self.head] - view.nodes[self.tail])
+
+
+@dataclass(frozen=True, slots=True)
+class Inertia(FromNodes):
+    """An inertia force m a, from an acceleration as drawn, at the scale kF."""
+
+    reads = ("tail", "head")
+    mass: str
+    tail: str
+    head: str
+
+    def at(self, view: View) -> FloatArray:
+        """Return the length in drawn millimetres."""
+        known = view.parameters
+        size = np.abs(view.nodes[self.head] - view.nodes[self.tail])
+        return np.asarray(known[self.mass] * size * known["ka"] / known["kF"])
+
+
+@dataclass(frozen=True, slots=True)
+class Force(FromNodes):
+    """A force on a link: its drawn length, its direction, and the joint at which it acts."""
+
+    reads = ("size", "along", "point")
+    name: str
+    size: "Length"
+    along: Direction
+    point: str
+
+    def moment(self, view: View, about: str) -> FloatArray:
+        """Return its moment about a joint, in square millimetres of the drawing: of kL times kF."""
+        arm = view.nodes[self.point] - view.nodes[about]
+        return geometry.cross(arm, self.along.at(view) * self.size.at(view))
+
+
+@dataclass(frozen=True, slots=True)
+class Couple(FromNodes):
+    """A couple on a link, N m: a datum; or -I epsilon, epsilon from the tangential acceleration as drawn.
+
+    Attributes
+    ----------
+    inertia : the moment of inertia's parameter; empty for a datum
+    vector : ends of that acceleration in its plan
+    link : the joints that it belongs to, in the sketch
+    """
+
+    reads = ("vector", "link")
+    name: str
+    inertia: str = ""
+    vector: tuple[str, ...] = ()
+    link: tuple[str, ...] = ()
+
+    def at(self, view: View) -> FloatArray:
+        """Return the couple, N m, counter-clockwise positive."""
+        known, nodes = view.parameters, view.nodes
+        if not self.inertia:
+            return known[self.name]
+        (tail, head), (first, second) = self.vector, self.link
+        arm = geometry.unit(nodes[second] - nodes[first])
+        epsilon = geometry.cross(arm, nodes[head] - nodes[tail]) * known["ka"]
+        return np.asarray(-known[self.inertia] * epsilon / view.real_length(first, second))
+
+
+@dataclass(frozen=True, slots=True)
+class Balance(FromNodes):
+    """A force from the moments about a joint: across or along a link, so that they balance.
+
+    Attributes
+    ----------
+    about : the joint about which moments are taken
+    point, along : where the balancing force acts, and its direction
+    forces, couples : what it balances
+    """
+
+    reads = ("about", "point", "along", "forces", "couples")
+    about: str
+    point: str
+    along: Direction
+    forces: tuple[Force, ...]
+    couples: tuple[Couple, ...] = ()
+
+    def moment(self, view: View) -> FloatArray:
+        """Return the sum of the moments that it balances, N m, counter-clockwise positive."""
+        known = view.parameters
+        drawn = sum((force.moment(view, self.about) for force in self.forces), np.asarray(0.0))
+        couples = sum((couple.at(view) for couple in self.couples), np.asarray(0.0))
+        return np.asarray(drawn * known["kL"] * known["kF"] + couples)
+
+    def at(self, view: View) -> FloatArray:
+        """Return the length in drawn millimetres."""
+        known, nodes = view.parameters, view.nodes
+        lever = geometry.cross(nodes[self.point] - nodes[self.about], self.along.at(view))
+        return np.asarray(-self.moment(view) / (lever * known["kL"] * known["kF"]))
+
+
+Length = Scaled | Normal | Coriolis | Component | Same | Inertia | Balance
 
 
 @dataclass(frozen=True, slots=True)

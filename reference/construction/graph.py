@@ -20,7 +20,7 @@ from typing import Literal
 
 import numpy as np
 
-from reference.construction.elements import Errors, Fixed, Line, Nodes, Parameters, View
+from reference.construction.elements import Balance, Errors, Fixed, Line, Nodes, Parameters, View
 from reference.construction.steps import (
     ArcAndLine,
     Coincide,
@@ -135,12 +135,13 @@ class Vector:
 
     Attributes
     ----------
-    scale : ``kv`` or ``ka``
+    scale : ``kv``, ``ka`` or ``kF``
     link : the pair of joints (from, to) whose relative motion it is: of a turning link it is
         perpendicular or parallel to the line between them, and gives its angular rate; of a slider
         and the point under it (which lie in one place) it is along the guide
     part : of an acceleration: ``n`` normal, ``t`` tangential, ``c`` Coriolis, ``r`` along a guide
     turning : of a Coriolis component, the link that carries the guide
+    reversed : its arrow points to `tail`: it closes a force polygon whose start it is drawn from
     """
 
     name: str
@@ -150,11 +151,12 @@ class Vector:
     link: tuple[str, str] | None = None
     part: Part = ""
     turning: str | None = None
+    reversed: bool = False
 
     @property
     def is_sum(self) -> bool:
-        """Return whether it is a full relative acceleration, such as a_BA, the sum of its components."""
-        return self.scale == "ka" and self.link is not None and not self.part
+        """Return whether it is the sum of others: a full relative acceleration, a reaction of parts."""
+        return self.scale != "kv" and self.link is not None and not self.part
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,7 +183,7 @@ class Construction:
 
     Attributes
     ----------
-    figures : steps by ``mechanism``, ``velocity_plan``, ``acceleration_plan``
+    figures : steps by ``mechanism``, ``velocity_plan``, ``acceleration_plan``, ``force_plan_B``
     poles : the pole's node by plan
     vectors : named vectors by name
     rates : angular velocities and accelerations by name
@@ -189,6 +191,8 @@ class Construction:
         construction itself finds it by other means
     centres : on the sketch, by Mehmke's similarity from the finished plans: instantaneous centres (``I3``)
         and acceleration poles (``J3``) of links that turn about no fixed pivot
+    pairs : the joints between which links, slots and slides run, from the earlier joint
+    moments : the balancing moment (``M_b``), from the moments of what acts on the driving link
     """
 
     figures: Mapping[str, tuple[Step, ...]]
@@ -197,6 +201,8 @@ class Construction:
     rates: Mapping[str, AngularRate]
     images: Mapping[str, Similar] = field(default_factory=dict)
     centres: Mapping[str, Similar] = field(default_factory=dict)
+    pairs: tuple[tuple[str, str], ...] = ()
+    moments: Mapping[str, Balance] = field(default_factory=dict)
 
     @cached_property
     def steps(self) -> tuple[Step, ...]:
@@ -265,11 +271,10 @@ class Construction:
     @property
     def links(self) -> Mapping[str, tuple[str, str]]:
         """Pairs of joints that the sketch draws as links, by their joined names."""
-        pairs = [vector.link for vector in self.vectors.values() if vector.link and vector.part != "r"]
         place = {joint.node: joint.other for joint in self.steps if isinstance(joint, Coincide)}
         return {
             f"{tail}{head}": (tail, head)
-            for tail, head in pairs
+            for tail, head in self.pairs
             if place.get(tail, tail) != place.get(head, head)
         }
 
@@ -355,9 +360,8 @@ def _starts(step: Step, construction: Construction) -> Iterator[str]:
             yield origin
         case Coincide(node=node, other=other):
             # A slotted link's point turns about the link's pivot; a point under a slider has a bar already.
-            velocities = (v.link for v in construction.vectors.values() if v.link and v.scale == "kv")
             here = {other, *(under for under, over in coincident(construction).items() if over == other)}
-            yield from (pivot for pivot, head in velocities if head == node and pivot not in here)
+            yield from (pivot for pivot, head in construction.pairs if head == node and pivot not in here)
         case TwoLines(first=first, second=second):
             # The slot of a yoke; guides are no bars.
             lines = (line for line in (first, second) if isinstance(line, Line))

@@ -1,0 +1,433 @@
+"""Derive the force plans of a mechanism: for each Assur group a closed polygon, from the last to the crank.
+
+On each link stand its inertia force, its weight, the loads, and what later groups exert on it. The part of
+a reaction across a link is computed from the moments about the group's inner joint, the given forces follow
+head to tail, and two lines of known direction close the polygon. Nodes are ``B.0``, ``B.1``, ... in the plan
+``force_plan_B``; vectors are named as `Draft` has it: R_12 is the reaction of link 1 on link 2.
+
+Source of the method: any course of kinetostatics, as Artobolevsky, Theory of Mechanisms, chapter 13.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+from reference.construction.elements import (
+    Along,
+    Balance,
+    Couple,
+    Direction,
+    Fixed,
+    Force,
+    Inertia,
+    Line,
+    Parallel,
+    Same,
+    Scaled,
+    VariantSide,
+)
+from reference.construction.graph import Construction, Part, Vector
+from reference.construction.steps import Given, Pole, Step, TwoLines
+from reference.mechanism import (
+    GROUND,
+    Crank,
+    CrossSlider,
+    Driver,
+    DrivingSlider,
+    Dyad,
+    FixedGuide,
+    Group,
+    Guide,
+    Mechanism,
+    Slider,
+    SlottedLink,
+    Yoke,
+    carriers,
+    guides_of,
+    links_by_group,
+    short_names,
+)
+
+FORCE_PLAN = "force_plan_"
+"""Start of a force plan's name; the group's joint follows."""
+Accelerations = str
+"""``given``: data of the task; ``own``: taken from the acceleration plan as drawn."""
+
+
+def with_force_plans(mechanism: Mechanism, plans: Construction, accelerations: Accelerations) -> Construction:
+    """Return the construction with the mechanism's force plans.
+
+    Where the accelerations are ``given``, velocity and acceleration plan are left out.
+    """
+    forces = ForcePlans(mechanism, plans, accelerations)
+    forces.write_down()
+    figures = {name: tuple(polygon.steps) for name, polygon in forces.figures.items()}
+    poles = {name: polygon.steps[0].node for name, polygon in forces.figures.items()}
+    vectors = {name: one for polygon in forces.figures.values() for name, one in polygon.vectors.items()}
+    if accelerations == "given":
+        figures = {"mechanism": plans.figures["mechanism"], **figures}
+        return Construction(figures, poles, vectors, {}, pairs=plans.pairs, moments=forces.moments)
+    return replace(
+        plans,
+        figures={**plans.figures, **figures},
+        poles={**plans.poles, **poles},
+        vectors={**plans.vectors, **vectors},
+        moments=forces.moments,
+    )
+
+
+@dataclass(slots=True)
+class Loaded:
+    """What acts on a link, as far as it is known."""
+
+    forces: list[Force] = field(default_factory=list)
+    couples: list[Couple] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class Polygon:
+    """A force plan while it is written down."""
+
+    joint: str
+    steps: list[Step] = field(default_factory=list)
+    vectors: dict[str, Vector] = field(default_factory=dict)
+
+    @property
+    def last(self) -> str:
+        """The node made last."""
+        return self.steps[-1].node
+
+    def start(self) -> str:
+        """Add the first node, the plan's pole."""
+        self.steps.append(Pole(f"{self.joint}.0"))
+        return self.last
+
+    def lay(self, name: str, start: str, force: Force, *, back: bool = False) -> str:
+        """Lay off a force from a node, or `back` so that it ends there; return the new node."""
+        node = f"{self.joint}.{len(self.steps)}"
+        along = replace(force.along, quarters=force.along.quarters + 2) if back else force.along
+        self.steps.append(Given(node, start, force.size, along))
+        return self.add(name, start, node, back=back)
+
+    def lay_all(self, start: str, forces: Iterable[Force], *, back: bool = False) -> str:
+        """Lay off forces one after another; return the last node."""
+        for force in forces:
+            start = self.lay(force.name, start, force, back=back)
+        return start
+
+    def close(self, first: Line, second: Line) -> str:
+        """Close the polygon by two lines; return their intersection."""
+        node = f"{self.joint}.{len(self.steps)}"
+        self.steps.append(TwoLines(node, first, second))
+        return node
+
+    def add(
+        self,
+        name: str,
+        tail: str,
+        head: str,
+        *,
+        back: bool = False,
+        part: Part = "",
+        link: tuple[str, str] | None = None,
+    ) -> str:
+        """Add a vector in the order of drawing; return its head."""
+        whole = f"{name}_{part}" if part else name
+        self.vectors[whole] = Vector(whole, tail, head, "kF", link, part, reversed=back)
+        return head
+
+
+@dataclass(slots=True)
+class ForcePlans:
+    """The force plans of a mechanism while they are written down."""
+
+    mechanism: Mechanism
+    plans: Construction
+    accelerations: Accelerations
+    loaded: dict[str, Loaded] = field(default_factory=dict)
+    figures: dict[str, Polygon] = field(default_factory=dict)
+    moments: dict[str, Balance] = field(default_factory=dict)
+    links: dict[str, tuple[str, ...]] = field(init=False)
+    carriers: dict[str, str] = field(init=False)
+    names: dict[str, str] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.links, self.carriers = links_by_group(self.mechanism), carriers(self.mechanism)
+        self.names = short_names(self.mechanism)
+
+    def reaction(self, by: str, on: str) -> str:
+        """Return the name of the reaction of one link on another: ``R_12``."""
+        names = (self.names[by], self.names[on])
+        return "R_" + ("" if max(map(len, names)) == 1 else "-").join(names)
+
+    def on(self, link: str) -> Loaded:
+        """Return what acts on a link."""
+        return self.loaded.setdefault(link, Loaded())
+
+    def write_down(self) -> None:
+        """Add the plans of all groups, from the last, and of the driving link."""
+        self._given_forces()
+        for group in reversed(self.mechanism.groups):
+            if any(self.on(link).forces or self.on(link).couples for link in self.links[group.node]):
+                self._group(group)
+        self._driver(self.mechanism.driver)
+
+    # What is given -------------------------------------------------------------------------------
+
+    def _given_forces(self) -> None:
+        for body in self.mechanism.bodies:
+            name, here = self.names[body.link], self.on(body.link)
+            if not self.mechanism.is_ground(body.centre):
+                here.forces.append(self._inertia_force(f"F_i{name}", body.centre, f"m_{name}"))
+            if self.mechanism.gravity is not None:
+                here.forces.append(_as_given(f"G_{name}", body.centre))
+            if body.inertia is not None:
+                here.couples += self._inertia_couple(body.link)
+        for load in self.mechanism.loads:
+            if load.force is not None:
+                self.on(load.link).forces.append(_as_given(f"F_{load.name}", load.point))
+            if load.couple is not None:
+                self.on(load.link).couples.append(Couple(f"M_{load.name}"))
+
+    def _inertia_force(self, name: str, centre: str, mass: str) -> Force:
+        if self.accelerations == "given":
+            return _as_given(name, centre)
+        vector = self.plans.vectors[f"a_{centre}"]
+        ends = vector.tail, vector.head
+        return Force(name, Inertia(mass, *ends), Parallel(*ends, quarters=2), centre)
+
+    def _inertia_couple(self, link: str) -> list[Couple]:
+        """Return the couple -I epsilon of a link that turns; of a slider, that of the link of its guide."""
+        name, turning = f"M_i{self.names[link]}", self._turning(link)
+        rate = self.plans.rates.get(f"epsilon_{turning}")
+        if not turning or (rate is None and not self._is_driven(turning)):
+            return []
+        if self.accelerations == "given" or rate is None or rate.drives:
+            return [Couple(name)]
+        vector = self.plans.vectors[rate.vector]
+        return [Couple(name, f"I_{self.names[link]}", (vector.tail, vector.head), rate.link)]
+
+    def _is_driven(self, link: str) -> bool:
+        driver = self.mechanism.driver
+        return isinstance(driver, Crank) and driver.link == link and driver.accelerated
+
+    def _turning(self, link: str) -> str:
+        """Return the link with which a link turns: itself, or the one that carries its guide."""
+        for group in self.mechanism.groups:
+            if link in self.links[group.node]:
+                return _turning_with(group, self.links[group.node].index(link))
+        return "" if isinstance(self.mechanism.driver, DrivingSlider) else link
+
+    # Groups --------------------------------------------------------------------------------------
+
+    def _polygon(self, joint: str) -> Polygon:
+        polygon = Polygon(joint)
+        self.figures[f"{FORCE_PLAN}{joint}"] = polygon
+        return polygon
+
+    def _group(self, group: Group) -> None:
+        polygon = self._polygon(group.node)
+        match group:
+            case Dyad():
+                self._dyad(polygon, group)
+            case Slider():
+                self._slider(polygon, group)
+            case SlottedLink():
+                self._slotted(polygon, group)
+            case CrossSlider(node=node, guides=(first, second)):
+                self._two_guides(polygon, group, (_across(node, first), _across(node, second)))
+            case Yoke(node=node, guide=guide):
+                self._yoke(polygon, group, _across(node, guide))
+
+    def _part_across(self, polygon: Polygon, start: str, link: str, ends: tuple[str, str]) -> str:
+        """Lay off the part across a link of the reaction at its outer pin, if forces act on the link.
+
+        It balances the moments about the inner joint. Arguments: `ends`, the outer pin and that joint.
+        """
+        here, (pin, inner) = self.on(link), ends
+        if not here.forces and not here.couples:
+            return start
+        across = Along(pin, inner, 1)
+        size = Balance(inner, pin, across, tuple(here.forces), tuple(here.couples))
+        polygon.steps.append(Given(f"{polygon.joint}.{len(polygon.steps)}", start, size, across))
+        name = self.reaction(self.carriers[pin], link)
+        return polygon.add(name, start, polygon.last, part="t", link=ends)
+
+    def _closed_at(
+        self, polygon: Polygon, link: str, ends: tuple[str, str], nodes: tuple[str, str, str], *, back: bool
+    ) -> None:
+        """Add the part along a link of the reaction at its outer pin, and the whole reaction.
+
+        Arguments: `nodes` are those where the part across starts and ends, and where the polygon closes.
+        """
+        name = self.reaction(self.carriers[ends[0]], link)
+        first, second, closed = nodes
+        has_parts = first != second
+        if has_parts:
+            polygon.add(name, first if back else second, closed, back=back, part="n", link=ends)
+        polygon.add(name, second if back else first, closed, back=back, link=ends if has_parts else None)
+        self._hand_over(polygon, link, ends[0])
+
+    def _hand_over(self, polygon: Polygon, link: str, joint: str, couples: Iterable[Couple] = ()) -> None:
+        """Let the reaction at a joint act, the other way round, on the link that carries it."""
+        self._act(polygon, link, self.carriers[joint], joint, couples)
+
+    def _act(
+        self, polygon: Polygon, link: str, carrier: str, joint: str, couples: Iterable[Couple] = ()
+    ) -> None:
+        if carrier == GROUND:
+            return
+        vector = polygon.vectors[self.reaction(carrier, link)]
+        along = Parallel(vector.tail, vector.head, quarters=0 if vector.reversed else 2)
+        force = Force(self.reaction(link, carrier), Same(vector.tail, vector.head), along, joint)
+        self.on(carrier).forces.append(force)
+        self.on(carrier).couples.extend(couples)
+
+    def _dyad(self, polygon: Polygon, group: Dyad) -> None:
+        (p, q), (link_p, link_q), inner = group.pins, group.links, group.node
+        start = polygon.start()
+        second = self._part_across(polygon, start, link_p, (p, inner))
+        middle = polygon.lay_all(second, self.on(link_p).forces)
+        end = polygon.lay_all(middle, self.on(link_q).forces)
+        last = self._part_across(polygon, end, link_q, (q, inner))
+        closed = polygon.close(Line(last, Along(q, inner)), Line(start, Along(p, inner)))
+        self._closed_at(polygon, link_q, (q, inner), (end, last, closed), back=False)
+        self._closed_at(polygon, link_p, (p, inner), (start, second, closed), back=True)
+        polygon.add(self.reaction(link_q, link_p), middle, closed, link=(p, inner))
+
+    def _slider(self, polygon: Polygon, group: Slider) -> None:
+        pin, inner, (rod, slider) = group.pin, group.node, self.links[group.node]
+        start = polygon.start()
+        second = self._part_across(polygon, start, rod, (pin, inner))
+        middle = polygon.lay_all(second, self.on(rod).forces)
+        end = polygon.lay_all(middle, self.on(slider).forces)
+        closed = polygon.close(Line(end, _across(inner, group.guide)), Line(start, Along(pin, inner)))
+        self._on_guide(polygon, slider, group.guide, end, closed, inner, back=False)
+        self._closed_at(polygon, rod, (pin, inner), (start, second, closed), back=True)
+        if middle != end:
+            polygon.add(self.reaction(slider, rod), middle, closed, link=(pin, inner))
+
+    def _on_guide(
+        self, polygon: Polygon, slider: str, guide: Guide, tail: str, head: str, joint: str, *, back: bool
+    ) -> None:
+        """Add the reaction of a guide; let it and the couples act on the link that carries it."""
+        carrier = GROUND if isinstance(guide, FixedGuide) else guide.link
+        polygon.add(self.reaction(carrier, slider), tail, head, back=back)
+        self._act(polygon, slider, carrier, joint, self.on(slider).couples)
+
+    def _slotted(self, polygon: Polygon, group: SlottedLink) -> None:
+        pivot, pin, (link, block) = group.pivot, group.pin, self.links[group.node]
+        axis = slot_axis(group)
+        across = replace(axis, quarters=axis.quarters + 1)
+        here, couples = self.on(link), (*self.on(link).couples, *self.on(block).couples)
+        start = polygon.start()
+        size = Balance(pivot, group.node, across, tuple(here.forces), tuple(couples))
+        second = polygon.lay(self.reaction(block, link), start, Force("", size, across, pin))
+        end = polygon.lay_all(second, here.forces)
+        polygon.add(self.reaction(self.carriers[pivot], link), start, end, back=True)
+        self._hand_over(polygon, link, pivot)
+        self._hinged_block(polygon, block, link, pin, (start, second))
+
+    def _hinged_block(
+        self, polygon: Polygon, block: str, link: str, pin: str, ends: tuple[str, str], *, back: bool = False
+    ) -> None:
+        """Let the reaction at a block's pin act on the link that carries the pin.
+
+        It is the block's own reaction on its `link` where nothing else acts on the block. Arguments: `ends`
+        of that reaction in the order of drawing.
+        """
+        carrier, forces = self.carriers[pin], self.on(block).forces
+        tail, head = ends
+        # The reaction on the link runs from `foot`, or to it; the block's forces stand before it.
+        foot, tip = (head, tail) if back else (tail, head)
+        first = polygon.lay_all(tip, reversed(forces), back=True)
+        if not forces:
+            vector = polygon.vectors[self.reaction(block, link)]
+            along = Parallel(vector.tail, vector.head, quarters=0 if vector.reversed else 2)
+            if carrier != GROUND:
+                force = Force(self.reaction(block, carrier), Same(vector.tail, vector.head), along, pin)
+                self.on(carrier).forces.append(force)
+            return
+        polygon.add(self.reaction(carrier, block), foot, first)
+        self._hand_over(polygon, block, pin)
+
+    def _two_guides(self, polygon: Polygon, group: CrossSlider, across: tuple[Direction, Direction]) -> None:
+        first, second = self.links[group.node]
+        start = polygon.start()
+        middle = polygon.lay_all(start, self.on(first).forces)
+        end = polygon.lay_all(middle, self.on(second).forces)
+        closed = polygon.close(Line(end, across[1]), Line(start, across[0]))
+        self._on_guide(polygon, second, group.guides[1], end, closed, group.node, back=False)
+        self._on_guide(polygon, first, group.guides[0], start, closed, group.node, back=True)
+        if middle not in {start, end}:
+            polygon.add(self.reaction(second, first), middle, closed)
+
+    def _yoke(self, polygon: Polygon, group: Yoke, across: Direction) -> None:
+        yoke, block = self.links[group.node]
+        start = polygon.start()
+        end = polygon.lay_all(start, self.on(yoke).forces)
+        slot: Direction = (
+            Fixed(f"angle slot {group.node}", 1)
+            if isinstance(group.guide, FixedGuide)
+            else Along(*group.guide.base)
+        )
+        closed = polygon.close(Line(end, across), Line(start, slot))
+        self.on(yoke).couples.extend(self.on(block).couples)
+        joint = group.node if isinstance(group.guide, FixedGuide) else group.pin
+        self._on_guide(polygon, yoke, group.guide, end, closed, joint, back=False)
+        polygon.add(self.reaction(block, yoke), start, closed, back=True)
+        self._hinged_block(polygon, block, yoke, group.pin, (start, closed), back=True)
+
+    # The driving link ----------------------------------------------------------------------------
+
+    def _driver(self, driver: Driver) -> None:
+        here = self.on(driver.link)
+        if not here.forces and not here.couples:
+            return
+        polygon = self._polygon(driver.pin)
+        start = polygon.start()
+        end = polygon.lay_all(start, here.forces)
+        name = self.reaction(GROUND, driver.link)
+        if isinstance(driver, Crank):
+            if end != start:
+                polygon.add(name, start, end, back=True)
+            forces, couples = tuple(here.forces), tuple(here.couples)
+            across = Along(driver.pivot, driver.pin, 1)
+            self.moments["M_b"] = Balance(driver.pivot, driver.pin, across, forces, couples)
+            return
+        along = Fixed(f"angle guide {driver.pin}")
+        closed = polygon.close(Line(end, along), Line(start, replace(along, quarters=1)))
+        polygon.add("F_b", end, closed)
+        polygon.add(name, start, closed, back=True)
+
+
+def _turning_with(group: Group, index: int) -> str:
+    """Return the link with which a group's link turns: itself, or that of a moving guide; empty if none."""
+    guides = guides_of(group)
+    match group:
+        case Dyad(links=links):
+            return links[index]
+        case SlottedLink(link=link):
+            return link
+        case Slider(link=link) if index == 0:
+            return link
+        case CrossSlider():
+            guides = (guides[index],)
+    return "" if isinstance(guides[0], FixedGuide) else guides[0].link
+
+
+def _as_given(name: str, point: str) -> Force:
+    """Return a force whose size and direction are data."""
+    return Force(name, Scaled(name, "kF"), Fixed(f"angle {name}"), point)
+
+
+def _across(node: str, guide: Guide) -> Direction:
+    """Return the direction across a guide."""
+    return Fixed(f"angle guide {node}", 1) if isinstance(guide, FixedGuide) else Along(*guide.base, 1)
+
+
+def slot_axis(group: SlottedLink) -> Along:
+    """Return the direction of a slotted link's guide on the sketch."""
+    axis = Along(group.foot or group.pivot, group.pin)
+    if isinstance(group.side, int):
+        return replace(axis, quarters=1 - group.side)
+    return replace(axis, side=VariantSide(f"side {group.node}"))
