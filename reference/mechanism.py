@@ -37,6 +37,8 @@ class Crank:
     """True if the crank has an angular acceleration: without one, a_A has no tangential part."""
     rpm: FloatArray | None = None
     gear_ratio: FloatArray | None = None
+    cylinder: str | None = None
+    """The cylinder that drives the crank, a slotted link, if one does."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,13 +215,13 @@ class Body:
     ----------
     link : its name; a slider has that of its joint (``slider_B``)
     centre : the joint, or the further point of the link, that is its centre of mass
-    mass : kg, shape (N,)
+    mass : kg, shape (N,); None where it is neglected
     inertia : moment of inertia about the centre, kg m^2; None where it is neglected
     """
 
     link: str
     centre: str
-    mass: FloatArray
+    mass: FloatArray | None = None
     inertia: FloatArray | None = None
 
 
@@ -341,7 +343,7 @@ GROUND, SLIDER = "0", "slider_"
 def links_of(group: Group) -> tuple[str, ...]:
     """Return the links that a group adds, in the order of its outer pins; a slider by its joint.
 
-    A point of a link adds none. Unique names are those of `links_by_group`.
+    A point of a link adds none.
     """
     match group:
         case Dyad(links=links):
@@ -351,60 +353,105 @@ def links_of(group: Group) -> tuple[str, ...]:
         case SlottedLink(link=link, pin=pin):
             return link, SLIDER + pin
         case CrossSlider(node=node):
-            return SLIDER + node, SLIDER + node
+            return SLIDER + node, f"{SLIDER}{node}2"
         case Yoke(link=link, node=node, pin=pin):
             return link or SLIDER + node, SLIDER + pin
     return ()
 
 
-def links_by_group(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
-    """Return `links_of` each group by its node; the second slider at a joint is ``slider_B2``."""
-    found: dict[str, tuple[str, ...]] = {}
-    taken: set[str] = set()
+def named_links(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
+    """Return the links that each group adds, by the group's node, in the order of `links_of`.
+
+    A further slider at a joint that has one already is numbered: ``slider_A``, then ``slider_A2``.
+    """
+    taken, named = {mechanism.driver.link}, dict[str, tuple[str, ...]]()
     for group in mechanism.groups:
-        names = []
+        names: list[str] = []
         for link in links_of(group):
             name, count = link, 1
-            while link.startswith(SLIDER) and name in taken:
+            while name in taken:
                 count += 1
                 name = f"{link}{count}"
             taken.add(name)
             names.append(name)
-        found[group.node] = tuple(names)
-    return found
+        named[group.node] = tuple(names)
+    return named
+
+
+def short_name(link: str) -> str:
+    """Return a link as it stands in names of forces; a slider by its joint."""
+    return link.removeprefix(SLIDER)
 
 
 def short_names(mechanism: Mechanism) -> dict[str, str]:
-    """Return each link as it stands in names of forces: a slider by its joint, unless a link has that name."""
-    links = [link for added in links_by_group(mechanism).values() for link in added]
+    """Return `short_name` of each link; a slider's whole name where a link is called as its joint."""
+    links = [link for added in named_links(mechanism).values() for link in added]
     names = {GROUND: GROUND, mechanism.driver.link: mechanism.driver.link}
     names |= {link: link for link in links if not link.startswith(SLIDER)}
     taken = set(names)
     for link in links:
-        short = link.removeprefix(SLIDER)
-        names.setdefault(link, link if short in taken else short)
+        names.setdefault(link, link if short_name(link) in taken else short_name(link))
     return names
+
+
+def hinged_at(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
+    """Return the links that are hinged together, or fixed, at each joint by the group that adds it.
+
+    The last one carries the joint's pin unless the mechanism's `pins` says otherwise. Points of a link are
+    its own alone; so are those under a slider, for this instant.
+    """
+    driver = mechanism.driver
+    found: dict[str, tuple[str, ...]] = dict.fromkeys(mechanism.ground_m, (GROUND,))
+    found[driver.pin] = (driver.link,)
+    named = named_links(mechanism)
+    for group in mechanism.groups:
+        found |= {guide.coincident: (guide.link,) for guide in moving_guides(group)}
+        match group:
+            case SlottedLink(link=link):
+                found |= dict.fromkeys(joints_of(group), (link,))
+            case CrossSlider():
+                found[group.node] = named[group.node][::-1]
+            case Yoke():
+                found[group.node] = named[group.node][:1]
+            case Dyad() | Slider():
+                found[group.node] = named[group.node]
+            case _:
+                found[group.node] = (group.link,)
+    return found
 
 
 def carriers(mechanism: Mechanism) -> dict[str, str]:
     """Return the link that carries the pin of each joint, to which later groups are hinged.
 
-    Of a joint of two links it is the second one (of a slider, the slider), unless `pins` says otherwise.
+    Of a joint of two links it is the second one (of a slider, the slider; of two blocks, the first), unless
+    `pins` says otherwise.
     """
-    found = {**dict.fromkeys(mechanism.ground_m, GROUND), mechanism.driver.pin: mechanism.driver.link}
-    links = links_by_group(mechanism)
+    return {**{joint: links[-1] for joint, links in hinged_at(mechanism).items()}, **mechanism.pins}
+
+
+def points_of(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
+    """Return the joints and points of every moving link that are fixed on it.
+
+    A yoke on a moving guide has no such point; its node, the point under the pin, stands for one.
+    """
+    driver, named = mechanism.driver, named_links(mechanism)
+    held = {driver.link: [driver.pivot, driver.pin] if isinstance(driver, Crank) else [driver.pin]}
     for group in mechanism.groups:
-        found |= {guide.coincident: guide.link for guide in moving_guides(group)}
+        links, node = named[group.node], group.node
         match group:
-            case SlottedLink(link=link):
-                found |= dict.fromkeys(joints_of(group), link)
-            case Yoke() | CrossSlider():
-                found[group.node] = links[group.node][0]
-            case Dyad() | Slider():
-                found[group.node] = links[group.node][1]
+            case Dyad(pins=outer):
+                held |= {link: [pin, node] for link, pin in zip(links, outer, strict=True)}
+            case Slider(pin=pin):
+                held |= {links[0]: [pin, node], links[1]: [node]}
+            case SlottedLink(pin=pin, pivot=pivot, foot=foot):
+                held |= {links[0]: [pivot, *([foot] if foot else [])], links[1]: [pin]}
+            case CrossSlider():
+                held |= {link: [node] for link in links}
+            case Yoke(pin=pin):
+                held |= {links[0]: [node], links[1]: [pin]}
             case _:
-                found[group.node] = group.link
-    return {**found, **mechanism.pins}
+                held[group.link].append(node)
+    return {link: tuple(joints) for link, joints in held.items()}
 
 
 # A mechanism apart from its numbers ----------------------------------------------------------------

@@ -88,6 +88,13 @@ class Numbers:
         # Division by the unit's inverse: 30 cm is then exactly the double nearest to 0.3 m.
         return np.asarray(self.number(formula) / round(1.0 / self.unit_m))
 
+    def amount(self, formula: Formula, what: str) -> FloatArray:
+        """Return a number that is not negative; raises FormulaError, which calls it `what`, for any other."""
+        numbers = self.number(formula)
+        if np.any(numbers < 0.0):
+            raise FormulaError(f"'{formula.text}' ({what}) must not be negative", numbers < 0.0)
+        return numbers
+
     def angle(self, formula: Formula) -> FloatArray:
         """Return an angle given in degrees in radians."""
         return np.asarray(np.radians(self.number(formula)))
@@ -225,7 +232,10 @@ def _by_cylinder(crank: CrankTable, cylinder: CylinderTable, file: MechanismFile
     omega = -speed / cross(u, r)
     swing = cross(u, 1j * omega * r) / length
     epsilon = -(growth - swing**2 * length + omega**2 * dot(u, r)) / cross(u, r)
-    return Crank(crank.link, crank.pivot, crank.pin, arm, np.angle(r), omega, epsilon, accelerated=True)
+    slots = (table for table in file.group if isinstance(table, SlottedLinkTable))
+    link = next(slot.link for slot in slots if (slot.pivot, slot.pin) == (cylinder.pivot, crank.pin))
+    joints = (crank.link, crank.pivot, crank.pin)
+    return Crank(*joints, arm, np.angle(r), omega, epsilon, accelerated=True, cylinder=link)
 
 
 def _omega(

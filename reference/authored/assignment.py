@@ -17,6 +17,7 @@ from pydantic import Field, model_validator
 
 from reference.authored import toml_file
 from reference.authored.assembly import LARGEST, Numbers, build_driver, build_mechanism
+from reference.authored.bodies import NOT_NEGATIVE, Masses, check_masses, with_centres, with_masses
 from reference.authored.flat_positions import signs_of, with_signs
 from reference.authored.formula import CONSTANTS, FUNCTIONS, Formula, FormulaError, Value
 from reference.authored.mechanism import MechanismFile, check_mechanism
@@ -121,7 +122,7 @@ TRADITIONS: dict[str, dict[str, str]] = {
 """Names that schools use for poles and scales: o, o', kL, kv, ka; or p, π, μl, μv, μa."""
 
 
-class AssignmentFile(Authored):
+class AssignmentFile(Masses):
     """An assignment: a mechanism, its variants, the scales, the sheets, the names that students see.
 
     `tradition` fills `names` with those of a school; names given one by one take precedence.
@@ -289,9 +290,13 @@ class Assignment:
         """Return the mechanism of every variant, SI, arrays of shape (N,).
 
         The positions of one n are one motion: sides hold in the first position that is not flat, and each
-        flat position on the way reverses them.
+        flat position on the way reverses them. With bodies, it has their centres of mass as points.
         """
-        mechanism = build_mechanism(self.mechanism_file, self.values(variants), len(variants))
+        file, values, count = self.file, self.values(variants), len(variants)
+        mechanism = build_mechanism(with_centres(self.mechanism_file, file.body), values, count)
+        if file.has_forces:
+            numbers = Numbers(values, count, LENGTH_UNITS_M[self.mechanism_file.length_unit])
+            mechanism = with_masses(mechanism, numbers, file)
         return with_signs(
             replace(mechanism, driver=self._at_speed(mechanism.driver)),
             {node: np.array([sign[variant] for variant in variants]) for node, sign in self.signs.items()},
@@ -469,6 +474,8 @@ def _check_table(assignment: Assignment) -> Iterator[Finding]:
             )
     place = "$.mechanism" if isinstance(assignment.file.mechanism, MechanismFile) else "mechanism file, $"
     yield from misused_columns(assignment.mechanism_file, rows, place)
+    yield from misused_columns(assignment.file.body, rows, "$.body")
+    yield from misused_columns(assignment.file.load, rows, "$.load")
 
 
 def _check_formulas(assignment: Assignment, source: Path) -> Faults:
@@ -510,10 +517,17 @@ def _check_formulas(assignment: Assignment, source: Path) -> Faults:
             of_mechanism += check(path, leaf.names, partial(read, leaf))
     for index, datum in enumerate(file.given):
         own += check(f"$.given[{index}].value", datum.value.names, partial(datum.value, known))
+    for path, key, formula in file.formulas:
+        read = partial(numbers.amount, what=key) if key in NOT_NEGATIVE else numbers.number
+        own += check(path, formula.names, partial(read, formula))
     faults = Faults()
     if not (own or of_mechanism):
-        of_mechanism += check("$", frozenset(), partial(assignment.mechanism, variants))
-        own += [] if of_mechanism else _check_scales(assignment, variants)
+        plain = replace(assignment, file=file.model_copy(update=Masses().model_dump()))
+        of_mechanism += check("$", frozenset(), partial(plain.mechanism, variants))
+        own += [] if of_mechanism else check_masses(file, plain.mechanism_file, plain.mechanism(variants[:1]))
+        if file.has_forces and not (own or of_mechanism):
+            own += check("$.body", frozenset(), partial(assignment.mechanism, variants))
+        own += [] if own or of_mechanism else _check_scales(assignment, variants)
     faults.add(assignment.path, own)
     faults.add(source, of_mechanism)
     return faults

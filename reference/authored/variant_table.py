@@ -38,8 +38,12 @@ MEASURES = {
     "epsilon": "an angular acceleration",
     "speed": "a speed",
     "acceleration": "an acceleration",
+    "mass": "a mass",
+    "inertia": "a moment of inertia",
+    "force": "a force",
+    "couple": "a moment",
 }
-"""The kind of quantity that a key of a mechanism holds, in the words of `UNITS`."""
+"""The kind of quantity that a key of a mechanism, a body or a load holds, in the words of `UNITS`."""
 LENGTHS = {"length", "lengths"}
 """Keys of lengths that must be above zero; coordinates need not be."""
 MOST_VARIANTS = 10_000
@@ -58,11 +62,19 @@ UNITS = {
     **dict.fromkeys(("rpm", "rev/min"), ("revolutions per minute", "")),
     "rad/s": ("an angular velocity", ""),
     "rad/s^2": ("an angular acceleration", ""),
+    "kg": ("a mass", ""),
+    "kg m^2": ("a moment of inertia", ""),
+    "N": ("a force", ""),
+    "N m": ("a moment", ""),
 }
 """The kind of quantity of a unit in a heading, and its unit of length."""
 _LETTERS = str.maketrans({"м": "m", "с": "s", "²": "^2", "р": "r", "а": "a", "д": "d"})
 """Cyrillic letters of units that look like or stand for the Latin ones."""
-_SPELT = {"об/мин": "rpm", "rot/min": "rpm", "min^-1": "rpm", "1/min": "rpm", "град": "deg", "1/s": "rad/s"}
+_SPELT = {
+    "об/мин": "rpm", "rot/min": "rpm", "min^-1": "rpm", "1/min": "rpm", "град": "deg", "1/s": "rad/s",
+    **dict.fromkeys(("n", "н"), "N"), **dict.fromkeys(("nm", "n·m", "n*m", "нм", "н·м", "н*м"), "N m"),
+    "кг": "kg", **dict.fromkeys(("kgm^2", "kg·m^2", "kg*m^2", "кгм^2", "кг·м^2", "кг*м^2"), "kg m^2"),
+}  # fmt: skip
 """Other spellings."""
 
 _HEADING = re.compile(r"\s*([^\s\[\](),]+)\s*(?:[\[(]\s*([^\[\]()]*?)\s*[\])]|,\s*(\S+))?\s*")
@@ -391,7 +403,7 @@ class _Reader:
 
 def _unit_of(text: str) -> str:
     """Return a unit in the spelling of `UNITS`, if it is one of them."""
-    plain = text.lower().replace(" ", "")
+    plain = text.lower().replace(" ", "").replace("²", "^2")
     return _SPELT.get(plain, plain.translate(_LETTERS))
 
 

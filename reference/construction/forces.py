@@ -43,12 +43,14 @@ from reference.mechanism import (
     Yoke,
     carriers,
     guides_of,
-    links_by_group,
+    named_links,
     short_names,
 )
 
 FORCE_PLAN = "force_plan_"
 """Start of a force plan's name; the group's joint follows."""
+Ends = tuple[str, str]
+"""Two joints of a link, or two nodes of a plan."""
 Accelerations = str
 """``given``: data of the task; ``own``: taken from the acceleration plan as drawn."""
 
@@ -128,7 +130,7 @@ class Polygon:
         *,
         back: bool = False,
         part: Part = "",
-        link: tuple[str, str] | None = None,
+        link: Ends | None = None,
     ) -> str:
         """Add a vector in the order of drawing; return its head."""
         whole = f"{name}_{part}" if part else name
@@ -151,7 +153,7 @@ class ForcePlans:
     names: dict[str, str] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.links, self.carriers = links_by_group(self.mechanism), carriers(self.mechanism)
+        self.links, self.carriers = named_links(self.mechanism), carriers(self.mechanism)
         self.names = short_names(self.mechanism)
 
     def reaction(self, by: str, on: str) -> str:
@@ -176,9 +178,9 @@ class ForcePlans:
     def _given_forces(self) -> None:
         for body in self.mechanism.bodies:
             name, here = self.names[body.link], self.on(body.link)
-            if not self.mechanism.is_ground(body.centre):
+            if body.mass is not None and not self.mechanism.is_ground(body.centre):
                 here.forces.append(self._inertia_force(f"F_i{name}", body.centre, f"m_{name}"))
-            if self.mechanism.gravity is not None:
+            if body.mass is not None and self.mechanism.gravity is not None:
                 here.forces.append(_as_given(f"G_{name}", body.centre))
             if body.inertia is not None:
                 here.couples += self._inertia_couple(body.link)
@@ -238,7 +240,7 @@ class ForcePlans:
             case Yoke(node=node, guide=guide):
                 self._yoke(polygon, group, _across(node, guide))
 
-    def _part_across(self, polygon: Polygon, start: str, link: str, ends: tuple[str, str]) -> str:
+    def _part_across(self, polygon: Polygon, start: str, link: str, ends: Ends) -> str:
         """Lay off the part across a link of the reaction at its outer pin, if forces act on the link.
 
         It balances the moments about the inner joint. Arguments: `ends`, the outer pin and that joint.
@@ -253,7 +255,7 @@ class ForcePlans:
         return polygon.add(name, start, polygon.last, part="t", link=ends)
 
     def _closed_at(
-        self, polygon: Polygon, link: str, ends: tuple[str, str], nodes: tuple[str, str, str], *, back: bool
+        self, polygon: Polygon, link: str, ends: Ends, nodes: tuple[str, str, str], *, back: bool
     ) -> None:
         """Add the part along a link of the reaction at its outer pin, and the whole reaction.
 
@@ -301,17 +303,17 @@ class ForcePlans:
         middle = polygon.lay_all(second, self.on(rod).forces)
         end = polygon.lay_all(middle, self.on(slider).forces)
         closed = polygon.close(Line(end, _across(inner, group.guide)), Line(start, Along(pin, inner)))
-        self._on_guide(polygon, slider, group.guide, end, closed, inner, back=False)
+        self._on_guide(polygon, slider, group.guide, (end, closed), inner)
         self._closed_at(polygon, rod, (pin, inner), (start, second, closed), back=True)
         if middle != end:
             polygon.add(self.reaction(slider, rod), middle, closed, link=(pin, inner))
 
     def _on_guide(
-        self, polygon: Polygon, slider: str, guide: Guide, tail: str, head: str, joint: str, *, back: bool
+        self, polygon: Polygon, slider: str, guide: Guide, ends: Ends, joint: str, *, back: bool = False
     ) -> None:
         """Add the reaction of a guide; let it and the couples act on the link that carries it."""
         carrier = GROUND if isinstance(guide, FixedGuide) else guide.link
-        polygon.add(self.reaction(carrier, slider), tail, head, back=back)
+        polygon.add(self.reaction(carrier, slider), *ends, back=back)
         self._act(polygon, slider, carrier, joint, self.on(slider).couples)
 
     def _slotted(self, polygon: Polygon, group: SlottedLink) -> None:
@@ -328,7 +330,7 @@ class ForcePlans:
         self._hinged_block(polygon, block, link, pin, (start, second))
 
     def _hinged_block(
-        self, polygon: Polygon, block: str, link: str, pin: str, ends: tuple[str, str], *, back: bool = False
+        self, polygon: Polygon, block: str, link: str, pin: str, ends: Ends, *, back: bool = False
     ) -> None:
         """Let the reaction at a block's pin act on the link that carries the pin.
 
@@ -356,8 +358,8 @@ class ForcePlans:
         middle = polygon.lay_all(start, self.on(first).forces)
         end = polygon.lay_all(middle, self.on(second).forces)
         closed = polygon.close(Line(end, across[1]), Line(start, across[0]))
-        self._on_guide(polygon, second, group.guides[1], end, closed, group.node, back=False)
-        self._on_guide(polygon, first, group.guides[0], start, closed, group.node, back=True)
+        self._on_guide(polygon, second, group.guides[1], (end, closed), group.node)
+        self._on_guide(polygon, first, group.guides[0], (start, closed), group.node, back=True)
         if middle not in {start, end}:
             polygon.add(self.reaction(second, first), middle, closed)
 
@@ -373,7 +375,7 @@ class ForcePlans:
         closed = polygon.close(Line(end, across), Line(start, slot))
         self.on(yoke).couples.extend(self.on(block).couples)
         joint = group.node if isinstance(group.guide, FixedGuide) else group.pin
-        self._on_guide(polygon, yoke, group.guide, end, closed, joint, back=False)
+        self._on_guide(polygon, yoke, group.guide, (end, closed), joint)
         polygon.add(self.reaction(block, yoke), start, closed, back=True)
         self._hinged_block(polygon, block, yoke, group.pin, (start, closed), back=True)
 
