@@ -233,15 +233,20 @@ class Component(FromNodes):
 
 @dataclass(frozen=True, slots=True)
 class Same(FromNodes):
-    """The length of a vector that is drawn already, at the same scale."""
+    """The length of a vector that is drawn already, at the same scale.
+
+    `sense` is a parameter, -1 for the mistake of the wrong sense, else absent.
+    """
 
     reads = ("tail", "head")
+    sense: str
     tail: str
     head: str
 
     def at(self, view: View) -> FloatArray:
         """Return the length in drawn millimetres."""
-        return np.abs(view.nodes[self.head] - view.nodes[self.tail])
+        size = np.abs(view.nodes[self.head] - view.nodes[self.tail])
+        return np.asarray(size * view.parameters.get(self.sense, 1.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,18 +267,24 @@ class Inertia(FromNodes):
 
 @dataclass(frozen=True, slots=True)
 class Force(FromNodes):
-    """A force on a link: its drawn length, its direction, and the joint at which it acts."""
+    """A force on a link: its drawn length, its direction, and the joint at which it acts.
+
+    `whole_arm` is for the mistake of taking the distance of that joint for the arm of the moment.
+    """
 
     reads = ("size", "along", "point")
     name: str
     size: "Length"
     along: Direction
     point: str
+    whole_arm: bool = False
 
     def moment(self, view: View, about: str) -> FloatArray:
         """Return its moment about a joint, in square millimetres of the drawing: of kL times kF."""
         arm = view.nodes[self.point] - view.nodes[about]
-        return geometry.cross(arm, self.along.at(view) * self.size.at(view))
+        force = self.along.at(view) * self.size.at(view)
+        moment = geometry.cross(arm, force)
+        return np.copysign(np.abs(arm) * np.abs(force), moment) if self.whole_arm else moment
 
 
 @dataclass(frozen=True, slots=True)
@@ -337,6 +348,17 @@ class Balance(FromNodes):
 
 
 Length = Scaled | Normal | Coriolis | Component | Same | Inertia | Balance
+
+
+def data_in(length: Length) -> frozenset[str]:
+    """Return the names of the data of forces and couples on which a length depends."""
+    match length:
+        case Scaled(quantity=name) | Inertia(mass=name) | Same(sense=name):
+            return frozenset((name,))
+        case Balance(forces=forces, couples=couples):
+            of_forces = (name for force in forces for name in data_in(force.size))
+            return frozenset((*of_forces, *(one.inertia or one.name for one in couples)))
+    return frozenset()
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ head to tail, and two lines of known direction close the polygon. Nodes are ``B.
 Source of the method: any course of kinetostatics, as Artobolevsky, Theory of Mechanisms, chapter 13.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 from reference.construction.elements import (
@@ -75,6 +75,12 @@ def with_force_plans(mechanism: Mechanism, plans: Construction, accelerations: A
         vectors={**plans.vectors, **vectors},
         moments=forces.moments,
     )
+
+
+def reaction(names: Mapping[str, str], by: str, on: str) -> str:
+    """Return the name of the reaction of one link on another: ``R_12``, ``R_0-rod``."""
+    short = (names[by], names[on])
+    return "R_" + ("" if max(map(len, short)) == 1 else "-").join(short)
 
 
 @dataclass(slots=True)
@@ -157,9 +163,8 @@ class ForcePlans:
         self.names = short_names(self.mechanism)
 
     def reaction(self, by: str, on: str) -> str:
-        """Return the name of the reaction of one link on another: ``R_12``."""
-        names = (self.names[by], self.names[on])
-        return "R_" + ("" if max(map(len, names)) == 1 else "-").join(names)
+        """Return the name of the reaction of one link on another."""
+        return reaction(self.names, by, on)
 
     def on(self, link: str) -> Loaded:
         """Return what acts on a link."""
@@ -269,19 +274,21 @@ class ForcePlans:
         polygon.add(name, second if back else first, closed, back=back, link=ends if has_parts else None)
         self._hand_over(polygon, link, ends[0])
 
-    def _hand_over(self, polygon: Polygon, link: str, joint: str, couples: Iterable[Couple] = ()) -> None:
+    def _hand_over(self, polygon: Polygon, link: str, joint: str) -> None:
         """Let the reaction at a joint act, the other way round, on the link that carries it."""
-        self._act(polygon, link, self.carriers[joint], joint, couples)
+        carrier = self.carriers[joint]
+        self._act(polygon.vectors[self.reaction(carrier, link)], link, carrier, joint)
 
     def _act(
-        self, polygon: Polygon, link: str, carrier: str, joint: str, couples: Iterable[Couple] = ()
+        self, vector: Vector, link: str, carrier: str, joint: str, couples: Iterable[Couple] = ()
     ) -> None:
+        """Let the opposite of a reaction on a link act on the link that carries the joint."""
         if carrier == GROUND:
             return
-        vector = polygon.vectors[self.reaction(carrier, link)]
+        name = self.reaction(link, carrier)
         along = Parallel(vector.tail, vector.head, quarters=0 if vector.reversed else 2)
-        force = Force(self.reaction(link, carrier), Same(vector.tail, vector.head), along, joint)
-        self.on(carrier).forces.append(force)
+        size = Same(f"sense {name}", vector.tail, vector.head)
+        self.on(carrier).forces.append(Force(name, size, along, joint))
         self.on(carrier).couples.extend(couples)
 
     def _dyad(self, polygon: Polygon, group: Dyad) -> None:
@@ -314,7 +321,8 @@ class ForcePlans:
         """Add the reaction of a guide; let it and the couples act on the link that carries it."""
         carrier = GROUND if isinstance(guide, FixedGuide) else guide.link
         polygon.add(self.reaction(carrier, slider), *ends, back=back)
-        self._act(polygon, slider, carrier, joint, self.on(slider).couples)
+        vector = polygon.vectors[self.reaction(carrier, slider)]
+        self._act(vector, slider, carrier, joint, self.on(slider).couples)
 
     def _slotted(self, polygon: Polygon, group: SlottedLink) -> None:
         pivot, pin, (link, block) = group.pivot, group.pin, self.links[group.node]
@@ -343,11 +351,8 @@ class ForcePlans:
         foot, tip = (head, tail) if back else (tail, head)
         first = polygon.lay_all(tip, reversed(forces), back=True)
         if not forces:
-            vector = polygon.vectors[self.reaction(block, link)]
-            along = Parallel(vector.tail, vector.head, quarters=0 if vector.reversed else 2)
-            if carrier != GROUND:
-                force = Force(self.reaction(block, carrier), Same(vector.tail, vector.head), along, pin)
-                self.on(carrier).forces.append(force)
+            # The block is in balance under two forces: the same vector stands for both.
+            self._act(polygon.vectors[self.reaction(block, link)], block, carrier, pin)
             return
         polygon.add(self.reaction(carrier, block), foot, first)
         self._hand_over(polygon, block, pin)

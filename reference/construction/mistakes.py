@@ -13,14 +13,18 @@ import numpy as np
 
 from reference.construction.elements import (
     Along,
+    Balance,
     Coriolis,
     Direction,
     Fixed,
+    Inertia,
     Line,
     Normal,
     Parameters,
+    Same,
     Scaled,
     View,
+    data_in,
 )
 from reference.construction.graph import Construction, Vector
 from reference.construction.steps import (
@@ -53,8 +57,18 @@ Code = Literal[
     "arithmetic",
     "units",
     "data_misread",
+    "inertia_reversed",
+    "force_missing",
+    "force_reversed",
+    "couple_missing",
+    "couple_reversed",
+    "wrong_arm",
 ]
 CODES: tuple[Code, ...] = get_args(Code)
+OF_FORCES = frozenset[str](
+    ("inertia_reversed", "force_missing", "force_reversed", "couple_missing", "couple_reversed")
+)
+"""Mistakes in what acts on a link: its moments and its polygon have them alike."""
 RPM_FACTOR = 30.0 / math.pi
 """Error factor of omega = n instead of omega = pi n / 30."""
 
@@ -75,7 +89,7 @@ class Mistake:
     ----------
     code : one of `CODES`
     at : the node, vector, scale or figure where it is made
-    slot : index of the step's line (0 or 1)
+    slot : index of the step's line (0 or 1), or of the force with a wrong arm
     other : what is used instead: two joints, a node, a vector (for its line), the two nodes swapped
     factor : of a length, speed or scale
     quarters : quarter turns of a figure or of the driving link's vector, counter-clockwise
@@ -109,6 +123,8 @@ def commit(mistake: Mistake, drawing: Drawing) -> Drawing:
         case "other_variant" | "data_misread":
             scales = {name: parameters[name] for name in ("kL", "kv", "ka", "turn") if name in parameters}
             return Drawing(construction, {**parameters, **mistake.parameters, **scales})
+        case code if code in OF_FORCES:
+            return Drawing(construction, {**parameters, **mistake.parameters})
         case "vector_missing":
             kept = {name: one for name, one in construction.vectors.items() if name != mistake.at}
             return Drawing(replace(construction, vectors=kept), parameters)
@@ -134,6 +150,10 @@ def changed_step(mistake: Mistake, construction: Construction) -> Step:
         ):
             factor = {"normal_missing": 0.0, "arithmetic": mistake.factor, "scale_wrong": mistake.factor}
             return replace(step, factor=step.factor * factor.get(mistake.code, -1.0))
+        case "wrong_arm", Given(length=Balance(forces=forces) as length):
+            wrong = replace(forces[mistake.slot], whole_arm=True)
+            forces = (*forces[: mistake.slot], wrong, *forces[mistake.slot + 1 :])
+            return replace(step, length=replace(length, forces=forces))
         case "normal_from_absolute", Given(length=Normal() as length):
             return replace(step, length=replace(length, tail=construction.poles["velocity_plan"]))
         case "parallel_for_perpendicular", Given():
@@ -286,23 +306,27 @@ def _mistakes_of_given(step: Given, construction: Construction) -> Iterator[Mist
             yield Mistake("normal_reversed", step.node)
             if isinstance(step.length, Normal) and step.length.tail != construction.poles["velocity_plan"]:
                 yield Mistake("normal_from_absolute", step.node)
+        case Balance(forces=forces, about=about):
+            yield Mistake("sense_reversed", step.node)
+            yield from (
+                Mistake("wrong_arm", step.node, slot)
+                for slot, force in enumerate(forces)
+                if force.point != about
+            )
         case _ if not isinstance(step.along, Fixed) or step.start in construction.poles.values():
             yield Mistake("sense_reversed", step.node)
 
 
 def _mistakes_of_lines(step: TwoLines, construction: Construction, figure: str) -> Iterator[Mistake]:
-    links = [
-        tuple(vector.link) for vector in construction.vectors.values() if vector.link and vector.scale == "kv"
-    ]
     pole = construction.poles[figure]
     joints = construction.figures["mechanism"]
     under = {joint.node: joint.other for joint in joints if isinstance(joint, Coincide)}
     for slot, line in enumerate((step.first, step.second)):
-        if not isinstance(line, Line) or not isinstance(line.along, Along):
+        if not isinstance(line, Line) or not isinstance(line.along, Along | Fixed):
             continue
         own = {under.get(joint, joint) for joint in line.along.needs}
         yield Mistake("parallel_for_perpendicular", step.node, slot)
-        for link in dict.fromkeys(links):
+        for link in construction.pairs:
             places = {under.get(joint, joint) for joint in link}
             if len(places) > 1 and places != own:
                 yield Mistake("wrong_link", step.node, slot, other=link)
@@ -367,6 +391,50 @@ def _further_lines(step: TwoLines, slot: int, line: Line, construction: Construc
                 yield Mistake("wrong_intersection", step.node, slot, other=(vector.name,))
 
 
+def mistakes_of_forces(drawing: Drawing) -> Iterator[Mistake]:
+    """Yield mistakes in what acts on links: of one force or couple, and of all of one kind.
+
+    An inertia force along the acceleration, a force or couple left out or with the wrong sense, among them a
+    reaction taken over from another group with the sense that it had there.
+    """
+    changes: dict[tuple[str, float], dict[str, str]] = {}
+    for name, datum in _data_of_forces(drawing.construction):
+        kind = "couple" if name.startswith("M_") else "inertia" if name.startswith("F_i") else "force"
+        if not name.startswith("G_"):
+            changes.setdefault((f"{kind}_reversed", -1.0), {})[name] = datum
+        if not name.startswith("R_"):
+            code = "couple_missing" if kind == "couple" else "force_missing"
+            changes.setdefault((code, 0.0), {})[name] = datum
+    for (code, factor), data in changes.items():
+        for name, datum in data.items():
+            yield Mistake(code, name, factor=factor, parameters=_changed(drawing, factor, datum))
+        for start in ("F_i", "G_", "M_i"):
+            alike = [datum for name, datum in data.items() if name.startswith(start)]
+            if len(alike) > 1:
+                yield Mistake(code, start, factor=factor, parameters=_changed(drawing, factor, *alike))
+
+
+def _data_of_forces(construction: Construction) -> Iterator[tuple[str, str]]:
+    """Yield each force that is laid off, and each couple, with the name of its datum."""
+    for vector in construction.vectors.values():
+        step = construction.step(vector.head)
+        if (
+            vector.scale == "kF"
+            and isinstance(step, Given)
+            and isinstance(step.length, Scaled | Inertia | Same)
+        ):
+            (datum,) = data_in(step.length)
+            yield vector.name, datum
+    balances = [step.length for step in construction.steps if isinstance(step, Given)]
+    for balance in (*balances, *construction.moments.values()):
+        if isinstance(balance, Balance):
+            yield from ((one.name, one.inertia or one.name) for one in balance.couples)
+
+
+def _changed(drawing: Drawing, factor: float, *names: str) -> Parameters:
+    return {name: np.asarray(factor * drawing.parameters.get(name, 1.0)) for name in names}
+
+
 def affected(mistake: Mistake, construction: Construction) -> frozenset[str]:
     """Return the nodes that a mistake moves: its own and those drawn from it."""
     is_of_data = mistake.code in {"other_variant", "data_misread"} and mistake.at not in construction.poles
@@ -374,5 +442,13 @@ def affected(mistake: Mistake, construction: Construction) -> frozenset[str]:
         return frozenset(step.node for step in construction.steps)
     if mistake.at in construction.figures:
         return frozenset(step.node for step in construction.figures[mistake.at])
+    if mistake.code in OF_FORCES:
+        data = frozenset(mistake.parameters)
+        at = {
+            step.node
+            for step in construction.steps
+            if isinstance(step, Given) and data & data_in(step.length)
+        }
+        return frozenset(one.node for one in construction.steps if at & construction.upstream(one.node))
     made_from = (step.node for step in construction.steps if mistake.at in construction.upstream(step.node))
     return frozenset({mistake.at, *made_from})
