@@ -454,6 +454,26 @@ def points_of(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
     return {link: tuple(joints) for link, joints in held.items()}
 
 
+def sliders_of(mechanism: Mechanism) -> dict[str, Guide | None]:
+    """Return the links that slide and carry a single joint, with their guides; None for a block in a slot."""
+    driver, named = mechanism.driver, named_links(mechanism)
+    found: dict[str, Guide | None] = {}
+    if isinstance(driver, DrivingSlider):
+        found[driver.link] = FixedGuide(driver.guide_m, driver.guide_rad)
+    for group in mechanism.groups:
+        links = named[group.node]
+        match group:
+            case CrossSlider(guides=guides):
+                found |= dict(zip(links, guides, strict=True))
+            case Slider(guide=guide):
+                found[links[1]] = guide
+            case Yoke(guide=guide):
+                found |= {links[0]: guide, links[1]: None}
+            case SlottedLink():
+                found[links[1]] = None
+    return found
+
+
 # A mechanism apart from its numbers ----------------------------------------------------------------
 
 

@@ -19,19 +19,13 @@ from reference.mechanism import (
     GROUND,
     SLIDER,
     Body,
-    Crank,
-    CrossSlider,
     FixedGuide,
     Load,
     Mechanism,
-    Slider,
-    SlottedLink,
-    Yoke,
-    guides_of,
     hinged_at,
-    named_links,
     points_of,
     short_name,
+    sliders_of,
     with_arrays,
 )
 
@@ -260,29 +254,11 @@ def _check_link(link: str, points: Points, where: str) -> Iterator[Finding]:
     yield Finding(where, f"{link} is not a moving link{meant}: known are {known}")
 
 
-def _sliding(mechanism: Mechanism) -> dict[str, bool]:
-    """Return the links that carry a single joint and slide, and whether on a fixed guide."""
-    driver, named = mechanism.driver, named_links(mechanism)
-    found = {} if isinstance(driver, Crank) else {driver.link: True}
-    for group in mechanism.groups:
-        links, fixed = named[group.node], [isinstance(guide, FixedGuide) for guide in guides_of(group)]
-        match group:
-            case CrossSlider():
-                found |= dict(zip(links, fixed, strict=True))
-            case Slider():
-                found[links[1]] = fixed[0]
-            case Yoke():
-                found |= {links[0]: fixed[0], links[1]: False}
-            case SlottedLink():
-                found[links[1]] = False
-    return found
-
-
 def _check_tables(mechanism: Mechanism, points: Points, bodies: Sequence[BodyTable]) -> Iterator[Finding]:
     """Check each body's link, its centre if that is a joint, and its pins."""
     seen: set[str] = set()
     pinned: dict[str, str] = {}
-    sliding = _sliding(mechanism)
+    sliding = sliders_of(mechanism)
     for index, body in enumerate(bodies):
         where, link, centre = f"$.body[{index}]", body.link, body.centre
         yield from _check_link(link, points, f"{where}.link")
@@ -346,7 +322,7 @@ def _check_centres(file: MechanismFile, bodies: Sequence[BodyTable]) -> Iterator
 
 
 def _check_loads(mechanism: Mechanism, points: Points, loads: Sequence[LoadTable]) -> Iterator[Finding]:
-    sliding, names = _sliding(mechanism), {"b": "of the balancing force"}
+    sliding, names = sliders_of(mechanism), {"b": "of the balancing force"}
     names |= {f"i{short_name(link)}": f"of the inertia force of link {link}" for link in points}
     for index, load in enumerate(loads):
         where, link = f"$.load[{index}]", load.link
@@ -358,7 +334,7 @@ def _check_loads(mechanism: Mechanism, points: Points, loads: Sequence[LoadTable
         elif load.point is None and load.force is not None and link not in sliding:
             held = ", ".join(points[link])
             yield Finding(f"{where}.point", f"is missing: the force acts on link {link} at one of {held}")
-        if load.motion is not None and not sliding.get(link, False):
+        if load.motion is not None and not isinstance(sliding.get(link), FixedGuide):
             on = "slides on a moving link" if link in sliding else "is no slider"
             yield Finding(f"{where}.motion", f"link {link} {on}: give angle_deg in place of motion")
         name = _load_name(load, points)

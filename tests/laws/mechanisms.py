@@ -6,11 +6,13 @@ import numpy as np
 from hypothesis import strategies as st
 
 from reference.mechanism import (
+    Body,
     Crank,
     CrossSlider,
     DrivingSlider,
     Dyad,
     FixedGuide,
+    Load,
     Mechanism,
     MovingGuide,
     Plate,
@@ -19,7 +21,10 @@ from reference.mechanism import (
     SlotPoint,
     SlottedLink,
     Yoke,
+    hinged_at,
     moving_guides,
+    points_of,
+    sliders_of,
 )
 
 KINDS = (
@@ -243,7 +248,7 @@ class Sketch:
         if found is None:
             return False
         guide = replace(found[0], coincident=f"W{len(self.groups)}")
-        yoke = Yoke(f"Z{len(self.groups)}", pin, array(0.0), guide, f"Y{len(self.groups)}")
+        yoke = Yoke(f"Z{len(self.groups)}", pin, array(0.0), guide, f"YY{len(self.groups)}")
         return self.add(yoke, self.at[pin], {})
 
     def plate(self) -> bool:
@@ -425,6 +430,52 @@ def points_of_links(mechanism: Mechanism) -> dict[str, list[str]]:
         for guide in moving_guides(group):
             carry(guide.link, *guide.base, guide.coincident)
     return links
+
+
+# With masses and loads ----------------------------------------------------------------------------
+
+
+def loaded(mechanism: Mechanism, seed: int) -> Mechanism:
+    """The mechanism with random bodies, loads and gravity; links with random pins; a cylinder that drives."""
+    lot = np.random.default_rng(seed)
+    points, hinged, slots = points_of(mechanism), hinged_at(mechanism), {}
+    for group in mechanism.groups:
+        if isinstance(group, SlottedLink):
+            slots[group.link] = group
+    more, bodies, loads = [], [], []
+    for link, joints in points.items():
+        joints = [*joints]
+        if link in slots:
+            more.append(SlotPoint(f"S{link}", slots[link].node, link, array(complex(*lot.uniform(-1, 1, 2)))))
+            joints.append(more[-1].node)
+        elif len(joints) > 1 and lot.random() < 0.7:
+            more.append(PointOnLine(f"S{link}", (joints[0], joints[1]), link, array(lot.uniform(-1, 2))))
+            joints.append(more[-1].node)
+        if lot.random() < 0.8:
+            size = 10.0 ** lot.uniform(-1, 2)
+            inertia = lot.choice([0.0, size * lot.uniform(0, 1)])
+            bodies.append(Body(link, str(lot.choice(joints)), array(size), array(inertia)))
+        if lot.random() < 0.4:
+            force = 10.0 ** lot.uniform(0, 4) * turn_to(lot.uniform(-np.pi, np.pi))
+            loads.append(Load(f"L{len(loads)}", link, str(lot.choice(joints)), array(force), array(0.0)))
+        if lot.random() < 0.2:
+            couple = array(lot.uniform(-100, 100))
+            loads.append(Load(f"L{len(loads)}", link, joints[0], array(0j), couple))
+        if isinstance(sliders_of(mechanism).get(link), FixedGuide):
+            force = array(complex(lot.uniform(-1000, 1000)))
+            loads.append(Load(f"L{len(loads)}", link, joints[0], force, array(0.0), joints[0]))
+    driver = mechanism.driver
+    for group in slots.values():
+        grounded = mechanism.ground_m.keys() - {getattr(driver, "pivot", "")}
+        if isinstance(driver, Crank) and group.pin == driver.pin and group.pivot in grounded:
+            driver = replace(driver, cylinder=group.link)
+    pins = {joint: str(lot.choice(links)) for joint, links in hinged.items() if len(links) > 1}
+    gravity = array(9.81) if lot.random() < 0.5 else None
+    groups = (*mechanism.groups, *more)
+    return replace(
+        mechanism, driver=driver, groups=groups, bodies=tuple(bodies), loads=tuple(loads),
+        gravity=gravity, pins=pins,
+    )  # fmt: skip
 
 
 def after(mechanism: Mechanism, time_s) -> Mechanism:

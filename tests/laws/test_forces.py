@@ -1,0 +1,232 @@
+"""Forces obey Newton and Euler: against one linear system of 50 digits, by their power, by superposition."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from mpmath import mp
+
+from reference.kinematics.motion import move, move_where_possible
+from reference.kinematics.solving import one_variant, solve
+from reference.kinetics import forces_of
+from reference.mechanism import (
+    GROUND,
+    Crank,
+    CrossSlider,
+    DrivingSlider,
+    Dyad,
+    FixedGuide,
+    Mechanism,
+    Slider,
+    SlottedLink,
+    Yoke,
+    carriers,
+    named_links,
+)
+from tests.laws.mechanisms import KINDS, array, loaded, random_mechanism
+from tests.examples import slow
+
+TRUE_DIGITS = 50
+
+
+def cross(u, v):
+    return u.real * v.imag - u.imag * v.real
+
+
+class Equations:
+    """The equilibrium of every link: two equations of forces, one of moments about the origin."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.solution = solve(mechanism, one_variant(0, mp.mpmathify), anew=True)
+        self.at = {name: joint.position for name, joint in self.solution.joints.items()}
+        self.mechanism, self.named, self.carriers = mechanism, named_links(mechanism), carriers(mechanism)
+        self.turns: dict[str, str] = {}
+        self.unknowns: list[tuple[str, str, str, str]] = []
+        self.columns: list[dict[tuple[str, int], object]] = []
+        self.given: dict[str, list] = {
+            link: [mp.mpf(0)] * 3 for links in self.named.values() for link in links
+        }
+        self.given[mechanism.driver.link] = [mp.mpf(0)] * 3
+        self.connect()
+        self.load()
+
+    def number(self, values):
+        return self.solution.take(values)
+
+    def force(self, kind: str, joint: str, on: str, by: str, direction) -> None:
+        """An unknown force of a direction, on one link and against the other."""
+        arm = self.at[joint]
+        parts = (direction.real, direction.imag, cross(arm, direction))
+        self.unknown(kind, joint, on, by, parts)
+
+    def unknown(self, kind, joint, on, by, parts):
+        self.unknowns.append((kind, joint, on, by))
+        self.columns.append(
+            {(link, row): sign * part for link, sign in ((on, 1), (by, -1)) for row, part in enumerate(parts)}
+        )
+
+    def hinge(self, joint, on, by):
+        self.force("x", joint, on, by, mp.mpc(1))
+        self.force("y", joint, on, by, mp.mpc(0, 1))
+
+    def slide(self, joint, on, by, along):
+        self.force("n", joint, on, by, 1j * along)
+        self.unknown("m", joint, on, by, (0, 0, mp.mpf(1)))
+
+    def line(self, guide):
+        if isinstance(guide, FixedGuide):
+            return GROUND, mp.expj(self.number(guide.angle_rad))
+        g, h = guide.base
+        d = self.at[h] - self.at[g]
+        return guide.link, d / abs(d)
+
+    def connect(self):
+        driver = self.mechanism.driver
+        cylinder = getattr(driver, "cylinder", None)
+        if isinstance(driver, DrivingSlider):
+            along = mp.expj(self.number(driver.guide_rad))
+            self.slide(driver.pin, driver.link, GROUND, along)
+            self.force("balancing", driver.pin, driver.link, GROUND, along)
+        else:
+            self.hinge(driver.pivot, driver.link, GROUND)
+            if cylinder is None:
+                self.unknown("balancing", "", driver.link, GROUND, (0, 0, mp.mpf(1)))
+        for group in self.mechanism.groups:
+            links = self.named[group.node]
+            match group:
+                case Dyad(pins=pins, node=node):
+                    for pin, link in zip(pins, links, strict=True):
+                        self.hinge(pin, link, self.carriers[pin])
+                    self.hinge(node, *links)
+                case Slider(pin=pin, node=node, guide=guide):
+                    self.hinge(pin, links[0], self.carriers[pin])
+                    self.hinge(node, *links)
+                    by, along = self.line(guide)
+                    self.slide(node, links[1], by, along)
+                    self.turns[links[1]] = by
+                case SlottedLink(pin=pin, pivot=pivot, node=node):
+                    self.hinge(pin, links[1], self.carriers[pin])
+                    self.hinge(pivot, links[0], self.carriers[pivot])
+                    along = self.solution.slots[node][1]
+                    self.slide(pin, links[1], links[0], along)
+                    self.turns[links[1]] = links[0]
+                    if links[0] == cylinder:
+                        self.force("balancing", pin, links[1], links[0], along)
+                case CrossSlider(node=node, guides=guides):
+                    self.hinge(node, *links)
+                    for link, guide in zip(links, guides, strict=True):
+                        by, along = self.line(guide)
+                        self.slide(node, link, by, along)
+                        self.turns[link] = by
+                case Yoke(node=node, pin=pin, guide=guide):
+                    by, along = self.line(guide)
+                    self.slide(node, links[0], by, along)
+                    fixed = isinstance(guide, FixedGuide)
+                    slot = mp.expj(self.number(group.slot_rad)) if fixed else 1j * along
+                    self.slide(pin, links[1], links[0], slot)
+                    self.hinge(pin, links[1], self.carriers[pin])
+                    self.turns |= {links[0]: by, links[1]: by}
+
+    def load(self):
+        """Given forces, from the accelerations of 50 digits."""
+        joints, mechanism = self.solution.joints, self.mechanism
+        rates = self.solution.epsilon
+        for body in mechanism.bodies:
+            mass = self.number(body.mass)
+            force = -mass * joints[body.centre].acceleration
+            if mechanism.gravity is not None:
+                force -= 1j * mass * self.number(mechanism.gravity)
+            turning = self.turns.get(body.link, body.link)
+            couple = -self.number(body.inertia) * rates.get(turning, mp.mpf(0))
+            self.act(body.link, body.centre, force, couple)
+        for load in mechanism.loads:
+            force = self.number(load.force)
+            if load.slider is not None:
+                slider = joints[load.slider]
+                motion = slider.velocity or slider.acceleration
+                force = force.real * motion / abs(motion) if motion else mp.mpc(0)
+            self.act(load.link, load.point, force, self.number(load.couple))
+
+    def act(self, link, point, force, couple):
+        for row, part in enumerate((force.real, force.imag, cross(self.at[point], force) + couple)):
+            self.given[link][row] += part
+
+    def solved(self) -> dict[tuple[str, str, str], object]:
+        """By joint and links, the force; by "moment" too, that of a guide about its joint; "balancing"."""
+        links = [*self.given]
+        assert len(self.unknowns) == 3 * len(links)
+        matrix = mp.matrix(3 * len(links), 3 * len(links))
+        right = mp.matrix(3 * len(links), 1)
+        index = {link: 3 * place for place, link in enumerate(links)}
+        for column, parts in enumerate(self.columns):
+            for (link, row), part in parts.items():
+                if link != GROUND:
+                    matrix[index[link] + row, column] = part
+        for link in links:
+            for row in range(3):
+                right[index[link] + row] = -self.given[link][row]
+        values = mp.lu_solve(matrix, right)
+        found = {}
+        for unknown, parts, value in zip(self.unknowns, self.columns, values, strict=True):
+            kind, joint, on, by = unknown
+            if kind == "balancing":
+                found["balancing"] = value * mp.mpc(parts[on, 0], parts[on, 1]) if joint else value
+                continue
+            for first, second, sign in ((on, by, 1), (by, on, -1)):
+                key = ("moment" if kind == "m" else "force", joint, first, second)
+                part = mp.mpf(1) if kind == "m" else mp.mpc(parts[on, 0], parts[on, 1])
+                found[key] = found.get(key, mp.mpc(0)) + sign * value * part
+        return found
+
+
+def errors(mechanism: Mechanism) -> tuple[float, float] | None:
+    """The largest error of any force, relative to the largest one, and its prediction; None without a motion."""
+    motion = move_where_possible(mechanism)
+    if not np.isfinite(motion.predicted_error[0]):
+        return None
+    forces = forces_of(mechanism, motion)
+    with mp.workdps(TRUE_DIGITS):
+        equations = Equations(mechanism)
+        truth = equations.solved()
+        reach = max(map(abs, equations.at.values()))
+        pairs = [(one.force, truth["force", one.joint, one.on, one.by], 1) for one in forces.hinges.values()]
+        for one in forces.guides.values():
+            pairs.append((one.force, truth["force", one.joint, one.on, one.by], 1))
+            pairs.append((one.moment, truth["moment", one.joint, one.on, one.by], reach))
+        one = forces.balancing
+        pairs.append(
+            (one.force if one.is_force else one.moment, truth["balancing"], 1 if one.is_force else reach)
+        )
+        assert len(truth) == 2 * len(pairs) - 1
+        given = [abs(complex(one.force[0])) for one in forces.given]
+        given += [abs(float(one.couple[0])) / reach for one in forces.given]
+        size = max([*given, *(abs(exact) / share for _, exact, share in pairs)])
+        if size == 0:
+            return 0.0, 0.0
+        error = max(abs(mp.mpmathify(complex(found[0])) - exact) / share for found, exact, share in pairs)
+        return float(error / size), float(forces.predicted_error[0])
+
+
+def random_loaded(number: int, least_sine: float):
+    lot = np.random.default_rng(number)
+    chain = list(lot.choice(KINDS, size=lot.integers(1, 7)))
+    # Every kind stands first in some chain.
+    chain = [KINDS[number % len(KINDS)], *chain]
+    mechanism = random_mechanism(
+        int(lot.integers(2**31)), chain, slider_drives=number % 3 == 0, least_sine=least_sine
+    )
+    return loaded(mechanism, number)
+
+
+@pytest.mark.parametrize("block", [0, *slow(*range(1, 10))])
+@pytest.mark.parametrize("least_sine", [0.25, 1e-9])
+def test_forces_solve_all_equations_of_newton_and_euler(block, least_sine):
+    checked = 0
+    for number in range(50 * block, 50 * (block + 1)):
+        found = errors(random_loaded(number, least_sine))
+        if found is None:
+            continue
+        error, predicted = found
+        assert error <= predicted, number
+        checked += 1
+    assert checked > 40
