@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 from reference.authored.assignment import Assignment, Scales, Variant
 from reference.construction.derive import construction_of, image_name
 from reference.construction.elements import Normal, View
+from reference.construction.forces import Accelerations, reaction
 from reference.construction.graph import Construction, Vector, evaluate, parameters_of
 from reference.construction.mistakes import Drawing
 from reference.construction.steps import Given, TwoLines
-from reference.geometry import ComplexArray, FloatArray, cross, dot
+from reference.geometry import ComplexArray, FloatArray, cross, dot, unit
 from reference.kinematics.motion import Motion, move
-from reference.mechanism import Mechanism
+from reference.kinetics import Forces, forces_of
+from reference.mechanism import Mechanism, short_names
+from reference.quantities import group_of
 
 ZERO_SHARE = 1e-9
 """A vector shorter than this share of its plan's size is a zero vector and has no direction."""
@@ -31,8 +34,9 @@ class Plan:
     Attributes
     ----------
     nodes_mm : by figure and node, complex, millimetres from the figure's origin (a plan's pole)
-    vectors_si : by name, complex, m/s and m/s^2
-    rates : omega_k, epsilon_k, rad/s and rad/s^2, counter-clockwise positive
+    vectors_si : by name, complex, m/s, m/s^2 and N, in the vector's own sense
+    rates : omega_k, epsilon_k, rad/s and rad/s^2, and M_b, N m, counter-clockwise positive
+    forces : of every variant, where the assignment has force plans
     """
 
     variants: tuple[Variant, ...]
@@ -43,6 +47,7 @@ class Plan:
     nodes_mm: Mapping[str, Mapping[str, ComplexArray]]
     vectors_si: Mapping[str, ComplexArray]
     rates: Mapping[str, FloatArray]
+    forces: Forces | None = None
 
     @property
     def construction(self) -> Construction:
@@ -70,13 +75,21 @@ class Plan:
 
 
 def construction_for(
-    assignment: Assignment, variants: list[Variant] | None = None, *, accelerations: bool = True
+    assignment: Assignment,
+    variants: list[Variant] | None = None,
+    *,
+    accelerations: bool = True,
+    forces: Accelerations | None = None,
 ) -> Construction:
-    """Return the construction of an assignment's plans for some variants (default: the first one)."""
+    """Return the construction of an assignment's plans for some variants (default: the first one).
+
+    Arguments: `forces`, whence the accelerations of its force plans come (default: as its pages have it).
+    """
     return construction_of(
         assignment.mechanism(assignment.variants()[:1] if variants is None else variants),
         accelerations=accelerations,
         plate_by_similarity=assignment.file.plate_images == "similarity",
+        forces=assignment.forces and (forces or assignment.forces),
     )
 
 
@@ -86,25 +99,34 @@ def exact_plan(
     scales: Scales | None = None,
     *,
     accelerations: bool = True,
+    forces: Accelerations | None = None,
 ) -> Plan:
     """Return the exact plans of some variants, at the given scales or those that the assignment proposes.
+
+    Arguments: see `construction_for`.
 
     Raises MechanismError where a variant does not assemble.
     """
     mechanism = assignment.mechanism(variants)
     scales = scales or assignment.scales(variants)
-    motion = move(mechanism, accelerations=accelerations)
-    construction = construction_for(assignment, variants, accelerations=accelerations)
+    construction = construction_for(assignment, variants, accelerations=accelerations, forces=forces)
+    solved = None
+    motion = move(mechanism, accelerations=accelerations or assignment.forces is not None)
     nodes = _nodes(construction, mechanism, motion, scales)
-    vectors = {}
-    for name, vector in construction.vectors.items():
-        figure = nodes[construction.figure_of(vector.head)]
-        vectors[name] = (figure[vector.head] - figure[vector.tail]) * getattr(scales, vector.scale)
     rates = {name: _rate(motion, name) for name in construction.rates}
     parameters = parameters_of(mechanism, scales.kL, scales.kv, scales.ka)
     parameters = {**_measured(construction, motion), **parameters}
+    if scales.kF is not None and assignment.forces is not None:
+        solved = forces_of(mechanism, motion)
+        nodes |= force_nodes(construction, mechanism, motion, solved, scales.kF)
+        rates |= dict.fromkeys(construction.moments, solved.balancing.moment)
+        parameters |= {"kF": scales.kF, **data_of_forces(mechanism, solved)}
+    vectors = {}
+    for name, vector in construction.vectors.items():
+        figure, sense = nodes[construction.figure_of(vector.head)], -1.0 if vector.reversed else 1.0
+        vectors[name] = (figure[vector.head] - figure[vector.tail]) * (sense * getattr(scales, vector.scale))
     drawing = Drawing(construction, parameters)
-    return Plan(tuple(variants), mechanism, motion, scales, drawing, nodes, vectors, rates)
+    return Plan(tuple(variants), mechanism, motion, scales, drawing, nodes, vectors, rates, solved)
 
 
 def _nodes(
@@ -113,6 +135,8 @@ def _nodes(
     """Return every node from the closed form: images of the joints, and ends of normal components."""
     figures = {"mechanism": {joint: np.asarray(r / scales.kL) for joint, r in motion.position.items()}}
     for figure, pole in construction.poles.items():
+        if group_of(figure):
+            continue
         primed = figure == "acceleration_plan"
         rate, scale = (motion.acceleration, scales.ka) if primed else (motion.velocity, scales.kv)
         zero = np.zeros(np.shape(scale), dtype=np.complex128)
@@ -125,6 +149,47 @@ def _nodes(
                 nodes[vector.head] = nodes[vector.tail] + _component(motion, vector) / scales.ka
         figures[figure] = {step.node: nodes[step.node] for step in construction.figures[figure]}
     return figures
+
+
+def force_nodes(
+    construction: Construction, mechanism: Mechanism, motion: Motion, forces: Forces, scale: FloatArray
+) -> dict[str, dict[str, ComplexArray]]:
+    """Return the nodes of the force plans: the ends of forces laid off one after another."""
+    names, values = short_names(mechanism), {one.name: one.force for one in forces.given}
+    for one in (*forces.hinges.values(), *forces.guides.values()):
+        values[reaction(names, one.by, one.on)] = one.force
+        values[reaction(names, one.on, one.by)] = -one.force
+    values["F_b"] = forces.balancing.force
+    figures = {}
+    for figure, pole in construction.poles.items():
+        if not group_of(figure):
+            continue
+        nodes = {pole: np.zeros(np.shape(scale), np.complex128)}
+        for vector in construction.vectors_of(figure):
+            if vector.tail in nodes and vector.head not in nodes:
+                force = values[vector.name.removesuffix(f"_{vector.part}")]
+                if vector.part:
+                    pin, inner = vector.link or ("", "")
+                    along = unit(motion.position[inner] - motion.position[pin])
+                    axis = along if vector.part == "n" else 1j * along
+                    force = np.asarray(axis * dot(axis, force))
+                sense = -1.0 if vector.reversed else 1.0
+                nodes[vector.head] = np.asarray(nodes[vector.tail] + sense * force / scale)
+        figures[figure] = {step.node: nodes[step.node] for step in construction.figures[figure]}
+    return figures
+
+
+def data_of_forces(mechanism: Mechanism, forces: Forces) -> dict[str, FloatArray]:
+    """Return the parameters of force plans: masses, and sizes, directions and couples of given forces."""
+    known: dict[str, FloatArray] = {}
+    for one in forces.given:
+        known |= {one.name: np.abs(one.force), f"angle {one.name}": np.angle(one.force)}
+        known[f"M_{one.name.partition('_')[2]}"] = one.couple
+    for body in mechanism.bodies:
+        name = short_names(mechanism)[body.link]
+        known |= {f"m_{name}": body.mass} if body.mass is not None else {}
+        known |= {f"I_{name}": body.inertia} if body.inertia is not None else {}
+    return known
 
 
 def vectors_of(construction: Construction, mechanism: Mechanism, motion: Motion) -> dict[str, ComplexArray]:
