@@ -157,10 +157,15 @@ class ForcePlans:
     links: dict[str, tuple[str, ...]] = field(init=False)
     carriers: dict[str, str] = field(init=False)
     names: dict[str, str] = field(init=False)
+    cylinder: SlottedLink | None = field(init=False)
+    """The group of the cylinder that drives the crank, without mass: its thrust, F_b, balances the crank."""
 
     def __post_init__(self) -> None:
         self.links, self.carriers = named_links(self.mechanism), carriers(self.mechanism)
         self.names = short_names(self.mechanism)
+        slotted = (one for one in self.mechanism.groups if isinstance(one, SlottedLink))
+        cylinder = getattr(self.mechanism.driver, "cylinder", None)
+        self.cylinder = next((one for one in slotted if one.link == cylinder), None)
 
     def reaction(self, by: str, on: str) -> str:
         """Return the name of the reaction of one link on another."""
@@ -174,7 +179,9 @@ class ForcePlans:
         """Add the plans of all groups, from the last, and of the driving link."""
         self._given_forces()
         for group in reversed(self.mechanism.groups):
-            if any(self.on(link).forces or self.on(link).couples for link in self.links[group.node]):
+            if group is not self.cylinder and any(
+                self.on(link).forces or self.on(link).couples for link in self.links[group.node]
+            ):
                 self._group(group)
         self._driver(self.mechanism.driver)
 
@@ -395,14 +402,19 @@ class ForcePlans:
         end = polygon.lay_all(start, here.forces)
         name = self.reaction(GROUND, driver.link)
         if isinstance(driver, Crank):
+            along: Direction = Along(driver.pivot, driver.pin, 1)
+            if self.cylinder is not None:
+                along = slot_axis(self.cylinder)
+            balance = Balance(driver.pivot, driver.pin, along, tuple(here.forces), tuple(here.couples))
+            if self.cylinder is None:
+                self.moments["M_b"] = balance
+            else:
+                end = polygon.lay("F_b", end, Force("F_b", balance, along, driver.pin))
             if end != start:
                 polygon.add(name, start, end, back=True)
-            forces, couples = tuple(here.forces), tuple(here.couples)
-            across = Along(driver.pivot, driver.pin, 1)
-            self.moments["M_b"] = Balance(driver.pivot, driver.pin, across, forces, couples)
             return
-        along = Fixed(f"angle guide {driver.pin}")
-        closed = polygon.close(Line(end, along), Line(start, replace(along, quarters=1)))
+        guide = Fixed(f"angle guide {driver.pin}")
+        closed = polygon.close(Line(end, guide), Line(start, replace(guide, quarters=1)))
         polygon.add("F_b", end, closed)
         polygon.add(name, start, closed, back=True)
 
