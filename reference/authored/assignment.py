@@ -5,6 +5,7 @@ evaluated on arrays over variants.
 """
 
 import os
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
@@ -13,7 +14,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from reference.authored import toml_file
 from reference.authored.assembly import LARGEST, Numbers, build_driver, build_mechanism
@@ -35,8 +36,8 @@ from reference.authored.variant_table import (
 from reference.errors import AuthoredFileError, CallError, Faults, Finding, near_names, ranges_of
 from reference.geometry import FloatArray
 from reference.kinematics.motion import BoolArray
-from reference.mechanism import Crank, Driver, Mechanism
-from reference.quantities import SCALE_UNITS
+from reference.mechanism import Crank, Driver, Mechanism, links_of
+from reference.quantities import FIGURE, FORCE_PLAN, SCALE_UNITS, group_of, scale_of
 
 
 class Range(Authored):
@@ -73,19 +74,36 @@ class ScalesTable(Authored):
     """The assignment's own rule for the scales.
 
     Formulas of the variant's values and of `crank_mm` (drawn length of the crank), `crank_m` (its
-    real length), `omega`, then `kL`, then `kv`; where a slider drives, of `speed` instead (m/s).
+    real length), `omega`, then `kL`, then `kv`; where a slider drives, of `speed` instead (m/s). kF, for
+    force plans, may use `force`, too (N): the variant's largest given force.
     """
 
     crank_mm: FormulaText | None = None
     kL: FormulaText  # noqa: N815 - the field's own name for it
     kv: FormulaText
     ka: FormulaText
-    bare_units: dict[Literal["kL", "kv", "ka"], str] = Field(default={})
+    kF: FormulaText | None = None  # noqa: N815
+    bare_units: dict[Literal["kL", "kv", "ka", "kF"], str] = Field(default={})
     """The unit of a scale that a student writes as a bare number, where the assignment says one."""
 
+    @property
+    def rules(self) -> dict[str, Formula]:
+        """The formulas of the scales, by name, in the order in which each may follow from those before."""
+        return {name: rule for name in SCALE_NAMES if (rule := getattr(self, name)) is not None}
 
-PageKind = Literal["all", "velocity", "acceleration", "mechanism"]
+
+PageKind = Literal["all", "velocity", "acceleration", "mechanism", "forces"]
 GridSide = Annotated[int, Field(ge=1, le=6)]
+
+
+def _of_a_figure(name: str) -> str:
+    if not re.fullmatch(FIGURE, name):
+        known = "mechanism, velocity_plan, acceleration_plan"
+        raise ValueError(f"must be one of {known}, or {FORCE_PLAN} and the joint of a group")
+    return name
+
+
+FigureName = Annotated[str, AfterValidator(_of_a_figure), Field(json_schema_extra={"pattern": FIGURE})]
 
 
 class PageTable(Authored):
@@ -96,7 +114,7 @@ class PageTable(Authored):
     """
 
     kind: PageKind
-    figures: Annotated[list[Literal["mechanism", "velocity_plan", "acceleration_plan"]], Field(min_length=1)]
+    figures: Annotated[list[FigureName], Field(min_length=1)]
     grid: Annotated[list[GridSide], Field(min_length=2, max_length=2)] | None = None
 
     @model_validator(mode="after")
@@ -116,9 +134,9 @@ class GivenTable(Authored):
 
 TRADITIONS: dict[str, dict[str, str]] = {
     "o": {},
-    "p": {"o": "p", "o'": "π", "kL": "μl", "kv": "μv", "ka": "μa"},
+    "p": {"o": "p", "o'": "π", "kL": "μl", "kv": "μv", "ka": "μa", "kF": "μF"},
 }
-"""Names that schools use for poles and scales: o, o', kL, kv, ka; or p, π, μl, μv, μa."""
+"""Names that schools use for poles and scales: o, o', kL, kv, ka, kF; or p, π, μl, μv, μa, μF."""
 
 
 class AssignmentFile(Authored):
@@ -179,15 +197,23 @@ class Variant:
 
 
 SCALE_NAMES = tuple(SCALE_UNITS)
+USUAL_SCALES = SCALE_NAMES[:3]
+"""Those of an assignment without forces."""
 
 
 @dataclass(frozen=True, slots=True)
 class Scales:
-    """Real units per millimetre on paper: m/mm, (m/s)/mm, (m/s^2)/mm."""
+    """Real units per millimetre on paper: m/mm, (m/s)/mm, (m/s^2)/mm; N/mm where an assignment has forces."""
 
     kL: FloatArray  # noqa: N815 - the field's own name for it
     kv: FloatArray
     ka: FloatArray
+    kF: FloatArray | None = None  # noqa: N815
+
+    @property
+    def by_name(self) -> dict[str, FloatArray]:
+        """Every scale that there is, by name."""
+        return {name: scale for name in SCALE_NAMES if (scale := getattr(self, name)) is not None}
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,6 +248,18 @@ class Assignment:
         """The positions, where a sheet has all of them; else none."""
         is_shared = any(page.grid for page in self.file.page)
         return tuple(self.numbers("position") or ()) if is_shared else ()
+
+    @property
+    def figures(self) -> tuple[str, ...]:
+        """The figures on its pages, each once."""
+        return tuple(dict.fromkeys(figure for page in self.file.page for figure in page.figures))
+
+    @property
+    def scale_names(self) -> tuple[str, ...]:
+        """The scales of the drawings: kL, kv and ka; with force plans, those of the pages' figures."""
+        drawn = {scale_of(figure) for figure in self.figures}
+        usual = USUAL_SCALES if "kF" not in drawn else USUAL_SCALES[:1]
+        return tuple(name for name in SCALE_NAMES if name in drawn or name in usual)
 
     def variants(self) -> list[Variant]:
         """Return every variant, by number, then by position."""
@@ -304,12 +342,14 @@ class Assignment:
         crank_mm: float | FloatArray | None = None,
         **declared: float | FloatArray | None,
     ) -> Scales:
-        """Return the scales kL, kv and ka: those declared, the others by the assignment's rule.
+        """Return the scales: those declared, the others by the assignment's rule.
 
         A declared kL, or the drawn crank, replaces the proposed length of the crank.
         """
         known = self.scale_values(variants, crank_mm=crank_mm, **declared)
-        return Scales(*(np.broadcast_to(known[name], (len(variants),)) for name in SCALE_NAMES))
+        return Scales(
+            **{name: np.broadcast_to(known[name], (len(variants),)) for name in self.file.scales.rules}
+        )
 
     def scale_values(
         self,
@@ -327,12 +367,19 @@ class Assignment:
             known["crank_mm"] = np.asarray(crank_mm, float)
         elif rule.crank_mm is not None:
             known["crank_mm"] = rule.crank_mm(known)
-        for name in SCALE_NAMES:
+        if rule.kF is not None:
+            known |= self._forces(variants)
+        for name, formula in rule.rules.items():
             given = declared.get(name)
-            known[name] = getattr(rule, name)(known) if given is None else np.asarray(given, float)
+            known[name] = formula(known) if given is None else np.asarray(given, float)
             if name == "kL" and given is not None and "crank_m" in known:
                 known["crank_mm"] = np.asarray(known["crank_m"]) / known[name]
         return known
+
+    def _forces(self, variants: list[Variant]) -> dict[str, Value]:
+        """Return the values of the forces that the rule for kF may use: ``force``, the largest given one."""
+        forces = [np.abs(load.force) for load in self.mechanism(variants).loads]
+        return {"force": np.max(np.broadcast_arrays(*forces), axis=0)} if forces else {}
 
     def _at_speed(self, driver: Driver) -> Driver:
         if not isinstance(driver, Crank):
@@ -419,6 +466,8 @@ def _load(path: Path, _changed_ns: int) -> Assignment:
     faults.add(path, _check_table(assignment))
     faults.tell()
     _check_formulas(assignment, source).tell()
+    faults.add(path, _check_force_plans(assignment))
+    faults.tell()
     variants = assignment.variants()
     if not assignment.numbers("position"):
         return assignment
@@ -521,8 +570,8 @@ def _check_formulas(assignment: Assignment, source: Path) -> Faults:
 
 def _check_scales(assignment: Assignment, variants: list[Variant]) -> Iterator[Finding]:
     """Report the first scale that cannot be computed, or is not above zero; the others follow from it."""
-    known: dict[str, FloatArray | float] = dict.fromkeys(SCALE_NAMES, 1.0)
-    for name in SCALE_NAMES:
+    known: dict[str, FloatArray | float] = dict.fromkeys(assignment.file.scales.rules, 1.0)
+    for name in tuple(known):
         del known[name]
         try:
             known[name] = getattr(assignment.scales(variants, **known), name)
@@ -532,6 +581,22 @@ def _check_scales(assignment: Assignment, variants: list[Variant]) -> Iterator[F
         if not np.all((known[name] > 1.0 / LARGEST) & (known[name] < LARGEST)):
             yield Finding(f"$.scales.{name}", f"{name} must be above zero for every variant")
             return
+
+
+def _check_force_plans(assignment: Assignment) -> Iterator[Finding]:
+    """Report force plans of joints that name no group, and a missing scale of forces."""
+    if "kF" not in assignment.scale_names:
+        return
+    if assignment.file.scales.kF is None:
+        yield Finding("$.scales.kF", "is missing: a page shows a force plan")
+    mechanism = assignment.mechanism(assignment.variants()[:1])
+    joints = [group.node for group in reversed(mechanism.groups) if links_of(group)]
+    known = ", ".join(f"{FORCE_PLAN}{joint}" for joint in (*joints, mechanism.driver.pin))
+    for index, page in enumerate(assignment.file.page):
+        for place, figure in enumerate(page.figures):
+            if (joint := group_of(figure)) and joint not in (*joints, mechanism.driver.pin):
+                message = f"{joint} names no group of this mechanism; its force plans are {known}"
+                yield Finding(f"$.page[{index}].figures[{place}]", message)
 
 
 def _failing(variants: list[Variant], which: BoolArray | None) -> str:

@@ -20,7 +20,7 @@ from typing import Literal
 
 import numpy as np
 
-from reference.construction.elements import Errors, Fixed, Line, Nodes, Parameters, View
+from reference.construction.elements import Errors, Fixed, Length, Line, Nodes, Parameters, View
 from reference.construction.steps import (
     ArcAndLine,
     Coincide,
@@ -189,6 +189,7 @@ class Construction:
         construction itself finds it by other means
     centres : on the sketch, by Mehmke's similarity from the finished plans: instantaneous centres (``I3``)
         and acceleration poles (``J3``) of links that turn about no fixed pivot
+    moments : moments (N m, counter-clockwise positive) by name, each from nodes of the sketch and the plans
     """
 
     figures: Mapping[str, tuple[Step, ...]]
@@ -197,6 +198,7 @@ class Construction:
     rates: Mapping[str, AngularRate]
     images: Mapping[str, Similar] = field(default_factory=dict)
     centres: Mapping[str, Similar] = field(default_factory=dict)
+    moments: Mapping[str, Length] = field(default_factory=dict)
 
     @cached_property
     def steps(self) -> tuple[Step, ...]:
