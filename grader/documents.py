@@ -10,14 +10,15 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from reference.construction.mistakes import Code
-from reference.quantities import value_name
+from reference.quantities import FIGURE, value_name
 
 SCHEMA_VERSION = 1
 
 Version = Literal[1]
 Verdict = Literal["full", "partial", "none", "follow_through", "review", "not_judged"]
 Status = Literal["graded", "needs_review", "unreadable", "missing"]
-ScaleName = Literal["kL", "kv", "ka"]
+ScaleName = Literal["kL", "kv", "ka", "kF"]
+FigureName = Annotated[str, Field(pattern=FIGURE)]
 Cause = Literal["assignment", "rubric", "submission", "roster", "decision", "program", "new", "gone"]
 """Cause of a changed mark."""
 Sign = Literal["hand_errors", "same_place", "same_numbers", "same_picture", "other_number"]
@@ -169,7 +170,7 @@ class ReadingDocument(Document):
     page: int
     student_id: str | None
     sheet: SheetDocument | None
-    figures: dict[Literal["mechanism", "velocity_plan", "acceleration_plan"], FigureDocument]
+    figures: dict[FigureName, FigureDocument]
     unread: list[UnreadDocument] = []
     problems: list[ProblemDocument] = []
     timing_ms: TimingDocument | None = None
@@ -613,6 +614,7 @@ class LintScales(Document):
     kL: tuple[float, float]  # noqa: N815 - the field's own name for it
     kv: tuple[float, float]
     ka: tuple[float, float]
+    kF: tuple[float, float] | None = None  # noqa: N815
     room: float
     shortest_mm: LintLeast | None
     under_8_mm: int

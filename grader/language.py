@@ -7,6 +7,7 @@ other languages. `docs/translating.md` says what to do after a text has changed.
 import gettext as gnu
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from importlib.resources import files
@@ -14,6 +15,7 @@ from importlib.resources import files
 from markupsafe import Markup, escape
 
 from reference.errors import CallError
+from reference.quantities import group_of, sort_of
 
 LANGUAGES = ("en", "ro", "ru")
 DOMAIN = "planmark"
@@ -27,13 +29,14 @@ def N_(text: str) -> str:  # noqa: N802 - gettext's own name for it
 
 UNITS = (
     N_("mm"), N_("m"), N_("m/s"), N_("m/s²"), N_("rad/s"), N_("rad/s²"),
-    N_("s"), N_("m/mm"), N_("(m/s)/mm"), N_("(m/s²)/mm"),
+    N_("s"), N_("m/mm"), N_("(m/s)/mm"), N_("(m/s²)/mm"), N_("N"), N_("N m"), N_("N/mm"),
 )  # fmt: skip
 """Units as people read them; each has its letters in every language."""
 
 SIDES = {"left": N_("on the left"), "right": N_("on the right"), "ahead": N_("ahead"), "behind": N_("behind")}
 """Side on which a joint lies, as a datum of a variant."""
 
+NO_NAMES: Mapping[str, str] = {}
 _LANGUAGE_NAMES = {"en": "English", "ro": "română", "ru": "русский"}
 
 
@@ -47,6 +50,14 @@ class Tongue:
     def gettext(self, text: str) -> str:
         """Return the text in this language, or the text itself if the catalogue has none."""
         return self.catalogue.gettext(text) if text else ""
+
+    def titled(self, titles: Mapping[str, str], figure: str, names: Mapping[str, str] = NO_NAMES) -> str:
+        """Return the title of a figure, or what else is told of it: force plans share one with ``{group}``.
+
+        Arguments: `names` are those that students know.
+        """
+        group = group_of(figure)
+        return self.gettext(titles[sort_of(figure)]).replace("{group}", names.get(group, group))
 
     def ngettext(self, one: str, many: str, count: int) -> str:
         """Return the form that goes with `count`."""
@@ -114,7 +125,8 @@ def _catalogue(code: str) -> gnu.NullTranslations:
 
 _GREEK = {"omega": "ω", "epsilon": "ε"}
 _NAME = re.compile(
-    r"\b(?:([vank])_([A-Z][A-Za-z0-9]{0,7})(?:_([ntcr])\b)?|(omega|epsilon)_(\w{1,4})|([kμ])([Llva])\b"
+    r"\b(?:([vank])_([A-Z][A-Za-z0-9]{0,7})(?:_([ntcr])\b)?|(omega|epsilon)_(\w{1,4})|([kμ])([LlvaF])\b"
+    r"|([FGRM])_(b|i?[0-9A-Z][0-9A-Za-z]{0,7}(?:-[0-9A-Za-z]{1,8})?)(?:_([nt]))?\b"
     r"|(O)([0-9])(?=[A-Z]?\b)|(a)_([ntcr])\b|([ωε])([0-9]))"
 )
 """A name in running text: its letter, its index below, and perhaps one above."""

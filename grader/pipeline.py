@@ -71,7 +71,8 @@ def read_submission(
 ) -> list[ScannedPage]:
     """The submission's pages with every vector of the figures that are asked for."""
     own = partial(_of_position, assignment=assignment, variant=submission.variant)
-    pages = [own(_with_captions(page, assignment, submission.undeclared)) for page in pages]
+    scales = [name for name in assignment.scale_names if name in submission.undeclared]
+    pages = [own(_with_captions(page, assignment, scales)) for page in pages]
     read = read_pages(pages, assignment, submission.variant, submission.declared, asked.vectors)
     drawn = {figure for page in read for figure in page.reading.figures}
     if any(page.narrowed for page in pages) and not asked.figures <= drawn:

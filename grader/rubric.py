@@ -13,13 +13,14 @@ from typing import Annotated, Literal, Self, cast
 
 from pydantic import Field, model_validator
 
+from grader.documents import ScaleName
 from grader.records import MECHANISM
 from reference.authored.assignment import Assignment, AssignmentFile, load_assignment, locate
 from reference.authored.toml_file import Authored, Identifier, Text, is_file, load
 from reference.construction.graph import ON_SKETCH, Construction
 from reference.errors import AuthoredFileError, CallError, Faults, Finding, look_alikes
 from reference.plan import construction_for
-from reference.quantities import value_name
+from reference.quantities import KindName, kind_of, value_name
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
@@ -133,7 +134,12 @@ class DoubtTable(Authored):
     other_variant: Literal["person", "none", "follow"] = "person"
 
 
-Section = Literal["mechanism", "scales", "velocity_plan", "acceleration_plan", "angular"]
+Section = Literal["mechanism", "scales", "velocity_plan", "acceleration_plan", "angular", "force_plans"]
+SECTIONS: dict[KindName, Section] = {
+    "velocity": "velocity_plan", "acceleration": "acceleration_plan",
+    "omega": "angular", "epsilon": "angular", "force": "force_plans", "moment": "force_plans",
+}  # fmt: skip
+"""The section of each kind of vector and turning quantity."""
 
 
 class WeightsTable(Authored):
@@ -144,16 +150,17 @@ class WeightsTable(Authored):
     velocity_plan: Positive | None = None
     acceleration_plan: Positive | None = None
     angular: Positive | None = None
+    force_plans: Positive | None = None
 
 
 class CriterionTable(Authored):
     """One criterion and its points: exactly one of what a rubric may ask for.
 
-    It is a `vector`, its computed `value`, an `angular` quantity, the `sense` of one, a `scale`, `link` or
-    `point`. `figure = "mechanism"`: the vector as drawn again at its point on the sketch. A `point` of the
-    sketch is an instantaneous centre (``I3``) or an acceleration pole (``J3``). `optional`: not judged if it
-    was not handed in. `direction = false`: only the length counts. `tolerance` replaces the rubric's for this
-    criterion, so does `follow_through`.
+    It is a `vector`, its computed `value`, an `angular` quantity, a `moment`, the `sense` of one of these, a
+    `scale`, `link` or `point`. `figure = "mechanism"`: the vector as drawn again at its point on the sketch.
+    A `point` of the sketch is an instantaneous centre (``I3``) or an acceleration pole (``J3``). `optional`:
+    not judged if it was not handed in. `direction = false`: only the length counts. `tolerance` replaces the
+    rubric's for this criterion, so does `follow_through`.
     """
 
     id: Identifier
@@ -162,8 +169,9 @@ class CriterionTable(Authored):
     vector: str | None = None
     value: str | None = None
     angular: str | None = None
+    moment: str | None = None
     sense: str | None = None
-    scale: Literal["kL", "kv", "ka"] | None = None
+    scale: ScaleName | None = None
     link: str | None = None
     point: str | None = None
     figure: Literal["mechanism"] | None = None
@@ -174,9 +182,8 @@ class CriterionTable(Authored):
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
-        kinds = (self.vector, self.value, self.angular, self.sense, self.scale, self.link, self.point)
-        if sum(kind is not None for kind in kinds) != 1:
-            raise ValueError("must have exactly one of vector, value, angular, sense, scale, link and point")
+        if sum(getattr(self, kind) is not None for kind in ASKED) != 1:
+            raise ValueError(f"must have exactly one of {', '.join(ASKED[:-1])} and {ASKED[-1]}")
         if self.figure and not self.vector:
             raise ValueError("has a figure, which only a vector may have")
         if self.point and not self.direction:
@@ -185,8 +192,8 @@ class CriterionTable(Authored):
 
     @property
     def turning(self) -> str | None:
-        """The angular quantity that is asked for, or whose sense is."""
-        return self.angular or self.sense
+        """The angular quantity or moment that is asked for, or whose sense is."""
+        return self.angular or self.moment or self.sense
 
     @property
     def name(self) -> str:
@@ -195,7 +202,8 @@ class CriterionTable(Authored):
         sense = self.sense and f"{self.sense}_sense"
         if self.vector and self.figure:
             return f"{self.vector}{ON_SKETCH}"
-        return self.vector or of_value or self.angular or sense or self.scale or self.link or self.point or ""
+        told = (self.vector, of_value, self.angular, self.moment, sense, self.scale, self.link, self.point)
+        return next(filter(None, told), "")
 
     @property
     def is_on_sketch(self) -> bool:
@@ -209,13 +217,19 @@ class CriterionTable(Authored):
             return "mechanism"
         if self.scale is not None:
             return "scales"
-        if self.turning is not None:
-            return "angular"
-        return "velocity_plan" if self.name.startswith("v_") else "acceleration_plan"
+        return SECTIONS.get(kind_of(self.turning or self.name).name, "acceleration_plan")
+
+
+ASKED = ("vector", "value", "angular", "moment", "sense", "scale", "link", "point")
+"""The keys of a criterion that say what it asks for."""
 
 
 class RubricFile(Authored):
-    """A rubric as authored."""
+    """A rubric as authored.
+
+    `accelerations`: the inertia forces of force plans follow from accelerations that are given, or from the
+    student's own plan; by default from the own one where a page shows it.
+    """
 
     schema_version: Literal[1]
     id: Identifier
@@ -232,6 +246,7 @@ class RubricFile(Authored):
     least_followed_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.2
     """If an earlier answer makes a vector shorter than this share of the right length, it is not judged: such
     a follow-through is trivial."""
+    accelerations: Literal["given", "own"] | None = None
     values_alone: bool = False
     """True if a computed value counts for a vector without its drawn length."""
     criterion: Annotated[list[CriterionTable], Field(min_length=1)]
@@ -264,9 +279,8 @@ class RubricFile(Authored):
     @property
     def needs_accelerations(self) -> bool:
         """True if any criterion needs the acceleration plan."""
-        return any(
-            c.name.startswith(("a_", "epsilon_")) or c.scale == "ka" or (c.point or "").startswith("J")
-            for c in self.criterion
+        return self.accelerations == "own" or any(
+            kind_of(c.name).omegas == 2 or (c.point or "").startswith("J") for c in self.criterion
         )
 
     def tolerance_of(self, asked: CriterionTable | str) -> ToleranceTable:
@@ -347,13 +361,35 @@ def asked_of(assignment: Assignment, rubric: RubricFile) -> Asked:
     return Asked(figures, (*vectors, *rubric.on_sketch), rubric.entries, assignment)
 
 
+def scales_asked(assignment: Assignment, rubric: RubricFile) -> tuple[str, ...]:
+    """Return the scales that students declare: the assignment's, ka only if accelerations are needed."""
+    return tuple(name for name in assignment.scale_names if name != "ka" or rubric.needs_accelerations)
+
+
+def accelerations_of(assignment: Assignment, rubric: RubricFile) -> Literal["given", "own"] | None:
+    """Return where the accelerations of the inertia forces are from; None if no page shows a force plan."""
+    if "kF" not in assignment.scale_names:
+        return None
+    return rubric.accelerations or ("own" if "acceleration_plan" in assignment.figures else "given")
+
+
+def _check_accelerations(assignment: Assignment, rubric: RubricFile) -> Iterator[Finding]:
+    """Report accelerations that no page shows, and those for which there is no force plan."""
+    told = rubric.accelerations
+    if told is not None and accelerations_of(assignment, rubric) is None:
+        yield Finding("$.accelerations", "no page of the assignment shows a force plan: leave it out")
+    elif told == "own" and "acceleration_plan" not in assignment.figures:
+        yield Finding("$.accelerations", 'no page shows the acceleration plan: add one, or say "given"')
+
+
 def check_rubric(rubric: RubricFile, construction: Construction) -> list[Finding]:
     """Report names in the rubric that the construction does not know."""
     known = {
         "vector": tuple(construction.vectors),
         "value": tuple(construction.vectors),
         "angular": tuple(construction.rates),
-        "sense": tuple(construction.rates),
+        "moment": tuple(construction.moments),
+        "sense": (*construction.rates, *construction.moments),
         "link": tuple(construction.links),
         "point": tuple(construction.centres),
     }
@@ -380,6 +416,7 @@ def rubric_of(assignment: Assignment) -> RubricFile:
     """
     rubric = load_rubric(assignment.file.rubric, beside=assignment.path)
     findings = check_rubric(rubric, construction_for(assignment))
+    findings += _check_accelerations(assignment, rubric)
     if findings:
         path = locate("rubric", assignment.file.rubric, assignment.path)
         raise AuthoredFileError(str(path), tuple(findings))
@@ -448,6 +485,7 @@ def _idle_weights(rubric: RubricFile) -> Iterator[Finding]:
         "velocity_plan": "vector",
         "acceleration_plan": "vector",
         "angular": "angular",
+        "force_plans": "vector",
     }
     for section, kind in kinds.items():
         if getattr(rubric.weights, section) is not None and section not in rubric.sections:

@@ -99,6 +99,3 @@ def scale_of(figure: str) -> str:
     """Return the scale at which a figure is drawn; empty for what is no figure."""
     kind = kind_of_figure(figure)
     return kind.scale if kind else ""
-
-
-SCALE_OF = {kind.figure: kind.scale for kind in DRAWN.values()}

@@ -46,7 +46,7 @@ from grader.documents import (
 )
 from grader.language import LANGUAGES
 from grader.rubric import RubricFile, check_rubric
-from reference.authored.assignment import TRADITIONS, Assignment, Variant
+from reference.authored.assignment import SCALE_NAMES, TRADITIONS, Assignment, Variant
 from reference.authored.formula import Formula
 from reference.authored.toml_file import LENGTH_UNITS_M, SideText, Text
 from reference.authored.variant_table import KEYS, LENGTHS, formulas_in
@@ -54,7 +54,6 @@ from reference.construction.derive import image_name
 from reference.construction.graph import Construction, ancestors
 from reference.geometry import FloatArray
 from reference.plan import Plan, construction_for, exact_plan
-from reference.quantities import SCALE_OF
 
 ODD_RATIO = 200.0
 """Largest ratio of the longest link to another: no drawing shows both, and metres are a thousand mm."""
@@ -95,9 +94,7 @@ def lint(assignment: Assignment, rubric: RubricFile) -> Lint:
     these are examined one by one.
     """
     variants = assignment.variants()
-    accelerations = rubric.needs_accelerations or any(
-        "acceleration_plan" in page.figures for page in assignment.file.page
-    )
+    accelerations = rubric.needs_accelerations or "acceleration_plan" in assignment.figures
     construction = construction_for(assignment, variants, accelerations=accelerations)
     broken = broken_variants(assignment, variants)
     findings = [*broken_findings(assignment, broken), *_odd_sizes(assignment)]
@@ -366,7 +363,7 @@ def _told_results(assignment: Assignment, rubric: RubricFile, plan: Plan) -> Ite
 
 def _unknown_names(assignment: Assignment, construction: Construction) -> Iterator[LintFinding]:
     known = {step.node for step in construction.steps} | construction.vectors.keys()
-    known |= construction.rates.keys() | set(SCALE_OF.values())
+    known |= construction.rates.keys() | set(SCALE_NAMES)
     known |= TRADITIONS.get(assignment.file.tradition, {}).keys()
     for name in assignment.file.names:
         if name not in known:

@@ -19,7 +19,7 @@ from grader.rubric import RubricFile
 from reference.authored.assignment import SCALE_NAMES, Assignment, Scales, Variant
 from reference.geometry import FloatArray
 from reference.plan import ZERO_SHARE, Plan
-from reference.quantities import SCALE_OF, unit_of
+from reference.quantities import scale_of, unit_of
 
 WELL_READ_MM = 8.0
 """Shorter vectors are read from scans with less certainty."""
@@ -313,7 +313,7 @@ def _needed(template: Template, plan: Plan, extents: Extents) -> dict[str, Float
     for figure, box in template.zones.items():
         factor = growth(box, *extents[figure])
         # A figure that is a single point fits at any scale.
-        scale = getattr(plan.scales, SCALE_OF[figure])
+        scale = getattr(plan.scales, scale_of(figure))
         needed[figure] = np.where(np.isfinite(factor), scale / factor, scale)
     return needed
 
@@ -336,23 +336,23 @@ def _best_template(figures: Sequence[str], plan: Plan, extents: Extents, links_m
 
 def _round_scales(templates: Sequence[Template], plan: Plan, extents: Extents, *, together: bool) -> Scales:
     """Return round scales that fit every page; a scale that no page needs is unchanged."""
-    scales = {name: np.asarray(getattr(plan.scales, name)) for name in SCALE_OF.values()}
+    scales = plan.scales.by_name
     finest: dict[str, FloatArray] = {}
     for template in templates:
         for figure, values in _needed(template, plan, extents).items():
-            name = SCALE_OF[figure]
+            name = scale_of(figure)
             finest[name] = np.maximum(finest[name], values) if name in finest else values
     for name, values in finest.items():
         common = np.full_like(values, np.max(values)) if together else values
         scales[name] = round_up(common)
-    return Scales(scales["kL"], scales["kv"], scales["ka"])
+    return Scales(**scales)
 
 
 def _redrawn(extents: Extents, plan: Plan, scales: Scales) -> dict[str, Size]:
     """Return the figures' sizes at other scales."""
-    factors = {name: getattr(plan.scales, name) / getattr(scales, name) for name in SCALE_OF.values()}
+    factors = {name: one / getattr(scales, name) for name, one in plan.scales.by_name.items()}
     return {
-        figure: (wide * factors[SCALE_OF[figure]], high * factors[SCALE_OF[figure]])
+        figure: (wide * factors[scale_of(figure)], high * factors[scale_of(figure)])
         for figure, (wide, high) in extents.items()
     }
 
@@ -380,7 +380,7 @@ def _judged(name: ProposalName, scales: Scales, plan: Plan, asked: AskedVectors,
     often = sorted(zip(asked.names, short.sum(axis=1).tolist(), strict=True), key=lambda entry: -entry[1])
     over_all = LintScales(
         name=name,
-        **{each: ends_of(getattr(scales, each)) for each in SCALE_NAMES},
+        **{each: ends_of(one) for each, one in scales.by_name.items()},
         room=room,
         shortest_mm=shortest,
         under_8_mm=int(np.sum(short)),
@@ -393,8 +393,8 @@ def _judged(name: ProposalName, scales: Scales, plan: Plan, asked: AskedVectors,
 
 def scale_findings(assignment: Assignment, plan: Plan, proposed: Sequence[Proposal]) -> Iterator[LintFinding]:
     """Suggest round scales, and report whether normals can be constructed by the triangle."""
-    drawn = {figure for _, figures in pages_of(assignment, plan) for figure in figures}
-    names = [name for figure, name in SCALE_OF.items() if figure in drawn]
+    drawn = {scale_of(figure) for _, figures in pages_of(assignment, plan) for figure in figures}
+    names = [name for name in SCALE_NAMES if name in drawn]
     own, round_, each = (proposal.over_all for proposal in proposed)
     if own.shortest_link_mm < LEAST_DRAWN_MM:
         message = (
@@ -445,11 +445,11 @@ def _short_findings(plan: Plan, own: LintScales, each: Proposal) -> Iterator[Lin
 def suggestions(proposed: Sequence[Proposal], plan: Plan, figures: Collection[str]) -> dict[Variant, str]:
     """Return, as text, round scales for each variant that leave fewer requested vectors under 8 mm."""
     own, _, each = proposed
-    names = [name for figure, name in SCALE_OF.items() if figure in figures]
+    names = [name for name in SCALE_NAMES if name in {*map(scale_of, figures)}]
     texts = {}
     for index, variant in enumerate(plan.variants):
         if each.short[index] < own.short[index] or own.over_all.room < 1.0:
-            scales = Scales(*(getattr(each.scales, name)[index : index + 1] for name in SCALE_NAMES))
+            scales = Scales(**{name: one[index : index + 1] for name, one in each.scales.by_name.items()})
             texts[variant] = (
                 f"{written(scales, names)}: {each.short[index]} instead of {own.short[index]} asked vectors"
                 f" under {WELL_READ_MM:g} mm"

@@ -35,10 +35,10 @@ from reference.drawing.sheets import ENGLISH, reference_drawing
 from reference.drawing.subject import Wording
 from reference.geometry import FloatArray
 from reference.plan import Plan
-from reference.quantities import SCALE_UNITS, unit_of
+from reference.quantities import unit_of
 
-Title = Literal["Scales", "Mechanism", "Velocities", "Accelerations"]
-PLANS: dict[Title, str] = {"Velocities": "velocity_plan", "Accelerations": "acceleration_plan"}
+Title = Literal["Scales", "Mechanism", "Velocities", "Accelerations", "Forces"]
+PLANS: dict[str, Title] = {"kv": "Velocities", "ka": "Accelerations", "kF": "Forces"}
 MARGIN_MM = 15.0
 """Margin inside the drawing frame, 10 mm, on all sides."""
 BOTTOM_MM = A3_MM[1] - MARGIN_MM
@@ -100,17 +100,17 @@ def sections_of(plan: Plan) -> tuple[Section, ...]:
     """Return all columns of a plan's variants."""
     count = len(plan.variants)
     scales = [
-        Column(name, name, unit, np.broadcast_to(getattr(plan.scales, name), (count,)), 5, "g")
-        for name, unit in SCALE_UNITS.items()
+        Column(name, name, unit_of(name), np.broadcast_to(scale, (count,)), 5, "g")
+        for name, scale in plan.scales.by_name.items()
     ]
     rates = [Column(f"{name}_value", name, unit_of(name), _rate(plan, name), 5, "g") for name in plan.rates]
     sections = [
         Section("Scales", tuple((column,) for column in (*scales, *rates))),
         Section("Mechanism", tuple(_point(joint, at, count) for joint, at in plan.motion.position.items())),
     ]
-    for title, figure in PLANS.items():
-        if figure in plan.nodes_mm:
-            names = [vector.name for vector in plan.construction.vectors_of(figure)]
+    for scale, title in PLANS.items():
+        names = [name for name, vector in plan.construction.vectors.items() if vector.scale == scale]
+        if names:
             sections.append(Section(title, tuple(_vector(plan, name) for name in names)))
     return tuple(sections)
 

@@ -18,7 +18,7 @@ from grader.files import shown_text, write_whole
 from grader.language import N_, Tongue, tongue
 from grader.options import CheckOptions, Level, VariantOptions
 from grader.records import of_error
-from grader.rubric import RubricFile, rubric_of
+from grader.rubric import rubric_of
 from grader.self_check.advice import RESULTS, CheckedLine
 from grader.self_check.results import LEVELS, likely_mistakes
 from grader.self_check.values import check_values
@@ -55,7 +55,7 @@ def check_measured(name: str, options: CheckOptions) -> bool:
     if options.template is not None:
         named = [replace(options, position=one) for one in assignment.positions(options.position)]
         variants = [_variant(assignment, None, one, speaker) for one in named]
-        _write_template(options.template, rubric, variants, speaker)
+        _write_template(options.template, columns_of(assignment, rubric), variants, speaker)
     if file is None:
         if options.template is None:
             raise failure(CallError, "measured_needed", "", speaker)
@@ -127,14 +127,14 @@ def checked_level(level: str, speaker: Tongue = ENGLISH) -> Level:
     return wanted
 
 
-def _write_template(file: Path, rubric: RubricFile, variants: Sequence[Variant], speaker: Tongue) -> None:
+def _write_template(file: Path, asked: dict[str, str], variants: Sequence[Variant], speaker: Tongue) -> None:
     """Write the file that a student fills in: columns, a comment with units, a line for each variant."""
     if file.suffix.lower() != ".csv":
         known = {"option": "--template", "file": file, "names": ".csv"}
         raise failure(CallError, "template_file", "ending", speaker, **known)
     if file.exists():
         raise failure(CallError, "template_exists", "", speaker, file=file)
-    columns = dict.fromkeys(variants[0].numbers, "") | columns_of(rubric)
+    columns = dict.fromkeys(variants[0].numbers, "") | asked
     units = [speaker.unit(unit) for unit in columns.values()]
     text = io.StringIO()
     # Spreadsheets of languages with decimal commas separate fields by semicolons.

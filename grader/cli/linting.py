@@ -122,6 +122,7 @@ def _scales_table(scales: Sequence[LintScales]) -> Table:
         "kL": ["..".join(dict.fromkeys(map(ratio_text, proposal.kL))) for proposal in scales],
         "kv, (m/s)/mm": [_span(proposal.kv) for proposal in scales],
         "ka, (m/s^2)/mm": [_span(proposal.ka) for proposal in scales],
+        **({"kF, N/mm": [_span(one.kF) for one in scales if one.kF]} if scales[0].kF else {}),
         "fits, times": [f"{proposal.room:.2f}" for proposal in scales],
         "shortest asked, mm": [_worst_of([proposal.shortest_mm], "{:.2f}") for proposal in scales],
         f"asked under {WELL_READ_MM:g} mm": [

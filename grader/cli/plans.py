@@ -14,7 +14,7 @@ from grader.solution.document import plan_document
 from reference.authored.assignment import Assignment, load_assignment
 from reference.errors import CallError
 from reference.plan import Plan, exact_plan
-from reference.quantities import SCALE_UNITS, unit_of
+from reference.quantities import unit_of
 
 STEP_FILES = (".html", ".pdf", ".txt")
 TERMINAL = Path("-")
@@ -97,7 +97,7 @@ def _print_table(assignment: Assignment, plan: Plan) -> None:
     scales = document.scales
     console = Console()
     console.print(f"[bold]{assignment.file.title.en}[/bold], {plan.variants[0]}", highlight=False)
-    told = [f"{name} = {getattr(scales, name):.6g} {unit}" for name, unit in SCALE_UNITS.items()]
+    told = [f"{name} = {scale:.6g} {unit_of(name)}" for name, scale in scales.items()]
     console.print("   ".join(told), highlight=False)
     table = new_table("vector, point", "drawn mm", "value", "unit", "direction deg", left=("unit",))
     for vector, row in document.vectors.items():
@@ -109,7 +109,7 @@ def _print_table(assignment: Assignment, plan: Plan) -> None:
     for name in plan.construction.centres:
         if (point := document.centres_m[name]) is not None:
             at = complex(*point) - complex(*document.points_m[pivot])
-            real, mm, angle = abs(at), abs(at) / scales.kL, np.degrees(np.angle(at)) % 360.0
+            real, mm, angle = abs(at), abs(at) / scales["kL"], np.degrees(np.angle(at)) % 360.0
             table.add_row(f"{name} from {pivot}", f"{mm:.2f}", f"{real:.4f}", "m", f"{angle:.2f}")
     console.print(table)
     worst = min((float(np.min(sine)) for sine in plan.motion.transmission.values()), default=1.0)

@@ -56,6 +56,7 @@ from reference.authored.assignment import SCALE_NAMES
 from reference.construction.graph import AngularRate
 from reference.construction.mistakes import line_of
 from reference.construction.steps import Given
+from reference.construction.uncertainty import EndSpread
 from reference.quantities import kind_of, unit_of, vector_of_value
 
 
@@ -142,7 +143,7 @@ def _judged(charges: Charges, criterion: CriterionTable) -> Outcome:
 
 # The order of construction -------------------------------------------------------------------------
 
-ORDER = ("length", "velocity", "omega", "acceleration", "epsilon")
+ORDER = ("length", "velocity", "omega", "acceleration", "epsilon", "force", "moment")
 """Kinds of quantities as they are drawn and computed."""
 
 
@@ -479,45 +480,63 @@ def _is_not_drawn(task: Task, evidence: Evidence, name: str, length_mm: float) -
 
 
 def _rate(charges: Charges, criterion: CriterionTable) -> Outcome:
-    """An angular quantity, or its sense, against the exact one, then against what the own vector gives.
+    """An angular quantity, a moment, or its sense, against the exact one, then what the own drawing gives.
 
     That of the driving link follows from the data alone.
     """
     task, following, values = charges.task, charges.following, charges.evidence.values
     name, unit = criterion.turning or "", unit_of(criterion.turning or "")
-    rate, right, sense = task.construction.rates[name], task.rates[name], values.get(f"{name}_sense")
-    value = values.get(name)
+    rate, right = task.construction.rates.get(name), {**task.rates, **task.moments}[name]
+    value, sense = values.get(name), values.get(f"{name}_sense")
     if criterion.sense is not None:
         # A magnitude alone has none.
         value = sense or min(value or 0.0, 0.0) or None
     if value is None:
         expected = Quantity() if criterion.sense else Quantity(value=right, unit=unit)
         return _absent(charges, criterion, expected)
-    source, table = task.segments[rate.vector], task.rubric.tolerance_of(criterion)
-    per_mm = following.used[source.scale] / task.lengths_m[name]
-    if rate.drives:
-        per_mm = table.scale_relative * abs(right) / table.length_mm or 1.0
+    table = task.rubric.tolerance_of(criterion)
+    per_mm = table.scale_relative * abs(right) / table.length_mm or 1.0
+    if rate is not None and not rate.drives:
+        per_mm = following.used[task.segments[rate.vector].scale] / task.lengths_m[name]
     held = HeldValue(task.rubric, criterion, value, per_mm, sense)
     exact, followed = Expectation(right / held.per_mm), False
     mark = held.against(exact)
-    if not mark.is_full and not rate.drives:
-        # It is as uncertain as the vector that turns the link.
-        uncertainty = following.uncertainty_of(source, source.drawn(following.used))
-        exact = replace(exact, uncertainty=uncertainty)
+    is_drawn = rate is None or not rate.drives
+    if not mark.is_full and is_drawn:
+        exact = replace(exact, uncertainty=_uncertainty_of(charges, name, per_mm))
         mark = held.against(exact)
     charges.remember(criterion.name, mark)
-    follows = not mark.is_full and not rate.drives and task.rubric.follows_through(criterion)
-    own = _own_rate(charges, rate, value) if follows else None
-    if own is not None:
-        one = Expectation(own / held.per_mm, "vector", source.name, frozenset({source.head}))
+    follows = not mark.is_full and is_drawn and task.rubric.follows_through(criterion)
+    one = _own_turning(charges, name, value, per_mm) if follows else None
+    if one is not None:
         candidate, shown = charges.credited(one, held.against(one))
         charges.charged |= shown
         if candidate.is_better(mark):
-            mark, right, followed = the_better(candidate, mark, *charges.why(one)), own, True
+            right, followed = one.vector.real * per_mm, True
+            mark = the_better(candidate, mark, *charges.why(one))
     if criterion.sense is not None:
         return outcome_of(criterion, mark, Quantity(), Quantity(), Tolerance(), followed=followed)
     measured, expected = Quantity(value=value, unit=unit), Quantity(value=right, unit=unit)
     return outcome_of(criterion, mark, measured, expected, held.allowed(exact), followed=followed)
+
+
+def _uncertainty_of(charges: Charges, name: str, per_mm: float) -> EndSpread:
+    """The propagated drafting error: of an angular quantity, that of the vector that turns the link."""
+    task, following = charges.task, charges.following
+    if name in task.moments:
+        return following.moment(name, per_mm).uncertainty
+    source = task.segments[task.construction.rates[name].vector]
+    return following.uncertainty_of(source, source.drawn(following.used))
+
+
+def _own_turning(charges: Charges, name: str, value: float, per_mm: float) -> Expectation | None:
+    """The angular quantity or moment that the student's own drawing gives; None without any."""
+    task = charges.task
+    if name in task.moments:
+        return charges.following.moment(name, per_mm)
+    rate = task.construction.rates[name]
+    own, source = _own_rate(charges, rate, value), task.segments[rate.vector]
+    return None if own is None else Expectation(own / per_mm, "vector", source.name, frozenset({source.head}))
 
 
 def _own_rate(charges: Charges, rate: AngularRate, value: float) -> float | None:

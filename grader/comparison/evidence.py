@@ -348,7 +348,7 @@ def turn_of(task: Task, sketch: Figure) -> tuple[float, float]:
     It is fitted to the whole mechanism where that is right, else to what is right without one joint and
     those drawn from it, else to the pivots alone, which no mistake moves; `NOT_TURNED` without any.
     """
-    exact = task.nodes({"kL": 1.0, "kv": 1.0, "ka": 1.0})
+    exact = task.nodes(dict.fromkeys(task.assignment.scale_names, 1.0))
     sure = {
         name: node
         for name, node in sketch.nodes.items()

@@ -20,8 +20,7 @@ from grader.comparison.scales import Scale
 from grader.comparison.task import Made, Task, TaskSegment
 from grader.comparison.verdicts import NO_SPREAD, Expectation
 from grader.records import MECHANISM
-from reference.authored.assignment import SCALE_NAMES
-from reference.construction.elements import Coriolis, Normal
+from reference.construction.elements import Coriolis, Normal, View
 from reference.construction.graph import AngularRate
 from reference.construction.mistakes import Drawing, Mistake, commit, line_of
 from reference.construction.steps import Divide, Given, Similar, TwoLines
@@ -145,7 +144,7 @@ class FollowThrough:
     @property
     def wrong_scales(self) -> frozenset[str]:
         """The scales that the drawing does not follow."""
-        return frozenset(scale for scale in SCALE_NAMES if self.followed[scale] != self.used[scale])
+        return frozenset(scale for scale, used in self.used.items() if self.followed[scale] != used)
 
     def causes_of(self, node: str, basis: PlanBasis) -> frozenset[str]:
         """The wrong nodes of a basis from which a node is made; a turned plan is wrong at its first node."""
@@ -165,7 +164,7 @@ class FollowThrough:
 
     def own(self, scales: Mapping[str, float], basis: PlanBasis | None = None) -> Nodes:
         """The student's own nodes, by figure; measured ones as they lie in plans drawn by the basis."""
-        key = "own", basis and basis.name, *(scales[name] for name in SCALE_NAMES)
+        key = "own", basis and basis.name, *scales.values()
         return self._cached(key, lambda: own_nodes(self.task, self.evidence, basis or self.right(scales)))
 
     def right(self, scales: Mapping[str, float]) -> PlanBasis:
@@ -186,7 +185,7 @@ class FollowThrough:
             construction = task.by_similarity if by_similarity else drawn.construction
             return trace(construction, drawn.parameters, task.skill, own)
 
-        key = "traced", basis and basis.name, by_similarity, *(scales[name] for name in SCALE_NAMES)
+        key = "traced", basis and basis.name, by_similarity, *scales.values()
         return self._cached(key, traced)
 
     def from_nodes(
@@ -207,6 +206,19 @@ class FollowThrough:
         vector = found.vector(segment.tail, segment.head)
         uncertainty, se = self.spreads(found.shifts(segment.tail, segment.head), found.drafting_count, vector)
         return Expectation(vector, "nodes", "", relies_on, uncertainty, se)
+
+    def moment(self, name: str, per_mm: float) -> Expectation:
+        """The moment that the student's own nodes give, as millimetres of so many N m."""
+        construction, traced, known_as = self.task.construction, self.traced(self.used), self.right(self.used)
+        moment = construction.moments[name]
+        nodes = {node: traced.nodes[node] for node in moment.needs}
+        placed = {node: np.asarray(one.at) for node, one in nodes.items()}
+        shifted = {node: np.asarray(one.at + one.shifts) for node, one in nodes.items()}
+        found, moved = (moment.at(View(at, known_as.parameters)) / per_mm for at in (placed, shifted))
+        shifts = np.asarray(moved - found, dtype=np.complex128)
+        uncertainty, se = self.spreads(shifts, traced.drafting_count, complex(found))
+        relies_on = frozenset[str]().union(*map(construction.upstream, nodes)) & known(self.own(self.used))
+        return Expectation(complex(found), "nodes", "", relies_on, uncertainty, se)
 
     def spreads(
         self, shifts: ComplexArray, drafting_count: int, along: complex
@@ -266,7 +278,7 @@ class FollowThrough:
 
     def _turned_basis(self, crank: str) -> PlanBasis | None:
         task, own = self.task, self.evidence.vector(crank)
-        if own is None or own.direction_rad is None or not task.real[crank]:
+        if own is None or own.direction_rad is None or not task.real.get(crank):
             return None
         turn = math.remainder(own.direction_rad - cmath.phase(task.real[crank]), math.tau)
         quarters = round(turn / (math.pi / 2.0))
@@ -380,9 +392,9 @@ class FollowThrough:
 
     def uncertainty_of(self, segment: TaskSegment, along: complex) -> EndSpread:
         """The propagated drafting error of a vector since the start of the drawing."""
-        task, scales = self.task, (self.used["kv"], self.used["ka"])
+        scales = (scale for name, scale in self.used.items() if name != "kL")
         key = ("reach", segment.name, abs(along), cmath.phase(along), *scales, self.evidence.has_sheets)
-        return task.cached(key, lambda: self._uncertainty_of(segment, along))
+        return self.task.cached(key, lambda: self._uncertainty_of(segment, along))
 
     def _uncertainty_of(self, segment: TaskSegment, along: complex) -> EndSpread:
         shifts = self.task.traced(self.used).shifts(segment.tail, segment.head)
@@ -417,7 +429,7 @@ class FollowThrough:
         right = segment.drawn(scales)
         own = self.evidence.vector(source)
         if own is not None:
-            share = own.length_mm * scales["kv"] / abs(task.real[source])
+            share = own.length_mm * scales[task.segments[source].scale] / abs(task.real[source])
             head = task.construction.vectors[source].head
             yield Expectation(right * share**2, "vector", source, frozenset({head}))
         rate = next((one for one in task.construction.rates.values() if one.vector == source), None)
@@ -450,7 +462,7 @@ class FollowThrough:
         own, right = self.evidence.vector(name), self.task.real[name]
         if own is None or not right:
             return None
-        share = own.length_mm * scales["kv"] / abs(right)
+        share = own.length_mm * scales[self.task.segments[name].scale] / abs(right)
         if own.direction_rad is None:
             return share
         return math.copysign(share, math.cos(own.direction_rad - cmath.phase(right)))

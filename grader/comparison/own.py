@@ -12,7 +12,6 @@ from grader.comparison.evidence import DrawnVector, Evidence
 from grader.comparison.task import Task
 from grader.records import MECHANISM
 from grader.rubric import ToleranceTable
-from reference.authored.assignment import SCALE_NAMES
 from reference.construction.elements import Coriolis, Normal, Parameters, View
 from reference.construction.graph import AngularRate, Construction, Vector, evaluate
 from reference.construction.steps import ArcAndLine, Given, Step, TwoArcs
@@ -411,7 +410,7 @@ def other_mechanism(
 
 def _tried(task: Task, scales: Mapping[str, float]) -> list[tuple[PlanBasis, Mapping[str, complex]]]:
     """The right mechanism and every wrong assembly, each with its vectors, complex millimetres by name."""
-    key = ("plans", *(scales[name] for name in SCALE_NAMES))
+    key = ("plans", *scales.values())
 
     def tried() -> list[tuple[PlanBasis, Mapping[str, complex]]]:
         known = task.at(scales)

@@ -21,7 +21,6 @@ from grader.tables.scale_text import (
     Refused,
     parse_scale,
 )
-from reference.authored.assignment import SCALE_NAMES
 from reference.construction.uncertainty import spread
 from reference.quantities import unit_of
 
@@ -53,9 +52,9 @@ class Scale:
 
 
 def settle(task: Task, evidence: Evidence, declared: Mapping[str, str]) -> dict[str, Scale]:
-    """The three scales, in the order in which each may follow from those before."""
+    """The assignment's scales, in the order in which each may follow from those before."""
     settled: dict[str, Scale] = {}
-    for name in SCALE_NAMES:
+    for name in task.assignment.scale_names:
         scale, said = _settled_scale(task, evidence, name, declared.get(name), settled), evidence.verdicts
         settled[name] = _as_decided(scale, said[name]) if name in said else scale
     return settled
@@ -353,7 +352,7 @@ def declarations(
     problems: list[Reason] = []
     unread: list[Unread] = []
     known: dict[str, float] = {}
-    for name in SCALE_NAMES:
+    for name in task.assignment.scale_names:
         given = [(declared.get(name, "").strip(), source) for source, declared in entered.items()]
         given += [(declared.get(name, "").strip(), "measurements") for declared in further]
         given = [(text, source) for text, source in given if text]

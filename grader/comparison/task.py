@@ -9,8 +9,8 @@ from typing import TypeVar, cast
 import numpy as np
 
 from grader.rubric import RubricFile, ToleranceTable
-from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
-from reference.construction.elements import Parameters
+from reference.authored.assignment import Assignment, Variant
+from reference.construction.elements import Parameters, View
 from reference.construction.graph import Construction, evaluate
 from reference.construction.uncertainty import Skill, TracedDrawing, trace
 from reference.mechanism import Crank, Dyad, Mechanism, Slider
@@ -41,7 +41,7 @@ class TaskSegment:
     Attributes
     ----------
     real : exact, complex SI
-    scale : ``kv``, ``ka`` or ``kL``
+    scale : ``kL``, ``kv``, ``ka`` or ``kF``
     """
 
     name: str
@@ -65,6 +65,7 @@ class Task:
     real : exact vectors, complex SI, by name
     segments : the vectors and the links of the sketch, by name
     rates : exact angular quantities, rad/s and rad/s^2
+    moments : exact moments, N m
     lengths_m : by angular quantity, the real length of its link
     pin : of the driving link
     yardstick : the crank; where a slider drives, the first link of given length; None without any
@@ -81,6 +82,7 @@ class Task:
     real: Mapping[str, complex]
     segments: Mapping[str, TaskSegment]
     rates: Mapping[str, float]
+    moments: Mapping[str, float]
     lengths_m: Mapping[str, float]
     pin: str
     yardstick: Yardstick | None
@@ -95,8 +97,18 @@ class Task:
         return f"Task({self.assignment.file.id}, {self.variant})"
 
     def driving_vector(self, name: str) -> str:
-        """The driving link's vector of the kind of a vector or scale: it shows the scale and the turn."""
-        return f"{kind_of(name).letter}_{self.pin}"
+        """The vector by the data of the kind of a vector or scale: it shows the scale and the turn.
+
+        It is the driving link's; of forces, which have none, the largest given one of the vector's plan.
+        """
+        kind, vectors, figure = kind_of(name), self.construction.vectors, self.construction.figure_of
+        if kind.omegas is not None:
+            return f"{kind.letter}_{self.pin}"
+        given = [one for one in vectors.values() if one.scale == kind.scale and one.name in self.parameters]
+        if name in vectors:
+            given = [one for one in given if figure(one.head) == figure(vectors[name].head)]
+        largest = max(given, key=lambda one: abs(self.real[one.name]), default=None)
+        return name if largest is None else largest.name
 
     def tolerance_at(self, node: str) -> ToleranceTable:
         """The tolerance of a node's position: that of the vector or link asked for that ends there.
@@ -117,11 +129,11 @@ class Task:
     @property
     def rule_scales(self) -> dict[str, float]:
         """The scales that the assignment's rule gives."""
-        return {name: float(self.parameters[name]) for name in SCALE_NAMES}
+        return {name: float(self.parameters[name]) for name in self.assignment.scale_names}
 
     def at(self, scales: Mapping[str, float]) -> dict[str, np.ndarray[tuple[int, ...], np.dtype[np.float64]]]:
         """The parameters with other scales."""
-        return {**self.parameters, **{name: np.asarray(scales[name]) for name in SCALE_NAMES}}
+        return {**self.parameters, **{name: np.asarray(scale) for name, scale in scales.items()}}
 
     def nodes(self, scales: Mapping[str, float]) -> Mapping[str, complex]:
         """All nodes at these scales."""
@@ -130,15 +142,15 @@ class Task:
             nodes = evaluate(self.construction, self.at(scales))
             return {name: complex(np.ravel(node)[0]) for name, node in nodes.items()}
 
-        return self.cached(("nodes", *(scales[name] for name in SCALE_NAMES)), evaluated)
+        return self.cached(("nodes", *scales.values()), evaluated)
 
     def traced(self, scales: Mapping[str, float]) -> TracedDrawing:
         """The whole drawing with its propagated drafting errors, at these scales.
 
         The sketch is at the rule's scale: its size hardly changes the errors of the plans.
         """
-        key = ("traced", scales["kv"], scales["ka"], self.skill)
         rule = {**scales, "kL": float(self.parameters["kL"])}
+        key = ("traced", *rule.values(), self.skill)
         return self.cached(key, lambda: trace(self.construction, self.at(rule), self.skill))
 
     @property
@@ -202,6 +214,8 @@ def _made(assignment: Assignment, rubric: RubricFile, variant: Variant) -> Task:
         name: TaskSegment(name, tail, head, "kL", places[head] - places[tail])
         for name, (tail, head) in construction.links.items()
     }
+    right = View(evaluate(construction, parameters), parameters) if construction.moments else None
+    moments = {name: float(np.ravel(one.at(right))[0]) for name, one in construction.moments.items() if right}
     return Task(
         assignment=assignment,
         rubric=rubric,
@@ -211,6 +225,7 @@ def _made(assignment: Assignment, rubric: RubricFile, variant: Variant) -> Task:
         real=real,
         segments=segments,
         rates={name: float(rate[0]) for name, rate in plan.rates.items()},
+        moments=moments,
         lengths_m={name: float(parameters[rate.length]) for name, rate in construction.rates.items()},
         pin=driver.pin,
         yardstick=_yardstick(plan.mechanism),

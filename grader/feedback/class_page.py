@@ -41,10 +41,9 @@ from grader.feedback.mistakes import MISTAKES
 from grader.feedback.numbers import points_text, score_text
 from grader.feedback.words import STATES, VERDICTS, environment, problem_sentence, unmatched_sentence
 from grader.files import result_folders, write_whole
-from grader.language import N_, Tongue, tongue
+from grader.language import N_, NO_NAMES, Tongue, tongue
 from grader.marking.trust import CONFIDENCE
 from grader.overlay.scene import MARKS
-from grader.texts.spoken import NO_NAMES
 
 # The page -----------------------------------------------------------------------------------------
 

@@ -11,12 +11,12 @@ from dataclasses import replace
 
 from grader.documents import CriterionDocument, Parameters, Quantity
 from grader.feedback.mistakes import GIVING_AWAY, MISTAKES, NORMAL_END, precise, question_of, words_of
-from grader.language import N_, Tongue, tongue
+from grader.language import N_, NO_NAMES, Tongue, tongue
 from grader.options import Level
 from grader.outcomes import CHARGED, CREDITED, NamedMistake, Outcome
 from grader.records import Reason, Value
 from grader.texts.reasons import MISREAD, UNCHECKED, UNDECIDED, UNSURE, reason_sentence
-from grader.texts.spoken import NO_NAMES, place
+from grader.texts.spoken import place
 
 # Criteria -----------------------------------------------------------------------------------------
 

@@ -23,7 +23,7 @@ from grader.tables.measurements import StudentSubmission
 from grader.tables.reader import at, near, short
 from grader.tables.roster import Roster, RosterRow
 from grader.texts.spoken import ENGLISH, clause, unmatched_document
-from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
+from reference.authored.assignment import Assignment, Variant
 from reference.construction.derive import construction_of
 
 _DIGITS = 8
@@ -88,8 +88,7 @@ def _task(assignment: Assignment, variant: Variant | None) -> object:
     mechanism = assignment.mechanism_file.model_dump_json(exclude={"title"})
     if variant is None:
         return assignment.id, mechanism
-    scales = assignment.scales([variant])
-    numbers = {**assignment.values([variant]), **{name: getattr(scales, name) for name in SCALE_NAMES}}
+    numbers = {**assignment.values([variant]), **assignment.scales([variant]).by_name}
     told = {name: f"{float(np.ravel(number)[0]):.9g}" for name, number in numbers.items()}
     return assignment.id, mechanism, assignment.file.plate_images, told
 

@@ -38,8 +38,7 @@ from grader.outcomes import NamedMistake
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN
 from reference.construction.mistakes import Mistake
 from reference.geometry import FloatArray
-
-PARTS = (MECHANISM, VELOCITY_PLAN, ACCELERATION_PLAN)
+from reference.quantities import OF_MOTION
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,8 +141,8 @@ def _crank_elsewhere(task: Task, drawn: DrawnParts) -> Owner | None:
     if link is None or task.omega is None:
         return None
     sketched = _turned_by(task, drawn, f"{link.tail}{link.head}")
-    followed = [_turned_by(task, drawn, task.driving_vector(kind)) for kind in ("v", "a")]
-    table = task.rubric.tolerance_of(task.driving_vector("v"))
+    followed = [_turned_by(task, drawn, task.driving_vector(scale)) for scale in OF_MOTION]
+    table = task.rubric.tolerance_of(task.driving_vector("kv"))
     limit = math.radians(table.direction_deg) * table.farthest
     if abs(sketched) <= limit or not any(abs(one - sketched) < limit < abs(one) for one in followed):
         return None
@@ -165,7 +164,7 @@ def _turned_by(task: Task, drawn: DrawnParts, name: str) -> float:
 
 def _drawn(task: Task, evidence: Evidence) -> dict[str, dict[str, DrawnVector]]:
     """Return the drawn vectors by part, as read, else as measured."""
-    found: dict[str, dict[str, DrawnVector]] = {part: {} for part in PARTS}
+    found: dict[str, dict[str, DrawnVector]] = {part: {} for part in (MECHANISM, *task.construction.poles)}
     for name, segment in task.segments.items():
         one = evidence.vector(name)
         if one is not None and one.length_mm > 0.0:

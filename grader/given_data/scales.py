@@ -10,7 +10,7 @@ from grader.comparison.task import Task
 from grader.given_data.sets import ExactDrawings
 from grader.tables.scale_text import Declared, parse_scale
 from reference.geometry import FloatArray
-from reference.quantities import kind_of
+from reference.quantities import OF_MOTION, kind_of
 
 WRONG_SCALE, OF_ANY = 0.1, 0.5
 """Probability that a plan follows the rule's scale instead of the declared one, and any other scale; density
@@ -36,7 +36,7 @@ def _driving(
     task: Task, drawn: Mapping[str, DrawnVector], scales: Mapping[str, float]
 ) -> tuple[str, float] | None:
     """Return the driving link's vector of a plan, and its declared scale; None if either is missing."""
-    for scale in ("kv", "ka"):
+    for scale in OF_MOTION:
         name = task.driving_vector(scale)
         has_length = name in drawn and drawn[name].length_mm > 0.0
         if has_length and scale in scales and task.real.get(name):

@@ -32,6 +32,7 @@ from reference.construction.mistakes import (
 from reference.construction.steps import ArcAndLine, TwoArcs
 from reference.errors import PlanmarkError
 from reference.geometry import ComplexArray, FloatArray
+from reference.quantities import OF_MOTION
 
 Kind = Literal["own", "other_variant", "data_misread"]
 CRANK = "angle crank"
@@ -109,7 +110,7 @@ def _all_variants(task: Task) -> ExactDrawings:
     except PlanmarkError:
         variants, together = [task.variant], {**task.parameters, **AT_SCALE_ONE}
         rule = task.assignment.scales(variants)
-    rules = {name: np.broadcast_to(getattr(rule, name), len(variants)) for name in SCALE_NAMES}
+    rules = {name: np.broadcast_to(one, len(variants)) for name, one in rule.by_name.items()}
     data = tuple(
         Data(
             "other_variant",
@@ -325,7 +326,7 @@ def _drawn_angles(task: Task, drawn: DrawnParts) -> dict[str, float]:
 def _images(task: Task) -> Iterable[str]:
     """Return the heads of the driving link's vectors."""
     vectors = task.construction.vectors
-    return [vectors[name].head for name in map(task.driving_vector, "va") if name in vectors]
+    return [vectors[name].head for name in map(task.driving_vector, OF_MOTION) if name in vectors]
 
 
 def _apart(one: float, other: float) -> float:

@@ -20,7 +20,7 @@ from reference.construction.graph import evaluate
 from reference.construction.mistakes import Drawing, Mistake, commit
 from reference.construction.steps import Given
 from reference.construction.uncertainty import Skill
-from reference.quantities import kind_of
+from reference.quantities import kind_of, scale_of
 from reference.replay.explanations import RARITY, SLIP, Observations
 from reference.replay.nothing import with_nothing
 from reference.replay.replay import Replay, Root, replay
@@ -139,13 +139,15 @@ ONE_FACTOR = 0.08
 
 
 def _scale_of_slips(case: Case, best: Replay) -> Root | None:
-    """The scale ka that computed components follow, where several are off by one factor; else None."""
-    logs = [math.log(one.factor) for one in best.made if one.code == SLIP]
+    """The scale that computed components follow, where several are off by one factor; else None."""
+    slips = [one for one in best.made if one.code == SLIP]
+    logs = [math.log(one.factor) for one in slips]
     if len(logs) < 2 or max(logs) - min(logs) > ONE_FACTOR:
         return None
     factor = math.exp(sum(logs) / len(logs))
-    made = () if "ka" in case.assumed else (Mistake("scale_wrong", "ka", factor=factor),)
-    parameters = {"ka": np.asarray(case.drawing.parameters["ka"] / factor)}
+    scale = scale_of(case.drawing.construction.figure_of(slips[-1].at))
+    made = () if scale in case.assumed else (Mistake("scale_wrong", scale, factor=factor),)
+    parameters = {scale: np.asarray(case.drawing.parameters[scale] / factor)}
     return Root(made, parameters, cost=RARITY["scale_wrong"])
 
 
@@ -285,7 +287,7 @@ def _other_scales(case: Case) -> Iterator[Root]:
         name: value * factor
         for name, value in case.drawing.parameters.items()
         for scale, factor in factors.items()
-        if name.startswith(f"{kind_of(scale).letter}_")
+        if name.partition("_")[0] in kind_of(scale).letters
     }
     for parameters in (scales, starts):
         yield Root(made, parameters, cost=RARITY["scale_wrong"] + FURTHER_SCALE * (len(made) - 1))

@@ -21,7 +21,7 @@ from reference.construction.mistakes import Drawing, Mistake, line_of
 from reference.construction.steps import Given, TwoLines
 from reference.construction.uncertainty import trace
 from reference.geometry import ComplexArray, FloatArray
-from reference.quantities import kind_of
+from reference.quantities import OF_MOTION, kind_of
 from reference.replay.explanations import AREA_MM, Covariance, Observation, Observations
 
 LEAST_ERROR_MM = 0.15
@@ -130,7 +130,7 @@ def _scales_of_the_drawn_driver(
 ) -> dict[str, FloatArray]:
     """The scales of the plans as they follow from the drawn lengths of the driving link's vectors."""
     found = {}
-    for scale in ("kv", "ka"):
+    for scale in OF_MOTION:
         drawn = evidence.vector(task.driving_vector(scale))
         size = math.hypot(
             *(float(one) for name, one in parameters.items() if name.startswith(f"{kind_of(scale).letter}_"))

@@ -26,7 +26,7 @@ from grader.rubric import CriterionTable, RubricFile
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.graph import evaluate
 from reference.construction.mistakes import Mistake
-from reference.quantities import vector_of_value
+from reference.quantities import OF_MOTION, vector_of_value
 from reference.replay.replay import Replay
 
 Read = TypeVar("Read", ReadNode, ReadVector)
@@ -131,12 +131,11 @@ def _with_scales_exchanged(
     task: Task, submission: Submission, comparison: Comparison
 ) -> tuple[Submission, Comparison] | None:
     """The submission with kv and ka exchanged, compared; None where that does not put both right."""
-    scales = [comparison.settled[name] for name in ("kv", "ka")]
     other = with_scales_exchanged(submission)
-    if other is None or not all(map(_is_off, scales)):
+    if other is None or not all(_is_off(comparison.settled[name]) for name in OF_MOTION):
         return None
     exchanged = compare(task, other, explain)
-    after = [exchanged.settled[name] for name in ("kv", "ka")]
+    scales, after = ([one.settled[name] for name in OF_MOTION] for one in (comparison, exchanged))
     are_other_units = all(one.used.refused for one in scales) and not any(one.used.refused for one in after)
     return (other, exchanged) if are_other_units or not any(map(_is_off, after)) else None
 

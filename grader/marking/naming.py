@@ -17,6 +17,7 @@ from reference.construction.elements import Along, Line
 from reference.construction.graph import Construction
 from reference.construction.mistakes import RPM_FACTOR, Drawing, Mistake, affected, commit
 from reference.construction.steps import Given, Step, TwoLines
+from reference.quantities import kind_of
 from reference.replay.explanations import SLIP
 from reference.replay.replay import Replay
 
@@ -275,7 +276,10 @@ def speed_mistake(mistake: Mistake, ratio: float | None) -> Mistake:
 
     Arguments: `ratio` of the gear, that may be forgotten or multiplied by.
     """
-    of_scale, power = mistake.at in SCALE_NAMES, 2 if mistake.at == "ka" else 1
+    of_scale = mistake.at in SCALE_NAMES
+    power = kind_of(mistake.at).omegas if of_scale else 1
+    if not power:
+        return mistake
     gears = {"": (" / U" if ratio else "", 1.0)}
     gears |= {"ratio_forgotten": ("", ratio), "ratio_multiplied": (" · U", ratio**2)} if ratio else {}
     formulas = {"": (RIGHT_SPEED, 1.0), **SPEED_SLIPS}
@@ -286,7 +290,7 @@ def speed_mistake(mistake: Mistake, ratio: float | None) -> Mistake:
         if (slip or gear) and not (of_scale and (slip not in SHOWN_BY_SCALES or (slip and gear)))
     }
     fitting = [(all(names), off, names) for names, off in residual.items() if off <= RPM_WITHIN]
-    if not fitting or mistake.at == "kL":
+    if not fitting:
         return mistake
     slip, gear = min(fitting)[-1]
     formula, instead_of = formulas[slip][0] + gears[gear][0], RIGHT_SPEED + gears[""][0]

@@ -20,6 +20,7 @@ from grader.outcomes import UsedScale
 from grader.records import Reading, ReadVector
 from reference.construction.mistakes import RPM_FACTOR, Mistake
 from reference.geometry import FloatArray
+from reference.quantities import OF_MOTION, KindName, kind_of
 from reference.replay.explanations import AREA_MM
 from reference.replay.nothing import NOTHING_FITS
 
@@ -126,7 +127,7 @@ class _Entries:
         """The measured vectors that are asked for."""
         # A scale that nobody declared was taken from the lengths themselves.
         used = {**task.rule_scales, **{name: one.used for name, one in scales.items() if not one.assumed}}
-        rows = []
+        rows, plans = [], [*task.construction.poles]
         for name, one in drawn.items():
             if name not in task.construction.vectors:
                 continue
@@ -144,7 +145,7 @@ class _Entries:
                     turned,
                     table.length_at(length) / 2.0,
                     max(math.radians(table.direction_deg), across) / 2.0,
-                    float(segment.scale == "ka"),
+                    float(plans.index(task.construction.figure_of(segment.head))),
                 )
             )
         return cls(*np.array(rows or np.zeros((0, 7)), np.float64).reshape(-1, 7).T)
@@ -168,13 +169,14 @@ class _Entries:
         It must be likelier in each plan, as one plan alone has another mistake, and most must not fit as they
         stand. Arguments: of each way residuals and price; standard errors, and the range of any entry.
         """
-        if min(np.sum(self.plan == 0.0), np.sum(self.plan == 1.0)) < LEAST_ENTRIES:
+        plans = [self.plan == index for index in range(max(2, int(self.plan.max(initial=0.0)) + 1))]
+        if min(map(np.sum, plans)) < LEAST_ENTRIES:
             return None
         costs = [_cost(one, sigmas, anywhere) + price for one, price in zip(residuals, prices, strict=True)]
         best, probability = _chosen(costs, 2.0 * math.log(anywhere) * len(self.plan))
         if best == 0 or probability < SURE or _share(residuals[0], sigmas) > MOST_FIT:
             return None
-        for plan in (self.plan == 0.0, self.plan == 1.0):
+        for plan in plans:
             found, right = (_cost(residuals[way][plan], sigmas[plan], anywhere) for way in (best, 0))
             if found >= right:
                 return None
@@ -314,13 +316,14 @@ def _lengths(entries: _Entries) -> _Found | None:
 
 # Values -------------------------------------------------------------------------------------------
 
-VALUE_UNITS: Mapping[str, tuple[str, float]] = {
-    "cm/s": ("va", 100.0),
-    "mm/s": ("va", 1000.0),
-    "rev/min": ("o", RPM_FACTOR),
-    "deg/s": ("oe", 1.0 / DEGREE),
+VALUE_UNITS: Mapping[str, tuple[tuple[KindName, ...], float]] = {
+    "cm/s": (("velocity", "acceleration"), 100.0),
+    "mm/s": (("velocity", "acceleration"), 1000.0),
+    "rev/min": (("omega",), RPM_FACTOR),
+    "deg/s": (("omega", "epsilon"), 1.0 / DEGREE),
+    "kN": (("force",), 0.001),
 }
-"""By unit, the first letters of the quantities that are in it, and the factor of all of them."""
+"""By unit, the kinds of the quantities that are in it, and the factor of all of them."""
 RELATIVE_SIGMA = 0.03
 """Standard error of a value's logarithm: of a length measured by hand and a scale."""
 VALUE_RANGE = 10.0
@@ -342,7 +345,7 @@ def _values(
     ratios = {name: abs(value / float(right[name])) for name, value in values.items() if right.get(name)}
     known = {name: ratio for name, ratio in ratios.items() if 0.0 < ratio < math.inf}
     for unit, (kinds, factor) in VALUE_UNITS.items():
-        names = [name for name in known if name[0] in kinds]
+        names = [name for name in known if kind_of(name).name in kinds]
         if len(names) < LEAST_ENTRIES:
             continue
         logs = np.log([known[name] for name in names])
@@ -366,7 +369,7 @@ EXCHANGED = Mistake(UNITS, "scales", other=("exchanged",))
 
 def with_scales_exchanged(submission: Submission) -> Submission | None:
     """The submission with what was declared as kv and ka exchanged; None unless both were declared."""
-    kv, ka = (submission.declared.get(name, "").strip() for name in ("kv", "ka"))
+    kv, ka = (submission.declared.get(name, "").strip() for name in OF_MOTION)
     if not kv or not ka or kv == ka:
         return None
     return replace(submission, declared={**submission.declared, "kv": ka, "ka": kv})

@@ -8,11 +8,13 @@ from dataclasses import dataclass, replace
 
 from markupsafe import Markup
 
+from grader.language import NO_NAMES
 from grader.outcomes import CHARGED
 from grader.overlay.scene import XY, Arrow, Ghost, Layer, Picture, Scene, between, is_in, layers_of
-from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, Box
-from grader.texts.spoken import NO_NAMES
+from grader.records import MECHANISM, Box
+from reference.authored.assignment import SCALE_NAMES
 from reference.drawing.canvas import FONTS, elements
+from reference.quantities import scale_of
 
 CLOSE_UP_MARGIN_MM = 12.0
 LEAST_CLOSE_UP_MM = 60.0
@@ -57,9 +59,10 @@ class PageView:
 def page_views(picture: Picture, index: int, names: Mapping[str, str] = NO_NAMES) -> list[PageView]:
     """Return the whole sheet, then close-ups of plans that are small on it; `names` as students know them."""
     scene = picture.scene
+    plans = {arrow.figure for arrow in scene.arrows} - {MECHANISM}
     close_ups = {
         figure: box
-        for figure in (VELOCITY_PLAN, ACCELERATION_PLAN)
+        for figure in sorted(plans, key=lambda figure: (SCALE_NAMES.index(scale_of(figure)), figure))
         if (box := _close_up(_part(scene, figure))) is not None
     }
     if not picture.scan:

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from grader.documents import CriterionDocument
+from grader.language import NO_NAMES
 from grader.outcomes import CHARGED, Outcome
 from grader.records import MECHANISM, Box, FloatArray, Reading, ReadVector, on_sheet
-from grader.texts.spoken import NO_NAMES
 from reference.construction.graph import ON_SKETCH, Vector
 from reference.drawing import symbols
 from reference.drawing.canvas import PAPER, Area, Curve, Label, Ring, Shape, Stroke, Text, pieces_of, width_of

@@ -13,7 +13,7 @@ match. Students who made mistakes match their own variant less well.
 import base64
 import contextlib
 import io
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -199,14 +199,15 @@ def draft_csv(roster: Roster, draft: RosterDraft) -> str:
     Pages without a suggestion are on the contact sheet alone: a line without a student would make the roster
     invalid.
     """
-    rows = [[*COLUMNS, *DRAFT_COLUMNS]]
+    scales = [name for name in SCALE_NAMES if name != "kF" or any(name in row.scales for row in roster.rows)]
+    rows = [[*(name for name in COLUMNS if name in scales or name not in SCALE_NAMES), *DRAFT_COLUMNS]]
     for row in roster.rows:
         mine = [suggestion for suggestion in draft.suggestions if suggestion.row is row]
-        rows.append([*_cells(row), *_judged(row, mine)])
+        rows.append([*_cells(row, scales), *_judged(row, mine)])
     return written((map(guarded, row) for row in rows), end="\n")
 
 
-def _cells(row: RosterRow) -> list[str]:
+def _cells(row: RosterRow, scales: Iterable[str]) -> list[str]:
     """Return the roster's own columns unchanged, except `scans`."""
     whole = ["" if value is None else str(value) for value in (row.n, row.position)]
     return [
@@ -214,7 +215,7 @@ def _cells(row: RosterRow) -> list[str]:
         row.name,
         *whole,
         row.email or "",
-        *(row.scales.get(name, "") for name in SCALE_NAMES),
+        *(row.scales.get(name, "") for name in scales),
         row.lang or "",
     ]
 

@@ -49,7 +49,7 @@ from grader.tables.roster import RosterRow
 from reference.authored.assignment import Assignment, PageKind, PageTable, Variant
 from reference.drawing.canvas import Piece, pieces_of, scale_pieces
 from reference.errors import AuthoredFileError, CallError, Finding
-from reference.quantities import SCALE_OF, unit_of, value_name
+from reference.quantities import scale_of, unit_of, value_name
 
 # One page -----------------------------------------------------------------------------------------
 
@@ -57,12 +57,14 @@ FIGURES = {
     MECHANISM: N_("Mechanism"),
     VELOCITY_PLAN: N_("Velocity plan"),
     ACCELERATION_PLAN: N_("Acceleration plan"),
+    "force_plan": N_("Force plan of the group of {group}"),
 }
 KINDS = {
     "mechanism": N_("Mechanism"),
     "all": N_("Mechanism, velocities and accelerations"),
     "velocity": N_("Velocities"),
     "acceleration": N_("Accelerations"),
+    "forces": N_("Forces"),
 }
 UNITS = (N_("rev/min"), N_("cm"), N_("°"))
 """Units of given data beyond those of `grader.language`."""
@@ -153,7 +155,8 @@ def draw_page(
     _task(drawing, assignment, text.variants, tongue)
     _advice(drawing, tongue)
     for figure, zone in form.template.zones.items():
-        title, apart = tongue.gettext(FIGURES[figure]), set(form.positions.values()) - {zone}
+        title = tongue.titled(FIGURES, figure, assignment.file.names)
+        apart = set(form.positions.values()) - {zone}
         for position, cell in form.positions.items() if apart else ((None, zone),):
             _zone(drawing, cell, title if position is None else f"{title}, {_position(position, tongue)}")
     for name, at in text.poles:
@@ -452,7 +455,7 @@ def _forms(
             known = {"form": table.kind, "values": tuple(one for one in wanted if one not in values)}
             problems.append(Reason("sheet_values", known, str(assignment.path)))
         problems.extend(_too_small(assignment, table, fit))
-        scales = {SCALE_OF[figure]: SCALE_BOXES[SCALE_OF[figure]] for figure in figures}
+        scales = {scale: SCALE_BOXES[scale] for scale in map(scale_of, figures)}
         cells = position_zones(assignment, fit.template.zones) if table.grid else {}
         forms.append(
             PageForm(table.kind, fit.template, scales | boxes, dict(construction.poles), values, cells)

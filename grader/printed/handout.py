@@ -15,9 +15,9 @@ from reportlab.platypus import Flowable, PageBreak, Paragraph, SimpleDocTemplate
 from grader.language import N_, Tongue, symbols, tongue
 from grader.printed.answer_sheet import given_data, variants_of
 from grader.printed.pdf import BOLD, REGULAR, embed_fonts, number, put_shapes, with_marks
-from grader.rubric import RubricFile
+from grader.rubric import SECTIONS, RubricFile, scales_asked
 from grader.tables.roster import RosterRow
-from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
+from reference.authored.assignment import Assignment, Variant
 from reference.drawing.canvas import Piece, bounds, pieces_of, scale_pieces
 from reference.drawing.sketch import scheme
 from reference.drawing.subject import Subject
@@ -25,7 +25,7 @@ from reference.errors import MechanismError
 from reference.geometry import ComplexArray
 from reference.mechanism import DrivingSlider, FixedGuide, guides_of
 from reference.plan import exact_plan
-from reference.quantities import SCALE_OF, kind_of, unit_of
+from reference.quantities import DRAWN, kind_of, unit_of
 
 NAME, GROUP, DATE = N_("Name"), N_("Group"), N_("Date")
 NUMBER = {"n": N_("number"), "position": N_("position")}
@@ -38,6 +38,8 @@ TABLES = {
     "velocity_plan": N_("Velocities"),
     "acceleration_plan": N_("Accelerations"),
     "angular": N_("Angular velocities and accelerations"),
+    "force_plans": N_("Forces"),
+    "moments": N_("Moments"),
 }
 SCALE, VALUE, VECTOR, LENGTH = N_("Scale"), N_("Value"), N_("Vector"), N_("Drawn, mm")
 DIRECTION, QUANTITY = N_("Direction, °"), N_("Quantity")
@@ -242,21 +244,22 @@ def _tables(assignment: Assignment, rubric: RubricFile, speaker: Tongue) -> Iter
     asked: dict[str, list[str]] = {title: [] for title in TABLES}
     for criterion in rubric.criterion:
         name = criterion.value or criterion.name
-        if name not in asked.get(criterion.section, [name]):
-            asked[criterion.section].append(name)
-    asked["scales"] = [name for name in SCALE_NAMES if name != "ka" or rubric.needs_accelerations]
+        table_of = "moments" if kind_of(name).name == "moment" else criterion.section
+        if name not in asked.get(table_of, [name]):
+            asked[table_of].append(name)
+    asked["scales"] = [*scales_asked(assignment, rubric)]
 
     def table(kind: str, wide_mm: float) -> list[Flowable]:
         if not asked[kind]:
             return []
         _ = speaker.gettext
         shown = [(name, names.get(name, name)) for name in asked[kind]]
-        if kind in {"scales", "angular"}:
+        if kind in {"scales", "angular", "moments"}:
             word, pieces = (SCALE, scale_pieces) if kind == "scales" else (QUANTITY, pieces_of)
             head = [_(word), _(VALUE)]
             rows = [[_cell(pieces(one), unit_of(name), speaker), ""] for name, one in shown]
         else:
-            unit = speaker.unit(kind_of(SCALE_OF[kind]).unit)
+            unit = speaker.unit(unit_of(asked[kind][0]))
             head = [_(VECTOR), _(LENGTH), _(DIRECTION), f"{_(VALUE)}, {unit}"]
             values = [name for name in asked[kind] if name in rubric.values] or asked[kind]
             rows = [[_letters(pieces_of(one)), "", "", "" if name in values else "–"] for name, one in shown]
@@ -268,7 +271,8 @@ def _tables(assignment: Assignment, rubric: RubricFile, speaker: Tongue) -> Iter
         ]
 
     half = (WIDE_MM - GAP_MM) / 2.0
-    first, second = ("velocity_plan", "scales", "angular"), ("acceleration_plan",)
+    first = ("velocity_plan", "scales", "angular")
+    second = ("acceleration_plan", *(kind for kind in ("force_plans", "moments") if asked[kind]))
     if max(sum(len(asked[kind]) + 2 for kind in kinds) for kinds in (first, second)) > MOST_ROWS:
         for kind in (*first, *second):
             yield from table(kind, WIDE_MM)
@@ -288,15 +292,15 @@ def _every_position(
     yield _text(assignment.file.title.in_language(speaker.lang), 14, BOLD)
     yield _text(_whose(row, Variant(row.n), speaker), 10, BOLD)
     yield _text(_(EVERY_POSITION), 12, BOLD)
-    for plan in SCALE_OF:
-        drawn = [name for name in rubric.vectors if kind_of(name).figure == plan and name[2:] != pin]
-        values = [name for name in rubric.values if kind_of(name).figure == plan]
+    for kind in DRAWN.values():
+        drawn = [name for name in rubric.vectors if kind_of(name) is kind and name != f"{kind.letter}_{pin}"]
+        values = [name for name in rubric.values if kind_of(name) is kind]
         units = [(name, "mm") for name in drawn] + [(name, unit_of(name)) for name in values]
         if not units:
             continue
         heads = [_cell(pieces_of(names.get(name, name)), unit, speaker) for name, unit in units]
         rows = [[one, *[""] * len(heads)] for one in positions]
-        yield from (Spacer(1, 4 * mm), _text(_(TABLES[plan]), 10, BOLD), Spacer(1, mm))
+        yield from (Spacer(1, 4 * mm), _text(_(TABLES[SECTIONS[kind.name]]), 10, BOLD), Spacer(1, mm))
         yield _empty([_(NUMBER["position"]), *heads], rows, WIDE_MM, WRITING_MM)
     yield PageBreak()
 

@@ -19,7 +19,7 @@ from reference.construction.graph import Construction, evaluate, parameters_of
 from reference.drawing.canvas import A3_MM
 from reference.geometry import ComplexArray
 from reference.plan import construction_for
-from reference.quantities import SCALE_OF, value_name, vector_of_value
+from reference.quantities import scale_of, value_name, vector_of_value
 
 # The code's text ----------------------------------------------------------------------------------
 
@@ -73,8 +73,9 @@ _MARKER_Y_MM = (14.0, 271.0)
 CODE_MM: Box = (363.0, 13.0, 28.0, 28.0)
 """Position of the QR code, quiet zone included."""
 SCALE_BOXES: dict[str, Box] = {
-    name: (306.0, 13.0 + 9.5 * row, 53.0, 8.0) for row, name in enumerate(SCALE_NAMES)
+    name: (306.0, 13.0 + 9.5 * min(row, 2), 53.0, 8.0) for row, name in enumerate(SCALE_NAMES)
 }
+"""No sheet has accelerations and forces: their scales are written in the same place."""
 _ZONE_GAP_MM = 4.0
 """Ink of one zone does not reach the next."""
 _FIELD_COLUMNS = ((39.0, 103.0), (159.0, 113.0), (289.0, 103.0))
@@ -445,8 +446,8 @@ def values_of(
     if left_mm >= _LEAST_VALUE_MM:
         places = {name: (boxes[name][0], below, boxes[name][2], left_mm) for name in wanted}
     else:
-        used = {SCALE_OF[figure] for figure in figures}
-        free = [box for name, box in SCALE_BOXES.items() if name not in used]
+        used = {SCALE_BOXES[scale_of(figure)] for figure in figures}
+        free = [box for box in dict.fromkeys(SCALE_BOXES.values()) if box not in used]
         rows = [(x, y, _VALUE_WIDE_MM, _FIELD_MOST_MM) for x, y, _, _ in free[: len(wanted)]]
         places = dict(zip(wanted, rows, strict=True)) if len(wanted) == len(rows) else {}
     found, (scales, nodes) = {}, _drawn(assignment, construction, variants)

@@ -38,6 +38,7 @@ from grader.records import (
 from reference.authored.assignment import Assignment, Scales, Variant
 from reference.construction.mistakes import Drawing
 from reference.geometry import ComplexArray
+from reference.quantities import DRAWN
 
 LEAST_SKETCH = 15.0
 LEAST_PLAN = 12.0
@@ -365,8 +366,7 @@ def _nowhere(drawing: Drawing, names: Sequence[str]) -> Iterator[Unread]:
         if vector is None:
             yield Unread(name, Reason("not_of_assignment"))
         else:
-            code = "no_velocity_plan" if vector.scale == "kv" else "no_acceleration_plan"
-            yield Unread(name, Reason(code))
+            yield Unread(name, Reason(f"no_{DRAWN[vector.scale].figure}"))
 
 
 # Named nodes and vectors with their errors ---------------------------------------------------------

@@ -31,7 +31,7 @@ from grader.review.questions import (
     whole_title,
 )
 from grader.review.session import OPEN, Session, Standing, Student, mark_of
-from reference.quantities import SCALE_OF
+from reference.quantities import scale_of
 
 WHOSE = N_("Whose data were drawn?")
 WHICH = N_("Which stroke is meant: %(vectors)s?")
@@ -276,7 +276,7 @@ def _written_at(session: Session, student: Student, doubt: Doubt, look: Facts) -
     """
     scale = next((one.name for one in session.batch.rubric.criterion if one.id == doubt.id), doubt.id[-2:])
     for sheet, page in enumerate(session.pages_of(student)):
-        if page.sheet is not None and any(SCALE_OF.get(figure) == scale for figure in page.sheet.zones):
+        if page.sheet is not None and scale in map(scale_of, page.sheet.zones):
             x, y, wide, high = SCALE_BOXES[scale]
             margin = 0.25 * wide
             box = (x - margin, y - margin, wide + 2 * margin, high + 2 * margin)

@@ -192,7 +192,7 @@ def _owners(asked: _Asked) -> Iterator[Doubt]:
 def _scales(asked: _Asked) -> Iterator[Doubt]:
     """Yield the scales that wait, each with the vectors that wait for it."""
     by_scale = {one.name: one.id for one in asked.task.rubric.criterion if one.name in SCALE_NAMES}
-    for scale in SCALE_NAMES:
+    for scale in asked.task.assignment.scale_names:
         own = [one for one in asked.waiting if one.id == by_scale.get(scale)]
         undecided = [one for one in asked.waiting if _waits_for(asked.task, one, scale)]
         if not own and len(undecided) < LIKELY_WHOLE:

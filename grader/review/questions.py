@@ -329,7 +329,7 @@ def look_of(session: Session, student: Student, criterion: CriterionDocument) ->
         figure = session.figure_of(student, criterion)
         read = student.report.reading.sheets[sheet].figures
         cells = _cells_box(session, page, criterion)
-        box = cells or (seen[0] if seen else _box_of(read.get(figure), scene.page_mm))  # type: ignore[call-overload]
+        box = cells or (seen[0] if seen else _box_of(read.get(figure), scene.page_mm))
         facts = {
             **sheet_facts(session, student, sheet),
             "page_mm": scene.page_mm,

@@ -17,6 +17,7 @@ from grader.tables.measurements import NOTHING_MEASURED, StudentSubmission
 from grader.texts.spoken import message, sentence
 from reference.authored.assignment import Assignment, Variant
 from reference.errors import InputFileError
+from reference.quantities import sort_of
 
 
 def photo_check(
@@ -53,9 +54,8 @@ def photo_check(
         name: task.construction.figure_of(vector.head) for name, vector in task.construction.vectors.items()
     }
     unread = {name for name, figure in figures.items() if figure in drawn}
-    absent = [
-        figure for figure in PLANS_UNSEEN if figure in {figures.get(one) for one in rubric.vectors} - drawn
-    ]
+    asked_for = {figures.get(one) for one in rubric.vectors} - drawn
+    absent = dict.fromkeys(sort_of(figure) for figure in task.construction.poles if figure in asked_for)
     told = [*(speaker.gettext(PLANS_UNSEEN[figure]) for figure in absent), *_said(problems, speaker)]
     lines = checked_lines(judgement, level, speaker, assignment, unread)
     pictures = pictures_of(pages, NOTHING_MEASURED, task.construction, judgement, show_expected=False)
@@ -65,6 +65,7 @@ def photo_check(
 PLANS_UNSEEN = {
     VELOCITY_PLAN: N_("No velocity plan was found: if it is on another sheet, check that one, too."),
     ACCELERATION_PLAN: N_("No acceleration plan was found: if it is on another sheet, check that one, too."),
+    "force_plan": N_("No force plan was found: if it is on another sheet, check that one, too."),
 }
 """Shown for a photo on which the plan of this name was not found."""
 _OF_NO_USE = frozenset(

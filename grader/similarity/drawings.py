@@ -30,7 +30,7 @@ from grader.similarity.submission import (
     fitting,
     scales_used,
 )
-from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
+from reference.authored.assignment import Assignment, Variant
 from reference.construction.elements import View
 from reference.construction.graph import Construction
 from reference.construction.steps import Coincide, Pivot, Pole, Step
@@ -214,7 +214,8 @@ def _raw_errors(
     nodes: dict[str, ComplexArray] = {}
     known = plan.drawing.parameters
     view = View(nodes, known)
-    copied = View(nodes, {**known, **{name: np.asarray(known[name] / (1.0 + SMALL)) for name in SCALE_NAMES}})
+    scaled = {name: np.asarray(scale / (1.0 + SMALL)) for name, scale in plan.scales.by_name.items()}
+    copied = View(nodes, {**known, **scaled})
     errors, by_scale = [], []
     with np.errstate(invalid="ignore", divide="ignore"):
         for step in plan.construction.steps:

@@ -163,6 +163,6 @@ def scales_used(
     proposed = assignment.scales(variants)
     scales = {
         name: [each.used.get(name, usual) for each, usual in zip(submissions, values, strict=True)]
-        for name, values in (("kL", proposed.kL), ("kv", proposed.kv), ("ka", proposed.ka))
+        for name, values in proposed.by_name.items()
     }
-    return Scales(*map(np.array, scales.values()))
+    return Scales(**{name: np.array(values) for name, values in scales.items()})

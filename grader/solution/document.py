@@ -9,7 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
+from grader.documents import ScaleName
+from reference.authored.assignment import Assignment, Variant
 from reference.construction.graph import Construction
 from reference.geometry import ComplexArray, FloatArray
 from reference.kinematics.motion import Motion
@@ -88,14 +89,6 @@ class _Document(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
 
-class ScalesDocument(_Document):
-    """Real units per millimetre on paper: m/mm, (m/s)/mm, (m/s^2)/mm."""
-
-    kL: float  # noqa: N815 - the field's own name for it
-    kv: float
-    ka: float
-
-
 class PlanVector(_Document):
     """An exact vector; a zero vector's direction is null."""
 
@@ -116,7 +109,8 @@ class PlanDocument(_Document):
     assignment: str
     variant: dict[str, int]
     position: int | None
-    scales: ScalesDocument
+    scales: dict[ScaleName, float]
+    """Real units per millimetre on paper: m/mm, (m/s)/mm, (m/s^2)/mm, N/mm."""
     points_m: dict[str, tuple[float, float]]
     vectors: dict[str, PlanVector]
     nodes_mm: dict[str, dict[str, tuple[float, float]]]
@@ -165,7 +159,7 @@ def _columns(plan: Plan) -> _Columns:
         "value": lists({name: np.abs(plan.vectors_si[name]) for name in vectors}),
         "drawn_mm": lists({name: np.abs(plan.drawn_mm(name)) for name in vectors}),
         "direction_deg": lists({name: plan.direction_deg(name) for name in vectors}),
-        "scale": lists({name: getattr(plan.scales, name) for name in SCALE_NAMES}),
+        "scale": lists(plan.scales.by_name),
         "rate": lists({name: rate for name, rate in plan.rates.items() if name not in told}),
         "conditioning": lists(conditioning(plan)),
     }
@@ -186,7 +180,7 @@ def _document(assignment: Assignment, plan: Plan, columns: _Columns, index: int)
         assignment=assignment.id,
         variant=variant_numbers(plan.variants[index]),
         position=plan.variants[index].position,
-        scales=ScalesDocument(**numbers("scale")),
+        scales=numbers("scale"),
         points_m=points("mechanism"),
         vectors={
             name: PlanVector(

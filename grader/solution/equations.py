@@ -9,6 +9,7 @@ import numpy as np
 from grader.language import N_
 from grader.solution.formulas import TICK, Formula, Fraction, Grid, Name
 from grader.solution.sentences import NEXT_TO_NOTHING, Speaker, guided
+from reference.authored.assignment import SCALE_NAMES
 from reference.authored.formula import Formula as AuthoredFormula
 from reference.authored.formula import Value
 from reference.construction.elements import Along, Coriolis, Length, Normal, side_at
@@ -16,7 +17,7 @@ from reference.construction.equations import Equation, Proportion, Term
 from reference.drawing.canvas import Piece, pieces_of
 from reference.geometry import cross
 from reference.mechanism import Crank
-from reference.quantities import kind_of, unit_of
+from reference.quantities import OF_MOTION, kind_of, unit_of
 
 SIZE, DIRECTION, PAPER = N_("size"), N_("direction"), N_("on paper")
 GUIDE, SLOT = N_("guide of %(joint)s"), N_("slot of %(joint)s")
@@ -121,7 +122,7 @@ def size_formula(speaker: Speaker, length: Length, node: str) -> tuple[Formula, 
             return ("2 · ", names), ("2 · ", numbers)
     driver = speaker.subject.plan.mechanism.driver
     quantity = getattr(length, "quantity", "")
-    if not isinstance(driver, Crank) or not quantity.startswith(("v_", "a_")):
+    if not isinstance(driver, Crank) or kind_of(quantity).scale not in OF_MOTION:
         return None
     turns = quantity == f"a_{driver.pin}_t"
     rate, name = (driver.epsilon, "epsilon") if turns else (driver.omega, "omega")
@@ -187,8 +188,8 @@ def scale_formula(speaker: Speaker, scale: str) -> Formula:
     if not rule.names or not np.isclose(float(np.ravel(rule(known))[0]), value):
         return (name, *end)
     first: tuple[Formula, ...] = ()
-    if scale != "kL" and rule.names & {"omega", "speed", "crank_m"}:
-        vector = plan.construction.vectors[f"{scale[1:]}_{driver.pin}"]
+    if scale in OF_MOTION and rule.names & {"omega", "speed", "crank_m"}:
+        vector = plan.construction.vectors[f"{kind_of(scale).letter}_{driver.pin}"]
         first = (" = ", Fraction(speaker.symbol(vector.name), speaker.symbol(vector.tail, vector.head)))
     return (name, *first, *_both(speaker, rule, known), *end)
 
@@ -206,7 +207,7 @@ def _both(speaker: Speaker, rule: AuthoredFormula, known: Mapping[str, Value]) -
 def _symbols(speaker: Speaker) -> Callable[[str], Formula]:
     """Return how to write a name of the assignment's formulas."""
     driver = speaker.subject.plan.mechanism.driver
-    known: dict[str, Formula] = {scale: speaker.scale(scale) for scale in ("kL", "kv", "ka")}
+    known: dict[str, Formula] = {scale: speaker.scale(scale) for scale in SCALE_NAMES}
     if isinstance(driver, Crank):
         arm = speaker.symbol(driver.pivot, driver.pin)
         drawn = Piece(speaker.tongue.gettext(DRAWN), -1)

@@ -58,6 +58,7 @@ TITLES = {
     "mechanism": N_("Mechanism"),
     "velocity_plan": N_("Velocity plan"),
     "acceleration_plan": N_("Acceleration plan"),
+    "force_plan": N_("Force plan of the group of {group}"),
     "centres": N_("Instantaneous centres and acceleration poles"),
 }
 VARIANT = {"n": N_("n"), "position": N_("position")}

@@ -16,22 +16,23 @@ from reference.construction.graph import AngularRate, Vector
 from reference.construction.steps import Given, Step
 from reference.drawing.canvas import Piece
 from reference.drawing.subject import Subject
-from reference.quantities import SCALE_OF, kind_of, unit_of
+from reference.quantities import kind_of, scale_of, unit_of
 
+CENTRES = "centres"
 INTRODUCTIONS = {
-    "mechanism": N_("Every real length is divided by %(scale)s."),
-    "velocity_plan": N_(
-        "Every velocity is divided by %(scale)s; directions are taken from the mechanism sketch."
-    ),
-    "acceleration_plan": N_(
+    "kL": N_("Every real length is divided by %(scale)s."),
+    "kv": N_("Every velocity is divided by %(scale)s; directions are taken from the mechanism sketch."),
+    "ka": N_(
         "Every acceleration is divided by %(scale)s; normal components point towards the centre of rotation."
     ),
-    "centres": N_(
+    "kF": N_(
+        "Every force is divided by %(scale)s; each vector begins where the one before it ends, in any order."
+    ),
+    CENTRES: N_(
         "Points of a moving link that have no velocity (instantaneous centres I) or no acceleration "
         "(acceleration poles J) at this moment, by Mehmke's similarity."
     ),
 }
-CENTRES = "centres"
 COUNTER_CLOCKWISE, CLOCKWISE = N_("counter-clockwise"), N_("clockwise")
 LENGTHS_MM = N_("Directions count counter-clockwise from the horizontal to the right.")
 
@@ -95,15 +96,14 @@ def explain(
             equation = known.get(step.node)
             is_first = equation is not None and equation.sums and equation.nodes[0] == step.node
             told.append(_explanation(speaker, number, step, equation if is_first else None))
-        introduction = speaker.say(
-            INTRODUCTIONS[figure], scale=speaker.write(speaker.scale(SCALE_OF[figure]))
-        )
-        formulas = [*driving_speed(speaker)] if figure == "velocity_plan" else []
-        formulas.append(scale_formula(speaker, SCALE_OF[figure]))
+        scale = scale_of(figure)
+        introduction = speaker.say(INTRODUCTIONS[scale], scale=speaker.write(speaker.scale(scale)))
+        formulas = [*driving_speed(speaker)] if scale == "kv" else []
+        formulas.append(scale_formula(speaker, scale))
         vectors = {vector.name for vector in construction.vectors_of(figure)}
         found = (one for one in construction.rates.values() if one.vector in vectors and not one.drives)
         rates = [_turning(speaker, rate) for rate in found]
-        title = tongue.gettext(TITLES[figure])
+        title = tongue.titled(TITLES, figure)
         sections.append(PlanSection(figure, title, introduction, tuple(told), tuple(formulas), tuple(rates)))
     centres = tuple(
         ExplainedStep(number + k, step, sentences.sentence(speaker, step))
@@ -129,10 +129,11 @@ def _explanation(speaker: Speaker, number: int, step: Step, equation: Equation |
 
 def computed(speaker: Speaker, step: Step) -> Iterator[Formula]:
     """Yield the lengths that the step draws, from data or from earlier figures."""
-    on_plan = speaker.subject.plan.construction.figure_of(step.node) != "mechanism"
+    figure = speaker.subject.plan.construction.figure_of(step.node)
+    on_plan = figure != "mechanism"
     for length in [step.length] if isinstance(step, Given) else sentences.scaled_names(step):
         mm = abs(float(length.at(speaker.view)))
-        scale = length.scale if isinstance(length, Scaled) else "ka"
+        scale = length.scale if isinstance(length, Scaled) else scale_of(figure)
         real = mm * speaker.scale_value(scale)
         if real == 0.0 or speaker.is_nothing(step.node, mm):
             continue

@@ -33,7 +33,7 @@ from grader.records import (
     Unread,
     Value,
 )
-from grader.rubric import RubricFile
+from grader.rubric import RubricFile, scales_asked
 from grader.tables.reader import (
     MARK,
     Row,
@@ -49,12 +49,12 @@ from grader.tables.reader import (
     why_no_id,
 )
 from grader.tables.scale_text import MAX_LENGTH as LONGEST_SCALE
-from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
+from reference.authored.assignment import SCALE_NAMES, USUAL_SCALES, Assignment, Variant
 from reference.authored.variant_table import delimiter_of
 from reference.construction.derive import construction_of
 from reference.construction.graph import Construction, coincident
 from reference.errors import MOST_FINDINGS
-from reference.quantities import SCALE_UNITS, kind_of, unit_of, value_name
+from reference.quantities import kind_of, unit_of, value_name
 
 if TYPE_CHECKING:
     from grader.tables.decisions import Decision
@@ -65,7 +65,7 @@ TABLES = {"segments_mm": "", "directions_deg": "_deg", "values": "_value"}
 MAX_BYTES = 1_000_000
 """A class of a thousand with every length, direction and value writes half of it."""
 CLASS_TABLE = TableKind(
-    "measurements", (*KEYS, *SCALE_NAMES, "v_A", "v_A_deg", "v_A_value"), ("student_id",), MAX_BYTES, 20_000,
+    "measurements", (*KEYS, *USUAL_SCALES, "v_A", "v_A_deg", "v_A_value"), ("student_id",), MAX_BYTES, 20_000,
     has_comments=True, unreadable="measurements_unreadable", encoding="measurements_encoding",
 )  # fmt: skip
 OWN_TABLE = replace(CLASS_TABLE, required=())
@@ -167,12 +167,13 @@ class StudentSubmission:
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """Names of measurable quantities: vectors with the plan each is in, and angular quantities."""
+    """Names of measurable quantities: vectors with the plan each is in, rates and moments, scales."""
 
     vectors: Mapping[str, str]
     rates: tuple[str, ...]
     unused: frozenset[str] = frozenset()
     """Vectors that make sense in this mechanism, but that its plans are drawn without."""
+    scales: tuple[str, ...] = USUAL_SCALES
 
     @property
     def values(self) -> tuple[str, ...]:
@@ -193,24 +194,26 @@ def names_of(assignment: Assignment) -> Names:
     ]
     possible += [f"a_{about}_{part}" for about in under for part in ("c", "r")]
     unused = frozenset(possible) - construction.vectors.keys()
-    vectors = {name: kind_of(name).figure for name in (*construction.vectors, *sorted(unused))}
+    vectors = {name: construction.figure_of(one.head) for name, one in construction.vectors.items()}
+    vectors |= {name: kind_of(name).figure for name in sorted(unused)}
     vectors |= dict.fromkeys(construction.on_sketch, MECHANISM)
-    return Names(vectors, tuple(construction.rates), unused)
+    rates = (*construction.rates, *construction.moments)
+    return Names(vectors, rates, unused, assignment.scale_names)
 
 
-def columns_of(rubric: RubricFile) -> dict[str, str]:
+def columns_of(assignment: Assignment, rubric: RubricFile) -> dict[str, str]:
     """The columns of a file with all that a rubric asks for, each with its unit."""
-    columns = {name: unit for name, unit in SCALE_UNITS.items() if name != "ka" or rubric.needs_accelerations}
+    columns = {name: unit_of(name) for name in scales_asked(assignment, rubric)}
     for criterion in rubric.criterion:
         if criterion.vector or criterion.point:
             columns[criterion.name] = "mm"
             columns |= {f"{criterion.name}_deg": "°"} if criterion.direction else {}
         elif criterion.value:
             columns[criterion.name] = unit_of(criterion.value)
-        elif criterion.angular:
-            columns[value_name(criterion.angular)] = unit_of(criterion.angular)
         elif criterion.sense:
             columns[criterion.name] = "cw/ccw"
+        elif criterion.turning:
+            columns[value_name(criterion.turning)] = unit_of(criterion.turning)
     return columns
 
 
@@ -232,8 +235,8 @@ def read_measurements(
     if path.suffix.lower() == ".json":
         return (_parse_json(text, name, names),)
     columns = _columns(names)
-    table = kind.table(text, name, lambda header: _faults_of(header, columns))
-    meant = _unknown(table.header, columns)
+    table = kind.table(text, name, lambda header: _faults_of(header, names.scales, columns))
+    meant = _unknown(table.header, names.scales, columns)
     return tuple(_line(row, meant, _Entries(name, names, columns, row), is_own=is_own) for row in table.rows)
 
 
@@ -243,9 +246,10 @@ def measurements_in(cells: Mapping[str, str], names: Names, file: str, lang: str
     Raises TableError, in the language, where none of the columns is known.
     """
     row, columns = Row(0, tuple(cells.values()), tuple(cells), ";"), _columns(names)
-    if faults := list(_faults_of(row.header, columns)):
+    if faults := list(_faults_of(row.header, names.scales, columns)):
         raise TableError(CLASS_TABLE.code, file, faults, tongue(lang))
-    return _line(row, _unknown(row.header, columns), _Entries(file, names, columns, row), is_own=True)
+    meant = _unknown(row.header, names.scales, columns)
+    return _line(row, meant, _Entries(file, names, columns, row), is_own=True)
 
 
 def students_in(path: Path) -> tuple[str, ...]:
@@ -277,14 +281,18 @@ def _columns(names: Names) -> Mapping[str, tuple[str, str]]:
     return columns | {f"{name}_sense": ("values", name) for name in names.rates}
 
 
-def _faults_of(header: Sequence[str], columns: Mapping[str, object]) -> Iterator[Reason]:
-    if not {*SCALE_NAMES, *columns}.intersection(header):
+def _faults_of(
+    header: Sequence[str], scales: Sequence[str], columns: Mapping[str, object]
+) -> Iterator[Reason]:
+    if not {*scales, *columns}.intersection(header):
         yield Reason("no_measurements", {"line": 1, "names": tuple(columns)[:3]})
 
 
-def _unknown(header: Sequence[str], columns: Mapping[str, object]) -> dict[str, tuple[str, ...]]:
+def _unknown(
+    header: Sequence[str], scales: Sequence[str], columns: Mapping[str, object]
+) -> dict[str, tuple[str, ...]]:
     """The columns that are not known, each with those it may be meant for that are not there."""
-    known, names = {"", *KEYS, *SCALE_NAMES, *columns}, sorted(columns)
+    known, names = {"", *KEYS, *scales, *columns}, sorted(columns)
     unknown = [name for name in header if name not in known][:MOST_FINDINGS]
     meant = {name: near(name, names, most=2).get("near", ()) for name in unknown}
     return {name: tuple(one for one in near_it if one not in header) for name, near_it in meant.items()}
@@ -412,7 +420,7 @@ def _line(row: Row, meant: Mapping[str, tuple[str, ...]], entries: _Entries, *, 
             entries.number(column, column, short(text), real_number(text, row.delimiter))
         elif text and column in meant:
             entries.unknown(column, short(text), meant[column])
-    for scale in SCALE_NAMES:
+    for scale in entries.names.scales:
         if row[scale]:
             entries.scale(scale, scale, row[scale])
     return entries.measurements(student, n, position, is_usable=is_usable)
@@ -528,8 +536,8 @@ def _parse_json(text: str, file: str, names: Names) -> Measurements:
     entries = _Entries(file, names, _columns(names))
     for name, value in _take(data, "scales"):
         path = f"$.scales.{name[:40]}"
-        if name not in SCALE_NAMES:
-            entries.row.fault(path, Reason("not_known", {"names": SCALE_NAMES}))
+        if name not in names.scales:
+            entries.row.fault(path, Reason("not_known", {"names": names.scales}))
         else:
             entries.scale(path, name, str(value) if _is_number(value) else _text_or_fault(value))
     for table, end in TABLES.items():

@@ -1,9 +1,9 @@
 """Scales as students declare them: text with a unit, parsed, never guessed.
 
-Understood are quantities (``0.006 m/mm``, ``0,036 (м/с)/мм``, ``0.036 m/s·mm`` for "per mm"),
-ratios for lengths (``1:5``, ``5 cm/cm``), correspondences (``1 mm = 0.05 m/s``), the assignment's
-kind of rule (``kv = omega kL``), and chains of them (``ka = ω2kL = 16,59 (m/s2)/mm``: the last
-part that says a value counts). The result is real SI units per millimetre on paper.
+Understood are quantities (``0.006 m/mm``, ``0,036 (м/с)/мм``, ``0.036 m/s·mm`` for "per mm",
+``25 N/mm``), ratios for lengths (``1:5``, ``5 cm/cm``), correspondences (``1 mm = 0.05 m/s``), the
+assignment's kind of rule (``kv = omega kL``), and chains of them (``ka = ω2kL = 16,59 (m/s2)/mm``:
+the last part that says a value counts). The result is real SI units per millimetre on paper.
 
 A declared scale that cannot be understood is a value, `Refused`, with the reason and what could be
 written instead.
@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from grader.records import Reason, Value, Written
 from reference.authored.assignment import SCALE_NAMES, Assignment, Scales, Variant
 from reference.mechanism import Crank
+from reference.quantities import DRAWN
 
 SURE = 0.9
 """Probability from which a text read in a printed box is taken for what was written."""
@@ -27,24 +28,30 @@ MAX_EXPONENT = 6
 MAX_DEPTH = 6
 PAPER_MM_PER_M = 1000.0
 
-TIME_POWER: Mapping[str, int] = {"kL": 0, "kv": -1, "ka": -2}
-"""A scale is real over paper: the metres cancel, powers of the second stay."""
+DIMENSIONS: Mapping[str, tuple[int, int, int]] = {
+    name: (0, -kind.omegas, 0) if kind.omegas is not None else (-1, 0, 1) for name, kind in DRAWN.items()
+}
+"""Powers of the metre, the second and the newton: real over paper, so that the metres of motions cancel."""
 EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "kL": ("1:5", "5 cm/cm", "0.005 m/mm"),
     "kv": ("0.036 (m/s)/mm", "kv = omega kL"),
     "ka": ("0.108 (m/s^2)/mm", "ka = omega^2 kL"),
+    "kF": ("25 N/mm", "1 mm = 25 N"),
 }
-UNITS: Mapping[str, tuple[float, int, int]] = {
-    "m": (1.0, 1, 0),
-    "dm": (0.1, 1, 0),
-    "cm": (0.01, 1, 0),
-    "mm": (0.001, 1, 0),
-    "km": (1000.0, 1, 0),
-    "s": (1.0, 0, 1),
-    "sec": (1.0, 0, 1),
-    "min": (60.0, 0, 1),
+UNITS: Mapping[str, tuple[float, int, int, int]] = {
+    "m": (1.0, 1, 0, 0),
+    "dm": (0.1, 1, 0, 0),
+    "cm": (0.01, 1, 0, 0),
+    "mm": (0.001, 1, 0, 0),
+    "km": (1000.0, 1, 0, 0),
+    "s": (1.0, 0, 1, 0),
+    "sec": (1.0, 0, 1, 0),
+    "min": (60.0, 0, 1, 0),
+    "N": (1.0, 0, 0, 1),
+    "daN": (10.0, 0, 0, 1),
+    "kN": (1000.0, 0, 0, 1),
 }
-"""SI factor, power of the metre, power of the second."""
+"""SI factor, powers of the metre, the second and the newton."""
 CYRILLIC: Mapping[str, str] = {
     "м": "m",
     "дм": "dm",
@@ -53,6 +60,9 @@ CYRILLIC: Mapping[str, str] = {
     "км": "km",
     "с": "s",
     "сек": "sec",
+    "Н": "N",
+    "даН": "daN",
+    "кН": "kN",
 }
 
 
@@ -103,7 +113,7 @@ def parse_scale(name: str, text: str | float, *, bare_unit: str | None = None) -
 
     Arguments
     ---------
-    name : ``kL``, ``kv`` or ``ka``
+    name : ``kL``, ``kv``, ``ka`` or ``kF``
     text : as declared; a number counts as a text without a unit
     bare_unit : the unit of a bare number where the assignment says one, such as ``(m/s)/mm``
     """
@@ -159,7 +169,7 @@ def _positive(value: float, text: str) -> float:
     return value
 
 
-_NO_SUCH: Mapping[str, str] = {"kL": "no_length", "kv": "no_velocity", "ka": "no_acceleration"}
+_NO_SUCH = {name: f"no_{kind.name}" for name, kind in DRAWN.items()}
 """The clause of a quantity with the wrong unit."""
 
 # Cleaning -----------------------------------------------------------------------------------------
@@ -187,6 +197,7 @@ _NAMES: Mapping[str, str] = {
     "kL": r"(?:k|mu|μ)[_ ]?[lL]",
     "kv": r"(?:k|mu|μ)[_ ]?[vV]",
     "ka": r"(?:k|mu|μ)[_ ]?[aA]",
+    "kF": r"(?:k|mu|μ)[_ ]?[fFpP]",
     "omega": r"(?:omega|ω|w)(?:_?1)?",
 }
 _RATIO_WORDS = r"(?:M|М|m|sc|scale|scara|scară|масштаб)"
@@ -224,7 +235,7 @@ def _powers(text: str, name: str) -> dict[str, int] | None:
         place = factor.end()
     time = -powers.get("omega", 0) - powers.get("kv", 0)
     scales = powers.get("kL", 0) + powers.get("kv", 0)
-    if name in powers or time != TIME_POWER[name] or scales != 1:
+    if name in powers or (0, time, 0) != DIMENSIONS[name] or scales != 1:
         return None
     return powers
 
@@ -237,8 +248,7 @@ class _Quantity:
     """A value in SI with the powers of its units; `is_bare` when no unit stood in the text."""
 
     value: float
-    metres: int = 0
-    seconds: int = 0
+    powers: tuple[int, int, int] = (0, 0, 0)
     is_bare: bool = True
 
     def times(self, other: "_Quantity", sign: int) -> "_Quantity":
@@ -246,13 +256,17 @@ class _Quantity:
             raise TextError("division_by_zero")
         return _Quantity(
             self.value * other.value**sign,
-            self.metres + sign * other.metres,
-            self.seconds + sign * other.seconds,
+            _sum(self.powers, other.powers, sign),
             self.is_bare and other.is_bare,
         )
 
     def fits(self, name: str) -> bool:
-        return not self.is_bare and self.metres == 0 and self.seconds == TIME_POWER[name]
+        return not self.is_bare and self.powers == DIMENSIONS[name]
+
+
+def _sum(one: tuple[int, int, int], other: tuple[int, int, int], times: int) -> tuple[int, int, int]:
+    first, second, third = (a + times * b for a, b in zip(one, other, strict=True))
+    return first, second, third
 
 
 _TOKEN = re.compile(
@@ -315,7 +329,7 @@ class _Reader:
             return base
         if base.value == 0.0:
             raise TextError("zero_power", self.text)
-        return _Quantity(base.value**exponent, base.metres * exponent, base.seconds * exponent, base.is_bare)
+        return _Quantity(base.value**exponent, _sum((0, 0, 0), base.powers, exponent), base.is_bare)
 
     def atom(self, depth: int) -> _Quantity:
         word = self.tokens[self.place]
@@ -329,8 +343,8 @@ class _Reader:
         if _is_number(word):
             return _Quantity(float(word))
         if word in UNITS:
-            factor, metres, seconds = UNITS[word]
-            return _Quantity(factor, metres, seconds, is_bare=False)
+            factor, *powers = UNITS[word]
+            return _Quantity(factor, (powers[0], powers[1], powers[2]), is_bare=False)
         if not word:
             raise TextError("unfinished", self.text)
         raise TextError("not_understood", self.text, sign=word)
@@ -387,7 +401,7 @@ def _correspondence(name: str, paper_text: str, real: list[_Quantity]) -> float 
         paper = _quantities(paper_text)[0]
     except TextError:
         return None
-    if (paper.metres, paper.seconds) != (1, 0) or paper.value <= 0.0:
+    if paper.powers != (1, 0, 0) or paper.value <= 0.0:
         return None
     values = {q.times(paper, -1).value for q in real if q.times(paper, -1).fits(name)}
     return values.pop() if len(values) == 1 else None

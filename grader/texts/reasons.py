@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 
-from grader.language import N_, Tongue
+from grader.language import N_, NO_NAMES, Tongue
 from grader.options import Level
-from grader.texts.spoken import NO_NAMES, Coded, filled, spoken
+from grader.texts.spoken import Coded, filled, spoken
 
 UNDECIDED = "scale_undecided"
 """Replaces `scale_assumed` and `follows` together under review: neither alone says what is in doubt."""

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Protocol, TypeVar, cast
 
 from grader.documents import ProblemDocument, UnmatchedDocument, UnreadDocument
-from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
+from grader.language import N_, NO_NAMES, ROOT_LANGUAGE, Tongue, tongue
 from grader.records import Reason, Unread, Value, of_error
 from grader.texts.clauses import CLAIMS, CLAUSES
 from grader.texts.exports import EXPORTS
@@ -13,11 +13,10 @@ from grader.texts.faults import FAULTS, WHERE
 from grader.texts.problems import ADVICE, PROBLEMS
 from grader.texts.refusals import REFUSALS
 from reference.errors import PlanmarkError, lines_of
-from reference.quantities import unit_of, vector_of_value
+from reference.quantities import sort_of, unit_of, vector_of_value
 
 ENGLISH = tongue(ROOT_LANGUAGE)
 SENTENCES = {**FAILURES, **REFUSALS}
-NO_NAMES: Mapping[str, str] = {}
 
 
 class Coded(Protocol):
@@ -36,6 +35,7 @@ PLACES = {
     "mechanism": N_("the mechanism"),
     "velocity_plan": N_("the velocity plan"),
     "acceleration_plan": N_("the acceleration plan"),
+    "force_plan": N_("the force plan of the group of {group}"),
     "directions": N_("the directions"),
     "lengths": N_("the lengths"),
     "scales": N_("the scales"),
@@ -68,7 +68,7 @@ def place(at: str, speaker: Tongue, names: Mapping[str, str] = NO_NAMES) -> str:
     vector = vector_of_value(at)
     if vector is not None:
         return f"{names.get(vector, vector)}, {speaker.unit(unit_of(vector))}"
-    return speaker.gettext(PLACES[at]) if at in PLACES else names.get(at, at)
+    return speaker.titled(PLACES, at, names) if sort_of(at) in PLACES else names.get(at, at)
 
 
 # Parameters in words ------------------------------------------------------------------------------
@@ -93,7 +93,8 @@ def spoken(
         elif not isinstance(value, int | float):
             words = _NOUNS.get(key, PLACES)
             said[key] = ", ".join(
-                speaker.gettext(words[one]) if one in words else names.get(one, one) for one in value
+                speaker.titled(words, one, names) if sort_of(one) in words else names.get(one, one)
+                for one in value
             )
         elif suffix in _UNIT_WRITERS and stem:
             said[stem] = _UNIT_WRITERS[suffix](speaker, value)

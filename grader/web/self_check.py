@@ -48,7 +48,7 @@ def form_of(assignment: Assignment, lang: str) -> dict[str, Any]:
     """Return the fields of a form, each with its name, group, unit and column, and the ranges of numbers."""
     speaker, names = tongue(lang), assignment.file.names
     fields = []
-    for column, unit in columns_of(rubric_of(assignment)).items():
+    for column, unit in columns_of(assignment, rubric_of(assignment)).items():
         name = column.removesuffix("_deg").removesuffix("_value")
         group = (
             "scales" if name in SCALE_UNITS

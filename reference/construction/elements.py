@@ -316,35 +316,36 @@ class Couple(FromNodes):
 
 
 @dataclass(frozen=True, slots=True)
-class Balance(FromNodes):
-    """A force from the moments about a joint: across or along a link, so that they balance.
+class Moments(FromNodes):
+    """The moments of forces and couples about a joint."""
 
-    Attributes
-    ----------
-    about : the joint about which moments are taken
-    point, along : where the balancing force acts, and its direction
-    forces, couples : what it balances
-    """
-
-    reads = ("about", "point", "along", "forces", "couples")
+    reads = ("about", "forces", "couples")
     about: str
-    point: str
-    along: Direction
     forces: tuple[Force, ...]
     couples: tuple[Couple, ...] = ()
 
-    def moment(self, view: View) -> FloatArray:
-        """Return the sum of the moments that it balances, N m, counter-clockwise positive."""
+    def at(self, view: View) -> FloatArray:
+        """Return the moment that balances them, N m, counter-clockwise positive."""
         known = view.parameters
         drawn = sum((force.moment(view, self.about) for force in self.forces), np.asarray(0.0))
         couples = sum((couple.at(view) for couple in self.couples), np.asarray(0.0))
-        return np.asarray(drawn * known["kL"] * known["kF"] + couples)
+        return np.asarray(-drawn * known["kL"] * known["kF"] - couples)
+
+
+@dataclass(frozen=True, slots=True)
+class Balance(FromNodes):
+    """A force at a joint, along a direction, that balances moments about another joint."""
+
+    reads = ("point", "along", "moments")
+    point: str
+    along: Direction
+    moments: Moments
 
     def at(self, view: View) -> FloatArray:
         """Return the length in drawn millimetres."""
         known, nodes = view.parameters, view.nodes
-        lever = geometry.cross(nodes[self.point] - nodes[self.about], self.along.at(view))
-        return np.asarray(-self.moment(view) / (lever * known["kL"] * known["kF"]))
+        lever = geometry.cross(nodes[self.point] - nodes[self.moments.about], self.along.at(view))
+        return np.asarray(self.moments.at(view) / (lever * known["kL"] * known["kF"]))
 
 
 Length = Scaled | Normal | Coriolis | Component | Same | Inertia | Balance
@@ -355,9 +356,9 @@ def data_in(length: Length) -> frozenset[str]:
     match length:
         case Scaled(quantity=name) | Inertia(mass=name) | Same(sense=name):
             return frozenset((name,))
-        case Balance(forces=forces, couples=couples):
-            of_forces = (name for force in forces for name in data_in(force.size))
-            return frozenset((*of_forces, *(one.inertia or one.name for one in couples)))
+        case Balance(moments=moments):
+            of_forces = (name for force in moments.forces for name in data_in(force.size))
+            return frozenset((*of_forces, *(one.inertia or one.name for one in moments.couples)))
     return frozenset()
 
 

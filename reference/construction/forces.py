@@ -20,6 +20,7 @@ from reference.construction.elements import (
     Force,
     Inertia,
     Line,
+    Moments,
     Parallel,
     Same,
     Scaled,
@@ -90,6 +91,10 @@ class Loaded:
     forces: list[Force] = field(default_factory=list)
     couples: list[Couple] = field(default_factory=list)
 
+    def about(self, joint: str) -> Moments:
+        """Return their moments about a joint."""
+        return Moments(joint, tuple(self.forces), tuple(self.couples))
+
 
 @dataclass(slots=True)
 class Polygon:
@@ -153,7 +158,7 @@ class ForcePlans:
     accelerations: Accelerations
     loaded: dict[str, Loaded] = field(default_factory=dict)
     figures: dict[str, Polygon] = field(default_factory=dict)
-    moments: dict[str, Balance] = field(default_factory=dict)
+    moments: dict[str, Moments] = field(default_factory=dict)
     links: dict[str, tuple[str, ...]] = field(init=False)
     carriers: dict[str, str] = field(init=False)
     names: dict[str, str] = field(init=False)
@@ -261,7 +266,7 @@ class ForcePlans:
         if not here.forces and not here.couples:
             return start
         across = Along(pin, inner, 1)
-        size = Balance(inner, pin, across, tuple(here.forces), tuple(here.couples))
+        size = Balance(pin, across, here.about(inner))
         polygon.steps.append(Given(f"{polygon.joint}.{len(polygon.steps)}", start, size, across))
         name = self.reaction(self.carriers[pin], link)
         return polygon.add(name, start, polygon.last, part="t", link=ends)
@@ -337,7 +342,7 @@ class ForcePlans:
         across = replace(axis, quarters=axis.quarters + 1)
         here, couples = self.on(link), (*self.on(link).couples, *self.on(block).couples)
         start = polygon.start()
-        size = Balance(pivot, group.node, across, tuple(here.forces), tuple(couples))
+        size = Balance(group.node, across, Moments(pivot, tuple(here.forces), couples))
         second = polygon.lay(self.reaction(block, link), start, Force("", size, across, pin))
         end = polygon.lay_all(second, here.forces)
         polygon.add(self.reaction(self.carriers[pivot], link), start, end, back=True)
@@ -402,13 +407,11 @@ class ForcePlans:
         end = polygon.lay_all(start, here.forces)
         name = self.reaction(GROUND, driver.link)
         if isinstance(driver, Crank):
-            along: Direction = Along(driver.pivot, driver.pin, 1)
-            if self.cylinder is not None:
-                along = slot_axis(self.cylinder)
-            balance = Balance(driver.pivot, driver.pin, along, tuple(here.forces), tuple(here.couples))
             if self.cylinder is None:
-                self.moments["M_b"] = balance
+                self.moments["M_b"] = here.about(driver.pivot)
             else:
+                along = slot_axis(self.cylinder)
+                balance = Balance(driver.pin, along, here.about(driver.pivot))
                 end = polygon.lay("F_b", end, Force("F_b", balance, along, driver.pin))
             if end != start:
                 polygon.add(name, start, end, back=True)

@@ -20,7 +20,7 @@ from typing import Literal
 
 import numpy as np
 
-from reference.construction.elements import Balance, Errors, Fixed, Line, Nodes, Parameters, View
+from reference.construction.elements import Errors, Fixed, Line, Moments, Nodes, Parameters, View
 from reference.construction.steps import (
     ArcAndLine,
     Coincide,
@@ -192,7 +192,7 @@ class Construction:
     centres : on the sketch, by Mehmke's similarity from the finished plans: instantaneous centres (``I3``)
         and acceleration poles (``J3``) of links that turn about no fixed pivot
     pairs : the joints between which links, slots and slides run, from the earlier joint
-    moments : the balancing moment (``M_b``), from the moments of what acts on the driving link
+    moments : the balancing moment (``M_b``) of what acts on the driving link, N m
     """
 
     figures: Mapping[str, tuple[Step, ...]]
@@ -202,7 +202,7 @@ class Construction:
     images: Mapping[str, Similar] = field(default_factory=dict)
     centres: Mapping[str, Similar] = field(default_factory=dict)
     pairs: tuple[tuple[str, str], ...] = ()
-    moments: Mapping[str, Balance] = field(default_factory=dict)
+    moments: Mapping[str, Moments] = field(default_factory=dict)
 
     @cached_property
     def steps(self) -> tuple[Step, ...]:

@@ -19,6 +19,7 @@ from reference.construction.elements import (
     Fixed,
     Inertia,
     Line,
+    Moments,
     Normal,
     Parameters,
     Same,
@@ -150,10 +151,10 @@ def changed_step(mistake: Mistake, construction: Construction) -> Step:
         ):
             factor = {"normal_missing": 0.0, "arithmetic": mistake.factor, "scale_wrong": mistake.factor}
             return replace(step, factor=step.factor * factor.get(mistake.code, -1.0))
-        case "wrong_arm", Given(length=Balance(forces=forces) as length):
-            wrong = replace(forces[mistake.slot], whole_arm=True)
-            forces = (*forces[: mistake.slot], wrong, *forces[mistake.slot + 1 :])
-            return replace(step, length=replace(length, forces=forces))
+        case "wrong_arm", Given(length=Balance(moments=moments) as length):
+            wrong = replace(moments.forces[mistake.slot], whole_arm=True)
+            forces = (*moments.forces[: mistake.slot], wrong, *moments.forces[mistake.slot + 1 :])
+            return replace(step, length=replace(length, moments=replace(moments, forces=forces)))
         case "normal_from_absolute", Given(length=Normal() as length):
             return replace(step, length=replace(length, tail=construction.poles["velocity_plan"]))
         case "parallel_for_perpendicular", Given():
@@ -306,7 +307,7 @@ def _mistakes_of_given(step: Given, construction: Construction) -> Iterator[Mist
             yield Mistake("normal_reversed", step.node)
             if isinstance(step.length, Normal) and step.length.tail != construction.poles["velocity_plan"]:
                 yield Mistake("normal_from_absolute", step.node)
-        case Balance(forces=forces, about=about):
+        case Balance(moments=Moments(forces=forces, about=about)):
             yield Mistake("sense_reversed", step.node)
             yield from (
                 Mistake("wrong_arm", step.node, slot)
@@ -425,10 +426,10 @@ def _data_of_forces(construction: Construction) -> Iterator[tuple[str, str]]:
         ):
             (datum,) = data_in(step.length)
             yield vector.name, datum
-    balances = [step.length for step in construction.steps if isinstance(step, Given)]
-    for balance in (*balances, *construction.moments.values()):
-        if isinstance(balance, Balance):
-            yield from ((one.name, one.inertia or one.name) for one in balance.couples)
+    lengths = [step.length for step in construction.steps if isinstance(step, Given)]
+    balances = [length.moments for length in lengths if isinstance(length, Balance)]
+    for moments in (*balances, *construction.moments.values()):
+        yield from ((one.name, one.inertia or one.name) for one in moments.couples)
 
 
 def _changed(drawing: Drawing, factor: float, *names: str) -> Parameters:

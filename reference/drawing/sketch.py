@@ -14,6 +14,7 @@ from reference.drawing.symbols import HAIR_MM, LINK_MM, THIN_MM, Bar, bars, bloc
 from reference.drawing.triangles import altitudes
 from reference.geometry import FloatArray
 from reference.mechanism import Crank, DrivingSlider, Mechanism, Plate, PointOnLine, SlotPoint, SlottedLink
+from reference.quantities import sort_of
 
 LETTER_MM, SMALL_LETTER_MM = 4.2, 3.2
 LINK_NUMBER_MM = 3.0
@@ -324,7 +325,7 @@ SUM_DASH, SUM_HEAD_MM = (2.2, 1.2), (2.4, 0.45)
 
 def polygon(subject: Subject, figure: str) -> DrawnFigure:
     """Return one plan of one variant."""
-    colour, nodes = PLAN_COLOURS[figure], subject.nodes(figure)
+    colour, nodes = PLAN_COLOURS[sort_of(figure)], subject.nodes(figure)
     drawn = [*_lines(subject, figure, nodes), *_vectors(subject, figure, nodes)]
     pole = subject.plan.construction.poles[figure]
     drawn.append(Part(pole, symbols.marked_point(nodes[pole], colour)))
@@ -353,7 +354,7 @@ def construction_lines(step: Step, view: View, nodes: dict[str, complex]) -> Ite
 
 def _vectors(subject: Subject, figure: str, nodes: dict[str, complex]) -> Iterator[Part]:
     """Draw each vector of non-zero length; of several along one line, the longest lowest."""
-    pole, colour = subject.plan.construction.poles[figure], PLAN_COLOURS[figure]
+    pole, colour = subject.plan.construction.poles[figure], PLAN_COLOURS[sort_of(figure)]
     for vector in subject.plan.construction.vectors_of(figure):
         if subject.is_zero(vector.name):
             continue

@@ -10,9 +10,9 @@ from reference.construction.elements import View
 from reference.drawing.canvas import Bounds, Piece, Shape, Text, bounds, pieces_of, scale_pieces
 from reference.geometry import FloatArray
 from reference.plan import ZERO_SHARE, Plan
-from reference.quantities import SCALE_OF, unit_of
+from reference.quantities import group_of, scale_of, sort_of, unit_of
 
-PLAN_COLOURS = {"velocity_plan": "#1456a0", "acceleration_plan": "#a03014"}
+PLAN_COLOURS = {"velocity_plan": "#1456a0", "acceleration_plan": "#a03014", "force_plan": "#1a6b3c"}
 FARTHEST_MM = 1e4
 TOUCHING_MM = 0.05
 """Nodes closer than this are one point on paper."""
@@ -29,6 +29,7 @@ class Wording:
             "mechanism": "Mechanism",
             "velocity_plan": "Velocity plan",
             "acceleration_plan": "Acceleration plan",
+            "force_plan": "Force plan of the group of {group}",
         }
     )
     variant: Mapping[str, str] = field(default_factory=lambda: {"n": "n", "position": "position"})
@@ -37,6 +38,10 @@ class Wording:
     too_large: str = "does not fit A3 at these scales"
     units: Mapping[str, str] = field(default_factory=dict)
     sides: Mapping[str, str] = field(default_factory=dict)
+
+    def title(self, figure: str) -> str:
+        """Return the title of a figure."""
+        return self.titles[sort_of(figure)].replace("{group}", group_of(figure))
 
     def unit(self, unit: str) -> str:
         """Return a unit in the language's letters, `m/s^2` with a superscript."""
@@ -157,4 +162,4 @@ class Subject:
 
     def caption(self, figure: str) -> Text:
         """Return the caption above a figure: its title and scale."""
-        return (Piece(f"{self.wording.titles[figure]},  "), *self.scale_with_value(SCALE_OF[figure]))
+        return (Piece(f"{self.wording.title(figure)},  "), *self.scale_with_value(scale_of(figure)))

@@ -49,8 +49,8 @@ def drawing_of(mechanism: Mechanism, motion, forces: Forces, accelerations: str)
 
 
 def moment(construction: Construction, nodes, parameters) -> float:
-    (balance,) = construction.moments.values()
-    return -float(balance.moment(View(nodes, parameters))[0])
+    (moments,) = construction.moments.values()
+    return float(np.ravel(moments.at(View(nodes, parameters)))[0])
 
 
 @pytest.mark.parametrize("accelerations", ["given", "own"])

@@ -22,7 +22,7 @@ from grader.scan.handwriting.model import (
 )
 from grader.scan.pixels import cut_out
 from grader.tables.scale_text import ByRule, Declared, ParsedScale, parse_scale
-from reference.quantities import SCALE_OF
+from reference.quantities import OF_MOTION, scale_of
 
 # What may stand in a scale's box, sign by sign ----------------------------------------------------
 
@@ -30,6 +30,8 @@ _DIGIT_SIGNS: Mapping[str, str] = {"0": "o", **{digit: digit for digit in "12345
 """The sign that each digit looks like."""
 _MARKS: Mapping[str, str] = {".": ".", ",": "'"}
 _LENGTHS = ("m", "cm", "mm")
+_FORCES = ("N", "kN", "H", "kH")
+"""H is the Cyrillic letter of the newton."""
 _POINTS = ("·", "*")
 _SPELT: Mapping[str, tuple[str, ...]] = {
     "m": ("m", "M"),
@@ -123,8 +125,8 @@ class State:
 def units(name: str) -> tuple[str, ...]:
     """Return the units of a scale as people write them, and none."""
     spellings = [""]
-    for real, paper in product(_LENGTHS, _LENGTHS[1:]):
-        if name == "kL":
+    for real, paper in product(_FORCES if name == "kF" else _LENGTHS, _LENGTHS[1:]):
+        if name not in OF_MOTION:
             spellings.append(f"{real}/{paper}")
             continue
         for second in ("s",) if name == "kv" else ("s2", "s^2"):
@@ -137,7 +139,7 @@ def units(name: str) -> tuple[str, ...]:
 @cache
 def rules(name: str) -> tuple[str, ...]:
     """Return rules by which a scale may be declared."""
-    if name == "kL":
+    if name not in OF_MOTION:
         return ()
     speeds = ("ω",) if name == "kv" else ("ω2", "ω^2")
     spellings = [f"{speed}{point}kL" for speed in speeds for point in ("", *_POINTS)]
@@ -148,7 +150,7 @@ def rules(name: str) -> tuple[str, ...]:
 
 
 def start(name: str) -> State:
-    """Return the state before the first sign of the box of `kL`, `kv` or `ka`."""
+    """Return the state before the first sign of the box of a scale."""
     texts = [f"{label}{rest}" for label in ("", f"{name}=") for rest in ("#", *rules(name))]
     texts += [f"{rule}=#" for rule in rules(name)]
     if name == "kL":
@@ -402,7 +404,7 @@ def written_scales(page: Page, sheet: Sheet, units: Mapping[str, str] | None = N
 
     Arguments: `units` are the units of bare numbers if the assignment gives them, by scale.
     """
-    names = [SCALE_OF[figure] for figure in sheet.zones if figure in SCALE_OF]
+    names = [*dict.fromkeys(filter(None, map(scale_of, sheet.zones)))]
     if not names:
         return {}
     scales = {}

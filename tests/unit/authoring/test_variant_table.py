@@ -38,7 +38,7 @@ def test_each_row_of_the_table_is_the_plan_of_its_variant(name):
     for index in (0, len(rows) // 2, len(rows) - 1):
         row, document = rows[index], plan_document(assignment, plan, index)
         assert {key: int(row[key]) for key in document.variant} == document.variant
-        assert float(row["kv"]) == pytest.approx(document.scales.kv, rel=WRITTEN_DIGITS)
+        assert float(row["kv"]) == pytest.approx(document.scales["kv"], rel=WRITTEN_DIGITS)
         for vector, exact in document.vectors.items():
             size = max(one.drawn_mm for one in document.vectors.values())
             assert float(row[vector]) == pytest.approx(exact.drawn_mm, rel=WRITTEN_DIGITS, abs=1e-9 * size)
