@@ -18,6 +18,7 @@ from reference.construction.mistakes import Drawing
 from reference.construction.steps import Given, TwoLines
 from reference.geometry import ComplexArray, FloatArray, cross, dot
 from reference.kinematics.motion import Motion, move
+from reference.kinetics import Forces, forces_of
 from reference.mechanism import Mechanism
 
 ZERO_SHARE = 1e-9
@@ -33,6 +34,7 @@ class Plan:
     nodes_mm : by figure and node, complex, millimetres from the figure's origin (a plan's pole)
     vectors_si : by name, complex, m/s and m/s^2
     rates : omega_k, epsilon_k, rad/s and rad/s^2, counter-clockwise positive
+    forces : None where the assignment has neither bodies nor loads, or accelerations are not asked for
     """
 
     variants: tuple[Variant, ...]
@@ -43,6 +45,7 @@ class Plan:
     nodes_mm: Mapping[str, Mapping[str, ComplexArray]]
     vectors_si: Mapping[str, ComplexArray]
     rates: Mapping[str, FloatArray]
+    forces: Forces | None = None
 
     @property
     def construction(self) -> Construction:
@@ -104,7 +107,9 @@ def exact_plan(
     parameters = parameters_of(mechanism, scales.kL, scales.kv, scales.ka)
     parameters = {**_measured(construction, motion), **parameters}
     drawing = Drawing(construction, parameters)
-    return Plan(tuple(variants), mechanism, motion, scales, drawing, nodes, vectors, rates)
+    acts = accelerations and bool(mechanism.bodies or mechanism.loads)
+    forces = forces_of(mechanism, motion) if acts else None
+    return Plan(tuple(variants), mechanism, motion, scales, drawing, nodes, vectors, rates, forces)
 
 
 def _nodes(
@@ -168,12 +173,14 @@ def conditioning(plan: Plan) -> dict[str, FloatArray]:
     """Return measures of how well the plan can be computed and drawn.
 
     ``transmission X``: |sin| on which joint X hangs; ``predicted_error``: relative error of the
-    computed velocities and accelerations; ``crossing X``: the angle in degrees at which the
-    construction lines of node X meet (90 is best).
+    computed velocities and accelerations; ``predicted_error_forces``: that of forces, relative to the
+    largest; ``crossing X``: the angle in degrees at which the construction lines of node X meet (90 is best).
     """
     transmission = plan.motion.transmission
     conditions: dict[str, FloatArray] = {f"transmission {node}": sine for node, sine in transmission.items()}
     conditions["predicted_error"] = plan.motion.predicted_error
+    if plan.forces is not None:
+        conditions["predicted_error_forces"] = plan.forces.predicted_error
     nodes = evaluate(plan.construction, plan.drawing.parameters)
     return {**conditions, **crossings_deg(plan.construction, plan.drawing, nodes)}
 
