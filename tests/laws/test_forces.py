@@ -222,7 +222,7 @@ def random_loaded(number: int, least_sine: float = LEAST_SINE) -> Mechanism:
 
 
 BLOCKS = [0, *slow(*range(1, 10))]
-"""Of fifty mechanisms each."""
+"""Fifty mechanisms each."""
 
 
 @pytest.mark.parametrize("block", BLOCKS)
