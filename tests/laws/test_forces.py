@@ -196,10 +196,8 @@ def errors(mechanism: Mechanism) -> tuple[float, float] | None:
         for one in forces.guides.values():
             pairs.append((one.force, truth["force", one.joint, one.on, one.by], 1))
             pairs.append((one.moment, truth["moment", one.joint, one.on, one.by], reach))
-        one = forces.balancing
-        pairs.append(
-            (one.force if one.is_force else one.moment, truth["balancing"], 1 if one.is_force else reach)
-        )
+        one, is_force = forces.balancing, forces.balancing.along is not None
+        pairs.append((one.force if is_force else one.moment, truth["balancing"], 1 if is_force else reach))
         assert len(truth) == 2 * len(pairs) - 1
         given = [abs(complex(one.force[0])) for one in forces.given]
         given += [abs(float(one.couple[0])) / reach for one in forces.given]
