@@ -143,12 +143,13 @@ class Equations:
             couple = -self.number(body.inertia) * rates.get(turning, mp.mpf(0))
             self.act(body.link, body.centre, force, couple)
         for load in mechanism.loads:
-            force = self.number(load.force)
+            force = mp.mpc(0) if load.force is None else self.number(load.force)
+            couple = mp.mpf(0) if load.couple is None else self.number(load.couple)
             if load.slider is not None:
                 slider = joints[load.slider]
                 motion = slider.velocity or slider.acceleration
                 force = force.real * motion / abs(motion) if motion else mp.mpc(0)
-            self.act(load.link, load.point, force, self.number(load.couple))
+            self.act(load.link, load.point, force, couple)
 
     def act(self, link, point, force, couple):
         for row, part in enumerate((force.real, force.imag, cross(self.at[point], force) + couple)):
