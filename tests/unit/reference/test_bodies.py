@@ -217,3 +217,38 @@ def test_forces_are_those_of_a_known_slider_crank():
     assert forces.hinges["A"].force[0] == pytest.approx(400 - 300j)
     assert forces.guides["B"].force[0] == pytest.approx(300j)
     assert forces.balancing.moment[0] == pytest.approx(-120.0)
+
+
+def test_a_cylinder_balances_the_crank_that_it_drives(tmp_path):
+    mechanism = """
+schema_version = 1
+id = "arm"
+title = { en = "Arm" }
+length_unit = "m"
+ground = { O1 = [0, 0], O2 = [0.5, 0] }
+[crank]
+pivot = "O2"
+pin = "A"
+length = 0.3
+cylinder = { pivot = "O1", length = 0.4, speed = 0.1, side = "left" }
+[[group]]
+type = "RPR"
+node = "A2"
+pin = "A"
+pivot = "O1"
+link = "2"
+"""
+    (tmp_path / "arm.mechanism.toml").write_text(mechanism, encoding="utf-8")
+    text = every_group.ASSIGNMENT.replace("page =", 'mechanism = "arm"\npage =')
+    path = tmp_path / "arm.assignment.toml"
+    path.write_text(text + '[[load]]\nlink = "1"\ncouple = 12\n', encoding="utf-8")
+    assignment = load_assignment(path)
+    plan = exact_plan(assignment, assignment.variants()[:1])
+    assert plan.forces is not None
+    thrust = plan.forces.balancing
+    assert (thrust.on, thrust.by) == ("slider_A", "2")
+    # 3-4-5: the cylinder meets the crank at right angles, with its thrust at 0.3 m from the pivot.
+    assert np.abs(thrust.force[0]) == pytest.approx(12 / 0.3)
+    assert thrust.moment[0] == 0.0
+    for joint in ("A", "O1"):
+        assert np.abs(plan.forces.hinges[joint].force[0]) == pytest.approx(12 / 0.3)
