@@ -401,8 +401,9 @@ class _Statics:
 
     def _balance_yoke(self, group: Yoke, links: tuple[str, ...]) -> None:
         rail, pin = self._rail(group.guide), group.pin
-        fixed = isinstance(group.guide, FixedGuide)
-        slot = self._rail(replace(group.guide, angle_rad=group.slot_rad))[1] if fixed else rail[1].left
+        slot = rail[1].left
+        if isinstance(group.guide, FixedGuide):
+            slot = self._rail(replace(group.guide, angle_rad=group.slot_rad))[1]
         (yoke, _), (block, _) = (self._sum(link, pin) for link in links)
         along = rail[1].by(yoke + block, dot)
         force = _from_moments(rail[1].left, along, slot.left, slot.by(block, dot))
