@@ -427,7 +427,8 @@ def _is_left_out(criterion: CriterionDocument) -> bool:
 
 
 def _title(cause: MistakeDocument | RivalDocument, speaker: Tongue) -> str:
-    return speaker.gettext(words_of(cause.code, cause.at, str(cause.parameters.get("line", ""))).title)
+    line = cause.parameters.get("line", cause.parameters.get("slip", ""))
+    return speaker.gettext(words_of(cause.code, cause.at, str(line)).title)
 
 
 # Files --------------------------------------------------------------------------------------------
