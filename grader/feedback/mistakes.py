@@ -8,6 +8,7 @@ import re
 from collections.abc import Collection
 from dataclasses import dataclass
 
+from grader.documents import MistakeDocument, RivalDocument
 from grader.language import N_
 from reference.construction.mistakes import RIGHT_TRIANGLE
 
@@ -327,6 +328,12 @@ def words_of(code: str, at: str = "", line: str = "") -> Words:
     if code == "sense_reversed" and at.startswith(("omega", "epsilon")):
         return _DRIVING
     return _BY_LINE.get(line, {}).get(code, usual)
+
+
+def mistake_title(cause: MistakeDocument | RivalDocument) -> str:
+    """Return the title of a report's mistake, a key of the catalogues."""
+    line = cause.parameters.get("line", cause.parameters.get("slip", ""))
+    return words_of(cause.code, cause.at, str(line)).title
 
 
 QUESTIONS: dict[str, str] = {
