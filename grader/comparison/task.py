@@ -97,7 +97,8 @@ class Task:
     def driving_vector(self, name: str) -> str:
         """The vector by the data of the kind of a vector or scale: it shows the scale and the turn.
 
-        It is the driving link's; of forces, which have none, the largest given one of the vector's plan.
+        It is the driving link's; of forces, which have none, the largest given one of the vector's plan, of
+        those that are asked for if there are any.
         """
         kind, vectors, figure = kind_of(name), self.construction.vectors, self.construction.figure_of
         if kind.omegas is not None:
@@ -105,7 +106,8 @@ class Task:
         given = [one for one in vectors.values() if one.scale == kind.scale and one.name in self.parameters]
         if name in vectors:
             given = [one for one in given if figure(one.head) == figure(vectors[name].head)]
-        largest = max(given, key=lambda one: abs(self.real[one.name]), default=None)
+        asked = [one for one in given if one.name in self.rubric.vectors] or given
+        largest = max(asked, key=lambda one: abs(self.real[one.name]), default=None)
         return name if largest is None else largest.name
 
     def tolerance_at(self, node: str) -> ToleranceTable:
