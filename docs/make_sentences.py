@@ -44,7 +44,7 @@ Row = tuple[str, ...]
 """A text in each of the languages."""
 
 EXAMPLES: Mapping[str, str] = {
-    "address": "https://marks.example.org",
+    "address": "https://marks.example.org", "along": "@15 cm", "across": "@4.84 cm", "on": "3",
     "angle": "@35°", "at": "b", "base": "AB", "centre": "A", "chance": "0.0004", "confidence": "62\u00a0%",
     "count": "2", "declared": "@0.04 (m/s)/mm", "degrees": "90", "direction": "perpendicular to %(link)s",
     "drawn": "@47.2 mm", "end": "b", "expected": "@1.67 m/s", "factor": "1.5", "first": "ab",

@@ -383,7 +383,7 @@ def plans_asked(assignment: Assignment, rubric: RubricFile) -> PlansAsked:
     return {"accelerations": rubric.needs_accelerations or forces == "own", "forces": forces}
 
 
-def _check_accelerations(assignment: Assignment, rubric: RubricFile) -> Iterator[Finding]:
+def check_accelerations(assignment: Assignment, rubric: RubricFile) -> Iterator[Finding]:
     """Report accelerations that no page shows, and those for which there is no force plan."""
     told = rubric.accelerations
     if told is not None and accelerations_of(assignment, rubric) is None:
@@ -426,7 +426,7 @@ def rubric_of(assignment: Assignment) -> RubricFile:
     """
     rubric = load_rubric(assignment.file.rubric, beside=assignment.path)
     findings = check_rubric(rubric, construction_for(assignment))
-    findings += _check_accelerations(assignment, rubric)
+    findings += check_accelerations(assignment, rubric)
     if findings:
         path = locate("rubric", assignment.file.rubric, assignment.path)
         raise AuthoredFileError(str(path), tuple(findings))

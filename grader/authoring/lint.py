@@ -45,7 +45,7 @@ from grader.documents import (
     LintWorst,
 )
 from grader.language import LANGUAGES
-from grader.rubric import RubricFile, check_rubric, plans_asked
+from grader.rubric import RubricFile, check_accelerations, check_rubric, plans_asked
 from reference.authored.assignment import SCALE_NAMES, TRADITIONS, Assignment, Variant
 from reference.authored.formula import Formula
 from reference.authored.toml_file import LENGTH_UNITS_M, SideText, Text
@@ -115,7 +115,7 @@ def lint(assignment: Assignment, rubric: RubricFile) -> Lint:
         *assembly_findings(assignment, sound),
         *condition_findings(assignment, plan, conditions),
         *length_findings(rubric, plan, asked),
-        *room_findings(assignment, plan, rooms),
+        *room_findings(assignment, plan, asked, rooms),
         *tie_findings(plan, ties_of(rubric, plan, asked)),
         *scale_findings(assignment, plan, scales),
         *_told_results(assignment, rubric, plan),
@@ -223,7 +223,7 @@ def data_findings(
     assignment: Assignment, rubric: RubricFile, construction: Construction
 ) -> Iterator[LintFinding]:
     """Report names in rubric and assignment that are unknown, unused, repeated, or not given to students."""
-    yield from _rubric_faults(rubric, construction)
+    yield from _rubric_faults(assignment, rubric, construction)
     yield from _unused_values(assignment)
     yield from _not_told(assignment)
     yield from _unknown_names(assignment, construction)
@@ -264,8 +264,10 @@ def _untranslated(assignment: Assignment, rubric: RubricFile) -> Iterator[LintFi
             yield LintFinding("hint", "not_translated", name, missing[0], message)
 
 
-def _rubric_faults(rubric: RubricFile, construction: Construction) -> Iterator[LintFinding]:
-    for fault in check_rubric(rubric, construction):
+def _rubric_faults(
+    assignment: Assignment, rubric: RubricFile, construction: Construction
+) -> Iterator[LintFinding]:
+    for fault in (*check_rubric(rubric, construction), *check_accelerations(assignment, rubric)):
         yield LintFinding("fault", "unknown_in_rubric", "rubric", fault.path, fault.message)
     judged_by: dict[str, str] = {}
     for index, criterion in enumerate(rubric.criterion):
@@ -310,8 +312,9 @@ def _with_their_own(assignment: Assignment, names: Iterable[str]) -> set[str]:
 
 def _unused_values(assignment: Assignment) -> Iterator[LintFinding]:
     file = assignment.file
-    outside = names_in(assignment.mechanism_file) | names_in(file.scales) | names_in(file.given)
-    outside |= names_in(file.body) | names_in(file.load)
+    outside = names_in(
+        [assignment.mechanism_file, file.scales, file.given, file.body, file.load, file.gravity]
+    )
     needed = _with_their_own(assignment, outside)
     for name in file.variant.values:
         if name not in needed:

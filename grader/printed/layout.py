@@ -7,7 +7,7 @@ sheet's top left corner, x right, y down.
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate
+from itertools import accumulate, combinations
 from typing import Literal, get_args
 
 import numpy as np
@@ -15,11 +15,11 @@ from pydantic import BaseModel, ConfigDict
 
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, FloatArray, Identity
 from reference.authored.assignment import SCALE_NAMES, Assignment, PageKind, PageTable, Scales, Variant
-from reference.construction.graph import Construction, evaluate
+from reference.construction.graph import Construction, Vector, evaluate
 from reference.drawing.canvas import A3_MM
 from reference.geometry import ComplexArray
 from reference.plan import construction_for, parameters_for
-from reference.quantities import scale_of, value_name, vector_of_value
+from reference.quantities import FORCE_PLANS, group_of, scale_of, value_name, vector_of_value, zone_of
 
 # The code's text ----------------------------------------------------------------------------------
 
@@ -158,10 +158,11 @@ def _grid(box: Box, grid: Sequence[int] | None) -> list[Box]:
 
 def position_zones(assignment: Assignment, zones: Mapping[str, Box]) -> dict[int, Box]:
     """Return the zone of each position on a page with these zones; empty where the page has one position."""
-    page = next((one for one in assignment.file.page if one.grid and set(one.figures) == set(zones)), None)
+    gridded = (page for page in assignment.file.page if page.grid)
+    page = next((one for one in gridded if set(map(zone_of, one.figures)) == set(zones)), None)
     if page is None:
         return {}
-    cells = _grid(zones[page.figures[0]], page.grid)
+    cells = _grid(zones[zone_of(page.figures[0])], page.grid)
     positions = assignment.shared_positions
     return dict(zip(positions, cells * (len(positions) if len(cells) == 1 else 1), strict=False))
 
@@ -186,6 +187,8 @@ def _divisions() -> list[dict[str, Box]]:
         left, right = _cut(DRAWING_MM, (share, 1.0 - share), across=True)
         divisions.extend(_zones((m, v), left, (top, 1.0 - top), rows) | {a: right} for top in (0.4, 0.55))
         divisions.append({m: left} | _zones((v, a), right, (0.45, 0.55), rows))
+    divisions.append(_zones((m, FORCE_PLANS), DRAWING_MM, (0.36, 0.64), columns))
+    divisions.append(_zones((FORCE_PLANS,), DRAWING_MM, (1.0,), columns))
     return divisions
 
 
@@ -256,9 +259,21 @@ def cells_of(
     table = _single(assignment, figures)
     if table is None:
         return {}
-    construction = page_construction(assignment, table.figures)
-    ordered = dict.fromkeys(table.figures)
-    return combs_of(boxes_of([v.name for figure in ordered for v in construction.polygon_of(figure)], asked))
+    vectors = measured_on(page_construction(assignment, table.figures), table.figures)
+    return combs_of(boxes_of([vector.name for vector in vectors], asked))
+
+
+def measured_on(construction: Construction, figures: Sequence[str]) -> list[Vector]:
+    """Return the vectors of a page whose lengths students may write down, in zone order.
+
+    Of motion the sums of components are left out, which few draw; of forces they are the reactions.
+    """
+    return [
+        vector
+        for figure in dict.fromkeys(figures)
+        for vector in construction.vectors_of(figure)
+        if group_of(figure) or not vector.is_sum
+    ]
 
 
 def written_cells(
@@ -271,9 +286,10 @@ def written_cells(
 
 
 def _single(assignment: Assignment, figures: Sequence[str]) -> PageTable | None:
-    """Return the page with these figures, if it has them for one position."""
-    known = (page for page in assignment.file.page if set(page.figures) == set(figures) and not page.grid)
-    return next(known, None)
+    """Return the page with these figures or zones, if it has them for one position."""
+    zones = set(map(zone_of, figures))
+    known = (page for page in assignment.file.page if not page.grid)
+    return next((page for page in known if set(map(zone_of, page.figures)) == zones), None)
 
 
 def boxes_of(names: Sequence[str], asked: Collection[str] | None) -> dict[str, Box]:
@@ -384,8 +400,8 @@ class TemplateFit:
     Attributes
     ----------
     template : the best of all
-    room : zone over need by figure, the smaller of width and height; below 1 it is too small in some variant
-    need_mm : widest and highest of any variant by figure, margins included
+    room : zone over need by zone, the smaller of width and height; below 1 it is too small in some variant
+    need_mm : widest and highest of any variant by zone, margins included
     """
 
     template: Template
@@ -435,10 +451,11 @@ def values_of(
 
     Arguments: `asked` as `RubricFile.entries`, ``v_B_value`` for the value of v_B.
     """
-    if _single(assignment, figures) is None or not any(map(vector_of_value, asked)):
+    table = _single(assignment, figures)
+    if table is None or not any(map(vector_of_value, asked)):
         return {}
-    construction, variants = page_construction(assignment, figures), assignment.variants()
-    vectors = {v.name: v for figure in dict.fromkeys(figures) for v in construction.polygon_of(figure)}
+    construction, variants = page_construction(assignment, table.figures), assignment.variants()
+    vectors = {vector.name: vector for vector in measured_on(construction, table.figures)}
     wanted = [name for name in vectors if value_name(name) in asked]
     boxes = field_boxes(tuple(vectors)) if wanted and len(vectors) <= EASY_FIELDS else {}
     below = max((y + high for _, y, _, high in boxes.values()), default=np.inf) + _FIELD_GAP_MM
@@ -446,7 +463,7 @@ def values_of(
     if left_mm >= _LEAST_VALUE_MM:
         places = {name: (boxes[name][0], below, boxes[name][2], left_mm) for name in wanted}
     else:
-        used = {SCALE_BOXES[scale_of(figure)] for figure in figures}
+        used = {SCALE_BOXES[scale_of(figure)] for figure in table.figures}
         free = [box for box in dict.fromkeys(SCALE_BOXES.values()) if box not in used]
         rows = [(x, y, _VALUE_WIDE_MM, _FIELD_MOST_MM) for x, y, _, _ in free[: len(wanted)]]
         places = dict(zip(wanted, rows, strict=True)) if len(wanted) == len(rows) else {}
@@ -461,12 +478,16 @@ def values_of(
     return found
 
 
-def extents_mm(
-    assignment: Assignment, figures: Sequence[str], variants: list[Variant]
-) -> dict[str, tuple[float, float]]:
-    """Return the largest width and height of each figure over variants, at the assignment's own scales."""
+Size = tuple[FloatArray, FloatArray]
+"""Width and height of a figure in every variant, millimetres, (N,) each."""
+Extents = Mapping[str, Size]
+"""The size of each figure."""
+
+
+def extents_mm(assignment: Assignment, figures: Sequence[str], variants: list[Variant]) -> dict[str, Size]:
+    """Return width and height of each figure of every variant, at the assignment's own scales."""
     return {
-        figure: (float(np.ptp(places.real, axis=0).max()), float(np.ptp(places.imag, axis=0).max()))
+        figure: (np.ptp(places.real, axis=0), np.ptp(places.imag, axis=0))
         for figure, places in places_mm(assignment, figures, variants).items()
     }
 
@@ -477,9 +498,9 @@ def poles_mm(
     """Return the best positions of the poles of a template's plans, sheet millimetres for each variant.
 
     A plan begun there is in the middle of its zone, or of its position's. A plan that is larger than its
-    zone in some variant has none: the student will choose another scale.
+    zone in some variant has none: the student will choose another scale. Nor have force plans.
     """
-    plans = [figure for figure in template.zones if figure != MECHANISM]
+    plans = [figure for figure in template.zones if figure not in {MECHANISM, FORCE_PLANS}]
     poles = {}
     for figure, places in places_mm(assignment, plans, variants).items():
         zone, own = template.zones[figure], position_zones(assignment, template.zones)
@@ -500,25 +521,56 @@ def best_template(
     return template_for(extents_mm(assignment, figures, assignment.variants()), grid)
 
 
-def template_for(
-    extents: Mapping[str, tuple[float, float]], grid: Sequence[int] | None = None
-) -> TemplateFit:
-    """Return that division for figures whose largest width and height (mm) are known already.
+def template_for(extents: Extents, grid: Sequence[int] | None = None) -> TemplateFit:
+    """Return that division for figures whose widths and heights (mm) are known already.
 
     Arguments: `grid` of the positions on the sheet; the room is that of one of its zones.
     """
-    figures = tuple(extents)
-    need = {figure: (wide + 2 * MARGIN_MM, high + 2 * MARGIN_MM) for figure, (wide, high) in extents.items()}
+    needs = {zone: _sizes_together(sizes) for zone, sizes in by_zone(extents).items()}
 
-    def room(template: Template, figure: str) -> float:
-        _, _, wide, high = template.of_one(grid).zones[figure]
-        return min(wide / need[figure][0], high / need[figure][1])
+    def rooms(template: Template, zone: str) -> FloatArray:
+        _, _, wide, high = template.of_one(grid).zones[zone]
+        return np.array([np.minimum(wide / need[0], high / need[1]) for need in needs[zone]])
+
+    def room(template: Template, zone: str) -> float:
+        return float(np.min(np.max(rooms(template, zone), axis=0)))
 
     def worth(template: Template) -> tuple[float, float]:
         # A plan's scale is the assignment's; the sketch's is often the student's choice.
-        plans = [room(template, figure) for figure in figures if figure != MECHANISM]
+        plans = [room(template, zone) for zone in needs if zone != MECHANISM]
         least = min(min(plans, default=np.inf), 1.0)
-        return (round(least, 6), min(room(template, figure) for figure in figures))
+        return (round(least, 6), min(room(template, zone) for zone in needs))
 
-    best = max((template for template in TEMPLATES if template.figures == set(figures)), key=worth)
-    return TemplateFit(best, {figure: room(best, figure) for figure in figures}, need)
+    best = max((template for template in TEMPLATES if template.figures == set(needs)), key=worth)
+    need_mm = {}
+    for zone, ways in needs.items():
+        way = ways[int(np.argmax(np.min(rooms(best, zone), axis=1)))]
+        need_mm[zone] = (float(np.max(way[0])), float(np.max(way[1])))
+    return TemplateFit(best, {zone: room(best, zone) for zone in needs}, need_mm)
+
+
+def by_zone(extents: Extents) -> dict[str, list[Size]]:
+    """Return the sizes of the figures in each zone."""
+    zones: dict[str, list[Size]] = {}
+    for figure, size in extents.items():
+        zones.setdefault(zone_of(figure), []).append(size)
+    return zones
+
+
+def lines_of(count: int) -> list[list[list[int]]]:
+    """Return the ways to set some figures side by side on one line or on two: the indices on each."""
+    every = range(count)
+    first = (one for size in range(1, count // 2 + 1) for one in combinations(every, size))
+    return [[[*every]], *([[*one], [k for k in every if k not in one]] for one in first)]
+
+
+def _sizes_together(sizes: Sequence[Size]) -> list[Size]:
+    """Return widths and heights of figures with margins: on one line or two, which are rows or columns."""
+    found = []
+    for lines in lines_of(len(sizes)):
+        for along, across in ((0, 1), (1, 0)):
+            long = [np.sum([sizes[k][along] + 2 * MARGIN_MM for k in line], axis=0) for line in lines]
+            wide = [np.max([sizes[k][across] for k in line], axis=0) + 2 * MARGIN_MM for line in lines]
+            both = (np.asarray(np.max(long, axis=0)), np.asarray(sum(wide)))
+            found.append((both[along], both[across]))
+    return found
