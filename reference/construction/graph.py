@@ -20,7 +20,17 @@ from typing import Literal
 
 import numpy as np
 
-from reference.construction.elements import Errors, Fixed, Line, Moments, Nodes, Parameters, View
+from reference.construction.elements import (
+    Couple,
+    Errors,
+    Fixed,
+    Force,
+    Line,
+    Moments,
+    Nodes,
+    Parameters,
+    View,
+)
 from reference.construction.steps import (
     ArcAndLine,
     Coincide,
@@ -193,6 +203,7 @@ class Construction:
         and acceleration poles (``J3``) of links that turn about no fixed pivot
     pairs : the joints between which links, slots and slides run, from the earlier joint
     moments : the balancing moment (``M_b``) of what acts on the driving link, N m
+    acting : what acts on each link but the reactions of its own group: given, or taken over
     """
 
     figures: Mapping[str, tuple[Step, ...]]
@@ -203,6 +214,7 @@ class Construction:
     centres: Mapping[str, Similar] = field(default_factory=dict)
     pairs: tuple[tuple[str, str], ...] = ()
     moments: Mapping[str, Moments] = field(default_factory=dict)
+    acting: Mapping[str, tuple[Force | Couple, ...]] = field(default_factory=dict)
 
     @cached_property
     def steps(self) -> tuple[Step, ...]:
