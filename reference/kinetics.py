@@ -291,7 +291,7 @@ def _arms(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
     return found
 
 
-def _turning_with(mechanism: Mechanism) -> dict[str, str]:
+def turning_with(mechanism: Mechanism) -> dict[str, str]:
     """Return the link with which each slider turns; none for those that do not turn."""
     guides = sliders_of(mechanism).items()
     found = {link: guide.link for link, guide in guides if isinstance(guide, MovingGuide)}
@@ -322,7 +322,7 @@ class _Statics:
         self.reactions: list[Reaction] = []
         self.size = self.slack = self.zero.real
         """The largest force, or moment over the mechanism's reach, and the largest error of one."""
-        self.arms, self.turns_with = _arms(mechanism), _turning_with(mechanism)
+        self.arms, self.turns_with = _arms(mechanism), turning_with(mechanism)
 
     def solve(self) -> Forces:
         """Return all forces, in the numbers of the motion."""

@@ -59,6 +59,8 @@ TITLES = {
     "velocity_plan": N_("Velocity plan"),
     "acceleration_plan": N_("Acceleration plan"),
     "force_plan": N_("Force plan of the group of {group}"),
+    "scheme": N_("Links of the group of {group}"),
+    "lever": N_("Zhukovsky's lever"),
     "centres": N_("Instantaneous centres and acceleration poles"),
 }
 VARIANT = {"n": N_("n"), "position": N_("position")}
