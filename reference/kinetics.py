@@ -10,9 +10,10 @@ a running bound: of the motion, of the arms, and of each pair of equations. Vari
 are solved again with more, as motion is.
 """
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import reduce
+from operator import mul
 from typing import Any, Literal
 
 import numpy as np
@@ -20,9 +21,10 @@ import numpy as np
 from reference.geometry import ComplexArray, FloatArray
 from reference.kinematics import assur
 from reference.kinematics.motion import DIGITS, EPSILON, EXTENDED_ENOUGH, LOSSY, SAFETY, Motion, refined
-from reference.kinematics.solving import Solution, Take, as_it_is
+from reference.kinematics.solving import Joint, Solution
 from reference.mechanism import (
     GROUND,
+    Array,
     Crank,
     CrossSlider,
     DrivingSlider,
@@ -36,6 +38,7 @@ from reference.mechanism import (
     SlottedLink,
     Yoke,
     carriers,
+    guides_of,
     named_links,
     short_names,
     sliders_of,
@@ -43,12 +46,14 @@ from reference.mechanism import (
 )
 from reference.numbers import Complex, Number, cross, dot, larger, where
 
+GivenKind = Literal["inertia", "weight", "load"]
+
 
 @dataclass(frozen=True, slots=True)
 class Given:
     """An inertia force with its couple, a weight, or a load: on `link` at `point`."""
 
-    kind: Literal["inertia", "weight", "load"]
+    kind: GivenKind
     name: str
     """Its vector's: ``F_i3``, ``G_3``, ``F_D``."""
     link: str
@@ -118,19 +123,13 @@ class Forces:
 def forces_of(mechanism: Mechanism, motion: Motion) -> Forces:
     """Return the forces of every variant of a mechanism whose motion, with accelerations, is solved."""
     mechanism = _directed(mechanism, motion)
-    count = motion.predicted_error.shape
-    moving = _Moving(
-        motion.position,
-        motion.velocity,
-        motion.acceleration,
-        motion.omega,
-        motion.epsilon,
-        as_it_is,
-        np.maximum(motion.predicted_error, SAFETY * EPSILON),
-    )
+    rates = zip(motion.position.values(), motion.velocity.values(), motion.acceleration.values(), strict=True)
+    joints = {name: Joint(*rate) for name, rate in zip(motion.position, rates, strict=True)}
+    solution = Solution(joints, motion.omega, motion.epsilon)
+    error = np.maximum(motion.predicted_error, SAFETY * EPSILON)
     with np.errstate(all="ignore"):
-        solved = _Statics(mechanism, moving).solve()
-        forces: Forces = with_arrays(solved, lambda values: np.array(np.broadcast_to(values, count)))
+        solved = _Statics(mechanism, solution, error).solve()
+        forces: Forces = with_arrays(solved, lambda values: np.array(np.broadcast_to(values, error.shape)))
         if forces.predicted_error.max() > LOSSY:
             _refine(forces, mechanism, motion)
     return forces
@@ -146,7 +145,7 @@ def _directed(mechanism: Mechanism, motion: Motion) -> Mechanism:
     guides, loads = sliders_of(mechanism), []
     for load in mechanism.loads:
         guide = guides.get(load.link)
-        if load.slider is not None and load.force is not None and isinstance(guide, FixedGuide):
+        if load.force is not None and load.slider is not None and isinstance(guide, FixedGuide):
             along = np.asarray(assur.heading(guide.angle_rad))
             speed, growth = (
                 _sense(dot(along, rates[load.slider]), rates, motion.predicted_error)
@@ -180,368 +179,304 @@ def _refine(forces: Forces, mechanism: Mechanism, motion: Motion) -> None:
     kept = predicted.copy()
     for solution, rows in solutions:
         with mp.workdps(DIGITS):
-            anew = _Statics(mechanism, _moving(solution)).solve()
-            for array, number in zip(_numbers(forces), _numbers(anew), strict=True):
-                exact = number if isinstance(number, np.ndarray) else complex(number)
-                array[rows] = exact if np.iscomplexobj(array) else np.real(exact)
+            anew = _Statics(mechanism, solution, EPSILON).solve()
+        for array, exact in zip(_arrays(forces), _arrays(anew), strict=True):
+            array[rows] = exact if np.iscomplexobj(array) else exact.real
     predicted[:] = kept
 
 
-def _numbers(part: Any) -> Iterator[Any]:  # noqa: ANN401 - forces, or a part of them
-    """Yield all numbers of forces, of any kind, in the order of their fields."""
-    if isinstance(part, Mapping):
-        part = tuple(part.values())
-    if isinstance(part, tuple):
-        for one in part:
-            yield from _numbers(one)
-    elif is_dataclass(part):
-        for each in fields(part):
-            yield from _numbers(getattr(part, each.name))
-    elif not isinstance(part, str | bool | None):
-        yield part
+def _arrays(forces: Forces) -> list[Array]:
+    """Return all arrays of forces, in the order of their fields."""
+    found: list[Array] = []
+    with_arrays(forces, found.append)
+    return found
 
 
 # In numbers of any kind ----------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
-class _Moving:
-    """A motion in numbers of any kind, and the relative error of its rates and places."""
+class _Near:
+    """A number or a vector, and a bound of its error, which grows as numbers are combined."""
 
-    at: Mapping[str, Complex]
-    velocity: Mapping[str, Complex]
-    acceleration: Mapping[str, Complex]
-    omega: Mapping[str, Number]
-    epsilon: Mapping[str, Number]
-    take: Take
-    error: Number
+    value: Any
+    slack: Any = 0.0
 
+    def __add__(self, other: "_Near") -> "_Near":
+        return _Near(self.value + other.value, self.slack + other.slack)
 
-def _moving(solution: Solution) -> _Moving:
-    joints = solution.joints.items()
-    at, velocity, acceleration = (
-        {name: getattr(joint, what) for name, joint in joints}
-        for what in ("position", "velocity", "acceleration")
-    )
-    return _Moving(at, velocity, acceleration, solution.omega, solution.epsilon, solution.take, EPSILON)
+    def __neg__(self) -> "_Near":
+        return _Near(-self.value, self.slack)
 
+    def by(self, other: "_Near", product: Callable[[Any, Any], Any] = mul) -> "_Near":
+        """Return the product, the cross or the scalar product with another one."""
+        lost = abs(self.value) * other.slack + abs(other.value) * self.slack
+        return _Near(product(self.value, other.value), lost)
 
-@dataclass(frozen=True, slots=True)
-class _Sum:
-    """The resultant of a link's forces, their moment about a point, and the errors of both."""
-
-    force: Complex
-    moment: Number
-    slack: Number
-    moment_slack: Number
-
-    def __add__(self, other: "_Sum") -> "_Sum":
-        return _Sum(*(getattr(self, each.name) + getattr(other, each.name) for each in fields(_Sum)))
-
-
-Vector = tuple[Complex, Number]
-"""An arm or a direction, and its error."""
-
-
-def _from_moments(u: Vector, m: Vector, v: Vector, n: Vector) -> tuple[Complex, Number]:
-    """Return the force R with u x R = m and v x R = n, and its error.
-
-    With v = -i g, v x R is the part of R along g.
-    """
-    area = cross(u[0], v[0])
-    force = (v[0] * m[0] - u[0] * n[0]) / area
-    lost = abs(v[0]) * m[1] + abs(u[0]) * n[1] + abs(m[0]) * v[1] + abs(n[0]) * u[1]
-    return force, (lost + abs(force) * (abs(u[0]) * v[1] + abs(v[0]) * u[1])) / abs(area)
-
-
-@dataclass(frozen=True, slots=True)
-class _Rail:
-    """A guide: the link that has it, its direction, and the error of that."""
-
-    link: str
-    along: Complex
-    slack: Number
+    def over(self, other: "_Near") -> "_Near":
+        """Return the quotient."""
+        value, size = self.value / other.value, abs(other.value)
+        return _Near(value, (self.slack + abs(value) * other.slack) / size)
 
     @property
-    def across(self) -> Vector:
-        """The arm for which the moment of a force is its part along the guide."""
-        return -1j * self.along, self.slack
-
-    def along_it(self, total: _Sum) -> Vector:
-        """Return the part along the guide that balances some forces, and its error."""
-        return -dot(self.along, total.force), total.slack + abs(total.force) * self.slack
-
-    def normal(self, total: _Sum, other: Complex, slack: Number) -> tuple[Complex, Number]:
-        """Return the guide's force that balances some forces and another one, and its error."""
-        force = total.force + other
-        across = -dot(1j * self.along, force)
-        return across * (1j * self.along), slack + total.slack + 2.0 * abs(force) * self.slack
+    def left(self) -> "_Near":
+        """The vector turned by 90 degrees counter-clockwise."""
+        return _Near(1j * self.value, self.slack)
 
 
-def _arms(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
-    """Return two joints of every link that turns by itself."""
-    driver = mechanism.driver
-    found = {driver.link: (driver.pivot, driver.pin)} if isinstance(driver, Crank) else {}
+def _from_moments(u: _Near, m: _Near, v: _Near, n: _Near) -> _Near:
+    """Return the force R with u x R = m and v x R = n; with v = i g, n is minus the part of R along g."""
+    return (v.by(m) + -u.by(n)).over(u.by(v, cross))
+
+
+Rail = tuple[str, _Near]
+"""The link that has a guide, and the guide's direction."""
+
+
+def turning(mechanism: Mechanism) -> dict[str, tuple[str, str, str]]:
+    """Return for every link that turns the one whose rate it has (a slider: its guide's), and two joints."""
+    driver, named = mechanism.driver, named_links(mechanism)
+    found = {driver.link: (driver.link, driver.pivot, driver.pin)} if isinstance(driver, Crank) else {}
     for group in mechanism.groups:
+        links, node = named[group.node], group.node
         match group:
-            case Dyad(pins=pins, links=links, node=node):
-                found |= {link: (pin, node) for link, pin in zip(links, pins, strict=True)}
-            case Slider(link=link, pin=pin, node=node) | SlottedLink(link=link, pivot=pin, node=node):
-                found[link] = (pin, node)
-    return found
-
-
-def turning_with(mechanism: Mechanism) -> dict[str, str]:
-    """Return the link with which each slider turns; none for those that do not turn."""
-    guides = sliders_of(mechanism).items()
-    found = {link: guide.link for link, guide in guides if isinstance(guide, MovingGuide)}
-    for group in mechanism.groups:
-        links = named_links(mechanism)[group.node]
-        match group:
-            case SlottedLink():
-                found[links[1]] = links[0]
+            case Dyad(pins=pins):
+                found |= {link: (link, pin, node) for link, pin in zip(links, pins, strict=True)}
+            case Slider(link=link, pin=pin):
+                found[link] = (link, pin, node)
+            case SlottedLink(link=link, pivot=pivot):
+                found |= dict.fromkeys(links, (link, pivot, node))
             case Yoke(guide=MovingGuide(link=link)):
-                found[links[1]] = link
+                found |= dict.fromkeys(links, found[link])
+        for link, guide in zip(links[-len(guides_of(group)) :], guides_of(group), strict=False):
+            if isinstance(guide, MovingGuide):
+                found[link] = found[guide.link]
     return found
 
 
 class _Statics:
-    """The equilibrium of one mechanism: forces collected by link, reactions found so far."""
+    """The equilibrium of one mechanism: what acts on its links, and the reactions found so far.
 
-    def __init__(self, mechanism: Mechanism, moving: _Moving) -> None:
-        self.mechanism, self.moving = mechanism, moving
-        self.at, self.take = moving.at, moving.take
+    Arguments: its motion; the relative error of that, of places as of rates.
+    """
+
+    def __init__(self, mechanism: Mechanism, solution: Solution, error: Number) -> None:
+        self.mechanism, self.solution, self.error = mechanism, solution, error
+        self.take, self.at = solution.take, {name: one.position for name, one in solution.joints.items()}
         self.named, self.carriers = named_links(mechanism), carriers(mechanism)
-        self.names = short_names(mechanism)
+        self.names, self.turning = short_names(mechanism), turning(mechanism)
         self.zero = 0.0 * self.at[mechanism.driver.pin]
         self.reach = reduce(larger, map(abs, self.at.values()))
-        self.arm_slack = 2.0 * moving.error * self.reach
-        """Error of the vector between two joints."""
-        self.acting: dict[str, list[tuple[str, Complex, Number, Number, Number]]] = {}
-        """On each link: point, force, couple, and the errors of both."""
+        self.acting: dict[str, list[tuple[str, _Near, _Near]]] = {}
+        """On each link: point, force, couple."""
         self.reactions: list[Reaction] = []
-        self.size = self.slack = self.zero.real
+        self.largest = _Near(self.zero.real, self.zero.real)
         """The largest force, or moment over the mechanism's reach, and the largest error of one."""
-        self.arms, self.turns_with = _arms(mechanism), turning_with(mechanism)
 
     def solve(self) -> Forces:
-        """Return all forces, in the numbers of the motion."""
+        """Return all forces as arrays."""
         given = tuple(self._given())
-        driver = self.mechanism.driver
-        cylinder: SlottedLink | None = None
+        driver, last = self.mechanism.driver, None
         for group in reversed(self.mechanism.groups):
             if isinstance(group, SlottedLink) and group.link == getattr(driver, "cylinder", None):
-                cylinder = group
+                last = group
             else:
                 self._balance(group)
-        balancing = self._drive(cylinder)
+        balancing = self._drive(last)
         hinges: dict[str, Reaction] = {}
         for one in reversed(self.reactions):
             if one.along is None:
                 key = one.joint if one.joint not in hinges else f"{one.joint}_{self.names[one.on]}"
                 hinges[key] = one
         guides = {self.names[one.on]: one for one in reversed(self.reactions) if one.along is not None}
-        size = larger(self.size, larger(abs(balancing.force), abs(balancing.moment) / self.reach))
-        predicted = self.slack / where(size == 0.0, 1.0, size)
-        return Forces(given, hinges, guides, balancing, self._power(given, balancing, cylinder), predicted)
-
-    # What acts on each link
+        size = self.largest.value
+        predicted = self.largest.slack / where(size == 0.0, 1.0, size)
+        power = _rounded(self._power(given, balancing, last))
+        return Forces(given, hinges, guides, balancing, power, _rounded(predicted))
 
     def _given(self) -> Iterator[Given]:
         """Yield inertia forces, weights and loads, and put them on their links."""
-        mechanism, moving, take, none = self.mechanism, self.moving, self.take, self.zero.real
-        most = moving.error * reduce(larger, map(abs, moving.acceleration.values()))
-        for body in mechanism.bodies:
-            mass, inertia = (none if one is None else take(one) for one in (body.mass, body.inertia))
-            short = self.names[body.link]
-            on = (body.link, body.centre)
-            turns = self.turns_with.get(body.link, body.link)
-            force, couple, slack = self.zero - mass * moving.acceleration[body.centre], none, none
-            if turns in self.arms:
-                p, q = self.arms[turns]
-                couple = none - inertia * moving.epsilon[turns]
+        take, joints, none = self.take, self.solution.joints, _Near(self.zero.real)
+        most = self.error * reduce(larger, [abs(joint.acceleration) for joint in joints.values()])
+        for body in self.mechanism.bodies:
+            mass, inertia = (none.value if one is None else take(one) for one in (body.mass, body.inertia))
+            couple = none
+            if body.link in self.turning:
+                link, p, q = self.turning[body.link]
                 slack = inertia * most / abs(self.at[q] - self.at[p])
-            yield Given("inertia", f"F_i{short}", *on, force, couple)
-            self._put(*on, force, couple, mass * most, slack)
-            if mechanism.gravity is not None:
-                weight = self.zero - 1j * (mass * take(mechanism.gravity))
-                yield Given("weight", f"G_{short}", *on, weight, none)
-                self._put(*on, weight, none)
-        for load in mechanism.loads:
-            force = self.zero + (none if load.force is None else take(load.force))
-            couple = none + (none if load.couple is None else take(load.couple))
-            yield Given("load", f"F_{load.name}", load.link, load.point, force, couple)
-            self._put(load.link, load.point, force, couple)
+                couple = _Near(none.value - inertia * self.solution.epsilon[link], slack)
+            force = _Near(self.zero - mass * joints[body.centre].acceleration, mass * most)
+            place, short = (body.link, body.centre), self.names[body.link]
+            yield self._put("inertia", f"F_i{short}", *place, force, couple)
+            if self.mechanism.gravity is not None:
+                force = _Near(self.zero - 1j * (mass * take(self.mechanism.gravity)))
+                yield self._put("weight", f"G_{short}", *place, force, none)
+        for load in self.mechanism.loads:
+            force, couple = (
+                _Near(zero if one is None else zero + take(one))
+                for zero, one in ((self.zero, load.force), (none.value, load.couple))
+            )
+            yield self._put("load", f"F_{load.name}", load.link, load.point, force, couple)
 
-    def _put(
-        self,
-        link: str,
-        point: str,
-        force: Complex,
-        couple: Number,
-        slack: Number = 0.0,
-        couple_slack: Number = 0.0,
-    ) -> None:
-        slacks = (slack + abs(force) * self.moving.error, couple_slack + abs(couple) * self.moving.error)
-        self.acting.setdefault(link, []).append((point, force, couple, *slacks))
-        self.slack = larger(self.slack, larger(slacks[0], slacks[1] / self.reach))
-        self.size = larger(self.size, larger(abs(force), abs(couple) / self.reach))
+    def _put(self, kind: GivenKind, name: str, link: str, point: str, force: _Near, couple: _Near) -> Given:
+        """Put a given force on its link, with the error of its rounding."""
+        rounded = (_Near(one.value, one.slack + abs(one.value) * self.error) for one in (force, couple))
+        self._act(link, point, *rounded)
+        return Given(kind, name, link, point, _rounded(force.value), _rounded(couple.value))
 
-    def _sum(self, link: str, about: str) -> _Sum:
+    def _act(self, link: str, point: str, force: _Near, couple: _Near) -> None:
+        self.acting.setdefault(link, []).append((point, force, couple))
+        for one, per in ((force, 1.0), (couple, self.reach)):
+            value, slack = larger(self.largest.value, abs(one.value) / per), one.slack / per
+            self.largest = _Near(value, larger(self.largest.slack, slack))
+
+    def _arm(self, tail: str, head: str) -> _Near:
+        slack = 0.0 if tail == head else 2.0 * self.error * self.reach
+        return _Near(self.at[head] - self.at[tail], slack)
+
+    def _sum(self, link: str, about: str) -> tuple[_Near, _Near]:
         """Return the resultant of what acts on a link, and its moment about a joint."""
-        total = _Sum(self.zero, self.zero.real, self.zero.real, self.zero.real)
-        for point, force, couple, slack, couple_slack in self.acting.get(link, ()):
-            arm = self.at[point] - self.at[about]
-            lost = abs(arm) * slack + abs(force) * self.arm_slack + couple_slack
-            total += _Sum(force, cross(arm, force) + couple, slack, lost)
-        return total
+        force, moment = _Near(self.zero), _Near(self.zero.real)
+        for point, one, couple in self.acting.get(link, ()):
+            force, moment = force + one, moment + self._arm(about, point).by(one, cross) + couple
+        return force, moment
 
-    def _pin(self, joint: str, on: str, force: Complex, slack: Number) -> None:
-        """Add the reaction at an outer joint; its opposite acts on the link that carries the pin."""
-        by = self.carriers[joint]
-        self.reactions.append(Reaction(joint, on, by, force, self.zero.real))
-        self._put(by, joint, -force, self.zero.real, slack)
-
-    def _inner(self, joint: str, links: tuple[str, ...], force: Complex) -> None:
-        """Add the reaction on the first of two links where they are hinged, or on the other by its pin."""
-        on, by = links
-        if self.carriers[joint] == on:
-            on, by, force = by, on, -force
-        self.reactions.append(Reaction(joint, on, by, force, self.zero.real))
-
-    def _guided(
-        self, joint: str, on: str, rail: _Rail, force: Complex, moment: Number, slacks: tuple[Number, Number]
+    def _react(
+        self, joint: str, on: str, by: str, force: _Near, moment: _Near | None = None, along: Complex = None
     ) -> None:
-        """Add the reaction of a guide; its opposite acts on the link that has the guide."""
-        self.reactions.append(Reaction(joint, on, rail.link, force, moment, rail.along))
-        self._put(rail.link, joint, -force, -moment, *slacks)
+        """Add the reaction on a link by another, on which its opposite acts."""
+        couple = moment or _Near(self.zero.real)
+        self._act(on, joint, force, couple)
+        self._act(by, joint, -force, -couple)
+        if along is None and self.carriers[joint] == on:
+            on, by, force = by, on, -force
+        direction = None if along is None else _rounded(along)
+        self.reactions.append(
+            Reaction(joint, on, by, _rounded(force.value), _rounded(couple.value), direction)
+        )
 
-    def _rail(self, guide: Guide) -> _Rail:
-        if isinstance(guide, FixedGuide):
-            return _Rail(GROUND, self.zero + assur.heading(self.take(guide.angle_rad)), SAFETY * EPSILON)
-        g, h = guide.base
-        d = self.at[h] - self.at[g]
-        return _Rail(guide.link, d / abs(d), self.arm_slack / abs(d))
+    def _close(self, joint: str, on: str, by: str = "") -> None:
+        """Add the reaction at a hinge, by default on the link of its pin, that balances all other forces."""
+        self._react(joint, on, by or self.carriers[joint], -self._sum(on, joint)[0])
 
-    # Groups
+    def _guide(self, joint: str, on: str, rail: Rail) -> None:
+        """Add the reaction of a guide that balances a slider across the guide and in its moments."""
+        (by, along), (force, moment) = rail, self._sum(on, joint)
+        across = along.left.by(force, dot)
+        self._react(joint, on, by, along.left.by(-across), -moment, along.value)
+
+    def _rail(self, guide: Guide) -> Rail:
+        if isinstance(guide, MovingGuide):
+            base = self._arm(*guide.base)
+            return guide.link, base.over(_Near(abs(base.value)))
+        return GROUND, self._heading(guide.angle_rad)
+
+    def _heading(self, angle_rad: FloatArray) -> _Near:
+        return _Near(self.zero + assur.heading(self.take(angle_rad)), SAFETY * EPSILON)
 
     def _balance(self, group: Group) -> None:
+        """Add the reactions of a group on which all but its own reactions act."""
         links = self.named[group.node]
         match group:
             case Dyad():
-                self._dyad(group, links)
-            case Slider():
-                self._slider(group, links)
+                self._balance_dyad(group, links)
+            case Slider(node=node, pin=pin):
+                rail = self._rail(group.guide)
+                (rod, moment), (block, _) = (self._sum(link, node) for link in links)
+                along = rail[1].by(rod + block, dot)
+                force = _from_moments(self._arm(node, pin), -moment, rail[1].left, along)
+                self._react(pin, links[0], self.carriers[pin], force)
+                self._close(node, *links)
+                self._guide(node, links[1], rail)
             case SlottedLink():
-                self._slotted(group, links)
-            case CrossSlider():
-                self._cross_slider(group, links)
+                self._balance_slotted(group, links)
+            case CrossSlider(node=node):
+                rails = [self._rail(guide) for guide in group.guides]
+                (first, moment), (second, _) = (self._sum(link, node) for link in links)
+                (by, g), (_, h) = rails
+                normal = -h.by(first + second, dot).over(g.by(h, cross))
+                self._react(node, links[0], by, g.left.by(normal), -moment, g.value)
+                self._close(node, *links)
+                self._guide(node, links[1], rails[1])
             case Yoke():
-                self._yoke(group, links)
+                self._balance_yoke(group, links)
 
-    def _dyad(self, group: Dyad, links: tuple[str, ...]) -> None:
-        first, second = (self._sum(link, group.node) for link in links)
-        both, slack = first + second, self.arm_slack
-        u, v = (self.at[pin] - self.at[group.node] for pin in group.pins)
-        far = second.moment - cross(v, both.force)
-        far_slack = second.moment_slack + abs(v) * both.slack + abs(both.force) * slack
-        near = (-first.moment, first.moment_slack)
-        force, lost = _from_moments((u, slack), near, (v, slack), (far, far_slack))
-        self._pin(group.pins[0], links[0], force, lost)
-        self._pin(group.pins[1], links[1], -both.force - force, lost + both.slack)
-        self._inner(group.node, links, -first.force - force)
+    def _balance_dyad(self, group: Dyad, links: tuple[str, ...]) -> None:
+        (p, q), node = group.pins, group.node
+        (first, moment), (second, far) = (self._sum(link, node) for link in links)
+        u, v = self._arm(node, p), self._arm(node, q)
+        force = _from_moments(u, -moment, v, far + -v.by(first + second, cross))
+        self._react(p, links[0], self.carriers[p], force)
+        self._close(node, *links)
+        self._close(q, links[1])
 
-    def _slider(self, group: Slider, links: tuple[str, ...]) -> None:
-        rail, (rod, block) = self._rail(group.guide), (self._sum(link, group.node) for link in links)
-        both = rod + block
-        arm = (self.at[group.pin] - self.at[group.node], self.arm_slack)
-        force, lost = _from_moments(arm, (-rod.moment, rod.moment_slack), rail.across, rail.along_it(both))
-        self._pin(group.pin, links[0], force, lost)
-        self._inner(group.node, links, -rod.force - force)
-        normal, lost = rail.normal(both, force, lost)
-        self._guided(group.node, links[1], rail, normal, -block.moment, (lost, block.moment_slack))
+    def _balance_yoke(self, group: Yoke, links: tuple[str, ...]) -> None:
+        rail, pin = self._rail(group.guide), group.pin
+        slot = self._heading(group.slot_rad) if isinstance(group.guide, FixedGuide) else rail[1].left
+        (yoke, _), (block, _) = (self._sum(link, pin) for link in links)
+        along = rail[1].by(yoke + block, dot)
+        force = _from_moments(rail[1].left, along, slot.left, slot.by(block, dot))
+        self._react(pin, links[1], self.carriers[pin], force)
+        self._guide(pin, links[1], (links[0], slot))
+        self._guide(group.node, links[0], rail)
 
-    def _slotted(self, group: SlottedLink, links: tuple[str, ...], crank: Crank | None = None) -> Number:
-        """Balance a slotted link; return the thrust on its block if it is the cylinder that drives `crank`."""
-        link, block = self._sum(links[0], group.pivot), self._sum(links[1], group.pin)
-        d, slack = self.at[group.pin] - self.at[group.pivot], self.arm_slack
-        reach, along, _ = assur.rpr_place(d, self.take(group.offset_m), self.take(group.side))
-        rail, both, thrust = _Rail(links[0], along, slack / abs(reach)), link + block, self.zero.real
-        moment = link.moment + block.moment + cross(d, block.force)
-        moment_slack = both.moment_slack + abs(d) * block.slack + abs(block.force) * slack
-        force, lost = _from_moments((d, slack), (-moment, moment_slack), rail.across, rail.along_it(block))
+    def _balance_slotted(
+        self, group: SlottedLink, links: tuple[str, ...], crank: Crank | None = None
+    ) -> _Near:
+        """Balance a slotted link; return the force on its block, of the cylinder that drives the crank."""
+        d, offset, side = self._arm(group.pivot, group.pin), self.take(group.offset_m), self.take(group.side)
+        reach, direction, _ = assur.rpr_place(d.value, offset, side)
+        along, length = _Near(direction, d.slack / abs(reach)), _Near(reach, d.slack * abs(d.value / reach))
+        (_, moment), (block, more) = (self._sum(link, group.pivot) for link in links)
+        force = _from_moments(d, -(moment + more), along.left, along.by(block, dot))
+        thrust = _Near(self.zero.real)
         if crank is not None:
-            arm, driven = self.at[crank.pin] - self.at[crank.pivot], self._sum(crank.link, crank.pivot)
-            lever = reach / cross(arm, d)
-            thrust = (cross(arm, force) - driven.moment) * lever
-            lost = lost + (abs(arm) * lost + driven.moment_slack + abs(force) * slack) * abs(lever)
-            lost = lost + abs(thrust) * slack * (abs(arm) + abs(d)) * abs(lever / reach)
-            force = force - thrust * d / reach
-        self._pin(group.pin, links[1], force, lost)
-        self._pin(group.pivot, links[0], -both.force - force, lost + both.slack)
-        normal, _ = rail.normal(block, force, lost)
-        self.reactions.append(Reaction(group.pin, links[1], links[0], normal, -block.moment, along))
-        return thrust * along
-
-    def _cross_slider(self, group: CrossSlider, links: tuple[str, ...]) -> None:
-        blocks, rails = [self._sum(link, group.node) for link in links], [*map(self._rail, group.guides)]
-        both, (g, h) = blocks[0] + blocks[1], (rail.along for rail in rails)
-        area = cross(g, h)
-        normals = (-dot(h, both.force) / area * 1j * g, dot(g, both.force) / area * 1j * h)
-        slack = rails[0].slack + rails[1].slack
-        self._inner(group.node, links, -blocks[0].force - normals[0])
-        for link, rail, block, normal in zip(links, rails, blocks, normals, strict=True):
-            lost = (both.slack + (abs(both.force) + abs(normal)) * slack) / abs(area)
-            self._guided(group.node, link, rail, normal, -block.moment, (lost, block.moment_slack))
-
-    def _yoke(self, group: Yoke, links: tuple[str, ...]) -> None:
-        yoke, block = self._sum(links[0], group.node), self._sum(links[1], group.pin)
-        rail, both = self._rail(group.guide), yoke + block
-        if isinstance(group.guide, FixedGuide):
-            slot = _Rail(links[0], self.zero + assur.heading(self.take(group.slot_rad)), SAFETY * EPSILON)
-        else:
-            slot = _Rail(links[0], 1j * rail.along, rail.slack)
-        force, lost = _from_moments(rail.across, rail.along_it(both), slot.across, slot.along_it(block))
-        self._pin(group.pin, links[1], force, lost)
-        pressed, slack = slot.normal(block, force, lost)
-        self.reactions.append(Reaction(group.pin, links[1], links[0], pressed, -block.moment, slot.along))
-        normal, lost = rail.normal(both, force, lost)
-        arm = self.at[group.pin] - self.at[group.node]
-        moment = cross(arm, pressed) - block.moment - yoke.moment
-        moment_slack = both.moment_slack + abs(arm) * slack + abs(pressed) * self.arm_slack
-        self._guided(group.node, links[0], rail, normal, moment, (lost, moment_slack))
-
-    # The driving link, and the check
+            arm = self._arm(crank.pivot, crank.pin)
+            needed = arm.by(force, cross) + -self._sum(crank.link, crank.pivot)[1]
+            lever = d.over(length)
+            thrust = needed.over(arm.by(lever, cross))
+            force = force + -lever.by(thrust)
+        self._react(group.pin, links[1], self.carriers[group.pin], force)
+        for link, one in zip(links, (-thrust, thrust), strict=True):
+            self._act(link, group.pin, along.by(one), _Near(self.zero.real))
+        self._guide(group.pin, links[1], (links[0], along))
+        self._close(group.pivot, links[0])
+        return along.by(thrust)
 
     def _drive(self, cylinder: SlottedLink | None) -> Balancing:
         """Balance the driving link, and the cylinder that drives it."""
-        driver, thrust = self.mechanism.driver, self.zero
+        driver, moment, force = self.mechanism.driver, _Near(self.zero.real), _Near(self.zero)
+        on, by, crank = driver.link, GROUND, isinstance(driver, Crank)
         if isinstance(driver, DrivingSlider):
-            total = self._sum(driver.link, driver.pin)
-            rail = self._rail(FixedGuide(driver.guide_m, driver.guide_rad))
-            normal, lost = rail.normal(total, self.zero, self.zero.real)
-            self._guided(driver.pin, driver.link, rail, normal, -total.moment, (lost, total.moment_slack))
-            force = -dot(rail.along, total.force) * rail.along
-            return Balancing(driver.link, GROUND, self.zero.real, force, is_force=True)
-        if cylinder is not None:
-            cylinder_, block = self.named[cylinder.node]
-            thrust = self._slotted(cylinder, (cylinder_, block), driver)
-        total = self._sum(driver.link, driver.pivot)
-        self._pin(driver.pivot, driver.link, -total.force, total.slack)
-        self.slack = larger(self.slack, total.moment_slack / self.reach)
-        if cylinder is not None:
-            return Balancing(block, cylinder_, self.zero.real, thrust, is_force=True)
-        return Balancing(driver.link, GROUND, -total.moment, self.zero, is_force=False)
+            along = self._heading(driver.guide_rad)
+            self._guide(driver.pin, on, (GROUND, along))
+            force = along.by(-along.by(self._sum(on, driver.pin)[0], dot))
+        elif cylinder is not None:
+            by, on = self.named[cylinder.node]
+            force, crank = self._balance_slotted(cylinder, (by, on), driver), False
+        else:
+            moment = -self._sum(on, driver.pivot)[1]
+        if isinstance(driver, Crank):
+            self._close(driver.pivot, driver.link, GROUND)
+        self._act(GROUND, driver.pin, force, moment)
+        return Balancing(on, by, _rounded(moment.value), _rounded(force.value), is_force=not crank)
 
     def _power(self, given: tuple[Given, ...], balancing: Balancing, cylinder: SlottedLink | None) -> Number:
-        """Return the power of all given forces and of the balancing one, relative to what each could have."""
-        velocity, driver, none = self.moving.velocity, self.mechanism.driver, self.zero.real
-        rate = velocity[driver.pin] - (velocity[cylinder.node] if cylinder else 0.0)
-        acts = [(one.force, velocity[one.point], one.couple, self._rate(one.link)) for one in given]
+        """Return the power of all given forces and of the balancing one, relative to what it could be."""
+        speeds = {name: _rounded(joint.velocity) for name, joint in self.solution.joints.items()}
+        driver = self.mechanism.driver
+        rate = speeds[driver.pin] - (speeds[cylinder.node] if cylinder else 0.0)
+        acts = [(one.force, speeds[one.point], one.couple, self._rate(one.link)) for one in given]
         acts.append((balancing.force, rate, balancing.moment, self._rate(driver.link)))
-        power = sum((dot(force, v) + couple * omega for force, v, couple, omega in acts), none)
-        most = sum((abs(force) * abs(v) + abs(couple * omega) for force, v, couple, omega in acts), none)
+        power = sum(dot(force, v) + couple * omega for force, v, couple, omega in acts)
+        most = sum(abs(force) * abs(v) + abs(couple * omega) for force, v, couple, omega in acts)
         return power / where(most == 0.0, 1.0, most)
 
     def _rate(self, link: str) -> Number:
-        return self.moving.omega.get(self.turns_with.get(link, link), self.zero.real)
+        return _rounded(
+            self.solution.omega[self.turning[link][0]] if link in self.turning else self.zero.real
+        )
+
+
+def _rounded(number: Number) -> Any:  # noqa: ANN401 - an array of doubles, or of extended floats
+    return number if isinstance(number, np.ndarray) else np.array([complex(number)])

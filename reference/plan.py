@@ -36,7 +36,7 @@ class Plan:
     nodes_mm : by figure and node, complex, millimetres from the figure's origin (a plan's pole)
     vectors_si : by name, complex, m/s, m/s^2 and N, in the vector's own sense
     rates : omega_k, epsilon_k, rad/s and rad/s^2, and M_b, N m, counter-clockwise positive
-    forces : of every variant, where the assignment has force plans
+    forces : None where the assignment has neither bodies nor loads, or accelerations are not asked for
     """
 
     variants: tuple[Variant, ...]
@@ -110,14 +110,14 @@ def exact_plan(
     mechanism = assignment.mechanism(variants)
     scales = scales or assignment.scales(variants)
     construction = construction_for(assignment, variants, accelerations=accelerations, forces=forces)
-    solved = None
     motion = move(mechanism, accelerations=accelerations or assignment.forces is not None)
     nodes = _nodes(construction, mechanism, motion, scales)
     rates = {name: _rate(motion, name) for name in construction.rates}
     parameters = parameters_of(mechanism, scales.kL, scales.kv, scales.ka)
     parameters = {**_measured(construction, motion), **parameters}
-    if scales.kF is not None and assignment.forces is not None:
-        solved = forces_of(mechanism, motion)
+    acts = motion.acceleration and (mechanism.bodies or mechanism.loads)
+    solved = forces_of(mechanism, motion) if acts else None
+    if solved is not None and assignment.forces is not None and scales.kF is not None:
         nodes |= force_nodes(construction, mechanism, motion, solved, scales.kF)
         rates |= dict.fromkeys(construction.moments, solved.balancing.moment)
         parameters |= {"kF": scales.kF, **data_of_forces(mechanism, solved)}
@@ -233,12 +233,14 @@ def conditioning(plan: Plan) -> dict[str, FloatArray]:
     """Return measures of how well the plan can be computed and drawn.
 
     ``transmission X``: |sin| on which joint X hangs; ``predicted_error``: relative error of the
-    computed velocities and accelerations; ``crossing X``: the angle in degrees at which the
-    construction lines of node X meet (90 is best).
+    computed velocities and accelerations; ``predicted_error_forces``: that of forces, relative to the
+    largest; ``crossing X``: the angle in degrees at which the construction lines of node X meet (90 is best).
     """
     transmission = plan.motion.transmission
     conditions: dict[str, FloatArray] = {f"transmission {node}": sine for node, sine in transmission.items()}
     conditions["predicted_error"] = plan.motion.predicted_error
+    if plan.forces is not None:
+        conditions["predicted_error_forces"] = plan.forces.predicted_error
     nodes = evaluate(plan.construction, plan.drawing.parameters)
     return {**conditions, **crossings_deg(plan.construction, plan.drawing, nodes)}
 

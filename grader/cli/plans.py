@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,11 +11,14 @@ from grader.cli.app import new_table
 from grader.files import write_whole
 from grader.language import Tongue, tongue
 from grader.options import PlanOptions
-from grader.solution.document import plan_document
+from grader.solution.document import ForceDocument, ForcesDocument, GuideDocument, plan_document
 from reference.authored.assignment import Assignment, load_assignment
 from reference.errors import CallError
 from reference.plan import Plan, exact_plan
 from reference.quantities import unit_of
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 STEP_FILES = (".html", ".pdf", ".txt")
 TERMINAL = Path("-")
@@ -36,7 +40,8 @@ def show_plan(name: str, options: PlanOptions) -> None:
     plan = exact_plan(assignment, variants, assignment.scales(variants, crank_mm=options.crank_mm))
     _draw(assignment, plan, options)
     if options.as_json:
-        terminal.say(plan_document(assignment, plan).model_dump_json(indent=2))
+        document = plan_document(assignment, plan)
+        terminal.say(document.model_dump_json(indent=2, exclude=document.unused))
         return
     _print_table(assignment, plan)
     for file in (one for one in options.drawn if one != TERMINAL):
@@ -112,8 +117,33 @@ def _print_table(assignment: Assignment, plan: Plan) -> None:
             real, mm, angle = abs(at), abs(at) / scales["kL"], np.degrees(np.angle(at)) % 360.0
             table.add_row(f"{name} from {pivot}", f"{mm:.2f}", f"{real:.4f}", "m", f"{angle:.2f}")
     console.print(table)
+    if document.forces is not None:
+        console.print(_table_of_forces(document.forces))
     worst = min((float(np.min(sine)) for sine in plan.motion.transmission.values()), default=1.0)
     if worst < 0.2:
         console.print(
             f"near a singular position: the sine of a transmission angle is {worst:.3f}", style="yellow"
         )
+
+
+def _table_of_forces(forces: ForcesDocument) -> "Table":
+    """Return inertia forces, reactions and the balancing moment or force, a row each."""
+
+    def direction(degrees: float | None) -> str:
+        return "-" if degrees is None else f"{degrees:.2f}"
+
+    table = new_table("force", "at", "N", "direction deg", "N m", left=("at",))
+    for link, one in forces.inertia.items():
+        row = (f"{one.force_N:.4g}", direction(one.direction_deg), f"{one.moment_Nm:.4g}")
+        table.add_row(f"inertia of {link}", one.at, *row)
+    for name, joint in (*forces.joints.items(), *forces.guides.items()):
+        moment = f"{joint.moment_Nm:.4g}" if isinstance(joint, GuideDocument) else ""
+        row = (f"{joint.value_N:.4g}", direction(joint.direction_deg), moment)
+        table.add_row(f"{joint.by} on {joint.on}", name, *row)
+    last = forces.balancing
+    if isinstance(last, ForceDocument):
+        row = (f"{last.value_N:.4g}", direction(last.direction_deg), "")
+    else:
+        row = ("", "", f"{last.moment_Nm:.4g}")
+    table.add_row(f"balancing on {last.on}", "", *row)
+    return table

@@ -65,7 +65,8 @@ def show_class(name: str, options: PlanOptions) -> bool:
     if pdf is not None:
         _print_pages(assignment, plan, pdf, drawings=options.drawings, lang=lang)
     if options.as_json:
-        documents = [one.model_dump(mode="json") for one in plan_documents(assignment, plan)]
+        plans = plan_documents(assignment, plan)
+        documents = [one.model_dump(mode="json", exclude=one.unused) for one in plans]
         terminal.say(json.dumps(documents, indent=2, ensure_ascii=False))
         return is_open
     if csv is None and pdf is None:

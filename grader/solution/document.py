@@ -14,6 +14,7 @@ from reference.authored.assignment import Assignment, Variant
 from reference.construction.graph import Construction
 from reference.geometry import ComplexArray, FloatArray
 from reference.kinematics.motion import Motion
+from reference.kinetics import Balancing, Forces, Given, Reaction
 from reference.mechanism import Crank, Mechanism
 from reference.plan import Plan, conditioning
 from reference.quantities import unit_of
@@ -98,11 +99,62 @@ class PlanVector(_Document):
     direction_deg: float | None
 
 
+class ForceDocument(_Document):
+    """The force of link `by` on link `on`, N; a zero force's direction is null."""
+
+    on: str
+    by: str
+    x_N: float  # noqa: N815 - the unit
+    y_N: float  # noqa: N815
+    value_N: float  # noqa: N815
+    direction_deg: float | None
+
+
+class GuideDocument(ForceDocument):
+    """The force of a guide across it; its moment about the slider's joint, or its point of action instead.
+
+    `at_m` is in the mechanism's coordinates; null where the force is zero.
+    """
+
+    moment_Nm: float  # noqa: N815
+    at_m: tuple[float, float] | None
+
+
+class InertiaDocument(_Document):
+    """The inertia force of a link, against the acceleration of its centre of mass `at`, and its couple."""
+
+    force_N: float  # noqa: N815
+    direction_deg: float | None
+    moment_Nm: float  # noqa: N815
+    at: str
+
+
+class BalancingMoment(_Document):
+    """The balancing moment on the driving crank, counter-clockwise positive."""
+
+    on: str
+    moment_Nm: float  # noqa: N815
+
+
+class ForcesDocument(_Document):
+    """The forces of a mechanism with bodies or loads; links are named as in its file, 0 is the frame.
+
+    `joints` are named by joint, a further hinge there by joint and link (``B_4``); `guides` by the slider's
+    joint. Where a slider or a cylinder drives, the balancing force is along its guide.
+    """
+
+    joints: dict[str, ForceDocument]
+    guides: dict[str, GuideDocument]
+    inertia: dict[str, InertiaDocument]
+    balancing: BalancingMoment | ForceDocument
+    power_residual: float
+
+
 class PlanDocument(_Document):
     """The exact plan of one variant; plan nodes relative to their pole, y up.
 
     `centres_m`: instantaneous centres (``I3``, of two links ``I34``) and acceleration poles (``J3``) in the
-    mechanism's coordinates; null if a link does not turn.
+    mechanism's coordinates; null if a link does not turn. Without bodies and loads there are no `forces`.
     """
 
     schema_version: Literal[1] = 1
@@ -117,6 +169,12 @@ class PlanDocument(_Document):
     angular: dict[str, float]
     centres_m: dict[str, tuple[float, float] | None]
     conditioning: dict[str, float | dict[str, float]]
+    forces: ForcesDocument | None = None
+
+    @property
+    def unused(self) -> set[str]:
+        """Fields that are left out of the JSON: the forces where there are none."""
+        return {"forces"} if self.forces is None else set()
 
 
 def variant_numbers(variant: Variant) -> dict[str, int]:
@@ -198,6 +256,43 @@ def _document(assignment: Assignment, plan: Plan, columns: _Columns, index: int)
             for name, point in points("centres").items()
         },
         conditioning=_grouped(numbers("conditioning")),
+        forces=None if plan.forces is None else _forces(plan.forces, plan.motion, index),
+    )
+
+
+def _forces(forces: Forces, motion: Motion, index: int) -> ForcesDocument:
+    """Return the forces of one variant."""
+    acting = [*(one.force for one in forces.given), *(one.force for one in forces.hinges.values())]
+    least = NO_TURN * max(abs(complex(force[index])) for force in acting)
+
+    def directed(force: ComplexArray) -> tuple[float, float | None]:
+        size, angle = abs(force[index]), math.degrees(np.angle(force[index])) % 360.0 % 360.0
+        return float(size), float(angle) if size > least else None
+
+    def reaction(one: Reaction | Balancing) -> dict[str, Any]:
+        (size, direction), force = directed(one.force), complex(one.force[index])
+        x, y = force.real + 0.0, force.imag + 0.0
+        links = {"on": one.on, "by": one.by}
+        return {**links, "x_N": x, "y_N": y, "value_N": size, "direction_deg": direction}
+
+    def guide(one: Reaction) -> GuideDocument:
+        point = motion.position[one.joint][index] + one.lever_m[index] * np.asarray(one.along)[index]
+        acts = directed(one.force)[1] is not None
+        at = (float(point.real), float(point.imag)) if acts else None
+        return GuideDocument(**reaction(one), moment_Nm=float(one.moment[index]) + 0.0, at_m=at)
+
+    def inertia(one: Given) -> InertiaDocument:
+        (size, direction), couple = directed(one.force), float(one.couple[index]) + 0.0
+        return InertiaDocument(force_N=size, direction_deg=direction, moment_Nm=couple, at=one.point)
+
+    last = forces.balancing
+    moment = BalancingMoment(on=last.on, moment_Nm=float(last.moment[index]) + 0.0)
+    return ForcesDocument(
+        joints={name: ForceDocument(**reaction(joint)) for name, joint in forces.hinges.items()},
+        guides={name: guide(slider) for name, slider in forces.guides.items()},
+        inertia={one.link: inertia(one) for one in forces.given if one.kind == "inertia"},
+        balancing=ForceDocument(**reaction(last)) if last.is_force else moment,
+        power_residual=float(forces.power_residual[index]),
     )
 
 

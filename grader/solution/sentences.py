@@ -59,7 +59,9 @@ TITLES = {
     "velocity_plan": N_("Velocity plan"),
     "acceleration_plan": N_("Acceleration plan"),
     "force_plan": N_("Force plan of the group of {group}"),
+    "driving_force_plan": N_("Force plan of the driving link"),
     "scheme": N_("Links of the group of {group}"),
+    "driving_scheme": N_("Driving link"),
     "lever": N_("Zhukovsky's lever"),
     "centres": N_("Instantaneous centres and acceleration poles"),
 }

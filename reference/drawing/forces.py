@@ -11,8 +11,8 @@ from reference.construction.equations import moment_sums
 from reference.construction.forces import reaction
 from reference.construction.graph import Vector
 from reference.drawing import symbols
-from reference.drawing.canvas import CONSTRUCTION, INK, Area, Piece, Shape, Stroke, shifted
-from reference.drawing.labels import Style, Wanted, letters
+from reference.drawing.canvas import CONSTRUCTION, INK, Area, Piece, Ring, Shape, Stroke, shifted
+from reference.drawing.labels import Style, Wanted, lengths_inside, letters, segments_of
 from reference.drawing.sketch import LETTER_MM, PLATE_FILL, SMALL_LETTER_MM, captioned
 from reference.drawing.subject import PLAN_COLOURS, DrawnFigure, Part, Subject
 from reference.drawing.symbols import HAIR_MM, LINK_MM, THIN_MM, Bar, bars, blocks, point, unit
@@ -29,6 +29,10 @@ FORCE_MM, GIVEN_MM, FOUND_MM = 15.0, 0.5, 0.25
 FORCE_LETTER_MM, ARM_LETTER_MM = 3.2, 2.6
 COUPLE_MM, COUPLE_START, COUPLE_SWEEP = 6.5, -0.6, 4.2
 ARM_HEAD_MM, LINE_DASH = (1.8, 0.3), (1.2, 1.0)
+SAMPLES = 16
+"""Places along an arrow where it is looked whether other lines are near."""
+SHIFTS = {0.0: 0.0, -1.0: 0.5, 1.05: 5.0, -2.05: 6.0}
+"""Where an arrow may start, in lengths from its point, and how many places may be touched instead."""
 COLOUR = PLAN_COLOURS["force_plan"]
 POLE, LEVER = "o", "lever"
 
@@ -152,8 +156,8 @@ def scheme_of(subject: Subject, figure: str) -> DrawnFigure:
     named = {joint for bar in bars(subject, full) if _is_of(bar, links, group) for joint in bar.joints}
     points = {name: at for name, at in nodes.items() if name in named or name in {one.at for one in acting}}
     parts = _picture(subject, points, drawn, acting, arms, share / scale)
-    title = subject.wording.titles["scheme"].replace("{group}", subject.shown(group))
-    return captioned(subject, "scheme", parts, INK, subject.captioned(title, "kL", 1.0 / share))
+    text = subject.captioned(subject.title_of("scheme", figure), "kL", 1.0 / share)
+    return captioned(subject, "scheme", parts, INK, text)
 
 
 def _is_of(bar: Bar, links: Sequence[str], group: str) -> bool:
@@ -191,27 +195,46 @@ def _picture(
     """
     shapes: list[Shape] = []
     wanted: list[Wanted] = []
+    hinges = {part.shape.centre for part in base if isinstance(part.shape, Ring)}
     for one in acting:
         at, width = nodes[one.at] + per_metre * one.aside_m, FOUND_MM if one.is_found else GIVEN_MM
         if one.force:
-            along = unit(one.force)
-            shapes += symbols.arrow(at, tip := at + FORCE_MM * along, width, COLOUR)
+            start, tip = _clear(at, unit(one.force), [*(part.shape for part in base), *shapes])
+            along = unit(tip - at) if abs(tip - at) > abs(start - at) else unit(start - at)
+            shapes += symbols.arrow(start, tip, width, COLOUR)
+            tip = max((start, tip), key=lambda end: abs(end - at))
         else:
             sweep, along = float(np.copysign(COUPLE_SWEEP, one.moment)), complex(np.exp(1j * COUPLE_START))
             shapes += symbols.turning(at, COUPLE_MM, COUPLE_START, sweep, COLOUR)
             tip = at + COUPLE_MM * along
         wanted.append(Wanted("", point(tip), subject.letter(one.name), FORCE_LETTER_MM, COLOUR, 0.8, along))
+    mm = subject.wording.unit("mm")
     for arm in arms:
         shapes += [Stroke(point(arm.start), point(arm.foot), HAIR_MM, CONSTRUCTION, LINE_DASH)]
         for start, end in ((arm.joint, arm.foot), (arm.foot, arm.joint)):
             shapes += symbols.arrow(start, end, HAIR_MM, CONSTRUCTION, ARM_HEAD_MM)
-        text = (*subject.letter(arm.name), Piece(f" = {subject.wording.number(f'{arm.mm:.4g}')}"))
+        text = (*subject.letter(arm.name), Piece(f" = {subject.wording.number(f'{arm.mm:.4g}')} {mm}"))
         middle = point((arm.joint + arm.foot) / 2.0)
         wanted.append(Wanted("", middle, text, ARM_LETTER_MM, CONSTRUCTION, 0.4, italic=False))
-    shapes += [symbols.marked_point(at) for node, at in nodes.items() if node in {one.at for one in acting}]
+    marked = {nodes[one.at] for one in acting if point(nodes[one.at]) not in hinges}
+    shapes += map(symbols.marked_point, sorted(marked, key=abs))
     drawn = [*base, *(Part("", shape) for shape in shapes)]
     style = Style(LETTER_MM, SMALL_LETTER_MM, INK, symbols.JOINT_RADIUS_MM)
     return (*drawn, *letters(subject, nodes, [part.shape for part in drawn], style, wanted))
+
+
+def _clear(at: complex, along: complex, drawn: Sequence[Shape]) -> tuple[complex, complex]:
+    """Return the ends of an arrow that starts or ends at a point, or beyond another arrow, clear of lines."""
+    lines = segments_of(drawn)
+
+    def touched(ends: tuple[complex, complex]) -> float:
+        places = [point(ends[0] + share * (ends[1] - ends[0])) for share in np.linspace(0.0, 1.0, SAMPLES)]
+        boxes = np.hstack([np.array(places), np.array(places)])
+        return float(np.any(lengths_inside(boxes, lines) > 0.0, axis=1).sum())
+
+    starts = [at + shift * FORCE_MM * along for shift in SHIFTS]
+    ends = {shift: (start, start + FORCE_MM * along) for shift, start in zip(SHIFTS, starts, strict=True)}
+    return ends[min(SHIFTS, key=lambda shift: touched(ends[shift]) + SHIFTS[shift])]
 
 
 # Zhukovsky's lever ---------------------------------------------------------------------------------

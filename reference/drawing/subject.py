@@ -30,7 +30,9 @@ class Wording:
             "velocity_plan": "Velocity plan",
             "acceleration_plan": "Acceleration plan",
             "force_plan": "Force plan of the group of {group}",
+            "driving_force_plan": "Force plan of the driving link",
             "scheme": "Links of the group of {group}",
+            "driving_scheme": "Driving link",
             "lever": "Zhukovsky's lever",
         }
     )
@@ -40,10 +42,6 @@ class Wording:
     too_large: str = "does not fit A3 at these scales"
     units: Mapping[str, str] = field(default_factory=dict)
     sides: Mapping[str, str] = field(default_factory=dict)
-
-    def title(self, figure: str) -> str:
-        """Return the title of a figure."""
-        return self.titles[sort_of(figure)].replace("{group}", group_of(figure))
 
     def unit(self, unit: str) -> str:
         """Return a unit in the language's letters, `m/s^2` with a superscript."""
@@ -174,4 +172,10 @@ class Subject:
 
     def caption(self, figure: str) -> Text:
         """Return the caption above a figure: its title and scale."""
-        return self.captioned(self.wording.title(figure), scale_of(figure))
+        return self.captioned(self.title_of(sort_of(figure), figure), scale_of(figure))
+
+    def title_of(self, sort: str, figure: str) -> str:
+        """Return the title of a figure, or of what stands beside it."""
+        group = group_of(figure)
+        sort = f"driving_{sort}" if group == self.plan.mechanism.driver.pin else sort
+        return self.wording.titles[sort].replace("{group}", self.shown(group))

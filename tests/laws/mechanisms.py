@@ -443,8 +443,8 @@ def loaded(mechanism: Mechanism, seed: int) -> Mechanism:
         if isinstance(group, SlottedLink):
             slots[group.link] = group
     more, bodies, loads = [], [], []
-    for link, joints in points.items():
-        joints = [*joints]
+    for link, held in points.items():
+        joints = [*held]
         if link in slots:
             more.append(SlotPoint(f"S{link}", slots[link].node, link, array(complex(*lot.uniform(-1, 1, 2)))))
             joints.append(more[-1].node)
@@ -560,5 +560,11 @@ def transformed(mechanism: Mechanism, turn: complex, *, mirror=False, factor=1.0
             speed=driver.speed * factor,
             acceleration=driver.acceleration * factor,
         )
+
+    def load_of(load):
+        force = load.force if load.slider else (np.conj(load.force) if mirror else load.force) * turn
+        return replace(load, force=force, couple=sign * load.couple)
+
     ground = {joint: place(z) for joint, z in mechanism.ground_m.items()}
-    return Mechanism(ground, driver, tuple(group_of(one) for one in mechanism.groups)), place
+    groups, loads = (tuple(map(*each)) for each in ((group_of, mechanism.groups), (load_of, mechanism.loads)))
+    return replace(mechanism, ground_m=ground, driver=driver, groups=groups, loads=loads), place
