@@ -3,16 +3,15 @@
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from markupsafe import Markup
 
 from grader.language import N_
 from grader.solution.formulas import Formula, Fraction, Grid, Name
 from grader.solution.sentences import Speaker
-from reference.construction.elements import Balance, Couple, Force, Inertia, Length, Same
+from reference.construction.elements import Balance, Couple, Inertia, Length, Same
 from reference.construction.equations import Arm, MomentSum, moment_sums
 from reference.drawing.canvas import Piece
-from reference.drawing.forces import OnLever, acting_on, links_of_plan, on_lever
-from reference.kinetics import turning_with
+from reference.drawing.forces import acting_on, links_of_plan, on_lever
+from reference.kinetics import turning
 from reference.mechanism import Crank, short_names
 from reference.quantities import group_of, unit_of
 
@@ -82,10 +81,10 @@ def force_formula(speaker: Speaker, size: Length) -> tuple[Formula, Formula] | N
 def couple_formula(speaker: Speaker, couple: Couple) -> tuple[Formula, Formula] | None:
     """Return how a couple follows, I epsilon, in names and in numbers; None for a datum."""
     plan, number = speaker.subject.plan, speaker.subject.number
-    short, turning = short_names(plan.mechanism), turning_with(plan.mechanism)
+    short = short_names(plan.mechanism)
     for body in plan.mechanism.bodies:
         if couple.name == f"M_i{short[body.link]}" and body.inertia is not None:
-            link = turning.get(body.link, body.link)
+            link = turning(plan.mechanism)[body.link][0]
             names = (speaker.symbol(f"I_{short[body.link]}"), TIMES, speaker.symbol(f"epsilon_{link}"))
             by = abs(number(plan.motion.epsilon[link]))
             return names, (speaker.bare(number(body.inertia)), TIMES, speaker.bare(by))
@@ -190,13 +189,13 @@ def _moment(speaker: Speaker, name: str, *between: Formula) -> Formula:
 def lever_table(speaker: Speaker) -> Grid:
     """Return the forces and couples on the lever with their arms and powers, and the powers' sum."""
     tongue, rows = speaker.tongue, [tuple(map(speaker.tongue.gettext, ON_LEVER))]
-    omega = speaker.subject.plan.motion.omega
-    turning = turning_with(speaker.subject.plan.mechanism)
+    omega, turns = speaker.subject.plan.motion.omega, turning(speaker.subject.plan.mechanism)
     for one in on_lever(speaker.subject):
         acting = one.acting
         value = speaker.real(abs(acting.force) or abs(acting.moment), unit_of(acting.name))
-        link = turning.get(acting.link, acting.link)
-        rate = "" if acting.force else speaker.real(speaker.subject.number(np.abs(omega[link])), "rad/s")
+        rate = "" if acting.force else speaker.real(
+            speaker.subject.number(np.abs(omega[turns[acting.link][0]])), "rad/s"
+        )
         arm = tongue.number(abs(one.arm_mm), 2) if acting.force else ""
         rows.append((speaker.symbol(acting.name), value, arm, rate, _power(speaker, one.power)))
     return Grid(tuple(rows), (0,) * len(ON_LEVER))

@@ -18,10 +18,12 @@ from reference.construction.elements import (
     FixedLine,
     Length,
     Line,
+    Parallel,
     Scaled,
     View,
     side_at,
 )
+from reference.construction.graph import Vector
 from reference.construction.steps import (
     ArcAndLine,
     Coincide,
@@ -40,7 +42,7 @@ from reference.construction.steps import (
 from reference.drawing.canvas import pieces_of, scale_pieces
 from reference.drawing.subject import Subject, Wording
 from reference.mechanism import SlottedLink, Yoke, moving_guides
-from reference.quantities import unit_of
+from reference.quantities import group_of, unit_of
 
 PERPENDICULAR = N_("perpendicular to %(link)s")
 PARALLEL = N_("parallel to %(link)s")
@@ -52,6 +54,8 @@ TURNED_RIGHT = N_("perpendicular to %(link)s, a quarter turn clockwise from the 
 GUIDE = N_("parallel to the guide of %(joint)s")
 ACROSS_GUIDE = N_("perpendicular to the guide of %(joint)s")
 SLOT = N_("parallel to the slot of %(joint)s")
+ACROSS_SLOT = N_("perpendicular to the slot of %(joint)s")
+OPPOSITE = N_("opposite to %(vector)s, in the direction %(angle)s")
 AT_ANGLE = N_("in the direction %(angle)s")
 ALONG_GUIDE = N_("along the guide of %(joint)s, in the direction %(angle)s")
 TITLES = {
@@ -185,6 +189,10 @@ class Speaker:
         vectors = self.subject.plan.construction.vectors.values()
         return next(vector.name for vector in vectors if (vector.tail, vector.head) == (tail, head))
 
+    def has_letters(self, node: str) -> bool:
+        """Return whether the nodes of a node's figure have letters; those of a force plan have none."""
+        return not group_of(self.subject.plan.construction.figure_of(node))
+
     def link_of(self, node: str) -> Name:
         """Return the link of the normal component that ends in a node."""
         vectors = self.subject.plan.construction.vectors.values()
@@ -206,16 +214,19 @@ class Speaker:
 
     def line_direction(self, along: Direction) -> Markup:
         """Describe the direction of a line, without a sense."""
-        if isinstance(along, Along):
+        if isinstance(along, Along | Parallel):
             text = PERPENDICULAR if along.quarters % 2 else PARALLEL
             return self.say(text, link=(along.tail, along.head))
         kind, joint = guided(along)
         if kind == "slot":
-            return self.say(SLOT, joint=joint)
+            return self.say(ACROSS_SLOT if along.quarters % 2 else SLOT, joint=joint)
         return self.say(ACROSS_GUIDE if along.quarters % 2 else GUIDE, joint=joint)
 
     def vector_direction(self, along: Direction, sign: float) -> Markup:
         """Describe the direction of a vector: a negative length reverses it."""
+        if isinstance(along, Parallel):
+            vector = self.vector(along.tail, along.head)
+            return self.say(OPPOSITE, vector=vector, angle=complex(along.at(self.view)))
         if not isinstance(along, Along):
             angle = complex(along.at(self.view)) * (-1.0 if sign < 0.0 else 1.0)
             kind, joint = guided(along)
@@ -314,6 +325,8 @@ LOCAL_ON_AXIS = N_("From %(origin)s lay off %(x)s in the direction %(x_direction
 
 def sentence(speaker: Speaker, step: Step) -> Markup:
     """Describe a step; raises ValueError for a kind of step without words."""
+    if step.node not in speaker.subject.plan.construction.centres and not speaker.has_letters(step.node):
+        return _force(speaker, step)
     match step:
         case Pole(node=node):
             return speaker.say(
@@ -343,6 +356,57 @@ def sentence(speaker: Speaker, step: Step) -> Markup:
             return _local(speaker, step)
         case _:
             raise ValueError(f"a step with words is expected, not {type(step).__name__}")
+
+
+START = N_("Mark the point at which the force plan begins.")
+LAY_FIRST = N_("From the beginning of the plan lay off %(name)s = %(length)s, %(direction)s.")
+LAY_NEXT = N_("From the end of %(other)s lay off %(name)s = %(length)s, %(direction)s.")
+LAY_TO_END = N_("Lay off %(name)s = %(length)s, %(direction)s, so that it ends where %(other)s ends.")
+LAY_TO_START = N_("Lay off %(name)s = %(length)s, %(direction)s, so that it ends where %(other)s begins.")
+NO_FORCE = N_("%(name)s is zero here: nothing is laid off.")
+MEET = N_(
+    "From the end of %(last)s draw a line %(first_direction)s for %(first)s, and from the beginning of the "
+    "plan a line %(second_direction)s for %(second)s. Where they meet, %(first)s ends and %(second)s begins."
+)
+CLOSING = N_("%(name)s closes the polygon.")
+
+
+def _force(speaker: Speaker, step: Step) -> Markup:
+    """Describe a step of a force plan, whose nodes have no letters, by the vectors that it draws."""
+    construction = speaker.subject.plan.construction
+    vectors = construction.polygon_of(construction.figure_of(step.node))
+
+    def between(tail: str) -> Vector:
+        return next(one for one in vectors if (one.tail, one.head) == (tail, step.node))
+
+    match step:
+        case Given(start=start, length=length):
+            own, mm = between(start), _length(speaker, length)
+            ending = [one for one in vectors if start == (one.tail if one.reversed else one.head)]
+            text, other = (LAY_TO_END if own.reversed else LAY_NEXT), ending[0].name if ending else ""
+            if own.reversed and (next_one := [one for one in vectors if one.head == start and one.reversed]):
+                text, other = LAY_TO_START, next_one[0].name
+            if start in construction.poles.values() and not own.reversed:
+                text = LAY_FIRST
+            if speaker.is_nothing(step.node, mm):
+                told = speaker.say(NO_FORCE, name=own.name)
+            else:
+                direction = speaker.vector_direction(step.along, mm * (-1.0 if own.reversed else 1.0))
+                told = speaker.say(text, name=own.name, length=abs(mm), direction=direction, other=other)
+            drawn = {own.name}
+        case TwoLines(first=Line() as first, second=Line() as second):
+            last = next(one for one in vectors if first.through in (one.head, one.tail))
+            names = [between(line.through).name for line in (first, second)]
+            told = speaker.say(
+                MEET, last=last.name, first=names[0], second=names[1],
+                first_direction=speaker.line_direction(first.along),
+                second_direction=speaker.line_direction(second.along),
+            )  # fmt: skip
+            drawn = {*names}
+        case _:
+            return speaker.say(START)
+    closing = [one.name for one in vectors if one.head == step.node and one.name not in drawn]
+    return Markup(" ").join((told, *(speaker.say(CLOSING, name=name) for name in closing)))
 
 
 def _length(speaker: Speaker, length: Length) -> float:

@@ -8,6 +8,16 @@ from markupsafe import Markup
 from grader.language import N_, Tongue
 from grader.solution import sentences
 from grader.solution.equations import driving_speed, grid_of, scale_formula, size_formula
+from grader.solution.forces import LEVER as ON_THE_LEVER
+from grader.solution.forces import (
+    balance_of,
+    balancing,
+    lever_lines,
+    lever_table,
+    moment_lines,
+    sense,
+    table_of,
+)
 from grader.solution.formulas import Formula, Fraction, Grid, Name, grid_text, plain
 from grader.solution.sentences import TITLES, Speaker, speaker_of
 from reference.construction.elements import Length, Scaled
@@ -15,8 +25,9 @@ from reference.construction.equations import Equation, equations
 from reference.construction.graph import AngularRate, Vector
 from reference.construction.steps import Given, Step
 from reference.drawing.canvas import Piece
+from reference.drawing.forces import LEVER
 from reference.drawing.subject import Subject
-from reference.quantities import kind_of, scale_of, unit_of
+from reference.quantities import group_of, kind_of, scale_of, sort_of, unit_of
 
 CENTRES = "centres"
 INTRODUCTIONS = {
@@ -33,7 +44,6 @@ INTRODUCTIONS = {
         "(acceleration poles J) at this moment, by Mehmke's similarity."
     ),
 }
-COUNTER_CLOCKWISE, CLOCKWISE = N_("counter-clockwise"), N_("clockwise")
 LENGTHS_MM = N_("Directions count counter-clockwise from the horizontal to the right.")
 
 
@@ -71,7 +81,7 @@ class ExplainedStep:
 
 @dataclass(frozen=True, slots=True)
 class PlanSection:
-    """The steps of one figure; `formulas` come before them, `rates` after them."""
+    """The steps of one figure; `formulas` and a `table` come before them, `rates` after them."""
 
     figure: str
     title: str
@@ -79,6 +89,7 @@ class PlanSection:
     steps: tuple[ExplainedStep, ...]
     formulas: tuple[Formula, ...] = ()
     rates: tuple[Formula, ...] = ()
+    table: Grid | None = None
 
 
 def explain(
@@ -102,9 +113,17 @@ def explain(
         formulas.append(scale_formula(speaker, scale))
         vectors = {vector.name for vector in construction.vectors_of(figure)}
         found = (one for one in construction.rates.values() if one.vector in vectors and not one.drives)
-        rates = [_turning(speaker, rate) for rate in found]
-        title = tongue.titled(TITLES, figure)
-        sections.append(PlanSection(figure, title, introduction, tuple(told), tuple(formulas), tuple(rates)))
+        rates = [*(_turning(speaker, rate) for rate in found), *balancing(speaker, figure)]
+        title = tongue.gettext(TITLES[subject.title_key(sort_of(figure), figure)])
+        title = title.replace("{group}", subject.shown(group_of(figure)))
+        table = table_of(speaker, figure) if group_of(figure) else None
+        sections.append(
+            PlanSection(figure, title, introduction, tuple(told), tuple(formulas), tuple(rates), table)
+        )
+    if subject.plan.forces is not None:
+        introduction = speaker.say(ON_THE_LEVER, scale=speaker.write(speaker.scale("kv")))
+        lines, table = tuple(lever_lines(speaker)), lever_table(speaker)
+        sections.append(PlanSection(LEVER, tongue.gettext(TITLES[LEVER]), introduction, (), (), lines, table))
     centres = tuple(
         ExplainedStep(number + k, step, sentences.sentence(speaker, step))
         for k, step in enumerate(_centre_steps(speaker), start=1)
@@ -137,13 +156,16 @@ def computed(speaker: Speaker, step: Step) -> Iterator[Formula]:
         real = mm * speaker.scale_value(scale)
         if real == 0.0 or speaker.is_nothing(step.node, mm):
             continue
+        if (total := balance_of(speaker, step.node)) is not None:
+            yield from moment_lines(speaker, total)
         if isinstance(step, Given) and on_plan:
             name = speaker.symbol(speaker.vector(step.start, step.node))
         else:
             name = _datum(speaker, length)
         formula = size_formula(speaker, length, step.node)
         if formula is not None:
-            yield (name, " = ", formula[0], " = ", formula[1], " = ", speaker.real(real, kind_of(scale).unit))
+            shown = (part for one in formula if one for part in (" = ", one))
+            yield (name, *shown, " = ", speaker.real(real, kind_of(scale).unit))
         numbers = Fraction(speaker.bare(real), speaker.bare(speaker.scale_value(scale)))
         yield (Fraction(name, speaker.scale(scale)), " = ", numbers, " = ", speaker.mm(mm))
 
@@ -169,10 +191,14 @@ def _measured(speaker: Speaker, vector: Vector) -> Formula:
     """Write a measured vector: drawn length times scale."""
     mm = 0.0 if speaker.subject.is_zero(vector.name) else speaker.distance(vector.tail, vector.head)
     by = speaker.scale_value(vector.scale)
-    drawn = (speaker.symbol(vector.tail, vector.head), " · ", speaker.scale(vector.scale))
     numbers = f"{speaker.tongue.number(mm, 2)} · {speaker.bare(by)}"
     real = speaker.real(mm * by, unit_of(vector.name))
-    return (speaker.symbol(vector.name), " = ", drawn, " = ", numbers, " = ", real)
+    if speaker.has_letters(vector.head):
+        drawn = (speaker.symbol(vector.tail, vector.head), " · ", speaker.scale(vector.scale))
+        return (speaker.symbol(vector.name), " = ", drawn, " = ", numbers, " = ", real)
+    value = speaker.subject.complex(speaker.subject.plan.vectors_si[vector.name])
+    angle = f", {speaker.degrees(value)}" if mm else ""
+    return (speaker.symbol(vector.name), " = ", numbers, " = ", real, angle)
 
 
 def _turning(speaker: Speaker, rate: AngularRate) -> Formula:
@@ -188,4 +214,4 @@ def _turning(speaker: Speaker, rate: AngularRate) -> Formula:
     )  # fmt: skip
     if turn == 0.0:
         return told
-    return (*told, f", {speaker.tongue.gettext(COUNTER_CLOCKWISE if turn > 0 else CLOCKWISE)}")
+    return (*told, f", {speaker.tongue.gettext(sense(turn))}")

@@ -16,7 +16,7 @@ from reference.drawing.labels import Style, Wanted, lengths_inside, letters, seg
 from reference.drawing.sketch import LETTER_MM, PLATE_FILL, SMALL_LETTER_MM, captioned
 from reference.drawing.subject import PLAN_COLOURS, DrawnFigure, Part, Subject
 from reference.drawing.symbols import HAIR_MM, LINK_MM, THIN_MM, Bar, bars, blocks, point, unit
-from reference.kinetics import turning_with
+from reference.kinetics import turning
 from reference.mechanism import Plate, named_links, short_names
 from reference.quantities import group_of
 
@@ -259,14 +259,15 @@ class OnLever:
 def on_lever(subject: Subject) -> list[OnLever]:
     """Return what acts on the lever; a force's moment about the pole is its power."""
     plan, found = subject.plan, list[OnLever]()
-    kv, turning = subject.number(plan.scales.kv), turning_with(plan.mechanism)
+    kv, turns = subject.number(plan.scales.kv), turning(plan.mechanism)
     for one in plan.forces.given if plan.forces else ():
         image = -1j * subject.complex(plan.motion.velocity[one.point]) / kv
         force, couple = subject.complex(one.force), subject.number(one.couple)
         if force:
             arm = float((np.conj(image) * unit(force)).imag)
             found.append(OnLever(Acting(one.name, one.link, one.point, force), image, arm, abs(force) * arm * kv))
-        if couple and (omega := plan.motion.omega.get(turning.get(one.link, one.link))) is not None:
+        if couple and one.link in turns:
+            omega = plan.motion.omega[turns[one.link][0]]
             acting = Acting(f"M_{one.name.partition('_')[2]}", one.link, one.point, 0j, couple)
             found.append(OnLever(acting, image, 0.0, couple * subject.number(omega)))
     return found

@@ -176,6 +176,9 @@ class Subject:
 
     def title_of(self, sort: str, figure: str) -> str:
         """Return the title of a figure, or of what stands beside it."""
-        group = group_of(figure)
-        sort = f"driving_{sort}" if group == self.plan.mechanism.driver.pin else sort
-        return self.wording.titles[sort].replace("{group}", self.shown(group))
+        title = self.wording.titles[self.title_key(sort, figure)]
+        return title.replace("{group}", self.shown(group_of(figure)))
+
+    def title_key(self, sort: str, figure: str) -> str:
+        """Return the key of that title: the driving link is no group."""
+        return f"driving_{sort}" if group_of(figure) == self.plan.mechanism.driver.pin else sort
