@@ -369,12 +369,14 @@ MEET = N_(
     "plan a line %(second_direction)s for %(second)s. Where they meet, %(first)s ends and %(second)s begins."
 )
 CLOSING = N_("%(name)s closes the polygon.")
+INNER = N_("%(name)s runs from the end of %(other)s to the same point.")
 
 
 def _force(speaker: Speaker, step: Step) -> Markup:
     """Describe a step of a force plan, whose nodes have no letters, by the vectors that it draws."""
     construction = speaker.subject.plan.construction
-    vectors = construction.polygon_of(construction.figure_of(step.node))
+    figure = construction.figure_of(step.node)
+    vectors = construction.polygon_of(figure)
 
     def between(tail: str) -> Vector:
         return next(one for one in vectors if (one.tail, one.head) == (tail, step.node))
@@ -406,7 +408,15 @@ def _force(speaker: Speaker, step: Step) -> Markup:
         case _:
             return speaker.say(START)
     closing = [one.name for one in vectors if one.head == step.node and one.name not in drawn]
-    return Markup(" ").join((told, *(speaker.say(CLOSING, name=name) for name in closing)))
+    sums = [one for one in construction.vectors_of(figure) if one.is_sum and one.head == step.node]
+    inner = {
+        one.name: next(other.name for other in vectors if one.tail in (other.head, other.tail))
+        for one in sums
+        if f"{one.name}_n" not in construction.vectors
+    }
+    more = [speaker.say(CLOSING, name=name) for name in closing]
+    more += [speaker.say(INNER, name=name, other=other) for name, other in inner.items()]
+    return Markup(" ").join((told, *more))
 
 
 def _length(speaker: Speaker, length: Length) -> float:

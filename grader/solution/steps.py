@@ -1,7 +1,7 @@
 """Explain the whole construction step by step: sentences, the numbers behind them, and the results."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from markupsafe import Markup
 
@@ -182,8 +182,13 @@ def _datum(speaker: Speaker, length: Length) -> Name:
 def _read_off(speaker: Speaker, step: Step) -> Iterator[Formula]:
     """Yield the vectors that end in the step's node and were not laid off."""
     laid_off = (step.start, step.node) if isinstance(step, Given) else None
-    for vector in speaker.subject.plan.construction.vectors.values():
+    vectors = speaker.subject.plan.construction.vectors
+    for vector in vectors.values():
         if vector.head == step.node and (vector.tail, vector.head) != laid_off:
+            parts = [f"{vector.name}_{part}" for part in "nt"]
+            if not speaker.has_letters(step.node) and vectors.keys() >= {*parts}:
+                whole, n, t = (replace(speaker.symbol(name), is_vector=True) for name in (vector.name, *parts))
+                yield (whole, " = ", n, " + ", t)
             yield _measured(speaker, vector)
 
 

@@ -190,14 +190,14 @@ def _closed(ends: _Ends, figure: str) -> Iterator[Equation]:
 def _of_force(step: Step, vector: Vector, earlier: list[Vector]) -> Term:
     """Return the term of a force: laid off, on a line, or, between nodes that others make, unknown."""
     ends = vector.tail, vector.head
-    if all((one.tail, one.head) != ends for one in earlier):
-        match step:
-            case Given(start=start) if start == vector.tail:
-                return Term(vector.name, *ends, step.length, step.along)
-            case TwoLines(first=first, second=second):
-                for line in (first, second):
-                    if isinstance(line, Line) and line.through == vector.tail:
-                        return Term(vector.name, *ends, along=line.along)
+    before = sum((one.tail, one.head) == ends for one in earlier)
+    match step:
+        case Given(start=start) if start == vector.tail and not before:
+            return Term(vector.name, *ends, step.length, step.along)
+        case TwoLines(first=first, second=second):
+            lines = [one for one in (first, second) if isinstance(one, Line) and one.through == vector.tail]
+            if before < len(lines):
+                return Term(vector.name, *ends, along=lines[before].along)
     return Term(vector.name, *ends)
 
 
