@@ -233,6 +233,7 @@ def _symbols(speaker: Speaker) -> Callable[[str], Formula]:
     """Return how to write a name of the assignment's formulas."""
     driver = speaker.subject.plan.mechanism.driver
     known: dict[str, Formula] = {scale: speaker.scale(scale) for scale in SCALE_NAMES}
+    known["force"] = speaker.symbol("F_max")
     if isinstance(driver, Crank):
         arm = speaker.symbol(driver.pivot, driver.pin)
         drawn = Piece(speaker.tongue.gettext(DRAWN), -1)

@@ -216,7 +216,7 @@ def lever_lines(speaker: Speaker) -> Iterator[Formula]:
         unknown, rate, speed = "M_b", f"omega_{driver.link}", number(np.asarray(driver.omega))
     else:
         unknown, rate = "F_b", f"v_{driver.pin}"
-        force, v = (speaker.subject.complex(one) for one in (solved.balancing.force, plan.motion.velocity[driver.pin]))
+        force, v = (speaker.subject.vector(one) for one in (solved.balancing.force, plan.motion.velocity[driver.pin]))
         speed = abs(v) if force == 0.0 else float((np.conj(force / abs(force)) * v).real)
     yield ("Σ", speaker.symbol("P"), " + ", speaker.symbol(unknown), TIMES, speaker.symbol(rate), " = ", "0")
     if speed:

@@ -1,6 +1,6 @@
 """The steps of a construction in the words of the textbook, in each language."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -325,9 +325,9 @@ LOCAL_ON_AXIS = N_("From %(origin)s lay off %(x)s in the direction %(x_direction
 
 def sentence(speaker: Speaker, step: Step) -> Markup:
     """Describe a step; raises ValueError for a kind of step without words."""
-    if step.node not in speaker.subject.plan.construction.centres and not speaker.has_letters(step.node):
-        return _force(speaker, step)
     match step:
+        case Pole() | Given() | TwoLines() if not speaker.has_letters(step.node):
+            return force(speaker, step)
         case Pole(node=node):
             return speaker.say(
                 POLE, node=node, fixed=speaker.names(tuple(speaker.subject.plan.mechanism.ground_m))
@@ -359,10 +359,11 @@ def sentence(speaker: Speaker, step: Step) -> Markup:
 
 
 START = N_("Mark the point at which the force plan begins.")
-LAY_FIRST = N_("From the beginning of the plan lay off %(name)s = %(length)s, %(direction)s.")
-LAY_NEXT = N_("From the end of %(other)s lay off %(name)s = %(length)s, %(direction)s.")
-LAY_TO_END = N_("Lay off %(name)s = %(length)s, %(direction)s, so that it ends where %(other)s ends.")
-LAY_TO_START = N_("Lay off %(name)s = %(length)s, %(direction)s, so that it ends where %(other)s begins.")
+LAY_FIRST = N_("From the beginning of the plan lay off %(force)s, %(direction)s.")
+LAY_NEXT = N_("From the end of %(other)s lay off %(force)s, %(direction)s.")
+LAY_TO_END = N_("Lay off %(force)s, %(direction)s, so that it ends where %(other)s ends.")
+LAY_TO_START = N_("Lay off %(force)s, %(direction)s, so that it ends where %(other)s begins.")
+ITS_DIRECTION = N_("in its direction")
 NO_FORCE = N_("%(name)s is zero here: nothing is laid off.")
 MEET = N_(
     "From the end of %(last)s draw a line %(first_direction)s for %(first)s, and from the beginning of the "
@@ -372,51 +373,58 @@ CLOSING = N_("%(name)s closes the polygon.")
 INNER = N_("%(name)s runs from the end of %(other)s to the same point.")
 
 
-def _force(speaker: Speaker, step: Step) -> Markup:
+def force(speaker: Speaker, step: Pole | Given | TwoLines, *, with_numbers: bool = True) -> Markup:
     """Describe a step of a force plan, whose nodes have no letters, by the vectors that it draws."""
     construction = speaker.subject.plan.construction
-    figure = construction.figure_of(step.node)
-    vectors = construction.polygon_of(figure)
+    if isinstance(step, Pole):
+        return speaker.say(START)
+    whole = construction.vectors_of(construction.figure_of(step.node))
+    vectors = [one for one in whole if not one.is_sum]
+    ends = {(one.tail, one.head): one.name for one in reversed(vectors)}
+    if isinstance(step, Given):
+        drawn = {name := ends[step.start, step.node]}
+        told = _lay_off(speaker, step, construction.vectors[name], vectors, with_numbers=with_numbers)
+    else:
+        lines = [line for line in (step.first, step.second) if isinstance(line, Line)]
+        drawn = {ends[line.through, step.node] for line in lines}
+        first, second = (speaker.line_direction(line.along) for line in lines)
+        told = speaker.say(
+            MEET, last=_ending(lines[0].through, vectors), first_direction=first, second_direction=second,
+            first=ends[lines[0].through, step.node], second=ends[lines[1].through, step.node],
+        )  # fmt: skip
+    closing = [speaker.say(CLOSING, name=name) for (_, head), name in ends.items()
+               if head == step.node and name not in drawn]
+    inner = [speaker.say(INNER, name=one.name, other=other) for one in whole
+             if one.is_sum and one.head == step.node and f"{one.name}_n" not in construction.vectors
+             and (other := _ending(one.tail, vectors))]
+    return Markup(" ").join((told, *closing, *inner))
 
-    def between(tail: str) -> Vector:
-        return next(one for one in vectors if (one.tail, one.head) == (tail, step.node))
 
-    match step:
-        case Given(start=start, length=length):
-            own, mm = between(start), _length(speaker, length)
-            ending = [one for one in vectors if start == (one.tail if one.reversed else one.head)]
-            text, other = (LAY_TO_END if own.reversed else LAY_NEXT), ending[0].name if ending else ""
-            if own.reversed and (next_one := [one for one in vectors if one.head == start and one.reversed]):
-                text, other = LAY_TO_START, next_one[0].name
-            if start in construction.poles.values() and not own.reversed:
-                text = LAY_FIRST
-            if speaker.is_nothing(step.node, mm):
-                told = speaker.say(NO_FORCE, name=own.name)
-            else:
-                direction = speaker.vector_direction(step.along, mm * (-1.0 if own.reversed else 1.0))
-                told = speaker.say(text, name=own.name, length=abs(mm), direction=direction, other=other)
-            drawn = {own.name}
-        case TwoLines(first=Line() as first, second=Line() as second):
-            last = next(one for one in vectors if first.through in (one.head, one.tail))
-            names = [between(line.through).name for line in (first, second)]
-            told = speaker.say(
-                MEET, last=last.name, first=names[0], second=names[1],
-                first_direction=speaker.line_direction(first.along),
-                second_direction=speaker.line_direction(second.along),
-            )  # fmt: skip
-            drawn = {*names}
-        case _:
-            return speaker.say(START)
-    closing = [one.name for one in vectors if one.head == step.node and one.name not in drawn]
-    sums = [one for one in construction.vectors_of(figure) if one.is_sum and one.head == step.node]
-    inner = {
-        one.name: next(other.name for other in vectors if one.tail in (other.head, other.tail))
-        for one in sums
-        if f"{one.name}_n" not in construction.vectors
-    }
-    more = [speaker.say(CLOSING, name=name) for name in closing]
-    more += [speaker.say(INNER, name=name, other=other) for name, other in inner.items()]
-    return Markup(" ").join((told, *more))
+def _ending(node: str, vectors: Sequence[Vector]) -> str:
+    """Return the first vector of a force plan whose arrow ends in a node; empty if none does."""
+    return next((one.name for one in vectors if node == (one.tail if one.reversed else one.head)), "")
+
+
+def _lay_off(
+    speaker: Speaker, step: Given, own: Vector, vectors: Sequence[Vector], *, with_numbers: bool
+) -> Markup:
+    mm = _length(speaker, step.length)
+    if speaker.is_nothing(step.node, mm):
+        return speaker.say(NO_FORCE, name=own.name)
+    others = [one for one in vectors if one is not own]
+    other = _ending(step.start, others)
+    text = LAY_FIRST if step.start in speaker.subject.plan.construction.poles.values() else LAY_NEXT
+    if own.reversed:
+        text = LAY_TO_END if other else LAY_TO_START
+        other = other or next(one.name for one in others if step.start == one.head)
+    told = Markup("{} = {}").format(speaker.name(own.name), speaker.mm(abs(mm)))
+    direction = speaker.say(ITS_DIRECTION)
+    if with_numbers or isinstance(step.along, Along):
+        direction = speaker.vector_direction(step.along, mm * (-1.0 if own.reversed else 1.0))
+    return speaker.say(
+        text, force=told if with_numbers else own.name, direction=direction,
+        other=other,
+    )  # fmt: skip
 
 
 def _length(speaker: Speaker, length: Length) -> float:

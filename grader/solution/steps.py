@@ -201,7 +201,7 @@ def _measured(speaker: Speaker, vector: Vector) -> Formula:
     if speaker.has_letters(vector.head):
         drawn = (speaker.symbol(vector.tail, vector.head), " · ", speaker.scale(vector.scale))
         return (speaker.symbol(vector.name), " = ", drawn, " = ", numbers, " = ", real)
-    value = speaker.subject.complex(speaker.subject.plan.vectors_si[vector.name])
+    value = speaker.subject.vector(speaker.subject.plan.vectors_si[vector.name])
     angle = f", {speaker.degrees(value)}" if mm else ""
     return (speaker.symbol(vector.name), " = ", numbers, " = ", real, angle)
 

@@ -92,7 +92,7 @@ def _reactions(subject: Subject, figure: str) -> Iterator[Acting]:
     plan, links, names = subject.plan, links_of_plan(subject, figure), short_names(subject.plan.mechanism)
     driver, solved, places = plan.mechanism.driver, plan.forces, dict[str, tuple[str, str, str, complex]]()
     for one in (*solved.hinges.values(), *solved.guides.values()) if solved else ():
-        away = 0j if one.along is None else subject.complex(np.nan_to_num(one.lever_m) * one.along)
+        away = 0j if one.along is None else subject.vector(np.nan_to_num(one.lever_m) * one.along)
         for on, by in ((one.on, one.by), (one.by, one.on)):
             places[reaction(names, by, on)] = (one.joint, on, by, away)
     told = [vector for vector in plan.construction.vectors_of(figure) if not vector.is_sum]
@@ -101,7 +101,7 @@ def _reactions(subject: Subject, figure: str) -> Iterator[Acting]:
     for vector in told:
         joint, on, by, away = places.get(whole(vector), (driver.pin, driver.link, "", 0j))
         if on in links and (by not in links or joint not in outer) and not subject.is_zero(vector.name):
-            force = subject.complex(plan.vectors_si[vector.name])
+            force = subject.vector(plan.vectors_si[vector.name])
             yield Acting(vector.name, on, joint, force, is_found=True, aside_m=away)
     if group_of(figure) == driver.pin:
         for name in plan.construction.moments:
@@ -261,8 +261,8 @@ def on_lever(subject: Subject) -> list[OnLever]:
     plan, found = subject.plan, list[OnLever]()
     kv, turns = subject.number(plan.scales.kv), turning(plan.mechanism)
     for one in plan.forces.given if plan.forces else ():
-        image = -1j * subject.complex(plan.motion.velocity[one.point]) / kv
-        force, couple = subject.complex(one.force), subject.number(one.couple)
+        image = -1j * subject.vector(plan.motion.velocity[one.point]) / kv
+        force, couple = subject.vector(one.force), subject.number(one.couple)
         if force:
             arm = float((np.conj(image) * unit(force)).imag)
             found.append(OnLever(Acting(one.name, one.link, one.point, force), image, arm, abs(force) * arm * kv))
@@ -276,7 +276,7 @@ def on_lever(subject: Subject) -> list[OnLever]:
 def lever_of(subject: Subject) -> DrawnFigure:
     """Return the velocity plan, turned a quarter clockwise, with the forces at the images of their points."""
     plan, kv = subject.plan, subject.number(subject.plan.scales.kv)
-    images = {joint: -1j * subject.complex(at) / kv for joint, at in plan.motion.velocity.items()}
+    images = {joint: -1j * subject.vector(at) / kv for joint, at in plan.motion.velocity.items()}
     fixed = [joint for joint in images if plan.mechanism.is_ground(joint)]
     names = {joint: POLE if joint in fixed else image_name(joint) for joint in images}
     nodes = {names[joint]: at for joint, at in images.items()}

@@ -114,13 +114,13 @@ class Subject:
         """Return the variant's number, from an array over variants or a number common to all."""
         return float(values[self.index] if np.ndim(values) else values)
 
-    def complex(self, values: ComplexArray) -> complex:
+    def vector(self, values: ComplexArray) -> complex:
         """Return the variant's complex number, from an array over variants or a number common to all."""
         return complex(np.broadcast_to(values, (len(self.plan.variants),))[self.index])
 
     def nodes(self, figure: str) -> dict[str, complex]:
         """Return a figure's nodes, complex millimetres about its origin, y up."""
-        return {node: self.complex(at) for node, at in self.plan.nodes_mm[figure].items()}
+        return {node: self.vector(at) for node, at in self.plan.nodes_mm[figure].items()}
 
     @property
     def view(self) -> View:
