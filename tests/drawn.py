@@ -3,7 +3,9 @@
 from functools import cache
 
 from reference.authored.assignment import load_assignment
+from reference.mechanism import SLIDER, named_links, points_of
 from reference.plan import exact_plan
+from tests import every_group
 
 _HEAD = """
 schema_version = 1
@@ -126,6 +128,37 @@ BUILT_IN = {
     "shaper 5": ("shaper", 5, None), "piston 5": ("piston", 5, None),
 }  # fmt: skip
 CASES = (*BUILT_IN, *MECHANISMS)
+
+
+WITH_FORCES = (*MECHANISMS, "every group")
+"""Mechanisms that `loaded` gives bodies."""
+
+
+@cache
+def loaded(case, folder, *, own):
+    """The assignment and plan of a case whose links all have bodies; with its own accelerations or given."""
+    head, _, inner = (_HEAD + MECHANISMS.get(case, "")).partition("[mechanism]")
+    if case == "every group":
+        inner = every_group.MECHANISM.replace("40 + n", "43")
+    name = f"f{WITH_FORCES.index(case)}{'own' if own else ''}"
+    head = head.format(name=name).replace("[scales]", "[scales]\nkF = 5")
+    text = f"{head}[mechanism]{inner.replace('{{', '{').replace('}}', '}').replace('{name}', name)}"
+    file = folder / f"{name}.assignment.toml"
+    file.write_text(text, encoding="utf-8")
+    bare = load_assignment(str(file))
+    mechanism = bare.mechanism(bare.variants())
+    plans = [*(node for node, links in named_links(mechanism).items() if links), mechanism.driver.pin]
+    figures = ["mechanism", *(["acceleration_plan"] if own else []), *(f"force_plan_{one}" for one in plans)]
+    text = text.replace('"mechanism", "velocity_plan", "acceleration_plan"', str(figures)[1:-1])
+    text = text.replace("[scales]", "gravity = 9.81\n[scales]")
+    for link, points in points_of(mechanism).items():
+        centre = "" if link.startswith(SLIDER) else f'centre = "{points[-1]}"'
+        text += f'\n[[body]]\nlink = "{link}"\nmass = 2\ninertia = 0.05\n{centre}\n'
+    link, points = [*points_of(mechanism).items()][-1]
+    text += f'[[load]]\nlink = "{link}"\npoint = "{points[0]}"\nforce = 300\nangle_deg = 200\n'
+    file.write_text(text, encoding="utf-8")
+    assignment = load_assignment(str(file))
+    return assignment, exact_plan(assignment, assignment.variants())
 
 
 @cache

@@ -9,25 +9,23 @@ from grader.solution.formulas import Formula, Fraction, Grid, Name
 from grader.solution.sentences import Speaker
 from reference.construction.elements import Balance, Couple, Inertia, Length, Same
 from reference.construction.equations import Arm, MomentSum, moment_sums
+from reference.construction.steps import Given
 from reference.drawing.canvas import Piece
-from reference.drawing.forces import acting_on, links_of_plan, on_lever
+from reference.drawing.forces import LEAST_M, acting_on, links_of_plan, on_lever
 from reference.kinetics import turning
 from reference.mechanism import Crank, short_names
 from reference.quantities import group_of, unit_of
 
 COUNTER_CLOCKWISE, CLOCKWISE = N_("counter-clockwise"), N_("clockwise")
-HEADINGS = (
-    N_("on link"), N_("force, couple"), N_("at"), N_("size"), N_("value"), N_("on paper, mm"), N_("direction"),
-)  # fmt: skip
-ON_LEVER = (
-    N_("force, couple"), N_("value"), N_("arm, mm"), N_("angular velocity"), N_("power"),
-)  # fmt: skip
+FORCE, VALUE = N_("force, couple"), N_("value")
+HEADINGS = (N_("on link"), FORCE, N_("at"), N_("size"), VALUE, N_("on paper, mm"), N_("direction"))
+ON_LEVER = (FORCE, VALUE, N_("arm, mm"), N_("angular velocity"), N_("power"))
 GIVEN = N_("given")
 LEVER = N_(
-    "The velocity plan is turned by 90° clockwise, and every given force and inertia force acts at the image "
-    "of its point. The sum of the moments about the pole, with that of the balancing moment, is zero. A force "
-    "times its arm times %(scale)s is its power; a couple's power is the couple times the angular velocity of "
-    "its link."
+    "The velocity plan is turned by 90° clockwise, and every given force and inertia force acts at the "
+    "image of its point. The sum of the moments about the pole, with that of the balancing moment, is "
+    "zero. A force times its arm times %(scale)s is its power; a couple's power is the couple times the "
+    "angular velocity of its link."
 )
 TIMES = " · "
 
@@ -35,13 +33,15 @@ TIMES = " · "
 def table_of(speaker: Speaker, figure: str) -> Grid:
     """Return what acts on the links of a force plan before it is drawn, one force or couple a row."""
     subject, _ = speaker.subject, speaker.tongue.gettext
-    acting, view = subject.plan.construction.acting, speaker.view
-    names, rows = short_names(subject.plan.mechanism), [tuple(map(_, HEADINGS))]
+    acting, names = subject.plan.construction.acting, short_names(subject.plan.mechanism)
+    rows: list[tuple[Formula, ...]] = [tuple(map(_, HEADINGS))]
     found = {one.name: one for one in acting_on(subject, figure) if not one.is_found}
     for link in links_of_plan(subject, figure):
         for one in (one for one in acting.get(link, ()) if one.name in found):
             told = found.pop(one.name)
-            size = couple_formula(speaker, one) if isinstance(one, Couple) else force_formula(speaker, one.size)
+            size = (
+                couple_formula(speaker, one) if isinstance(one, Couple) else force_formula(speaker, one.size)
+            )
             value = abs(told.moment) if isinstance(one, Couple) else abs(told.force)
             paper = "" if told.moment else speaker.tongue.number(value / speaker.scale_value("kF"), 2)
             angle = _(sense(told.moment)) if told.moment else speaker.degrees(told.force)
@@ -104,9 +104,9 @@ def balance_of(speaker: Speaker, node: str) -> MomentSum | None:
     """Return the sum of moments from which the vector follows that ends in a node."""
     construction = speaker.subject.plan.construction
     step = construction.step(node)
-    if not isinstance(balance := getattr(step, "length", None), Balance):
+    if not isinstance(step, Given) or not isinstance(step.length, Balance):
         return None
-    name = speaker.vector(getattr(step, "start", ""), node)
+    name = speaker.vector(step.start, node)
     return next(one for one in moments_of(speaker, construction.figure_of(node)) if one.unknown == name)
 
 
@@ -116,17 +116,20 @@ def moment_lines(speaker: Speaker, total: MomentSum) -> Iterator[Formula]:
     terms = _terms(speaker, total)
     if not terms:
         return
-    arms = [*total.arms, *([total.lever] if total.lever is not None and total.lever.name else [])]
-    for arm in arms:
+    for arm in total.named_arms:
         mm = arm.mm(speaker.view)
         drawn = (speaker.tongue.number(mm, 2), TIMES, speaker.bare(kL))
         yield (speaker.symbol(arm.name), " = ", *drawn, " = ", speaker.real(mm * kL, "m"))
     unknown = speaker.symbol(total.unknown)
     lever = (unknown, TIMES, _lever_name(speaker, total.lever)) if total.lever else unknown
-    sum_name = Name((Piece("ΣM"), Piece(speaker.subject.shown(total.about), -1)), f"ΣM_{total.about}")
     is_positive = sum(value for value, _, _ in terms) > 0.0
     signed = [(value, name) for value, name, _ in terms] + [(-1.0 if is_positive else 1.0, lever)]
-    yield (sum_name, " = ", *_signed(signed), " = ", "0")
+    yield (_sum_name(speaker, total.about), " = ", *_signed(signed), " = ", "0")
+
+
+def _sum_name(speaker: Speaker, joint: str) -> Name:
+    shown = speaker.subject.shown(joint)
+    return Name((Piece("ΣM"), Piece(shown, -1)), f"ΣM_{shown}")
 
 
 def moment_formula(speaker: Speaker, total: MomentSum) -> tuple[Formula, Formula] | None:
@@ -159,7 +162,10 @@ def _terms(speaker: Speaker, total: MomentSum) -> list[tuple[float, Formula, For
 
 def _signed(terms: Sequence[tuple[float, Formula]]) -> tuple[Formula, ...]:
     """Write a sum: each term with its sign, the first without a plus."""
-    signs = [(" + " if value >= 0.0 else " − ") if at else ("" if value >= 0.0 else "−") for at, (value, _) in enumerate(terms)]
+    signs = [
+        (" + " if value >= 0.0 else " − ") if at else ("" if value >= 0.0 else "−")
+        for at, (value, _) in enumerate(terms)
+    ]
     return tuple(part for sign, (_, term) in zip(signs, terms, strict=True) for part in (sign, term) if part)
 
 
@@ -167,8 +173,16 @@ def _lever_name(speaker: Speaker, lever: Arm) -> Name:
     return speaker.symbol(lever.name) if lever.name else speaker.symbol(lever.force.point, lever.about)
 
 
-def balancing(speaker: Speaker, figure: str) -> Iterator[Formula]:
-    """Yield how the balancing moment follows from the moments on the driving link."""
+def results(speaker: Speaker, figure: str) -> Iterator[Formula]:
+    """Yield where the guides' reactions act, and the balancing moment from those on the driving link."""
+    if not group_of(figure):
+        return
+    for one in acting_on(speaker.subject, figure):
+        if one.is_found and (metres := abs(one.aside_m)) > LEAST_M:
+            force = abs(one.force)
+            names = Fraction(_sum_name(speaker, one.at), speaker.symbol(one.name))
+            numbers = Fraction(speaker.bare(force * metres), speaker.bare(force))
+            yield (speaker.symbol(one.aside), " = ", names, " = ", numbers, " = ", speaker.real(metres, "m"))
     for total in moments_of(speaker, figure):
         formula = moment_formula(speaker, total) if total.lever is None else None
         if formula is not None:
@@ -188,13 +202,16 @@ def _moment(speaker: Speaker, name: str, *between: Formula) -> Formula:
 
 def lever_table(speaker: Speaker) -> Grid:
     """Return the forces and couples on the lever with their arms and powers, and the powers' sum."""
-    tongue, rows = speaker.tongue, [tuple(map(speaker.tongue.gettext, ON_LEVER))]
+    tongue = speaker.tongue
+    rows: list[tuple[Formula, ...]] = [tuple(map(tongue.gettext, ON_LEVER))]
     omega, turns = speaker.subject.plan.motion.omega, turning(speaker.subject.plan.mechanism)
     for one in on_lever(speaker.subject):
         acting = one.acting
         value = speaker.real(abs(acting.force) or abs(acting.moment), unit_of(acting.name))
-        rate = "" if acting.force else speaker.real(
-            speaker.subject.number(np.abs(omega[turns[acting.link][0]])), "rad/s"
+        rate = (
+            ""
+            if acting.force
+            else speaker.real(speaker.subject.number(np.abs(omega[turns[acting.link][0]])), "rad/s")
         )
         arm = tongue.number(abs(one.arm_mm), 2) if acting.force else ""
         rows.append((speaker.symbol(acting.name), value, arm, rate, _power(speaker, one.power)))
@@ -206,19 +223,19 @@ def _power(speaker: Speaker, watts: float) -> str:
 
 
 def lever_lines(speaker: Speaker) -> Iterator[Formula]:
-    """Yield the balancing moment or force from the sum of the powers, and that the force plans have it."""
-    plan, number = speaker.subject.plan, speaker.subject.number
-    loose = sum(one.power for one in on_lever(speaker.subject))
-    driver, solved = plan.mechanism.driver, plan.forces
-    if solved is None:
-        return
-    if isinstance(driver, Crank) and not solved.balancing.is_force:
-        unknown, rate, speed = "M_b", f"omega_{driver.link}", number(np.asarray(driver.omega))
+    """Yield the balancing moment or force from the sum of the powers."""
+    subject = speaker.subject
+    plan, driver = subject.plan, subject.plan.mechanism.driver
+    loose = abs(sum(one.power for one in on_lever(subject)))
+    force = subject.vector(plan.forces.balancing.force) if plan.forces else 0j
+    if isinstance(driver, Crank) and not (plan.forces and plan.forces.balancing.is_force):
+        unknown, rate, speed = "M_b", f"omega_{driver.link}", abs(subject.number(np.asarray(driver.omega)))
     else:
+        along = force / abs(force) if force else 1.0
         unknown, rate = "F_b", f"v_{driver.pin}"
-        force, v = (speaker.subject.vector(one) for one in (solved.balancing.force, plan.motion.velocity[driver.pin]))
-        speed = abs(v) if force == 0.0 else float((np.conj(force / abs(force)) * v).real)
-    yield ("Σ", speaker.symbol("P"), " + ", speaker.symbol(unknown), TIMES, speaker.symbol(rate), " = ", "0")
+        speed = abs((np.conj(along) * subject.vector(plan.motion.velocity[driver.pin])).real)
+    unit, names = unit_of(unknown), (speaker.symbol(unknown), speaker.symbol(rate))
+    yield ("Σ", speaker.symbol("P"), " + ", names[0], TIMES, names[1], " = ", "0")
     if speed:
-        fraction = Fraction(_power(speaker, -loose), speaker.bare(speed))
-        yield (speaker.symbol(unknown), " = ", fraction, " = ", speaker.real(abs(loose / speed), unit_of(unknown)))
+        fraction = Fraction(speaker.real(loose, "W"), speaker.bare(speed))
+        yield (names[0], " = ", fraction, " = ", speaker.real(loose / speed, unit))

@@ -326,11 +326,11 @@ LOCAL_ON_AXIS = N_("From %(origin)s lay off %(x)s in the direction %(x_direction
 def sentence(speaker: Speaker, step: Step) -> Markup:
     """Describe a step; raises ValueError for a kind of step without words."""
     match step:
-        case Pole() | Given() | TwoLines() if not speaker.has_letters(step.node):
-            return force(speaker, step)
         case Pole(node=node):
             return speaker.say(
-                POLE, node=node, fixed=speaker.names(tuple(speaker.subject.plan.mechanism.ground_m))
+                POLE if speaker.has_letters(node) else START,
+                node=node,
+                fixed=speaker.names(tuple(speaker.subject.plan.mechanism.ground_m)),
             )
         case Pivot(node=node):
             return _pivot(speaker, node)
@@ -373,11 +373,9 @@ CLOSING = N_("%(name)s closes the polygon.")
 INNER = N_("%(name)s runs from the end of %(other)s to the same point.")
 
 
-def force(speaker: Speaker, step: Pole | Given | TwoLines, *, with_numbers: bool = True) -> Markup:
+def force(speaker: Speaker, step: Given | TwoLines, *, with_numbers: bool = True) -> Markup:
     """Describe a step of a force plan, whose nodes have no letters, by the vectors that it draws."""
     construction = speaker.subject.plan.construction
-    if isinstance(step, Pole):
-        return speaker.say(START)
     whole = construction.vectors_of(construction.figure_of(step.node))
     vectors = [one for one in whole if not one.is_sum]
     ends = {(one.tail, one.head): one.name for one in reversed(vectors)}
@@ -392,11 +390,19 @@ def force(speaker: Speaker, step: Pole | Given | TwoLines, *, with_numbers: bool
             MEET, last=_ending(lines[0].through, vectors), first_direction=first, second_direction=second,
             first=ends[lines[0].through, step.node], second=ends[lines[1].through, step.node],
         )  # fmt: skip
-    closing = [speaker.say(CLOSING, name=name) for (_, head), name in ends.items()
-               if head == step.node and name not in drawn]
-    inner = [speaker.say(INNER, name=one.name, other=other) for one in whole
-             if one.is_sum and one.head == step.node and f"{one.name}_n" not in construction.vectors
-             and (other := _ending(one.tail, vectors))]
+    closing = [
+        speaker.say(CLOSING, name=name)
+        for (_, head), name in ends.items()
+        if head == step.node and name not in drawn
+    ]
+    inner = [
+        speaker.say(INNER, name=one.name, other=other)
+        for one in whole
+        if one.is_sum
+        and one.head == step.node
+        and f"{one.name}_n" not in construction.vectors
+        and (other := _ending(one.tail, vectors))
+    ]
     return Markup(" ").join((told, *closing, *inner))
 
 
@@ -442,6 +448,8 @@ def _pivot(speaker: Speaker, node: str) -> Markup:
 
 
 def _given(speaker: Speaker, step: Given) -> Markup:
+    if not speaker.has_letters(step.node):
+        return force(speaker, step)
     mm = _length(speaker, step.length)
     if speaker.is_nothing(step.node, mm):
         name = speaker.vector(step.start, step.node)
@@ -461,6 +469,8 @@ def direction_of(speaker: Speaker, step: Given) -> Markup:
 
 
 def _two_lines(speaker: Speaker, step: TwoLines) -> Markup:
+    if not speaker.has_letters(step.node):
+        return force(speaker, step)
     if isinstance(step.first, Line) and isinstance(step.second, Line):
         return speaker.say(
             TWO_LINES, node=step.node, first=step.first.through, second=step.second.through,

@@ -11,10 +11,10 @@ from grader.solution.equations import driving_speed, grid_of, scale_formula, siz
 from grader.solution.forces import LEVER as ON_THE_LEVER
 from grader.solution.forces import (
     balance_of,
-    balancing,
     lever_lines,
     lever_table,
     moment_lines,
+    results,
     sense,
     table_of,
 )
@@ -113,7 +113,7 @@ def explain(
         formulas.append(scale_formula(speaker, scale))
         vectors = {vector.name for vector in construction.vectors_of(figure)}
         found = (one for one in construction.rates.values() if one.vector in vectors and not one.drives)
-        rates = [*(_turning(speaker, rate) for rate in found), *balancing(speaker, figure)]
+        rates = [*(_turning(speaker, rate) for rate in found), *results(speaker, figure)]
         title = tongue.gettext(TITLES[subject.title_key(sort_of(figure), figure)])
         title = title.replace("{group}", subject.shown(group_of(figure)))
         table = table_of(speaker, figure) if group_of(figure) else None
@@ -187,7 +187,9 @@ def _read_off(speaker: Speaker, step: Step) -> Iterator[Formula]:
         if vector.head == step.node and (vector.tail, vector.head) != laid_off:
             parts = [f"{vector.name}_{part}" for part in "nt"]
             if not speaker.has_letters(step.node) and vectors.keys() >= {*parts}:
-                whole, n, t = (replace(speaker.symbol(name), is_vector=True) for name in (vector.name, *parts))
+                whole, n, t = (
+                    replace(speaker.symbol(name), is_vector=True) for name in (vector.name, *parts)
+                )
                 yield (whole, " = ", n, " + ", t)
             yield _measured(speaker, vector)
 

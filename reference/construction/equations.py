@@ -202,7 +202,7 @@ def _of_force(step: Step, vector: Vector, earlier: list[Vector]) -> Term:
 
 
 def _way(vectors: list[Vector], start: str, end: str) -> list[tuple[str, bool]]:
-    """Return the fewest vectors from a node to another, each with whether it runs backwards; none if apart."""
+    """Return the fewest vectors between two nodes, each with whether it runs backwards; none if apart."""
     ways: dict[str, list[tuple[str, bool]]] = {start: []}
     for _ in vectors:
         for one in vectors:
@@ -249,6 +249,12 @@ class MomentSum:
     arms: tuple[Arm, ...]
     couples: tuple[Couple, ...]
     lever: Arm | None = None
+
+    @property
+    def named_arms(self) -> tuple[Arm, ...]:
+        """The arms that are measured, in the order of their numbers."""
+        levers = () if self.lever is None or not self.lever.name else (self.lever,)
+        return (*levers, *self.arms)
 
 
 NO_ARM = 1e-9

@@ -15,7 +15,8 @@ from reference.drawing.canvas import CONSTRUCTION, INK, Area, Piece, Ring, Shape
 from reference.drawing.labels import Style, Wanted, lengths_inside, letters, segments_of
 from reference.drawing.sketch import LETTER_MM, PLATE_FILL, SMALL_LETTER_MM, captioned
 from reference.drawing.subject import PLAN_COLOURS, DrawnFigure, Part, Subject
-from reference.drawing.symbols import HAIR_MM, LINK_MM, THIN_MM, Bar, bars, blocks, point, unit
+from reference.drawing.symbols import HAIR_MM, LINK_MM, THIN_MM, Bar, bars, blocks, point
+from reference.drawing.symbols import unit as unit_vector
 from reference.kinetics import turning
 from reference.mechanism import Plate, named_links, short_names
 from reference.quantities import group_of
@@ -29,6 +30,8 @@ FORCE_MM, GIVEN_MM, FOUND_MM = 15.0, 0.5, 0.25
 FORCE_LETTER_MM, ARM_LETTER_MM = 3.2, 2.6
 COUPLE_MM, COUPLE_START, COUPLE_SWEEP = 6.5, -0.6, 4.2
 ARM_HEAD_MM, LINE_DASH = (1.8, 0.3), (1.2, 1.0)
+LEAST_M = 1e-6
+"""A guide's force nearer to its joint than this passes through it."""
 SAMPLES = 16
 """Places along an arrow where it is looked whether other lines are near."""
 SHIFTS = {0.0: 0.0, -1.0: 0.5, 1.05: 5.0, -2.05: 6.0}
@@ -56,6 +59,11 @@ class Acting:
     moment: float = 0.0
     is_found: bool = False
     aside_m: complex = 0j
+
+    @property
+    def aside(self) -> str:
+        """The name of that distance."""
+        return f"x_{self.name.partition('_')[2]}"
 
 
 def links_of_plan(subject: Subject, figure: str) -> tuple[str, ...]:
@@ -119,7 +127,7 @@ def whole(vector: Vector) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Dimension:
-    """An arm on a picture: from a joint to its foot on the line of a force, which starts at a point."""
+    """An arm on a picture, from a joint to its foot on the line of a force, which starts at a point."""
 
     name: str
     mm: float
@@ -131,7 +139,7 @@ class Dimension:
 def with_scheme(subject: Subject, polygon: DrawnFigure) -> DrawnFigure:
     """Return a force plan with the scheme of its links to its left, or above it where that is smaller."""
     scheme = scheme_of(subject, polygon.name)
-    (left, top, right, bottom), (x, y, end, low) = polygon.bounds, scheme.bounds
+    (left, top, *_), (x, y, end, low) = polygon.bounds, scheme.bounds
     options = (
         DrawnFigure(polygon.name, (*polygon.parts, *(Part("", shifted(one, by)) for one in scheme.shapes)))
         for by in ((left - APART_MM - end, top - y), (left - x, top - APART_MM - low))
@@ -146,12 +154,20 @@ def scheme_of(subject: Subject, figure: str) -> DrawnFigure:
     ends = [end for bar in bars(subject, full) if _is_of(bar, links, group) for end in bar.ends] or [0j]
     size = max(np.ptp(np.real(ends)), np.ptp(np.imag(ends)))
     share = next((one for one in SHARES if one * size <= SCHEME_MM), SHARES[-1])
-    nodes, scale = {name: share * at for name, at in full.items()}, subject.number(subject.plan.scales.kL)
+    nodes: dict[str, complex] = {name: share * at for name, at in full.items()}
+    scale = subject.number(subject.plan.scales.kL)
     arms = [
-        Dimension(arm.name, 1e3 * scale * arm.mm(view), share * arm.foot(view), nodes[arm.about], nodes[arm.force.point])
+        Dimension(
+            arm.name, 1e3 * scale * arm.mm(view), share * arm.foot(view), nodes[arm.about], nodes[force.point]
+        )
         for total in moment_sums(subject.plan.construction, figure, view)
-        for arm in (*total.arms, *([total.lever] if total.lever and total.lever.name else []))
+        for arm in total.named_arms
+        for force in (arm.force,)
     ]
+    for one in acting:
+        if abs(one.aside_m) > LEAST_M:
+            foot = nodes[one.at] + share / scale * one.aside_m
+            arms.append(Dimension(one.aside, 1e3 * abs(one.aside_m), foot, nodes[one.at], foot))
     drawn = [Part("", shape) for shape in _links(subject, links, group, nodes)]
     named = {joint for bar in bars(subject, full) if _is_of(bar, links, group) for joint in bar.joints}
     points = {name: at for name, at in nodes.items() if name in named or name in {one.at for one in acting}}
@@ -199,8 +215,8 @@ def _picture(
     for one in acting:
         at, width = nodes[one.at] + per_metre * one.aside_m, FOUND_MM if one.is_found else GIVEN_MM
         if one.force:
-            start, tip = _clear(at, unit(one.force), [*(part.shape for part in base), *shapes])
-            along = unit(tip - at) if abs(tip - at) > abs(start - at) else unit(start - at)
+            start, tip = _clear(at, unit_vector(one.force), [*(part.shape for part in base), *shapes])
+            along = unit_vector(tip - at) if abs(tip - at) > abs(start - at) else unit_vector(start - at)
             shapes += symbols.arrow(start, tip, width, COLOUR)
             tip = max((start, tip), key=lambda end: abs(end - at))
         else:
@@ -208,13 +224,12 @@ def _picture(
             shapes += symbols.turning(at, COUPLE_MM, COUPLE_START, sweep, COLOUR)
             tip = at + COUPLE_MM * along
         wanted.append(Wanted("", point(tip), subject.letter(one.name), FORCE_LETTER_MM, COLOUR, 0.8, along))
-    mm = subject.wording.unit("mm")
     for arm in arms:
         shapes += [Stroke(point(arm.start), point(arm.foot), HAIR_MM, CONSTRUCTION, LINE_DASH)]
         for start, end in ((arm.joint, arm.foot), (arm.foot, arm.joint)):
             shapes += symbols.arrow(start, end, HAIR_MM, CONSTRUCTION, ARM_HEAD_MM)
-        text = (*subject.letter(arm.name), Piece(f" = {subject.wording.number(f'{arm.mm:.4g}')} {mm}"))
-        middle = point((arm.joint + arm.foot) / 2.0)
+        length = f"{subject.wording.number(f'{arm.mm:.4g}')} {subject.wording.unit('mm')}"
+        text, middle = (*subject.letter(arm.name), Piece(f" = {length}")), point((arm.joint + arm.foot) / 2.0)
         wanted.append(Wanted("", middle, text, ARM_LETTER_MM, CONSTRUCTION, 0.4, italic=False))
     marked = {nodes[one.at] for one in acting if point(nodes[one.at]) not in hinges}
     shapes += map(symbols.marked_point, sorted(marked, key=abs))
@@ -264,8 +279,10 @@ def on_lever(subject: Subject) -> list[OnLever]:
         image = -1j * subject.vector(plan.motion.velocity[one.point]) / kv
         force, couple = subject.vector(one.force), subject.number(one.couple)
         if force:
-            arm = float((np.conj(image) * unit(force)).imag)
-            found.append(OnLever(Acting(one.name, one.link, one.point, force), image, arm, abs(force) * arm * kv))
+            arm = float((np.conj(image) * unit_vector(force)).imag)
+            found.append(
+                OnLever(Acting(one.name, one.link, one.point, force), image, arm, abs(force) * arm * kv)
+            )
         if couple and one.link in turns:
             omega = plan.motion.omega[turns[one.link][0]]
             acting = Acting(f"M_{one.name.partition('_')[2]}", one.link, one.point, 0j, couple)
@@ -280,16 +297,16 @@ def lever_of(subject: Subject) -> DrawnFigure:
     fixed = [joint for joint in images if plan.mechanism.is_ground(joint)]
     names = {joint: POLE if joint in fixed else image_name(joint) for joint in images}
     nodes = {names[joint]: at for joint, at in images.items()}
-    full, lines = subject.nodes("mechanism"), set[tuple[str, str]]()
-    for bar in bars(subject, full):
-        lines |= {tuple(names.get(joint, POLE) for joint in bar.joints)}
-    base = [Part("", Stroke(point(nodes[p]), point(nodes[q]), THIN_MM)) for p, q in sorted(lines) if p != q]
+    shown = [
+        [names.get(joint, POLE) for joint in bar.joints] for bar in bars(subject, subject.nodes("mechanism"))
+    ]
+    base = [Part("", Stroke(point(nodes[p]), point(nodes[q]), THIN_MM)) for p, q in shown if p != q]
     forces = [one for one in on_lever(subject) if one.acting.force]
     acting = [replace(one.acting, at=names[one.acting.at]) for one in forces]
     arms = [
         Dimension(f"h_{k}", abs(one.arm_mm), foot, 0j, one.image)
         for k, one in enumerate(forces, start=1)
-        if abs(foot := complex(-1j * unit(one.acting.force) * one.arm_mm)) > 0.0
+        if abs(foot := complex(-1j * unit_vector(one.acting.force) * one.arm_mm)) > 0.0
     ]
     parts = _picture(subject, {POLE: 0j, **nodes}, base, acting, arms, 1.0)
     return captioned(subject, LEVER, parts, COLOUR, subject.captioned(subject.wording.titles[LEVER], "kv"))

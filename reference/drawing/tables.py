@@ -122,7 +122,8 @@ def table_rows(subject: Subject, figures: Sequence[str]) -> Iterator[TableRow]:
         angle = f"{subject.number(plan.direction_deg(vector.name)):.2f}°"
         yield TableRow(
             subject.letter(vector.name),
-            "" if group_of(plan.construction.figure_of(vector.head))
+            ""
+            if group_of(plan.construction.figure_of(vector.head))
             else (*subject.letter(vector.tail), Piece(" "), *subject.letter(vector.head)),
             wording.number(f"{drawn:.2f}"),
             wording.number(f"{four_digits(real)}") + f" {wording.unit(unit_of(vector.name))}",
