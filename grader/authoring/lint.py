@@ -310,6 +310,7 @@ def _with_their_own(assignment: Assignment, names: Iterable[str]) -> set[str]:
 def _unused_values(assignment: Assignment) -> Iterator[LintFinding]:
     file = assignment.file
     outside = names_in(assignment.mechanism_file) | names_in(file.scales) | names_in(file.given)
+    outside |= names_in(file.body) | names_in(file.load)
     needed = _with_their_own(assignment, outside)
     for name in file.variant.values:
         if name not in needed:
