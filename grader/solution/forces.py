@@ -12,6 +12,7 @@ from reference.construction.equations import Arm, MomentSum, moment_sums
 from reference.construction.steps import Given
 from reference.drawing.canvas import Piece
 from reference.drawing.forces import LEAST_M, acting_on, links_of_plan, on_lever
+from reference.geometry import dot
 from reference.kinetics import turning
 from reference.mechanism import Crank, short_names
 from reference.quantities import group_of, unit_of
@@ -225,17 +226,21 @@ def _power(speaker: Speaker, watts: float) -> str:
 def lever_lines(speaker: Speaker) -> Iterator[Formula]:
     """Yield the balancing moment or force from the sum of the powers."""
     subject = speaker.subject
-    plan, driver = subject.plan, subject.plan.mechanism.driver
-    loose = abs(sum(one.power for one in on_lever(subject)))
-    force = subject.vector(plan.forces.balancing.force) if plan.forces else 0j
-    if isinstance(driver, Crank) and not (plan.forces and plan.forces.balancing.is_force):
+    plan, driver, solved = subject.plan, subject.plan.mechanism.driver, subject.plan.forces
+    if solved is None:
+        return
+    loose, last = abs(sum(one.power for one in on_lever(subject))), solved.balancing
+    if isinstance(driver, Crank) and last.along is None:
         unknown, rate, speed = "M_b", f"omega_{driver.link}", abs(subject.number(np.asarray(driver.omega)))
     else:
-        along = force / abs(force) if force else 1.0
-        unknown, rate = "F_b", f"v_{driver.pin}"
-        speed = abs((np.conj(along) * subject.vector(plan.motion.velocity[driver.pin])).real)
-    unit, names = unit_of(unknown), (speaker.symbol(unknown), speaker.symbol(rate))
+        # A cylinder pushes the pin away from its own point under it.
+        under = [one.node for one in plan.mechanism.groups if getattr(one, "link", "") == last.by]
+        velocity = plan.motion.velocity
+        slide = velocity[last.joint] - (velocity[under[0]] if under else 0.0)
+        unknown, rate = "F_b", f"v_{under[0] if under else ''}{last.joint}"
+        speed = abs(subject.number(dot(np.asarray(last.along), np.asarray(slide))))
+    names = speaker.symbol(unknown), speaker.symbol(rate)
     yield ("Σ", speaker.symbol("P"), " + ", names[0], TIMES, names[1], " = ", "0")
     if speed:
         fraction = Fraction(speaker.real(loose, "W"), speaker.bare(speed))
-        yield (names[0], " = ", fraction, " = ", speaker.real(loose / speed, unit))
+        yield (names[0], " = ", fraction, " = ", speaker.real(loose / speed, unit_of(unknown)))
