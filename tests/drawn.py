@@ -130,8 +130,18 @@ BUILT_IN = {
 CASES = (*BUILT_IN, *MECHANISMS)
 
 
-WITH_FORCES = (*MECHANISMS, "every group")
-"""Mechanisms that `loaded` gives bodies."""
+CYLINDER = """
+ground = { O1 = [0, 0], O2 = [200, -50] }
+crank = { pivot = "O1", pin = "A", length = 100, cylinder = { pivot = "O2", length = 150, speed = 40, side = "left" } }  # noqa: E501
+[[mechanism.group]]
+type = "RPR"
+node = "A3"
+pin = "A"
+pivot = "O2"
+link = "3"
+"""
+WITH_FORCES = (*MECHANISMS, "every group", "cylinder")
+"""Mechanisms that `loaded` gives bodies; a cylinder that drives has none."""
 
 
 @cache
@@ -140,6 +150,7 @@ def loaded(case, folder, *, own):
     head, _, inner = (_HEAD + MECHANISMS.get(case, "")).partition("[mechanism]")
     if case == "every group":
         inner = every_group.MECHANISM.replace("40 + n", "43")
+    inner += CYLINDER if case == "cylinder" else ""
     name = f"f{WITH_FORCES.index(case)}{'own' if own else ''}"
     head = head.format(name=name).replace("[scales]", "[scales]\nkF = 5")
     text = f"{head}[mechanism]{inner.replace('{{', '{').replace('}}', '}').replace('{name}', name)}"
@@ -147,14 +158,19 @@ def loaded(case, folder, *, own):
     file.write_text(text, encoding="utf-8")
     bare = load_assignment(str(file))
     mechanism = bare.mechanism(bare.variants())
-    plans = [*(node for node, links in named_links(mechanism).items() if links), mechanism.driver.pin]
+    cylinder = getattr(mechanism.driver, "cylinder", None)
+    plans = [node for node, links in named_links(mechanism).items() if links and cylinder not in links]
+    plans.append(mechanism.driver.pin)
     figures = ["mechanism", *(["acceleration_plan"] if own else []), *(f"force_plan_{one}" for one in plans)]
     text = text.replace('"mechanism", "velocity_plan", "acceleration_plan"', str(figures)[1:-1])
     text = text.replace("[scales]", "gravity = 9.81\n[scales]")
-    for link, points in points_of(mechanism).items():
+    loaded_links = {
+        link: points for link, points in points_of(mechanism).items() if cylinder is None or link == "1"
+    }
+    for link, points in loaded_links.items():
         centre = "" if link.startswith(SLIDER) else f'centre = "{points[-1]}"'
         text += f'\n[[body]]\nlink = "{link}"\nmass = 2\ninertia = 0.05\n{centre}\n'
-    link, points = [*points_of(mechanism).items()][-1]
+    link, points = [*loaded_links.items()][-1]
     text += f'[[load]]\nlink = "{link}"\npoint = "{points[0]}"\nforce = 300\nangle_deg = 200\n'
     file.write_text(text, encoding="utf-8")
     assignment = load_assignment(str(file))

@@ -89,7 +89,8 @@ def _direction(speaker: Speaker, term: Term) -> Formula:
                 return ("⊥ ", speaker.symbol(tail, head))
             if term.size is None:
                 return ("∥ ", speaker.symbol(tail, head))
-            turned = (quarters % 4 == 2) != (side_at(side, speaker.view) < 0)
+            back = isinstance(term.size, Balance) and float(term.size.at(speaker.view)) < 0.0
+            turned = ((quarters % 4 == 2) != (side_at(side, speaker.view) < 0)) != back
             first, second = (head, tail) if turned else (tail, head)
             return (speaker.symbol(first), " → ", speaker.symbol(second))
         case None:
