@@ -132,7 +132,11 @@ CASES = (*BUILT_IN, *MECHANISMS)
 
 CYLINDER = """
 ground = { O1 = [0, 0], O2 = [200, -50] }
-crank = { pivot = "O1", pin = "A", length = 100, cylinder = { pivot = "O2", length = 150, speed = 40, side = "left" } }  # noqa: E501
+[mechanism.crank]
+pivot = "O1"
+pin = "A"
+length = 100
+cylinder = { pivot = "O2", length = 150, speed = 40, side = "left" }
 [[mechanism.group]]
 type = "RPR"
 node = "A3"
