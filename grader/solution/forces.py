@@ -40,9 +40,8 @@ def table_of(speaker: Speaker, figure: str) -> Grid:
     for link in links_of_plan(subject, figure):
         for one in (one for one in acting.get(link, ()) if one.name in found):
             told = found.pop(one.name)
-            size = (
-                couple_formula(speaker, one) if isinstance(one, Couple) else force_formula(speaker, one.size)
-            )
+            size = None if isinstance(one, Couple) else force_formula(speaker, one.size)
+            size = size or product_of(speaker, one.name)
             value = abs(told.moment) if isinstance(one, Couple) else abs(told.force)
             paper = "" if told.moment else speaker.tongue.number(value / speaker.scale_value("kF"), 2)
             angle = _(sense(told.moment)) if told.moment else speaker.degrees(told.force)
@@ -64,31 +63,30 @@ def sense(turn: float) -> str:
 
 def force_formula(speaker: Speaker, size: Length) -> tuple[Formula, Formula] | None:
     """Return how a force follows, in names and in numbers: m a, m g, or as another; None for a datum."""
-    if isinstance(size, Same):
-        return speaker.symbol(speaker.vector(size.tail, size.head)), ""
-    kind, _, name = getattr(size, "mass" if isinstance(size, Inertia) else "quantity", "").partition("_")
-    mechanism, motion = speaker.subject.plan.mechanism, speaker.subject.plan.motion
-    short, number = short_names(mechanism), speaker.subject.number
-    is_inertia = kind == "m" or (kind == "F" and name.startswith("i"))
-    body = next((one for one in mechanism.bodies if name in (short[one.link], f"i{short[one.link]}")), None)
-    if body is None or body.mass is None or not (is_inertia or kind == "G"):
-        return None
-    by = number(np.abs(motion.acceleration[body.centre] if is_inertia else np.asarray(mechanism.gravity)))
-    factor = speaker.symbol(f"a_{body.centre}" if is_inertia else "g")
-    mass = speaker.symbol(f"m_{short[body.link]}")
-    return (mass, TIMES, factor), (speaker.bare(number(body.mass)), TIMES, speaker.bare(by))
+    match size:
+        case Same(tail=tail, head=head):
+            return speaker.symbol(speaker.vector(tail, head)), ""
+        case Inertia(mass=mass):
+            return product_of(speaker, f"F_i{mass.partition('_')[2]}")
+    return product_of(speaker, getattr(size, "quantity", ""))
 
 
-def couple_formula(speaker: Speaker, couple: Couple) -> tuple[Formula, Formula] | None:
-    """Return how a couple follows, I epsilon, in names and in numbers; None for a datum."""
-    plan, number = speaker.subject.plan, speaker.subject.number
-    short = short_names(plan.mechanism)
+def product_of(speaker: Speaker, name: str) -> tuple[Formula, Formula] | None:
+    """Return m a, m g or I epsilon of a body, in names and in numbers, by the name of what it makes."""
+    plan, turns = speaker.subject.plan, turning(speaker.subject.plan.mechanism)
     for body in plan.mechanism.bodies:
-        if couple.name == f"M_i{short[body.link]}" and body.inertia is not None:
-            link = turning(plan.mechanism)[body.link][0]
-            names = (speaker.symbol(f"I_{short[body.link]}"), TIMES, speaker.symbol(f"epsilon_{link}"))
-            by = abs(number(plan.motion.epsilon[link]))
-            return names, (speaker.bare(number(body.inertia)), TIMES, speaker.bare(by))
+        own, link = short_names(plan.mechanism)[body.link], turns.get(body.link, ("",))[0]
+        mass, inertia = (f"m_{own}", body.mass), (f"I_{own}", body.inertia)
+        found = {
+            f"F_i{own}": (mass, (f"a_{body.centre}", plan.motion.acceleration[body.centre])),
+            f"G_{own}": (mass, ("g", plan.mechanism.gravity)),
+            f"M_i{own}": (inertia, (f"epsilon_{link}", plan.motion.epsilon.get(link))),
+        }
+        if name in found:
+            names = tuple(speaker.symbol(letter) for letter, _ in found[name])
+            values = (speaker.subject.number(np.abs(np.asarray(value))) for _, value in found[name])
+            numbers = tuple(map(speaker.bare, values))
+            return (names[0], TIMES, names[1]), (numbers[0], TIMES, numbers[1])
     return None
 
 
