@@ -100,7 +100,8 @@ EXAMPLES: Mapping[str, str] = {
     "versions": "python 3.12 / 3.11", "whole": "7", "worker": "tcp://desk:40001",
     "wait": "90\u00a0s",
     "bias": "-0.05", "difference": "0.21", "equal": "17",
-    "force": "R_34_t = 12.3\u00a0mm", "waiting": "4", "zone": "EET", "wide": "@90 mm", "zone_high": "@120 mm", "zone_wide": "@180 mm",
+    "force": "R_34_t = 12.3\u00a0mm",
+    "waiting": "4", "zone": "EET", "wide": "@90 mm", "zone_high": "@120 mm", "zone_wide": "@180 mm",
 }  # fmt: skip
 """Parameters by name: after ``@`` a number with its unit; other texts of the catalogues are translated."""
 OTHERWISE: Mapping[str, Mapping[str, str]] = {

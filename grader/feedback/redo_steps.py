@@ -64,7 +64,7 @@ def redo(subject: Subject, tongue: Tongue, node: str, *, with_numbers: bool) -> 
     told = [*_told_steps(speaker, own[:MOST_STEPS], with_numbers=with_numbers)]
     later = [step.node for step in (*own[MOST_STEPS:], *(step for step in touched if step not in own))]
     if later:
-        drawn = tuple(dict.fromkeys(map(speaker.drawn_at, later)))
+        drawn = tuple(dict.fromkeys(map(construction.drawn_at, later)))
         told.append(speaker.say(THEN, nodes=speaker.names(drawn)))
     return [line.unescape() for line in told if line]
 

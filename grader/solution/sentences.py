@@ -193,12 +193,6 @@ class Speaker:
         """Return whether the nodes of a node's figure have letters; those of a force plan have none."""
         return not group_of(self.subject.plan.construction.figure_of(node))
 
-    def drawn_at(self, node: str) -> str:
-        """Return a node with a letter; of a force plan the vector that its step draws."""
-        vectors = self.subject.plan.construction.vectors.values()
-        drawn = (one.name for one in vectors if one.head == node and not one.is_sum)
-        return node if self.has_letters(node) else next(drawn)
-
     def link_of(self, node: str) -> Name:
         """Return the link of the normal component that ends in a node."""
         vectors = self.subject.plan.construction.vectors.values()

@@ -60,6 +60,7 @@ from reference.mechanism import (
     Yoke,
     guides_of,
 )
+from reference.quantities import group_of
 
 
 def pair(pin: str, node: str) -> str:
@@ -241,6 +242,12 @@ class Construction:
     def figure_of(self, node: str) -> str:
         """Return the figure that a node belongs to. Raises KeyError for an unknown node."""
         return self._by_node[node][0]
+
+    def drawn_at(self, node: str) -> str:
+        """Return a node's name; of a force plan, whose nodes have no letters, the vector that ends there."""
+        if node not in self._by_node or not group_of(self.figure_of(node)):
+            return node
+        return next(one.name for one in self.vectors.values() if one.head == node and not one.is_sum)
 
     def needed_for(self, nodes: Collection[str]) -> frozenset[str]:
         """Return the nodes from which some nodes are directly made."""
