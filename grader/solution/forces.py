@@ -1,4 +1,4 @@
-"""What acts on the links of a force plan, the moments about a joint, and the check by Zhukovsky's lever."""
+"""Tables of what acts on the links of a force plan, moments about joints, the check by Zhukovsky's lever."""
 
 from collections.abc import Iterator, Sequence
 

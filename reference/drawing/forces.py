@@ -1,4 +1,4 @@
-"""What stands beside a force plan: its links with the forces at their points, and Zhukovsky's lever."""
+"""Draw the links of a force plan with the forces at their points, and Zhukovsky's lever."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -35,7 +35,7 @@ LEAST_M = 1e-6
 SAMPLES = 16
 """Places along an arrow where it is looked whether other lines are near."""
 SHIFTS = {0.0: 0.0, -1.0: 0.5, 1.05: 5.0, -2.05: 6.0}
-"""Where an arrow may start, in lengths from its point, and how many places may be touched instead."""
+"""Starts of an arrow, in lengths from its point, and how many touched places each is worth."""
 COLOUR = PLAN_COLOURS["force_plan"]
 POLE, LEVER = "o", "lever"
 
