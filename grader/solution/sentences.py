@@ -391,9 +391,9 @@ def force(speaker: Speaker, step: Given | TwoLines, *, with_numbers: bool = True
             first=ends[lines[0].through, step.node], second=ends[lines[1].through, step.node],
         )  # fmt: skip
     closing = [
-        speaker.say(CLOSING, name=name)
-        for (_, head), name in ends.items()
-        if head == step.node and name not in drawn
+        speaker.say(CLOSING, name=one.name)
+        for one in vectors
+        if one.head == step.node and one.name not in drawn
     ]
     inner = [
         speaker.say(INNER, name=one.name, other=other)

@@ -438,6 +438,13 @@ def test_moments_are_told_with_arms_as_they_are_dimensioned(folder):
     assert "ΣM_B = " in "\n".join(in_unicode(line) for step in section.steps for line in step.before)
 
 
+def test_the_vector_that_closes_a_polygon_is_named(folder):
+    assignment, plan = loaded("two crossed guides", folder, own=False)
+    subject = Subject(assignment, plan, 0, wording_of(tongue("en")))
+    section = next(one for one in explain(subject, tongue("en")) if one.figure == "force_plan_A")
+    assert plain(section.steps[-1].sentence).endswith("R01 closes the polygon.")
+
+
 def test_pages_show_the_scheme_of_each_group_and_the_lever(folder):
     assignment, plan = loaded("two crossed guides", folder, own=False)
     subject = Subject(assignment, plan, 0, wording_of(tongue("en")))
