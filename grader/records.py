@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.errors import InputFileError, PlanmarkError
+from reference.quantities import zone_of
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -227,9 +228,10 @@ class Sheet:
 
         None stands for the whole sheet; the sketch alone has no boxes.
         """
-        if not figures or self.zones.keys() <= set(figures):
+        asked = set(map(zone_of, figures))
+        if not asked or self.zones.keys() <= asked:
             return None
-        zones = {figure: box for figure, box in self.zones.items() if figure in figures}
+        zones = {figure: box for figure, box in self.zones.items() if figure in asked}
         if zones.keys() <= {MECHANISM}:
             return []
         gap = ZONE_SLACK_MM

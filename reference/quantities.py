@@ -52,7 +52,9 @@ OF_MOTION = tuple(scale for scale, kind in DRAWN.items() if kind.omegas)
 """The scales of the plans in which the driving link has a vector."""
 SCALE_UNITS = {scale: kind.unit_per_mm for scale, kind in DRAWN.items()}
 _BY_LETTER = {letter: kind for kind in KINDS for letter in kind.letters}
-_BY_FIGURE = {kind.figure: kind for kind in DRAWN.values()}
+FORCE_PLANS = "force_plans"
+"""The zone that all force plans share on a printed sheet."""
+_BY_FIGURE = {kind.figure: kind for kind in DRAWN.values()} | {FORCE_PLANS: DRAWN["kF"]}
 FORCE_PLAN = "force_plan_"
 """Starts the names of force plans: each Assur group has one, named by its joint (``force_plan_D``)."""
 FIGURE = f"^(mechanism|velocity_plan|acceleration_plan|{FORCE_PLAN}[A-Za-z0-9]+)$"
@@ -88,6 +90,11 @@ def group_of(figure: str) -> str:
 def sort_of(figure: str) -> str:
     """Return the name that figures of one sort share: ``force_plan`` of all force plans; else its own."""
     return FORCE_PLAN.rstrip("_") if group_of(figure) else figure
+
+
+def zone_of(figure: str) -> str:
+    """Return the zone of a printed sheet in which a figure is drawn: its own, or that of all force plans."""
+    return FORCE_PLANS if group_of(figure) else figure
 
 
 def kind_of_figure(figure: str) -> Kind | None:

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from grader.authoring.findings import NAMED, BoolArray, LintFinding, Severity, chosen
 from grader.documents import LintLeast, LintScales
-from grader.printed.layout import FRAME_MM, MARGIN_MM, TEMPLATES, Template, template_for
+from grader.printed.layout import FRAME_MM, MARGIN_MM, TEMPLATES, Template, by_zone, lines_of, template_for
 from grader.records import MECHANISM, Box
 from grader.rubric import RubricFile
 from reference.authored.assignment import SCALE_NAMES, Assignment, Scales, Variant
 from reference.geometry import FloatArray
 from reference.plan import ZERO_SHARE, Plan
-from reference.quantities import scale_of, unit_of
+from reference.quantities import FORCE_PLANS, scale_of, unit_of, zone_of
 
 WELL_READ_MM = 8.0
 """Shorter vectors are read from scans with less certainty."""
@@ -27,6 +27,8 @@ Size = tuple[FloatArray, FloatArray]
 """Width and height of a figure in every variant, millimetres, (N,) each."""
 Extents = Mapping[str, Size]
 """The size of each figure."""
+Sheet = tuple[Template, tuple[str, ...]]
+"""A printed page's division and its figures."""
 IntArray = NDArray[np.intp]
 STEPS = (1.0, 2.0, 2.5, 4.0, 5.0, 10.0)
 """Factors of 10^k by which a ruler's millimetres are easily multiplied. ISO 5455 has 1, 2, 5 for lengths;
@@ -142,7 +144,7 @@ class PageRoom:
 
     Attributes
     ----------
-    zones : by figure, the factor by which it could be enlarged in its zone of the answer sheet
+    zones : by zone of the answer sheet, the factor by which what is in it could be enlarged
     frame : the factor by which all of them side by side could be enlarged in a plain A3 sheet's frame
     """
 
@@ -175,48 +177,26 @@ def room_of(figures: Sequence[str], extents: Extents, grid: Sequence[int] | None
         figure: (float(extents[figure][0].max()), float(extents[figure][1].max())) for figure in figures
     }
     template = template_for(largest, grid).template.of_one(grid)
-    zones = {figure: growth(template.zones[figure], *extents[figure]) for figure in figures}
-    return PageRoom(zones, _frame_growth([extents[figure] for figure in figures]))
+    sizes = {figure: extents[figure] for figure in figures}
+    zones = {zone: growth(template.zones[zone], inside) for zone, inside in by_zone(sizes).items()}
+    return PageRoom(zones, growth(FRAME_MM, [*sizes.values()]))
 
 
-def growth(box: Box, wide: FloatArray, high: FloatArray) -> FloatArray:
-    """Return the factor by which figures could be enlarged to fill a box, with margins for letters; (N,)."""
-    _, _, box_wide, box_high = box
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.minimum((box_wide - 2 * MARGIN_MM) / wide, (box_high - 2 * MARGIN_MM) / high))
+def growth(box: Box, sizes: Sequence[Size]) -> FloatArray:
+    """Return the factor by which figures side by side, on one line or two, could be enlarged in a box; (N,).
 
-
-def _frame_growth(sizes: Sequence[Size]) -> FloatArray:
-    """Return that factor for all figures of a page in the frame: in a row, in a column, or one beside two."""
-    wide, high = FRAME_MM[2], FRAME_MM[3]
-    turned = [size[::-1] for size in sizes]
-    options = [_in_line(sizes, wide, high), _in_line(turned, high, wide)]
-    if len(sizes) == 3:
-        for alone in range(3):
-            pair = [index for index in range(3) if index != alone]
-            for each, along, across in ((sizes, wide, high), (turned, high, wide)):
-                options.append(_beside_pair(each[alone], [each[index] for index in pair], along, across))
+    Each has margins for letters around it.
+    """
+    options = []
+    for lines in lines_of(len(sizes)):
+        for along, across in ((0, 1), (1, 0)):
+            limits = [(box[2 + along], len(line), sum(sizes[k][along] for k in line)) for line in lines]
+            widths = [np.max([sizes[k][across] for k in line], axis=0) for line in lines]
+            limits.append((box[2 + across], len(lines), sum(widths)))
+            with np.errstate(divide="ignore"):
+                factors = [(whole - 2 * MARGIN_MM * count) / size for whole, count, size in limits]
+            options.append(np.min(factors, axis=0))
     return np.asarray(np.max(options, axis=0))
-
-
-def _in_line(sizes: Sequence[Size], along: float, across: float) -> FloatArray:
-    """Return the factor for figures side by side."""
-    free = along - 2 * MARGIN_MM * len(sizes)
-    lengths, widths = sum(size[0] for size in sizes), np.max([size[1] for size in sizes], axis=0)
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.minimum(free / lengths, (across - 2 * MARGIN_MM) / widths))
-
-
-def _beside_pair(alone: Size, pair: Sequence[Size], along: float, across: float) -> FloatArray:
-    """Return the factor for a figure, and beside it two that share the sheet's other dimension."""
-    longer = np.max([size[0] for size in pair], axis=0)
-    limits = (
-        (along - 4 * MARGIN_MM, alone[0] + longer),
-        (across - 2 * MARGIN_MM, alone[1]),
-        (across - 4 * MARGIN_MM, pair[0][1] + pair[1][1]),
-    )
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.min([free / size for free, size in limits], axis=0))
 
 
 def room_findings(assignment: Assignment, plan: Plan, rooms: Mapping[int, PageRoom]) -> Iterator[LintFinding]:
@@ -226,9 +206,11 @@ def room_findings(assignment: Assignment, plan: Plan, rooms: Mapping[int, PageRo
             (
                 "does_not_fit",
                 factor,
-                f"the {figure.replace('_', ' ')} does not fit its zone on the A3 answer sheet: it would",
+                "the force plans do not fit their zone on the A3 answer sheet: they would"
+                if zone == FORCE_PLANS
+                else f"the {zone.replace('_', ' ')} does not fit its zone on the A3 answer sheet: it would",
             )
-            for figure, factor in room.zones.items()
+            for zone, factor in room.zones.items()
         ]
         side_by_side = "the page's figures do not fit side by side into the frame of a plain A3 sheet"
         checks.append(("does_not_fit_a3", room.frame, f"{side_by_side}: they would"))
@@ -282,15 +264,15 @@ def proposals(
     factors = [factor for room in rooms.values() for factor in room.zones.values()]
     own_room = min((float(np.min(factor)) for factor in factors), default=np.inf)
     links = _shortest_link_m(plan)
-    templates = [
-        _best_template(figures, plan, extents, links).of_one(assignment.file.page[index].grid)
-        for index, figures in pages_of(assignment, plan)
-    ]
+    sheets = []
+    for index, figures in pages_of(assignment, plan):
+        template = _best_template(figures, plan, extents, links)
+        sheets.append((template.of_one(assignment.file.page[index].grid), figures))
     proposed = [_judged("proposed", plan.scales, plan, asked, own_room)]
     names: tuple[ProposalName, ...] = ("round", "round_each")
     for name in names:
-        scales = _round_scales(templates, plan, extents, together=name == "round")
-        proposed.append(_judged(name, scales, plan, asked, _room(templates, _redrawn(extents, plan, scales))))
+        scales = _round_scales(sheets, plan, extents, together=name == "round")
+        proposed.append(_judged(name, scales, plan, asked, _room(sheets, _redrawn(extents, plan, scales))))
     return proposed
 
 
@@ -307,14 +289,20 @@ def _shortest_link_m(plan: Plan) -> FloatArray:
     return np.asarray(np.min([np.broadcast_to(length, (count,)) for length in lengths], axis=0))
 
 
-def _needed(template: Template, plan: Plan, extents: Extents) -> dict[str, FloatArray]:
-    """Return the finest scale at which each figure of a template fits its zone, (N,)."""
+def _growths(sheet: Sheet, extents: Extents) -> dict[str, FloatArray]:
+    """Return the factor by which what is in each zone of a sheet could be enlarged, (N,)."""
+    template, figures = sheet
+    sizes = by_zone({figure: extents[figure] for figure in figures})
+    return {zone: growth(template.zones[zone], inside) for zone, inside in sizes.items()}
+
+
+def _needed(sheet: Sheet, plan: Plan, extents: Extents) -> dict[str, FloatArray]:
+    """Return the finest scale at which what is in each zone of a sheet fits it, (N,)."""
     needed = {}
-    for figure, box in template.zones.items():
-        factor = growth(box, *extents[figure])
+    for zone, factor in _growths(sheet, extents).items():
         # A figure that is a single point fits at any scale.
-        scale = getattr(plan.scales, scale_of(figure))
-        needed[figure] = np.where(np.isfinite(factor), scale / factor, scale)
+        scale = getattr(plan.scales, scale_of(zone))
+        needed[zone] = np.where(np.isfinite(factor), scale / factor, scale)
     return needed
 
 
@@ -324,23 +312,23 @@ def _best_template(figures: Sequence[str], plan: Plan, extents: Extents, links_m
     def worth(template: Template) -> tuple[float, ...]:
         scales = {
             figure: float(round_up(np.asarray(np.max(values))))
-            for figure, values in _needed(template, plan, extents).items()
+            for figure, values in _needed((template, figures), plan, extents).items()
         }
         sketch = scales.pop(MECHANISM, None)
         link_mm = LEAST_LINK_MM if sketch is None else float(np.min(links_m)) / sketch
         plans = -sum(np.log(scale) for scale in scales.values())
         return (min(link_mm, LEAST_LINK_MM), float(plans), link_mm)
 
-    return max((each for each in TEMPLATES if each.figures == set(figures)), key=worth)
+    return max((each for each in TEMPLATES if each.figures == set(map(zone_of, figures))), key=worth)
 
 
-def _round_scales(templates: Sequence[Template], plan: Plan, extents: Extents, *, together: bool) -> Scales:
+def _round_scales(sheets: Sequence[Sheet], plan: Plan, extents: Extents, *, together: bool) -> Scales:
     """Return round scales that fit every page; a scale that no page needs is unchanged."""
     scales = plan.scales.by_name
     finest: dict[str, FloatArray] = {}
-    for template in templates:
-        for figure, values in _needed(template, plan, extents).items():
-            name = scale_of(figure)
+    for sheet in sheets:
+        for zone, values in _needed(sheet, plan, extents).items():
+            name = scale_of(zone)
             finest[name] = np.maximum(finest[name], values) if name in finest else values
     for name, values in finest.items():
         common = np.full_like(values, np.max(values)) if together else values
@@ -357,13 +345,9 @@ def _redrawn(extents: Extents, plan: Plan, scales: Scales) -> dict[str, Size]:
     }
 
 
-def _room(templates: Sequence[Template], extents: Extents) -> float:
-    rooms = [
-        float(np.min(growth(box, *extents[figure])))
-        for template in templates
-        for figure, box in template.zones.items()
-    ]
-    return min(rooms, default=np.inf)
+def _room(sheets: Sequence[Sheet], extents: Extents) -> float:
+    rooms = [factor for sheet in sheets for factor in _growths(sheet, extents).values()]
+    return min((float(np.min(factor)) for factor in rooms), default=np.inf)
 
 
 def _judged(name: ProposalName, scales: Scales, plan: Plan, asked: AskedVectors, room: float) -> Proposal:

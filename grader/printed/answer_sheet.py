@@ -49,7 +49,7 @@ from grader.tables.roster import RosterRow
 from reference.authored.assignment import Assignment, PageKind, PageTable, Variant
 from reference.drawing.canvas import Piece, pieces_of, scale_pieces
 from reference.errors import AuthoredFileError, CallError, Finding
-from reference.quantities import scale_of, unit_of, value_name
+from reference.quantities import FORCE_PLANS, scale_of, unit_of, value_name
 
 # One page -----------------------------------------------------------------------------------------
 
@@ -57,7 +57,7 @@ FIGURES = {
     MECHANISM: N_("Mechanism"),
     VELOCITY_PLAN: N_("Velocity plan"),
     ACCELERATION_PLAN: N_("Acceleration plan"),
-    "force_plan": N_("Force plan of the group of {group}"),
+    FORCE_PLANS: N_("Force plans"),
 }
 KINDS = {
     "mechanism": N_("Mechanism"),
@@ -155,7 +155,7 @@ def draw_page(
     _task(drawing, assignment, text.variants, tongue)
     _advice(drawing, tongue)
     for figure, zone in form.template.zones.items():
-        title = tongue.titled(FIGURES, figure, assignment.file.names)
+        title = tongue.gettext(FIGURES[figure])
         apart = set(form.positions.values()) - {zone}
         for position, cell in form.positions.items() if apart else ((None, zone),):
             _zone(drawing, cell, title if position is None else f"{title}, {_position(position, tongue)}")

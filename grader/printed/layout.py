@@ -7,8 +7,8 @@ sheet's top left corner, x right, y down.
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate
-from typing import Literal, get_args
+from itertools import accumulate, combinations
+from typing import Literal, TypeVar, get_args
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
@@ -18,8 +18,8 @@ from reference.authored.assignment import SCALE_NAMES, Assignment, PageKind, Pag
 from reference.construction.graph import Construction, evaluate, parameters_of
 from reference.drawing.canvas import A3_MM
 from reference.geometry import ComplexArray
-from reference.plan import construction_for
-from reference.quantities import scale_of, value_name, vector_of_value
+from reference.plan import construction_for, exact_plan
+from reference.quantities import FORCE_PLANS, scale_of, value_name, vector_of_value, zone_of
 
 # The code's text ----------------------------------------------------------------------------------
 
@@ -158,10 +158,11 @@ def _grid(box: Box, grid: Sequence[int] | None) -> list[Box]:
 
 def position_zones(assignment: Assignment, zones: Mapping[str, Box]) -> dict[int, Box]:
     """Return the zone of each position on a page with these zones; empty where the page has one position."""
-    page = next((one for one in assignment.file.page if one.grid and set(one.figures) == set(zones)), None)
+    gridded = (page for page in assignment.file.page if page.grid)
+    page = next((one for one in gridded if set(map(zone_of, one.figures)) == set(zones)), None)
     if page is None:
         return {}
-    cells = _grid(zones[page.figures[0]], page.grid)
+    cells = _grid(zones[zone_of(page.figures[0])], page.grid)
     positions = assignment.shared_positions
     return dict(zip(positions, cells * (len(positions) if len(cells) == 1 else 1), strict=False))
 
@@ -186,6 +187,8 @@ def _divisions() -> list[dict[str, Box]]:
         left, right = _cut(DRAWING_MM, (share, 1.0 - share), across=True)
         divisions.extend(_zones((m, v), left, (top, 1.0 - top), rows) | {a: right} for top in (0.4, 0.55))
         divisions.append({m: left} | _zones((v, a), right, (0.45, 0.55), rows))
+    divisions.append(_zones((m, FORCE_PLANS), DRAWING_MM, (0.35, 0.65), columns))
+    divisions.append(_zones((FORCE_PLANS,), DRAWING_MM, (1.0,), columns))
     return divisions
 
 
@@ -271,9 +274,10 @@ def written_cells(
 
 
 def _single(assignment: Assignment, figures: Sequence[str]) -> PageTable | None:
-    """Return the page with these figures, if it has them for one position."""
-    known = (page for page in assignment.file.page if set(page.figures) == set(figures) and not page.grid)
-    return next(known, None)
+    """Return the page with these figures or zones, if it has them for one position."""
+    zones = set(map(zone_of, figures))
+    known = (page for page in assignment.file.page if not page.grid)
+    return next((page for page in known if set(map(zone_of, page.figures)) == zones), None)
 
 
 def boxes_of(names: Sequence[str], asked: Collection[str] | None) -> dict[str, Box]:
@@ -384,8 +388,8 @@ class TemplateFit:
     Attributes
     ----------
     template : the best of all
-    room : zone over need by figure, the smaller of width and height; below 1 it is too small in some variant
-    need_mm : widest and highest of any variant by figure, margins included
+    room : zone over need by zone, the smaller of width and height; below 1 it is too small in some variant
+    need_mm : widest and highest of any variant by zone, margins included
     """
 
     template: Template
@@ -420,6 +424,9 @@ def _drawn(
 ) -> tuple[Scales, Mapping[str, ComplexArray]]:
     """Return the assignment's own scales, and all nodes drawn at them."""
     scales = assignment.scales(variants)
+    if assignment.forces is not None:
+        drawing = exact_plan(assignment, variants, accelerations=bool(construction.rates)).drawing
+        return scales, evaluate(construction, drawing.parameters)
     parameters = parameters_of(assignment.mechanism(variants), scales.kL, scales.kv, scales.ka)
     return scales, evaluate(construction, parameters)
 
@@ -435,10 +442,11 @@ def values_of(
 
     Arguments: `asked` as `RubricFile.entries`, ``v_B_value`` for the value of v_B.
     """
-    if _single(assignment, figures) is None or not any(map(vector_of_value, asked)):
+    table = _single(assignment, figures)
+    if table is None or not any(map(vector_of_value, asked)):
         return {}
-    construction, variants = page_construction(assignment, figures), assignment.variants()
-    vectors = {v.name: v for figure in dict.fromkeys(figures) for v in construction.polygon_of(figure)}
+    construction, variants = page_construction(assignment, table.figures), assignment.variants()
+    vectors = {v.name: v for figure in dict.fromkeys(table.figures) for v in construction.polygon_of(figure)}
     wanted = [name for name in vectors if value_name(name) in asked]
     boxes = field_boxes(tuple(vectors)) if wanted and len(vectors) <= EASY_FIELDS else {}
     below = max((y + high for _, y, _, high in boxes.values()), default=np.inf) + _FIELD_GAP_MM
@@ -446,7 +454,7 @@ def values_of(
     if left_mm >= _LEAST_VALUE_MM:
         places = {name: (boxes[name][0], below, boxes[name][2], left_mm) for name in wanted}
     else:
-        used = {SCALE_BOXES[scale_of(figure)] for figure in figures}
+        used = {SCALE_BOXES[scale_of(figure)] for figure in table.figures}
         free = [box for box in dict.fromkeys(SCALE_BOXES.values()) if box not in used]
         rows = [(x, y, _VALUE_WIDE_MM, _FIELD_MOST_MM) for x, y, _, _ in free[: len(wanted)]]
         places = dict(zip(wanted, rows, strict=True)) if len(wanted) == len(rows) else {}
@@ -477,9 +485,9 @@ def poles_mm(
     """Return the best positions of the poles of a template's plans, sheet millimetres for each variant.
 
     A plan begun there is in the middle of its zone, or of its position's. A plan that is larger than its
-    zone in some variant has none: the student will choose another scale.
+    zone in some variant has none: the student will choose another scale. Nor have force plans, which share one.
     """
-    plans = [figure for figure in template.zones if figure != MECHANISM]
+    plans = [figure for figure in template.zones if figure not in {MECHANISM, FORCE_PLANS}]
     poles = {}
     for figure, places in places_mm(assignment, plans, variants).items():
         zone, own = template.zones[figure], position_zones(assignment, template.zones)
@@ -507,18 +515,53 @@ def template_for(
 
     Arguments: `grid` of the positions on the sheet; the room is that of one of its zones.
     """
-    figures = tuple(extents)
-    need = {figure: (wide + 2 * MARGIN_MM, high + 2 * MARGIN_MM) for figure, (wide, high) in extents.items()}
+    needs = {
+        zone: _sizes_together([(wide + 2 * MARGIN_MM, high + 2 * MARGIN_MM) for wide, high in sizes])
+        for zone, sizes in by_zone(extents).items()
+    }
 
-    def room(template: Template, figure: str) -> float:
-        _, _, wide, high = template.of_one(grid).zones[figure]
-        return min(wide / need[figure][0], high / need[figure][1])
+    def rooms(template: Template, zone: str) -> list[float]:
+        _, _, wide, high = template.of_one(grid).zones[zone]
+        return [min(wide / need[0], high / need[1]) for need in needs[zone]]
+
+    def room(template: Template, zone: str) -> float:
+        return max(rooms(template, zone))
 
     def worth(template: Template) -> tuple[float, float]:
         # A plan's scale is the assignment's; the sketch's is often the student's choice.
-        plans = [room(template, figure) for figure in figures if figure != MECHANISM]
+        plans = [room(template, zone) for zone in needs if zone != MECHANISM]
         least = min(min(plans, default=np.inf), 1.0)
-        return (round(least, 6), min(room(template, figure) for figure in figures))
+        return (round(least, 6), min(room(template, zone) for zone in needs))
 
-    best = max((template for template in TEMPLATES if template.figures == set(figures)), key=worth)
-    return TemplateFit(best, {figure: room(best, figure) for figure in figures}, need)
+    best = max((template for template in TEMPLATES if template.figures == set(needs)), key=worth)
+    need_mm = {zone: needs[zone][int(np.argmax(rooms(best, zone)))] for zone in needs}
+    return TemplateFit(best, {zone: room(best, zone) for zone in needs}, need_mm)
+
+
+Sized = TypeVar("Sized")
+
+
+def by_zone(extents: Mapping[str, Sized]) -> dict[str, list[Sized]]:
+    """Return the sizes of the figures in each zone."""
+    zones: dict[str, list[Sized]] = {}
+    for figure, size in extents.items():
+        zones.setdefault(zone_of(figure), []).append(size)
+    return zones
+
+
+def lines_of(count: int) -> list[list[list[int]]]:
+    """Return the ways to set some figures side by side on one line or on two: the indices on each."""
+    every = range(count)
+    first = (one for size in range(1, count // 2 + 1) for one in combinations(every, size))
+    return [[[*every]], *([[*one], [k for k in every if k not in one]] for one in first)]
+
+
+def _sizes_together(sizes: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return widths and heights of boxes together: on one line or two, which are rows or columns."""
+    found = []
+    for lines in lines_of(len(sizes)):
+        for along, across in ((0, 1), (1, 0)):
+            long = max(sum(sizes[k][along] for k in line) for line in lines)
+            wide = sum(max(sizes[k][across] for k in line) for line in lines)
+            found.append((long, wide) if along == 0 else (wide, long))
+    return found

@@ -36,6 +36,7 @@ PLACES = {
     "velocity_plan": N_("the velocity plan"),
     "acceleration_plan": N_("the acceleration plan"),
     "force_plan": N_("the force plan of the group of {group}"),
+    "force_plans": N_("the set of force plans"),
     "directions": N_("the directions"),
     "lengths": N_("the lengths"),
     "scales": N_("the scales"),

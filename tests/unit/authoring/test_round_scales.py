@@ -10,7 +10,6 @@ import pytest
 from grader.authoring.lint import lint
 from grader.authoring.round_scales import (
     STEPS,
-    _frame_growth,
     extents_of,
     growth,
     ratio_text,
@@ -146,14 +145,14 @@ def test_figures_fit_a_plain_sheet_at_the_size_told_and_at_no_larger_one(count):
     rng = np.random.default_rng(count)
     for _ in range(200):
         boxes = rng.uniform(5.0, 300.0, (count, 2))
-        factor = float(_frame_growth([(np.array([wide]), np.array([high])) for wide, high in boxes])[0])
+        factor = float(growth(FRAME_MM, [(np.array([wide]), np.array([high])) for wide, high in boxes])[0])
         assert fits([tuple(factor * box) for box in boxes])
         assert not fits([tuple(1.001 * factor * box) for box in boxes])
 
 
 def test_a_figure_grows_to_the_edge_of_its_zone_less_the_margins():
     wide, high = np.array([50.0, 50.0, 0.0]), np.array([20.0, 90.0, 10.0])
-    factor = growth((0.0, 0.0, 124.0, 104.0), wide, high)
+    factor = growth((0.0, 0.0, 124.0, 104.0), [(wide, high)])
     np.testing.assert_allclose(factor, [2.0, 80.0 / 90.0, 8.0])
 
 
