@@ -114,7 +114,7 @@ def lint(assignment: Assignment, rubric: RubricFile) -> Lint:
         *assembly_findings(assignment, sound),
         *condition_findings(assignment, plan, conditions),
         *length_findings(rubric, plan, asked),
-        *room_findings(assignment, plan, rooms),
+        *room_findings(assignment, plan, asked, rooms),
         *tie_findings(plan, ties_of(rubric, plan, asked)),
         *scale_findings(assignment, plan, scales),
         *_told_results(assignment, rubric, plan),
@@ -309,7 +309,7 @@ def _with_their_own(assignment: Assignment, names: Iterable[str]) -> set[str]:
 
 def _unused_values(assignment: Assignment) -> Iterator[LintFinding]:
     file = assignment.file
-    outside = names_in(assignment.mechanism_file) | names_in(file.scales) | names_in(file.given)
+    outside = names_in([assignment.mechanism_file, file.scales, file.given, file.body, file.load, file.gravity])
     needed = _with_their_own(assignment, outside)
     for name in file.variant.values:
         if name not in needed:

@@ -19,7 +19,7 @@ from grader.rubric import RubricFile
 from reference.authored.assignment import SCALE_NAMES, Assignment, Scales, Variant
 from reference.geometry import FloatArray
 from reference.plan import ZERO_SHARE, Plan
-from reference.quantities import FORCE_PLANS, scale_of, unit_of, zone_of
+from reference.quantities import FORCE_PLANS, group_of, scale_of, unit_of, zone_of
 
 WELL_READ_MM = 8.0
 """Shorter vectors are read from scans with less certainty."""
@@ -199,7 +199,9 @@ def growth(box: Box, sizes: Sequence[Size]) -> FloatArray:
     return np.asarray(np.max(options, axis=0))
 
 
-def room_findings(assignment: Assignment, plan: Plan, rooms: Mapping[int, PageRoom]) -> Iterator[LintFinding]:
+def room_findings(
+    assignment: Assignment, plan: Plan, asked: AskedVectors, rooms: Mapping[int, PageRoom]
+) -> Iterator[LintFinding]:
     """Report figures too large for their zone, and pages whose figures do not fit a plain A3 sheet either."""
     for index, room in rooms.items():
         checks = [
@@ -220,8 +222,11 @@ def room_findings(assignment: Assignment, plan: Plan, rooms: Mapping[int, PageRo
                 meant = chosen(plan.variants, factor < 1.0)
                 yield LintFinding("warning", code, "assignment", f"$.page[{index}]", message, meant)
     shown = {figure for page in assignment.file.page for figure in page.figures}
+    built = plan.construction
+    needed = {built.figure_of(built.vectors[name].head) for name in asked.names}
     for figure in plan.nodes_mm:
-        if figure not in shown:
+        # Of force plans only those are needed whose vectors are asked for.
+        if figure not in shown and (not group_of(figure) or figure in needed):
             message = f"no page has the {figure.replace('_', ' ')}, which the rubric needs"
             yield LintFinding("warning", "no_page", "assignment", "$.page", message)
 

@@ -187,7 +187,7 @@ def _divisions() -> list[dict[str, Box]]:
         left, right = _cut(DRAWING_MM, (share, 1.0 - share), across=True)
         divisions.extend(_zones((m, v), left, (top, 1.0 - top), rows) | {a: right} for top in (0.4, 0.55))
         divisions.append({m: left} | _zones((v, a), right, (0.45, 0.55), rows))
-    divisions.append(_zones((m, FORCE_PLANS), DRAWING_MM, (0.35, 0.65), columns))
+    divisions.append(_zones((m, FORCE_PLANS), DRAWING_MM, (0.36, 0.64), columns))
     divisions.append(_zones((FORCE_PLANS,), DRAWING_MM, (1.0,), columns))
     return divisions
 
