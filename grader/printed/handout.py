@@ -15,16 +15,16 @@ from reportlab.platypus import Flowable, PageBreak, Paragraph, SimpleDocTemplate
 from grader.language import N_, Tongue, symbols, tongue
 from grader.printed.answer_sheet import given_data, variants_of
 from grader.printed.pdf import BOLD, REGULAR, embed_fonts, number, put_shapes, with_marks
-from grader.rubric import SECTIONS, RubricFile, scales_asked
+from grader.rubric import SECTIONS, RubricFile, accelerations_of, scales_asked
 from grader.tables.roster import RosterRow
 from reference.authored.assignment import Assignment, Variant
 from reference.drawing.canvas import Piece, bounds, pieces_of, scale_pieces
 from reference.drawing.sketch import scheme
 from reference.drawing.subject import Subject
 from reference.errors import MechanismError
-from reference.geometry import ComplexArray
-from reference.mechanism import DrivingSlider, FixedGuide, guides_of
-from reference.plan import exact_plan
+from reference.geometry import ComplexArray, FloatArray
+from reference.mechanism import Body, DrivingSlider, FixedGuide, guides_of, short_names
+from reference.plan import Plan, exact_plan
 from reference.quantities import DRAWN, kind_of, unit_of
 
 NAME, GROUP, DATE = N_("Name"), N_("Group"), N_("Date")
@@ -47,6 +47,17 @@ SIGNS = N_(
     "Directions count counter-clockwise from the horizontal to the right; angular quantities are positive"
     " counter-clockwise."
 )
+BODIES = {True: N_("Masses, and accelerations of the centres of mass"), False: N_("Masses")}
+LOADS, LINK, CENTRE = N_("Loads"), N_("Link"), N_("Centre of mass")
+LOAD = (N_("Load"), LINK, N_("Point"), VALUE, DIRECTION)
+ON_THE_LINE = N_("%(point)s on %(line)s, %(along)s from %(start)s")
+BESIDE = {
+    True: N_("%(point)s: %(along)s from %(start)s along %(line)s, %(across)s to the left"),
+    False: N_("%(point)s: %(along)s from %(start)s along %(line)s, %(across)s to the right"),
+}
+MOTIONS = {True: N_("along its motion"), False: N_("against its motion")}
+OWN = N_("Take accelerations of the centres of mass and angular accelerations from your acceleration plan.")
+REACTION = N_("%(vector)s is the force of link %(by)s on link %(on)s; 0 stands for the frame.")
 
 WIDE_MM = 182.0
 """Width of A4 between margins of 14 mm."""
@@ -123,10 +134,15 @@ def _sheet(
     caption = _text(speaker.gettext(title), 8)
     data: list[Flowable] = [_text(speaker.gettext(GIVEN), 10, BOLD)]
     data += [_markup(_letters(datum), 10) for datum in given_data(assignment, variant, speaker)]
+    gravity = assignment.mechanism([variant]).gravity
+    if gravity is not None:
+        data.append(_text(f"g = {number(float(gravity[0]), speaker.decimal_mark)} {speaker.unit('m/s²')}", 10))
     data += [Spacer(1, 2 * mm), _text(speaker.gettext(FIXED), 10, BOLD)]
     data += [_markup(line, 9) for line in _fixed(assignment, variant, speaker)]
     yield _side_by_side(data, [drawn, caption], WIDE_MM - SCHEME_MM[0] - GAP_MM)
     yield Spacer(1, 3 * mm)
+    if accelerations_of(assignment, rubric):
+        yield from _masses(assignment, rubric, variant, speaker)
     yield from _tables(assignment, rubric, speaker)
     yield Spacer(1, 2 * mm)
     yield _text(speaker.gettext(SIGNS), 8)
@@ -205,10 +221,15 @@ def _fitted(assignment: Assignment, variant: Variant) -> Subject:
 LENGTH_UNITS = {"mm": 1e3, "cm": 1e2, "m": 1.0}
 
 
+def _length_unit(assignment: Assignment) -> str:
+    """Return the unit of the given lengths."""
+    return next((one.unit for one in assignment.file.given if one.unit in LENGTH_UNITS), "m")
+
+
 def _fixed(assignment: Assignment, variant: Variant, speaker: Tongue) -> Iterator[Markup]:
     """Yield the positions of the ground's joints and guides, in the unit of the given lengths."""
     mechanism = assignment.mechanism([variant])
-    unit = next((one.unit for one in assignment.file.given if one.unit in LENGTH_UNITS), "m")
+    unit = _length_unit(assignment)
 
     def point(at: ComplexArray) -> str:
         place = complex(np.ravel(at)[0]) * LENGTH_UNITS[unit]
@@ -233,6 +254,82 @@ def _fixed(assignment: Assignment, variant: Variant, speaker: Tongue) -> Iterato
         degrees = number(float(np.degrees(np.ravel(angle)[0])), speaker.decimal_mark)
         known = {"joint": letter(joint), "point": point(through), "angle": f"{degrees}°"}
         yield Markup(speaker.gettext(GUIDE)) % known  # noqa: S704 - our own sentence
+
+
+# Masses and loads ---------------------------------------------------------------------------------
+
+
+def _masses(
+    assignment: Assignment, rubric: RubricFile, variant: Variant, speaker: Tongue
+) -> Iterator[Flowable]:
+    """Yield tables of the masses, with the accelerations that are given, and of the loads: no other forces."""
+    _, mark, unit = speaker.gettext, speaker.decimal_mark, speaker.unit
+    plan, are_given = exact_plan(assignment, [variant]), accelerations_of(assignment, rubric) == "given"
+    mechanism, short = plan.mechanism, short_names(plan.mechanism)
+    acts = {one.name: one for one in plan.forces.given} if plan.forces else {}
+
+    def told(value: FloatArray | None, digits: int = 6) -> str:
+        return "–" if value is None else number(float(f"{float(value[0]):.{digits}g}"), mark)
+
+    def direction(vector: ComplexArray) -> str:
+        return number(round(float(np.degrees(np.angle(vector[0]))) % 360.0, 1) % 360.0, mark)
+
+    bodies = []
+    for body in mechanism.bodies:
+        name, moving = short[body.link], plan.motion.acceleration[body.centre]
+        row = [name, told(body.mass), told(body.inertia), _centre(assignment, plan, body, speaker)]
+        if are_given:
+            is_moved = body.mass is not None and bool(np.any(moving))
+            row += [told(np.abs(moving), 4), direction(moving)] if is_moved else ["–", "–"]
+            row.append(
+                "–" if body.inertia is None else told(-acts[f"F_i{name}"].couple / body.inertia, 4)
+            )
+        bodies.append(row)
+    head = [_(LINK), f"m, {unit('kg')}", f"I, {unit('kg m²')}", _(CENTRE)]
+    head += [f"a, {unit('m/s²')}", _(DIRECTION), f"ε, {unit('rad/s²')}"] if are_given else []
+    loads = []
+    for load in mechanism.loads:
+        act, names = acts[f"F_{load.name}"], [short[load.link], _letters(pieces_of(load.point))]
+        if load.force is None:
+            couple = f"{told(act.couple)} {unit('N m')}"
+            loads.append([_letters(pieces_of(f"M_{load.name}")), names[0], "–", couple, "–"])
+            continue
+        along = _(MOTIONS[bool(load.force.real[0] > 0.0)]) if load.slider else ""
+        where = direction(act.force) if are_given or not along else along
+        value = f"{told(np.abs(act.force))} {unit('N')}"
+        loads.append([_letters(pieces_of(act.name)), *names, value, where])
+    shares = [0.09, 0.1, 0.13, 0.32, 0.12, 0.12, 0.12] if are_given else [0.12, 0.14, 0.16, 0.58]
+    for title, heads, rows, widths in (
+        (BODIES[are_given], head, bodies, shares),
+        (LOADS, [*map(_, LOAD)], loads, [0.12, 0.12, 0.12, 0.2, 0.44]),
+    ):
+        if rows:
+            yield from (_text(_(title), 10, BOLD), Spacer(1, mm))
+            yield _empty(heads, rows, WIDE_MM, shares=widths)
+            yield Spacer(1, 2 * mm)
+    if not are_given:
+        yield _text(_(OWN), 9)
+    yield Spacer(1, 2 * mm)
+
+
+def _centre(assignment: Assignment, plan: Plan, body: Body, speaker: Tongue) -> Markup:
+    """Return where a link's centre of mass is."""
+    tables = {one.link: one.centre for one in assignment.file.body}
+    point, centre = _letters(pieces_of(body.centre)), tables[body.link]
+    if centre is None or centre.base is None:
+        return point
+    at, unit = plan.motion.position, _length_unit(assignment)
+    start, end = (at[joint][0] for joint in centre.base)
+    place = (at[body.centre][0] - start) * abs(end - start) / (end - start) * LENGTH_UNITS[unit]
+
+    def length(value: float) -> str:
+        return f"{number(float(f'{abs(value):.5g}'), speaker.decimal_mark)}\N{NO-BREAK SPACE}{speaker.unit(unit)}"
+
+    line = Markup("").join(_letters(pieces_of(joint)) for joint in centre.base)
+    known = {"point": point, "line": line, "start": _letters(pieces_of(centre.base[0]))}
+    known |= {"along": length(place.real), "across": length(place.imag)}
+    is_on_it = abs(place.imag) < 1e-6 * abs(end - start) * LENGTH_UNITS[unit]
+    return Markup(speaker.gettext(ON_THE_LINE if is_on_it else BESIDE[place.imag > 0.0])) % known  # noqa: S704
 
 
 # Tables to fill in --------------------------------------------------------------------------------
@@ -311,11 +408,15 @@ def _cell(pieces: Iterable[Piece], unit: str, speaker: Tongue) -> Markup:
 
 
 def _empty(
-    head: Sequence[str], rows: Iterable[Sequence[str]], wide_mm: float, high_mm: float = ROW_MM
+    head: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    wide_mm: float,
+    high_mm: float = ROW_MM,
+    shares: Sequence[float] = (),
 ) -> Table:
     first = {2: 0.4, 4: 0.16}.get(len(head), 1.0 / len(head))
     rest = (1.0 - first) / (len(head) - 1)
-    widths = [share * wide_mm * mm for share in (first, *[rest] * (len(head) - 1))]
+    widths = [share * wide_mm * mm for share in shares or (first, *[rest] * (len(head) - 1))]
     cells = [[_text(word, 6.5) for word in head], *([_markup(cell, 10) for cell in row] for row in rows)]
     style = [
         ("GRID", (0, 0), (-1, -1), 0.4, grey), ("BACKGROUND", (0, 0), (-1, 0), whitesmoke),
