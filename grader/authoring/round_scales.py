@@ -13,7 +13,17 @@ from numpy.typing import NDArray
 
 from grader.authoring.findings import NAMED, BoolArray, LintFinding, Severity, chosen
 from grader.documents import LintLeast, LintScales
-from grader.printed.layout import FRAME_MM, MARGIN_MM, TEMPLATES, Template, by_zone, lines_of, template_for
+from grader.printed.layout import (
+    FRAME_MM,
+    MARGIN_MM,
+    TEMPLATES,
+    Extents,
+    Size,
+    Template,
+    by_zone,
+    lines_of,
+    template_for,
+)
 from grader.records import MECHANISM, Box
 from grader.rubric import RubricFile
 from reference.authored.assignment import SCALE_NAMES, Assignment, Scales, Variant
@@ -23,11 +33,7 @@ from reference.quantities import FORCE_PLANS, group_of, scale_of, unit_of, zone_
 
 WELL_READ_MM = 8.0
 """Shorter vectors are read from scans with less certainty."""
-Size = tuple[FloatArray, FloatArray]
-"""Width and height of a figure in every variant, millimetres, (N,) each."""
-Extents = Mapping[str, Size]
-"""The size of each figure."""
-Sheet = tuple[Template, tuple[str, ...]]
+Sheet = tuple[Template, Sequence[str]]
 """A printed page's division and its figures."""
 IntArray = NDArray[np.intp]
 STEPS = (1.0, 2.0, 2.5, 4.0, 5.0, 10.0)
@@ -173,11 +179,8 @@ def pages_of(assignment: Assignment, plan: Plan) -> list[tuple[int, tuple[str, .
 
 def room_of(figures: Sequence[str], extents: Extents, grid: Sequence[int] | None = None) -> PageRoom:
     """Return the room for a page's figures, in the layout of the answer sheet printed for them."""
-    largest = {
-        figure: (float(extents[figure][0].max()), float(extents[figure][1].max())) for figure in figures
-    }
-    template = template_for(largest, grid).template.of_one(grid)
     sizes = {figure: extents[figure] for figure in figures}
+    template = template_for(sizes, grid).template.of_one(grid)
     zones = {zone: growth(template.zones[zone], inside) for zone, inside in by_zone(sizes).items()}
     return PageRoom(zones, growth(FRAME_MM, [*sizes.values()]))
 
@@ -190,9 +193,10 @@ def growth(box: Box, sizes: Sequence[Size]) -> FloatArray:
     options = []
     for lines in lines_of(len(sizes)):
         for along, across in ((0, 1), (1, 0)):
-            limits = [(box[2 + along], len(line), sum(sizes[k][along] for k in line)) for line in lines]
-            widths = [np.max([sizes[k][across] for k in line], axis=0) for line in lines]
-            limits.append((box[2 + across], len(lines), sum(widths)))
+            long = [np.sum([sizes[k][along] for k in line], axis=0) for line in lines]
+            wide = np.sum([np.max([sizes[k][across] for k in line], axis=0) for line in lines], axis=0)
+            limits = [(box[2 + along], len(line), size) for line, size in zip(lines, long, strict=True)]
+            limits.append((box[2 + across], len(lines), wide))
             with np.errstate(divide="ignore"):
                 factors = [(whole - 2 * MARGIN_MM * count) / size for whole, count, size in limits]
             options.append(np.min(factors, axis=0))

@@ -26,6 +26,7 @@ from grader.printed.layout import (
     comb_cells,
     combs_of,
     marker_places,
+    measured_on,
     page_construction,
     poles_mm,
     position_zones,
@@ -443,8 +444,7 @@ def _forms(
         figures = list(dict.fromkeys(table.figures))
         fit = best_template(assignment, figures, table.grid)
         construction = page_construction(assignment, figures)
-        vectors = [] if table.grid else [construction.polygon_of(figure) for figure in figures]
-        names = [vector.name for several in vectors for vector in several]
+        names = [] if table.grid else [vector.name for vector in measured_on(construction, figures)]
         boxes = boxes_of(names, asked)
         if names and not boxes and (asked is None or set(names) & set(asked)):
             known: dict[str, Value] = {"form": table.kind, "lengths": len(names)}

@@ -18,12 +18,13 @@ from grader.printed.pdf import BOLD, REGULAR, embed_fonts, number, put_shapes, w
 from grader.rubric import SECTIONS, RubricFile, accelerations_of, scales_asked
 from grader.tables.roster import RosterRow
 from reference.authored.assignment import Assignment, Variant
+from reference.construction.forces import reaction
 from reference.drawing.canvas import Piece, bounds, pieces_of, scale_pieces
 from reference.drawing.sketch import scheme
 from reference.drawing.subject import Subject
 from reference.errors import MechanismError
 from reference.geometry import ComplexArray, FloatArray
-from reference.mechanism import Body, DrivingSlider, FixedGuide, guides_of, short_names
+from reference.mechanism import GROUND, Body, DrivingSlider, FixedGuide, guides_of, short_names
 from reference.plan import Plan, exact_plan
 from reference.quantities import DRAWN, kind_of, unit_of
 
@@ -309,6 +310,13 @@ def _masses(
             yield Spacer(1, 2 * mm)
     if not are_given:
         yield _text(_(OWN), 9)
+    hinges = plan.forces.hinges.values() if plan.forces else ()
+    for one in hinges:
+        by, on = short[one.by], short[one.on]
+        if reaction(short, one.by, one.on) in rubric.vectors and GROUND not in (by, on):
+            vector = _letters(pieces_of(reaction(short, one.by, one.on)))
+            yield _markup(Markup(_(REACTION)) % {"vector": vector, "by": by, "on": on}, 9)  # noqa: S704
+            break
     yield Spacer(1, 2 * mm)
 
 
@@ -326,8 +334,8 @@ def _centre(assignment: Assignment, plan: Plan, body: Body, speaker: Tongue) -> 
         return f"{number(float(f'{abs(value):.5g}'), speaker.decimal_mark)}\N{NO-BREAK SPACE}{speaker.unit(unit)}"
 
     line = Markup("").join(_letters(pieces_of(joint)) for joint in centre.base)
-    known = {"point": point, "line": line, "start": _letters(pieces_of(centre.base[0]))}
-    known |= {"along": length(place.real), "across": length(place.imag)}
+    known: dict[str, str] = {"along": length(place.real), "across": length(place.imag)}
+    known |= {"point": point, "line": line, "start": _letters(pieces_of(centre.base[0]))}
     is_on_it = abs(place.imag) < 1e-6 * abs(end - start) * LENGTH_UNITS[unit]
     return Markup(speaker.gettext(ON_THE_LINE if is_on_it else BESIDE[place.imag > 0.0])) % known  # noqa: S704
 
@@ -368,8 +376,8 @@ def _tables(assignment: Assignment, rubric: RubricFile, speaker: Tongue) -> Iter
         ]
 
     half = (WIDE_MM - GAP_MM) / 2.0
-    first = ("velocity_plan", "scales", "angular")
-    second = ("acceleration_plan", *(kind for kind in ("force_plans", "moments") if asked[kind]))
+    first = ("velocity_plan", "scales", "angular", *(["moments"] if asked["moments"] else []))
+    second = ("acceleration_plan", *(["force_plans"] if asked["force_plans"] else []))
     if max(sum(len(asked[kind]) + 2 for kind in kinds) for kinds in (first, second)) > MOST_ROWS:
         for kind in (*first, *second):
             yield from table(kind, WIDE_MM)
@@ -424,7 +432,9 @@ def _empty(
         ("BOTTOMPADDING", (0, 0), (-1, -1), 0), ("LEFTPADDING", (0, 0), (-1, -1), 3),
         ("RIGHTPADDING", (0, 0), (-1, -1), 1),
     ]  # fmt: skip
-    return Table(cells, colWidths=widths, rowHeights=[high_mm * mm] * len(cells), style=style, repeatRows=1)
+    # Cells that are printed, not to be filled in, may have several lines.
+    heights = [None if shares else high_mm * mm] * len(cells)
+    return Table(cells, colWidths=widths, rowHeights=heights, style=style, repeatRows=1)
 
 
 def _side_by_side(left: list[Flowable], right: list[Flowable], left_mm: float) -> Table:

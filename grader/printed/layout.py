@@ -8,18 +8,18 @@ import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate, combinations
-from typing import Literal, TypeVar, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, FloatArray, Identity
 from reference.authored.assignment import SCALE_NAMES, Assignment, PageKind, PageTable, Scales, Variant
-from reference.construction.graph import Construction, evaluate, parameters_of
+from reference.construction.graph import Construction, Vector, evaluate, parameters_of
 from reference.drawing.canvas import A3_MM
 from reference.geometry import ComplexArray
 from reference.plan import construction_for, exact_plan
-from reference.quantities import FORCE_PLANS, scale_of, value_name, vector_of_value, zone_of
+from reference.quantities import FORCE_PLANS, group_of, scale_of, value_name, vector_of_value, zone_of
 
 # The code's text ----------------------------------------------------------------------------------
 
@@ -259,9 +259,21 @@ def cells_of(
     table = _single(assignment, figures)
     if table is None:
         return {}
-    construction = page_construction(assignment, table.figures)
-    ordered = dict.fromkeys(table.figures)
-    return combs_of(boxes_of([v.name for figure in ordered for v in construction.polygon_of(figure)], asked))
+    vectors = measured_on(page_construction(assignment, table.figures), table.figures)
+    return combs_of(boxes_of([vector.name for vector in vectors], asked))
+
+
+def measured_on(construction: Construction, figures: Sequence[str]) -> list[Vector]:
+    """Return the vectors of a page whose lengths students may write down, in zone order.
+
+    Of motion the sums of components are left out, which few draw; of forces they are the reactions.
+    """
+    return [
+        vector
+        for figure in dict.fromkeys(figures)
+        for vector in construction.vectors_of(figure)
+        if group_of(figure) or not vector.is_sum
+    ]
 
 
 def written_cells(
@@ -446,7 +458,7 @@ def values_of(
     if table is None or not any(map(vector_of_value, asked)):
         return {}
     construction, variants = page_construction(assignment, table.figures), assignment.variants()
-    vectors = {v.name: v for figure in dict.fromkeys(table.figures) for v in construction.polygon_of(figure)}
+    vectors = {vector.name: vector for vector in measured_on(construction, table.figures)}
     wanted = [name for name in vectors if value_name(name) in asked]
     boxes = field_boxes(tuple(vectors)) if wanted and len(vectors) <= EASY_FIELDS else {}
     below = max((y + high for _, y, _, high in boxes.values()), default=np.inf) + _FIELD_GAP_MM
@@ -469,12 +481,18 @@ def values_of(
     return found
 
 
+Size = tuple[FloatArray, FloatArray]
+"""Width and height of a figure in every variant, millimetres, (N,) each."""
+Extents = Mapping[str, Size]
+"""The size of each figure."""
+
+
 def extents_mm(
     assignment: Assignment, figures: Sequence[str], variants: list[Variant]
-) -> dict[str, tuple[float, float]]:
-    """Return the largest width and height of each figure over variants, at the assignment's own scales."""
+) -> dict[str, Size]:
+    """Return width and height of each figure of every variant, at the assignment's own scales."""
     return {
-        figure: (float(np.ptp(places.real, axis=0).max()), float(np.ptp(places.imag, axis=0).max()))
+        figure: (np.ptp(places.real, axis=0), np.ptp(places.imag, axis=0))
         for figure, places in places_mm(assignment, figures, variants).items()
     }
 
@@ -508,24 +526,19 @@ def best_template(
     return template_for(extents_mm(assignment, figures, assignment.variants()), grid)
 
 
-def template_for(
-    extents: Mapping[str, tuple[float, float]], grid: Sequence[int] | None = None
-) -> TemplateFit:
-    """Return that division for figures whose largest width and height (mm) are known already.
+def template_for(extents: Extents, grid: Sequence[int] | None = None) -> TemplateFit:
+    """Return that division for figures whose widths and heights (mm) are known already.
 
     Arguments: `grid` of the positions on the sheet; the room is that of one of its zones.
     """
-    needs = {
-        zone: _sizes_together([(wide + 2 * MARGIN_MM, high + 2 * MARGIN_MM) for wide, high in sizes])
-        for zone, sizes in by_zone(extents).items()
-    }
+    needs = {zone: _sizes_together(sizes) for zone, sizes in by_zone(extents).items()}
 
-    def rooms(template: Template, zone: str) -> list[float]:
+    def rooms(template: Template, zone: str) -> FloatArray:
         _, _, wide, high = template.of_one(grid).zones[zone]
-        return [min(wide / need[0], high / need[1]) for need in needs[zone]]
+        return np.array([np.minimum(wide / need[0], high / need[1]) for need in needs[zone]])
 
     def room(template: Template, zone: str) -> float:
-        return max(rooms(template, zone))
+        return float(np.min(np.max(rooms(template, zone), axis=0)))
 
     def worth(template: Template) -> tuple[float, float]:
         # A plan's scale is the assignment's; the sketch's is often the student's choice.
@@ -534,16 +547,16 @@ def template_for(
         return (round(least, 6), min(room(template, zone) for zone in needs))
 
     best = max((template for template in TEMPLATES if template.figures == set(needs)), key=worth)
-    need_mm = {zone: needs[zone][int(np.argmax(rooms(best, zone)))] for zone in needs}
+    need_mm = {}
+    for zone, ways in needs.items():
+        way = ways[int(np.argmax(np.min(rooms(best, zone), axis=1)))]
+        need_mm[zone] = (float(np.max(way[0])), float(np.max(way[1])))
     return TemplateFit(best, {zone: room(best, zone) for zone in needs}, need_mm)
 
 
-Sized = TypeVar("Sized")
-
-
-def by_zone(extents: Mapping[str, Sized]) -> dict[str, list[Sized]]:
+def by_zone(extents: Extents) -> dict[str, list[Size]]:
     """Return the sizes of the figures in each zone."""
-    zones: dict[str, list[Sized]] = {}
+    zones: dict[str, list[Size]] = {}
     for figure, size in extents.items():
         zones.setdefault(zone_of(figure), []).append(size)
     return zones
@@ -556,12 +569,13 @@ def lines_of(count: int) -> list[list[list[int]]]:
     return [[[*every]], *([[*one], [k for k in every if k not in one]] for one in first)]
 
 
-def _sizes_together(sizes: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Return widths and heights of boxes together: on one line or two, which are rows or columns."""
+def _sizes_together(sizes: Sequence[Size]) -> list[Size]:
+    """Return widths and heights of figures with margins: on one line or two, which are rows or columns."""
     found = []
     for lines in lines_of(len(sizes)):
         for along, across in ((0, 1), (1, 0)):
-            long = max(sum(sizes[k][along] for k in line) for line in lines)
-            wide = sum(max(sizes[k][across] for k in line) for line in lines)
-            found.append((long, wide) if along == 0 else (wide, long))
+            long = [np.sum([sizes[k][along] + 2 * MARGIN_MM for k in line], axis=0) for line in lines]
+            wide = [np.max([sizes[k][across] for k in line], axis=0) + 2 * MARGIN_MM for line in lines]
+            both = (np.asarray(np.max(long, axis=0)), np.asarray(sum(wide)))
+            found.append((both[along], both[across]))
     return found
