@@ -24,6 +24,7 @@ from grader.tables.reader import at, near, short
 from grader.tables.roster import Roster, RosterRow
 from grader.texts.spoken import ENGLISH, clause, unmatched_document
 from reference.authored.assignment import Assignment, Variant
+from reference.authored.bodies import Masses
 from reference.construction.derive import construction_of
 
 _DIGITS = 8
@@ -90,6 +91,8 @@ def _task(assignment: Assignment, variant: Variant | None) -> object:
         return assignment.id, mechanism
     numbers = {**assignment.values([variant]), **assignment.scales([variant]).by_name}
     told = {name: f"{float(np.ravel(number)[0]):.9g}" for name, number in numbers.items()}
+    if assignment.file.has_forces:
+        mechanism += assignment.file.model_dump_json(include={*Masses.model_fields})
     return assignment.id, mechanism, assignment.file.plate_images, told
 
 
