@@ -85,11 +85,13 @@ def construction_for(
 
     Arguments: `forces`, whence the accelerations of its force plans come (default: as its pages have it).
     """
+    whence = assignment.forces and (forces or assignment.forces)
     return construction_of(
         assignment.mechanism(assignment.variants()[:1] if variants is None else variants),
-        accelerations=accelerations,
+        # Forces that follow from the student's own accelerations are not drawn without them.
+        accelerations=accelerations or whence == "own",
         plate_by_similarity=assignment.file.plate_images == "similarity",
-        forces=assignment.forces and (forces or assignment.forces),
+        forces=whence,
     )
 
 

@@ -232,9 +232,9 @@ def _given(file: MechanismFile) -> Iterator[tuple[str, str, str]]:
                 )
         for key, measure in MEASURES.items():
             values = getattr(table, key, None)
-            unit = _UNITS[measure].format(length=file.length_unit)
             if key in ("through", "at") or values is None:
                 continue
+            unit = _UNITS[measure].format(length=file.length_unit)
             for index, one in enumerate(values if isinstance(values, list) else [values]):
                 yield labels.get((key, index), labels.get(key, key)), one.text, unit
         guides = getattr(table, "guides", None) or [getattr(table, "guide", None)]

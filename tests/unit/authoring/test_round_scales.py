@@ -54,10 +54,11 @@ def with_round_scales(tmp_path: Path, name: str) -> Path:
     """A built-in assignment with the round scales that lint proposes for it in its file."""
     assignment = load_assignment(name)
     found = lint(assignment, load_rubric(assignment.file.rubric, beside=assignment.path))
-    kL, kv, ka = (float(getattr(found.scales[1].scales, one)[0]) for one in ("kL", "kv", "ka"))  # noqa: N806
+    scales = found.scales[1].scales.by_name
     text = assignment.path.read_text(encoding="utf-8")
-    crank = "" if assignment.mechanism_file.crank is None else f'crank_mm = "crank_m / {kL!r}"\n'
-    proposed = f"[scales]\n{crank}kL = {kL!r}\nkv = {kv!r}\nka = {ka!r}\n\n"
+    crank = "" if assignment.mechanism_file.crank is None else f'crank_mm = "crank_m / {scales["kL"][0]}"\n'
+    told = "".join(f"{scale} = {float(np.max(value))!r}\n" for scale, value in scales.items())
+    proposed = f"[scales]\n{crank}{told}\n"
     text, count = re.subn(r"\[scales\].*?(?=\n\[)", proposed, text, flags=re.DOTALL)
     assert count == 1
     (tmp_path / f"{name}.assignment.toml").write_text(text, encoding="utf-8")

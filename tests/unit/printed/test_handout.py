@@ -10,7 +10,7 @@ from grader.printed import handout
 from grader.printed.handout import make_handout
 from grader.rubric import rubric_of
 from grader.tables.roster import RosterRow
-from reference.authored.assignment import Variant, built_in, load_assignment
+from reference.authored.assignment import Variant, built_in, library, load_assignment
 from reference.errors import AuthoredFileError
 from reference.plan import exact_plan
 
@@ -33,11 +33,10 @@ def first_row(assignment, **known):
 def test_a_sheet_has_task_data_and_tables_and_no_number_of_the_solution(name):
     assignment = load_assignment(name)
     row = first_row(assignment)
-    (text,) = pages_of(assignment, row)
-    words = " ".join(text.split())
+    words = " ".join(" ".join(pages_of(assignment, row)).split())
     assert assignment.file.title.en in words
     assert "Ana Țîrlea (s07)" in words
-    assert "Velocities" in words
+    assert ("Velocities" if assignment.forces is None else "Forces") in words
     variant = Variant(row.n, row.position)
     given = {
         abs(float(np.ravel(one.value(assignment.values([variant])))[0])) for one in assignment.file.given
@@ -45,9 +44,57 @@ def test_a_sheet_has_task_data_and_tables_and_no_number_of_the_solution(name):
     plan = exact_plan(assignment, [variant])
     solution = {float(np.abs(plan.drawn_mm(name))[0]) for name in plan.construction.vectors}
     solution |= {float(np.abs(value)[0]) for value in plan.rates.values()}
+    if plan.forces is not None:
+        told = {one.name for one in plan.forces.given if one.kind == "load"}
+        solution |= {float(np.abs(value[0])) for name, value in plan.vectors_si.items() if name not in told}
+        given |= masses_of(assignment, plan)
     printed = {float(number) for number in re.findall(r"\d+\.\d+", words)}
     for number in printed - given:
         assert not any(number == pytest.approx(value, rel=1e-3) for value in solution if value > 1.0)
+
+
+def masses_of(assignment, plan):
+    """Masses, inertias, centres and accelerations."""
+    given = {float(one[0]) for body in plan.mechanism.bodies for one in (body.mass, body.inertia) if one}
+    centres = [body.centre for body in assignment.file.body if body.centre]
+    return given | {float(part.text) for centre in centres for part in centre.at or ()}
+
+
+def with_own_accelerations(folder):
+    """The pump's force plans after an acceleration plan of the student's own."""
+    for kind, given, own in (
+        ("rubric", 'accelerations = "given"', 'accelerations = "own"'),
+        ("assignment", "[[page]]", '[[page]]\nkind = "acceleration"\nfigures = ["acceleration_plan"]\n\n[[page]]'),
+    ):
+        path = library() / f"pump-forces.{kind}.toml"
+        text = path.read_text(encoding="utf-8").replace(given, own, 1)
+        (folder / path.name).write_text(text, encoding="utf-8")
+    return folder / "pump-forces.assignment.toml"
+
+
+def test_a_sheet_of_forces_tells_masses_loads_and_the_given_accelerations():
+    (text,) = pages_of(load_assignment("pump-forces"), RosterRow("", n=7))
+    words = re.sub(r"\s+", " ", text)
+    for told in (
+        "S2 on O2B, 15 cm from O2",
+        "S3: 17.9 cm from A along AB, 4.84 cm to the left",
+        # Accelerations of S3 and of the piston, by the solver.
+        "404.3 221.1 −243.6",
+        "162.9 180 –",
+        # Against the piston's motion, which is to the left.
+        "2650 N 0",
+        "R23 is the force of link 2 on link 3",
+    ):
+        assert told in words, (told, words)
+
+
+def test_students_with_an_acceleration_plan_of_their_own_are_not_told_its_results(tmp_path):
+    assignment = load_assignment(with_own_accelerations(tmp_path))
+    words = re.sub(r"\s+", " ", " ".join(pages_of(assignment, RosterRow("", n=7))))
+    assert "from your acceleration plan" in words
+    assert "against its motion" in words
+    assert "404.3" not in words
+    assert "2650 N" in words
 
 
 def test_each_student_reads_their_own_language():

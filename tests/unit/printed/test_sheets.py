@@ -264,8 +264,8 @@ def test_the_templates_numbers_are_what_printed_sheets_rely_on():
     }
     assert TEMPLATES[27].zones["acceleration_plan"] == (236.0, 148.6, 171.0, 114.4)
     assert TEMPLATES[28].zones == {
-        "mechanism": (23.0, 51.0, 133.0, 212.0),
-        "force_plans": (160.0, 51.0, 247.0, 212.0),
+        "mechanism": (23.0, 51.0, 136.8, 212.0),
+        "force_plans": (163.8, 51.0, 243.2, 212.0),
     }
     assert TEMPLATES[29].zones == {"force_plans": (23.0, 51.0, 384.0, 212.0)}
     assert len(TEMPLATES) == 30
