@@ -373,7 +373,7 @@ def accelerations_of(assignment: Assignment, rubric: RubricFile) -> Literal["giv
     return rubric.accelerations or ("own" if "acceleration_plan" in assignment.figures else "given")
 
 
-def _check_accelerations(assignment: Assignment, rubric: RubricFile) -> Iterator[Finding]:
+def check_accelerations(assignment: Assignment, rubric: RubricFile) -> Iterator[Finding]:
     """Report accelerations that no page shows, and those for which there is no force plan."""
     told = rubric.accelerations
     if told is not None and accelerations_of(assignment, rubric) is None:
@@ -416,7 +416,7 @@ def rubric_of(assignment: Assignment) -> RubricFile:
     """
     rubric = load_rubric(assignment.file.rubric, beside=assignment.path)
     findings = check_rubric(rubric, construction_for(assignment))
-    findings += _check_accelerations(assignment, rubric)
+    findings += check_accelerations(assignment, rubric)
     if findings:
         path = locate("rubric", assignment.file.rubric, assignment.path)
         raise AuthoredFileError(str(path), tuple(findings))

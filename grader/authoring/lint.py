@@ -45,7 +45,7 @@ from grader.documents import (
     LintWorst,
 )
 from grader.language import LANGUAGES
-from grader.rubric import RubricFile, check_rubric
+from grader.rubric import RubricFile, check_accelerations, check_rubric
 from reference.authored.assignment import SCALE_NAMES, TRADITIONS, Assignment, Variant
 from reference.authored.formula import Formula
 from reference.authored.toml_file import LENGTH_UNITS_M, SideText, Text
@@ -222,7 +222,7 @@ def data_findings(
     assignment: Assignment, rubric: RubricFile, construction: Construction
 ) -> Iterator[LintFinding]:
     """Report names in rubric and assignment that are unknown, unused, repeated, or not given to students."""
-    yield from _rubric_faults(rubric, construction)
+    yield from _rubric_faults(assignment, rubric, construction)
     yield from _unused_values(assignment)
     yield from _not_told(assignment)
     yield from _unknown_names(assignment, construction)
@@ -263,8 +263,10 @@ def _untranslated(assignment: Assignment, rubric: RubricFile) -> Iterator[LintFi
             yield LintFinding("hint", "not_translated", name, missing[0], message)
 
 
-def _rubric_faults(rubric: RubricFile, construction: Construction) -> Iterator[LintFinding]:
-    for fault in check_rubric(rubric, construction):
+def _rubric_faults(
+    assignment: Assignment, rubric: RubricFile, construction: Construction
+) -> Iterator[LintFinding]:
+    for fault in (*check_rubric(rubric, construction), *check_accelerations(assignment, rubric)):
         yield LintFinding("fault", "unknown_in_rubric", "rubric", fault.path, fault.message)
     judged_by: dict[str, str] = {}
     for index, criterion in enumerate(rubric.criterion):

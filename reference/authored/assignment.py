@@ -38,7 +38,7 @@ from reference.errors import AuthoredFileError, CallError, Faults, Finding, near
 from reference.geometry import FloatArray
 from reference.kinematics.motion import BoolArray
 from reference.mechanism import Crank, Driver, Mechanism, links_of
-from reference.quantities import FIGURE, FORCE_PLAN, SCALE_UNITS, group_of, scale_of
+from reference.quantities import FIGURE, FORCE_PLAN, FORCE_PLANS, SCALE_UNITS, group_of, scale_of, zone_of
 
 
 class Range(Authored):
@@ -614,6 +614,11 @@ def _check_force_plans(assignment: Assignment) -> Iterator[Finding]:
     joints = [group.node for group in reversed(mechanism.groups) if links_of(group)]
     known = ", ".join(f"{FORCE_PLAN}{joint}" for joint in (*joints, mechanism.driver.pin))
     for index, page in enumerate(assignment.file.page):
+        others = {zone_of(figure) for figure in page.figures} - {FORCE_PLANS, "mechanism"}
+        if others and any(map(group_of, page.figures)):
+            told = " and ".join(sorted(others)).replace("_", " ")
+            message = f"force plans share a sheet with the mechanism only: put the {told} on another page"
+            yield Finding(f"$.page[{index}].figures", message)
         for place, figure in enumerate(page.figures):
             if (joint := group_of(figure)) and joint not in (*joints, mechanism.driver.pin):
                 message = f"{joint} names no group of this mechanism; its force plans are {known}"

@@ -57,6 +57,8 @@ class CentreTable(Authored):
     @model_validator(mode="before")
     @classmethod
     def _by_its_name(cls, data: Any) -> Any:  # noqa: ANN401 - not yet validated
+        if not isinstance(data, str | dict):
+            raise ValueError(f"the centre of mass is {CENTRE}")
         return {"joint": data} if isinstance(data, str) else data
 
     @model_validator(mode="after")

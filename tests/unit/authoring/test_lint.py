@@ -10,9 +10,11 @@ import pytest
 
 from grader.authoring.findings import named
 from grader.authoring.lint import lint, lint_document
+from grader.authoring.round_scales import asked_vectors
 from grader.cli.exporting import schema
 from grader.rubric import load_rubric
 from reference.authored.assignment import Variant, built_in, library, load_assignment
+from reference.errors import AuthoredFileError
 from reference.plan import exact_plan
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -20,8 +22,10 @@ SINE_TOLERANCE = 1e-9
 
 
 def edited(tmp_path: Path, name: str, kind: str, old: str, new: str) -> Path:
-    """A built-in assignment's files copied, with one text replaced in one of them."""
+    """A built-in assignment's own files copied, with one text replaced in one of them."""
     for each in ("assignment", "mechanism", "rubric"):
+        if not (library() / f"{name}.{each}.toml").is_file():
+            continue
         text = (library() / f"{name}.{each}.toml").read_text(encoding="utf-8")
         if each == kind:
             assert old in text
@@ -177,6 +181,35 @@ def test_a_rubric_whose_accelerations_have_no_page_is_told(tmp_path):
     path = edited(tmp_path, "engine", "assignment", ', "acceleration_plan"]', "]")
     (told,) = findings_of(path, "no_page")
     assert "acceleration plan" in told.message
+
+
+def test_own_accelerations_without_an_acceleration_plan_are_a_fault(tmp_path):
+    path = edited(tmp_path, "pump-forces", "rubric", 'accelerations = "given"', 'accelerations = "own"')
+    (told,) = findings_of(path, "unknown_in_rubric")
+    assert (told.path, told.severity) == ("$.accelerations", "fault")
+    assert 'add one, or say "given"' in told.message
+
+
+def test_force_plans_share_a_sheet_with_the_mechanism_only(tmp_path):
+    path = edited(tmp_path, "pump-forces", "assignment", '"force_plan_D",', '"force_plan_D", "velocity_plan",')
+    with pytest.raises(AuthoredFileError, match="put the velocity plan on another page") as caught:
+        load_assignment(path)
+    assert [finding.path for finding in caught.value.findings] == ["$.page[0].figures"]
+
+
+def test_a_force_plan_without_a_page_is_told_just_where_it_is_asked_for(tmp_path):
+    assert not findings_of("pump-forces", "no_page")
+    path = edited(tmp_path, "pump-forces", "rubric", '\nvector = "R_43"', '\nvector = "R_31"')
+    (told,) = findings_of(path, "no_page")
+    assert "the force plan A" in told.message
+
+
+@pytest.mark.parametrize("name", ["pump-forces", "press-forces"])
+def test_built_in_force_plans_fit_and_are_long_enough_to_measure(name):
+    found = linted(name)
+    assert not found.needs_a_person
+    asked = asked_vectors(load_rubric(name), found.plan)
+    assert np.mean(asked.length_mm < 5.0) < 0.06
 
 
 def test_a_rubric_of_velocities_asks_for_no_accelerations():

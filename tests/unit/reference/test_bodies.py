@@ -154,6 +154,7 @@ side = "ahead"
         (('centre = "O1"', 'centre = "B"'), "$.body[0].centre", "link 1: it carries O1, A"),
         (('centre = "O1"', ""), "$.body[0].centre", "is missing"),
         (('centre = "O1"', 'centre = { base = ["O1", "A"] }'), "$.body[0].centre", "or base with at"),
+        (('centre = "O1"', "centre = [1, 2]"), "$.body[0].centre", "a joint of the link, or"),
         (('["A", "B"]', '["A", "G"]'), "$.body[2].centre.base", "must be two joints of link 6"),
         (('pins = ["B"]', 'pins = ["A"]'), "$.body[2].pins[0]", "its pin is on link 1"),
         (('pins = ["B"]', 'pins = ["E"]'), "$.body[2].pins[0]", "no point that is fixed on link 6"),
