@@ -18,7 +18,12 @@ import numpy as np
 
 from grader.printed.answer_sheet import make_sheets
 from grader.tables.roster import RosterRow
+from grader.rubric import rubric_of
 from reference.authored.assignment import Assignment, load_assignment
+from reference.construction.elements import View
+from reference.construction.graph import evaluate
+from reference.plan import exact_plan
+from reference.quantities import unit_of
 from samples.simulation import (
     CAREFUL,
     PENS,
@@ -255,10 +260,53 @@ def write_json(path: Path, line: dict[str, Any]) -> None:
     path.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
 
 
+# Force plans, entered as measured -----------------------------------------------------------------
+
+FORCES: dict[str, tuple[int, dict[str, float], dict[str, float]]] = {
+    "s01": (7, {}, {}),
+    "s02": (12, {"angle F_i3": np.pi}, {}),
+    "s03": (20, {}, {"kF": 125.0}),
+    "s04": (25, {"angle F_iD": np.pi}, {}),
+}
+"""Each student's n, angles (rad) by which a given force is turned wrongly, and scales of their own."""
+
+
+def forces_line(assignment: Assignment, student_id: str) -> dict[str, Any]:
+    """A student's force plans, drawn from the data as they took them, and measured to half a millimetre."""
+    n, turned, own = FORCES[student_id]
+    variant, rng = assignment.variant(n), np.random.default_rng([n, 41])
+    plan = exact_plan(assignment, [variant], assignment.scales([variant], **own))
+    parameters = {**plan.drawing.parameters}
+    parameters |= {name: parameters[name] + angle for name, angle in turned.items()}
+    construction, nodes = plan.construction, evaluate(plan.construction, parameters)
+    line: dict[str, Any] = {"student_id": student_id, "n": n}
+    line |= {name: f"{getattr(plan.scales, name)[0]:.6g} {unit_of(name)}" for name in assignment.scale_names}
+    for name in rubric_of(assignment).vectors:
+        vector = construction.vectors[name]
+        drawn = complex((nodes[vector.head] - nodes[vector.tail])[0]) * (-1.0 if vector.reversed else 1.0)
+        line[name] = round(2.0 * (abs(drawn) + rng.normal(0.0, 0.15))) / 2.0
+        line[f"{name}_deg"] = round(np.degrees(np.angle(drawn)) + rng.normal(0.0, 0.4)) % 360
+    moment = construction.moments["M_b"].at(View(nodes, parameters))
+    return {**line, "M_b_value": f"{float(moment[0]):.4g}"}
+
+
+def make_forces(assignment: Assignment, folder: Path) -> None:
+    """Write the class that has entered its force plans."""
+    folder.mkdir(parents=True, exist_ok=True)
+    lines = [forces_line(assignment, student_id) for student_id in FORCES]
+    columns = ("student_id", "name", "n", *assignment.scale_names)
+    named = [
+        {name: line.get(name, f"Student {number}") for name in columns} for number, line in enumerate(lines, 1)
+    ]
+    write_csv(folder / "roster.csv", named, ",")
+    write_csv(folder / "measurements.csv", lines, ",")
+
+
 def main(folder: Path) -> None:
-    """Make both classes."""
+    """Make the classes."""
     make_class(load_assignment("pump"), PUMP, folder / "pump", ",")
     make_class(load_assignment("press"), PRESS, folder / "press", ";")
+    make_forces(load_assignment("pump-forces"), folder / "pump-forces")
 
 
 if __name__ == "__main__":

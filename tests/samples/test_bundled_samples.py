@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from grader.pipeline import read_pages
+from grader.pipeline import mark, read_pages
 from grader.records import PageRef
-from grader.rubric import load_rubric
+from grader.rubric import load_rubric, rubric_of
 from grader.scan.decode.pages import is_blank, page_of
 from grader.scan.page import open_page
-from grader.tables.measurements import names_of, read_measurements
+from grader.tables.measurements import StudentSubmission, names_of, read_measurements
 from grader.tables.roster import read_roster
 from reference.authored.assignment import load_assignment
 from tests.examples import slow
@@ -47,7 +47,7 @@ def test_the_samples_are_small_enough_to_travel():
     assert sum(path.stat().st_size for path in SAMPLES.rglob("*") if path.is_file()) < MOST_BYTES
 
 
-@pytest.mark.parametrize("name", ["pump", "press"])
+@pytest.mark.parametrize("name", ["pump", "press", "pump-forces"])
 def test_the_readme_names_every_sample(name):
     told = (SAMPLES / "README.md").read_text(encoding="utf-8")
     for path in (SAMPLES / name).iterdir():
@@ -77,6 +77,25 @@ def test_the_script_makes_the_same_task_scales_and_scan_again(script, name, stud
         for figure, drawn in bundled["figures"].items():
             for vector, told in drawn.get("vectors", {}).items():
                 assert again["figures"][figure]["vectors"][vector]["intended"] == told["intended"]
+
+
+def test_the_script_makes_the_same_force_plans_again(script, tmp_path):
+    script.make_forces(load_assignment("pump-forces"), tmp_path)
+    for path in (SAMPLES / "pump-forces").iterdir():
+        assert (tmp_path / path.name).read_bytes() == path.read_bytes()
+
+
+def test_of_the_force_plans_two_are_right_and_two_have_an_inertia_force_along_the_acceleration():
+    folder, assignment = SAMPLES / "pump-forces", load_assignment("pump-forces")
+    rubric = rubric_of(assignment)
+    told = {}
+    for entered in read_measurements(folder / "measurements.csv", names_of(assignment)):
+        variant = assignment.variant(entered.n)
+        submission = StudentSubmission(entered.student_id, variant, measured=entered)
+        report, _ = mark(submission, (), assignment, rubric)
+        told[entered.student_id] = (report.score == report.max_score, {one.code for one in report.mistakes})
+    assert [told[student][0] for student in ("s01", "s03")] == [True, True]
+    assert [told[student][1] for student in ("s02", "s04")] == [{"inertia_reversed"}, {"inertia_reversed"}]
 
 
 def test_the_backs_in_the_class_pdf_are_blank_and_the_fronts_are_not():
