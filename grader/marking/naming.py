@@ -15,10 +15,9 @@ from grader.records import MECHANISM
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.elements import Along, Line
 from reference.construction.graph import Construction
-from reference.construction.mistakes import RPM_FACTOR, Drawing, Mistake, affected, commit
+from reference.construction.mistakes import RPM_FACTOR, SLIP, Drawing, Mistake, affected, commit
 from reference.construction.steps import Given, Step, TwoLines
 from reference.quantities import kind_of
-from reference.replay.explanations import SLIP
 from reference.replay.replay import Replay
 
 # What was drawn by mistake, where that is certain --------------------------------------------------
@@ -80,7 +79,7 @@ def named(
     best, shares = explanations[0], _Shares(explanations)
     all_thought_of = ALL_THOUGHT_OF if has_directions else ALL_THOUGHT_OF_BY_LENGTHS
     known = all_thought_of if len(best.made) > 1 else 1.0
-    slips = sum(one.code == SLIP for one in best.made)
+    slips = sum(one.code == SLIP and not one.other for one in best.made)
     explains, mistakes = _losses_explained(best, construction, lost), []
     record = partial(_record, construction, lost.gear_ratio)
     for mistake in _in_order(best.made, construction):
@@ -88,7 +87,7 @@ def named(
         rivals = shares.rivals(key, {key_of(one) for one in best.made})
         together = share + sum(shares.instead(key, key_of(one)) for one in rivals)
         is_sure = share >= LEAST_CONFIDENCE or (together >= SURE_TOGETHER and rivals)
-        is_shown = explains[mistake] and (mistake.code != SLIP or slips <= MOST_SLIPS)
+        is_shown = explains[mistake] and (mistake.code != SLIP or mistake.other or slips <= MOST_SLIPS)
         if is_shown and is_sure and not _is_slight(mistake, best):
             others = tuple(record(one, (), known * shares.instead(key, key_of(one))) for one in rivals)
             mistakes.append(record(mistake, tuple(explains[mistake]), known * share, others))

@@ -340,8 +340,8 @@ def _values(
     followed = {name: one.used.used / (one.other or one.used.used) for name, one in settled.items()}
     vectors = task.construction.vectors
     right = {name: abs(real) * followed.get(vectors[name].scale, 1.0) for name, real in task.real.items()}
-    for name, rate in task.rates.items():
-        right[name] = rate * followed.get(vectors[task.construction.rates[name].vector].scale, 1.0)
+    for name, rate in task.construction.rates.items():
+        right[name] = task.rates[name] * followed.get(vectors[rate.vector].scale, 1.0)
     ratios = {name: abs(value / float(right[name])) for name, value in values.items() if right.get(name)}
     known = {name: ratio for name, ratio in ratios.items() if 0.0 < ratio < math.inf}
     for unit, (kinds, factor) in VALUE_UNITS.items():

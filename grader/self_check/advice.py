@@ -16,6 +16,7 @@ from grader.self_check.results import Checked, Result, certain_mistakes, checked
 from grader.texts.reasons import reason_sentence
 from grader.texts.spoken import place
 from reference.authored.assignment import SCALE_NAMES, Assignment
+from reference.construction.mistakes import RIGHT_TRIANGLE
 
 RESULTS: Mapping[Result, tuple[str, str]] = {
     "right": ("✓", N_("right")),
@@ -164,6 +165,7 @@ _DRIVING = {
     },
     DRIVING_ALONG: {"parallel_for_perpendicular": N_("a_n lies along the link, towards the pivot.")},
 }
+_BY_TRIANGLE = {"arithmetic": N_("The right triangle gives v²/l at the scale ka only where kL·ka = kv².")}
 _SAME = N_("The same mistake as at %(name)s.")
 
 
@@ -255,5 +257,5 @@ def law_of(mistake: NamedMistake) -> str:
     if mistake.at.startswith(CORIOLIS_END):
         return _CORIOLIS.get(mistake.code, usual)
     line = line_of(mistake)
-    others = _GUIDE if line == ALONG_GUIDE else _DRIVING.get(line, {})
+    others = {**_DRIVING, ALONG_GUIDE: _GUIDE, RIGHT_TRIANGLE: _BY_TRIANGLE}.get(line, {})
     return others.get(mistake.code, usual)

@@ -9,7 +9,6 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from grader.documents import ScaleName
 from reference.authored.assignment import Assignment, Variant
 from reference.construction.graph import Construction
 from reference.geometry import ComplexArray, FloatArray
@@ -161,7 +160,7 @@ class PlanDocument(_Document):
     assignment: str
     variant: dict[str, int]
     position: int | None
-    scales: dict[ScaleName, float]
+    scales: dict[str, float]
     """Real units per millimetre on paper: m/mm, (m/s)/mm, (m/s^2)/mm, N/mm."""
     points_m: dict[str, tuple[float, float]]
     vectors: dict[str, PlanVector]
