@@ -51,10 +51,10 @@ SIGNS = N_(
 BODIES = {True: N_("Masses, and accelerations of the centres of mass"), False: N_("Masses")}
 LOADS, LINK, CENTRE = N_("Loads"), N_("Link"), N_("Centre of mass")
 LOAD = (N_("Load"), LINK, N_("Point"), VALUE, DIRECTION)
-ON_THE_LINE = N_("%(point)s on %(line)s, %(along)s from %(start)s")
+ON_THE_LINE = N_("%(point)s on %(link)s, %(along)s from %(tail)s")
 BESIDE = {
-    True: N_("%(point)s: %(along)s from %(start)s along %(line)s, %(across)s to the left"),
-    False: N_("%(point)s: %(along)s from %(start)s along %(line)s, %(across)s to the right"),
+    True: N_("%(point)s: %(along)s from %(tail)s along %(link)s, %(across)s to the left"),
+    False: N_("%(point)s: %(along)s from %(tail)s along %(link)s, %(across)s to the right"),
 }
 MOTIONS = {True: N_("along its motion"), False: N_("against its motion")}
 OWN = N_("Take accelerations of the centres of mass and angular accelerations from your acceleration plan.")
@@ -335,7 +335,7 @@ def _centre(assignment: Assignment, plan: Plan, body: Body, speaker: Tongue) -> 
 
     line = Markup("").join(_letters(pieces_of(joint)) for joint in centre.base)
     known: dict[str, str] = {"along": length(place.real), "across": length(place.imag)}
-    known |= {"point": point, "line": line, "start": _letters(pieces_of(centre.base[0]))}
+    known |= {"point": point, "link": line, "tail": _letters(pieces_of(centre.base[0]))}
     is_on_it = abs(place.imag) < 1e-6 * abs(end - start) * LENGTH_UNITS[unit]
     return Markup(speaker.gettext(ON_THE_LINE if is_on_it else BESIDE[place.imag > 0.0])) % known  # noqa: S704
 
