@@ -100,6 +100,7 @@ EXAMPLES: Mapping[str, str] = {
     "versions": "python 3.12 / 3.11", "whole": "7", "worker": "tcp://desk:40001",
     "wait": "90\u00a0s",
     "bias": "-0.05", "difference": "0.21", "equal": "17",
+    "force": "R_34_t = 12.3\u00a0mm",
     "waiting": "4", "zone": "EET", "wide": "@90 mm", "zone_high": "@120 mm", "zone_wide": "@180 mm",
 }  # fmt: skip
 """Parameters by name: after ``@`` a number with its unit; other texts of the catalogues are translated."""
@@ -125,6 +126,19 @@ OTHERWISE: Mapping[str, Mapping[str, str]] = {
     "It could not be read": {"why": "%(nodes)s, on which it depends, was not read for certain"},
     "It was read with": {"why": "%(nodes)s, on which it depends, was not read for certain"},
     "The sheet could not be placed": {"why": "only %(share)s of the sheet is in the picture"},
+    "From the end of %(other)s": {"other": "F_i4"},
+    "From the end of %(last)s": {
+        "last": "F_D",
+        "first": "R_0D",
+        "second": "R_34_n",
+        "first_direction": "perpendicular to the guide of %(joint)s",
+        "second_direction": "parallel to %(link)s",
+    },
+    "Lay off %(force)s": {"force": "F_D = 47.0\u00a0mm", "other": "R_43"},
+    "%(name)s runs": {"name": "R_D4", "other": "F_i4"},
+    "%(name)s closes": {"name": "R_01"},
+    "%(name)s is zero here: nothing": {"name": "F_i4"},
+    "opposite to %(vector)s": {"vector": "R_34"},
     "From %(start)s": {"direction": "parallel to %(link)s, from %(tail)s towards %(head)s"},
 }
 """Parameters of texts that begin so."""

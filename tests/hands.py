@@ -51,6 +51,8 @@ def measured(
         for vector in task.construction.vectors_of(plan):
             drawn = nodes[vector.head] - nodes[vector.tail]
             known = directions and abs(drawn) > ZERO_MM
+            # As the arrow points.
+            drawn = -drawn if vector.reversed else drawn
             degrees = math.degrees(cmath.phase(drawn)) % 360.0 if known else None
             vectors[vector.name] = ReadVector(abs(drawn), 0.0, degrees, 0.0 if known else None, 1.0)
         figures[plan] = Figure({}, vectors)

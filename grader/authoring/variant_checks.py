@@ -96,7 +96,7 @@ def assembly_findings(assignment: Assignment, variants: Sequence[Variant]) -> It
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
-    """Arrays of shape (N,) by joint or node; `error` is the predicted relative error of the plan."""
+    """Arrays of shape (N,) by joint, node or force; `error` is the predicted relative error of the plan."""
 
     transmission: Mapping[str, FloatArray]
     crossing_deg: Mapping[str, FloatArray]
@@ -111,6 +111,7 @@ def conditions_of(plan: Plan) -> Conditions:
         {name.removeprefix(kind): values for name, values in figures.items() if name.startswith(kind)}
         for kind in ("transmission ", "crossing ")
     )
+    crossing = {plan.construction.drawn_at(node): angle for node, angle in crossing.items()}
     return Conditions(transmission, crossing, figures.get("predicted_error", np.zeros(count)))
 
 

@@ -20,7 +20,17 @@ from typing import Literal
 
 import numpy as np
 
-from reference.construction.elements import Errors, Fixed, Line, Moments, Nodes, Parameters, View
+from reference.construction.elements import (
+    Couple,
+    Errors,
+    Fixed,
+    Force,
+    Line,
+    Moments,
+    Nodes,
+    Parameters,
+    View,
+)
 from reference.construction.steps import (
     ArcAndLine,
     Coincide,
@@ -50,6 +60,7 @@ from reference.mechanism import (
     Yoke,
     guides_of,
 )
+from reference.quantities import group_of
 
 
 def pair(pin: str, node: str) -> str:
@@ -193,6 +204,7 @@ class Construction:
         and acceleration poles (``J3``) of links that turn about no fixed pivot
     pairs : the joints between which links, slots and slides run, from the earlier joint
     moments : the balancing moment (``M_b``) of what acts on the driving link, N m
+    acting : what acts on each link but the reactions of its own group: given, or taken over
     """
 
     figures: Mapping[str, tuple[Step, ...]]
@@ -203,6 +215,7 @@ class Construction:
     centres: Mapping[str, Similar] = field(default_factory=dict)
     pairs: tuple[tuple[str, str], ...] = ()
     moments: Mapping[str, Moments] = field(default_factory=dict)
+    acting: Mapping[str, tuple[Force | Couple, ...]] = field(default_factory=dict)
 
     @cached_property
     def steps(self) -> tuple[Step, ...]:
@@ -229,6 +242,12 @@ class Construction:
     def figure_of(self, node: str) -> str:
         """Return the figure that a node belongs to. Raises KeyError for an unknown node."""
         return self._by_node[node][0]
+
+    def drawn_at(self, node: str) -> str:
+        """Return a node's name; of a force plan, whose nodes have no letters, the vector that ends there."""
+        if node not in self._by_node or not group_of(self.figure_of(node)):
+            return node
+        return next(one.name for one in self.vectors.values() if one.head == node and not one.is_sum)
 
     def needed_for(self, nodes: Collection[str]) -> frozenset[str]:
         """Return the nodes from which some nodes are directly made."""
