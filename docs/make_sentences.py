@@ -44,7 +44,7 @@ Row = tuple[str, ...]
 """A text in each of the languages."""
 
 EXAMPLES: Mapping[str, str] = {
-    "address": "https://marks.example.org", "along": "@15 cm", "across": "@4.84 cm",
+    "address": "https://marks.example.org", "along": "@15 cm", "across": "@4.84 cm", "on": "3",
     "angle": "@35°", "at": "b", "base": "AB", "centre": "A", "chance": "0.0004", "confidence": "62\u00a0%",
     "count": "2", "declared": "@0.04 (m/s)/mm", "degrees": "90", "direction": "perpendicular to %(link)s",
     "drawn": "@47.2 mm", "end": "b", "expected": "@1.67 m/s", "factor": "1.5", "first": "ab",
@@ -80,7 +80,7 @@ EXAMPLES: Mapping[str, str] = {
     "students": "30", "right": "24", "audited": "24", "unclear": "1", "student": "s07",
     "criterion": "Acceleration of B", "allowed": "3\u00a0%", "raised": "98.2\u00a0%",
     "times": "10", "vectors": "v_BA, v_CA", "letter": "A",
-    "advice": "scan it again", "assignment": "pump", "assumed": "@300 dpi", "by": "AB, v_A", "on": "3", "claim": "s07",
+    "advice": "scan it again", "assignment": "pump", "assumed": "@300 dpi", "by": "AB, v_A", "claim": "s07",
     "claims": "the QR code: %(claim)s", "copy": "2\u00a0%", "each": "2", "entries": "v_A: '6O'",
     "examples": "1:5, 5 cm/cm", "exit": "-11", "figure": "the velocity plan", "fits": "80\u00a0%",
     "form": "velocity", "given": "2", "graded": "n = 7", "grey": "40", "kind": "PNG", "lengths": "40",

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from grader.printed.answer_sheet import make_sheets
-from grader.tables.roster import RosterRow
 from grader.rubric import rubric_of
+from grader.tables.roster import RosterRow
 from reference.authored.assignment import Assignment, load_assignment
 from reference.construction.elements import View
 from reference.construction.graph import evaluate
@@ -296,7 +296,8 @@ def make_forces(assignment: Assignment, folder: Path) -> None:
     lines = [forces_line(assignment, student_id) for student_id in FORCES]
     columns = ("student_id", "name", "n", *assignment.scale_names)
     named = [
-        {name: line.get(name, f"Student {number}") for name in columns} for number, line in enumerate(lines, 1)
+        {name: line.get(name, f"Student {number}") for name in columns}
+        for number, line in enumerate(lines, 1)
     ]
     write_csv(folder / "roster.csv", named, ",")
     write_csv(folder / "measurements.csv", lines, ",")

@@ -312,7 +312,9 @@ def _with_their_own(assignment: Assignment, names: Iterable[str]) -> set[str]:
 
 def _unused_values(assignment: Assignment) -> Iterator[LintFinding]:
     file = assignment.file
-    outside = names_in([assignment.mechanism_file, file.scales, file.given, file.body, file.load, file.gravity])
+    outside = names_in(
+        [assignment.mechanism_file, file.scales, file.given, file.body, file.load, file.gravity]
+    )
     needed = _with_their_own(assignment, outside)
     for name in file.variant.values:
         if name not in needed:

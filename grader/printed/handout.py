@@ -137,7 +137,9 @@ def _sheet(
     data += [_markup(_letters(datum), 10) for datum in given_data(assignment, variant, speaker)]
     gravity = assignment.mechanism([variant]).gravity
     if gravity is not None:
-        data.append(_text(f"g = {number(float(gravity[0]), speaker.decimal_mark)} {speaker.unit('m/s²')}", 10))
+        data.append(
+            _text(f"g = {number(float(gravity[0]), speaker.decimal_mark)} {speaker.unit('m/s²')}", 10)
+        )
     data += [Spacer(1, 2 * mm), _text(speaker.gettext(FIXED), 10, BOLD)]
     data += [_markup(line, 9) for line in _fixed(assignment, variant, speaker)]
     yield _side_by_side(data, [drawn, caption], WIDE_MM - SCHEME_MM[0] - GAP_MM)
@@ -263,7 +265,7 @@ def _fixed(assignment: Assignment, variant: Variant, speaker: Tongue) -> Iterato
 def _masses(
     assignment: Assignment, rubric: RubricFile, variant: Variant, speaker: Tongue
 ) -> Iterator[Flowable]:
-    """Yield tables of the masses, with the accelerations that are given, and of the loads: no other forces."""
+    """Yield tables of the masses, with accelerations if they are given, and of the loads: no other forces."""
     _, mark, unit = speaker.gettext, speaker.decimal_mark, speaker.unit
     plan, are_given = exact_plan(assignment, [variant]), accelerations_of(assignment, rubric) == "given"
     mechanism, short = plan.mechanism, short_names(plan.mechanism)
@@ -282,9 +284,7 @@ def _masses(
         if are_given:
             is_moved = body.mass is not None and bool(np.any(moving))
             row += [told(np.abs(moving), 4), direction(moving)] if is_moved else ["–", "–"]
-            row.append(
-                "–" if body.inertia is None else told(-acts[f"F_i{name}"].couple / body.inertia, 4)
-            )
+            row.append("–" if body.inertia is None else told(-acts[f"F_i{name}"].couple / body.inertia, 4))
         bodies.append(row)
     head = [_(LINK), f"m, {unit('kg')}", f"I, {unit('kg m²')}", _(CENTRE)]
     head += [f"a, {unit('m/s²')}", _(DIRECTION), f"ε, {unit('rad/s²')}"] if are_given else []
@@ -331,7 +331,8 @@ def _centre(assignment: Assignment, plan: Plan, body: Body, speaker: Tongue) -> 
     place = (at[body.centre][0] - start) * abs(end - start) / (end - start) * LENGTH_UNITS[unit]
 
     def length(value: float) -> str:
-        return f"{number(float(f'{abs(value):.5g}'), speaker.decimal_mark)}\N{NO-BREAK SPACE}{speaker.unit(unit)}"
+        told = number(float(f"{abs(value):.5g}"), speaker.decimal_mark)
+        return f"{told}\N{NO-BREAK SPACE}{speaker.unit(unit)}"
 
     line = Markup("").join(_letters(pieces_of(joint)) for joint in centre.base)
     known: dict[str, str] = {"along": length(place.real), "across": length(place.imag)}

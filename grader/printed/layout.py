@@ -484,9 +484,7 @@ Extents = Mapping[str, Size]
 """The size of each figure."""
 
 
-def extents_mm(
-    assignment: Assignment, figures: Sequence[str], variants: list[Variant]
-) -> dict[str, Size]:
+def extents_mm(assignment: Assignment, figures: Sequence[str], variants: list[Variant]) -> dict[str, Size]:
     """Return width and height of each figure of every variant, at the assignment's own scales."""
     return {
         figure: (np.ptp(places.real, axis=0), np.ptp(places.imag, axis=0))
@@ -500,7 +498,7 @@ def poles_mm(
     """Return the best positions of the poles of a template's plans, sheet millimetres for each variant.
 
     A plan begun there is in the middle of its zone, or of its position's. A plan that is larger than its
-    zone in some variant has none: the student will choose another scale. Nor have force plans, which share one.
+    zone in some variant has none: the student will choose another scale. Nor have force plans.
     """
     plans = [figure for figure in template.zones if figure not in {MECHANISM, FORCE_PLANS}]
     poles = {}

@@ -58,7 +58,7 @@ class CentreTable(Authored):
     @classmethod
     def _by_its_name(cls, data: Any) -> Any:  # noqa: ANN401 - not yet validated
         if not isinstance(data, str | dict):
-            raise ValueError(f"the centre of mass is {CENTRE}")
+            raise ValueError(f"the centre of mass is {CENTRE}")  # noqa: TRY004 - pydantic catches this one
         return {"joint": data} if isinstance(data, str) else data
 
     @model_validator(mode="after")

@@ -191,7 +191,9 @@ def test_own_accelerations_without_an_acceleration_plan_are_a_fault(tmp_path):
 
 
 def test_force_plans_share_a_sheet_with_the_mechanism_only(tmp_path):
-    path = edited(tmp_path, "pump-forces", "assignment", '"force_plan_D",', '"force_plan_D", "velocity_plan",')
+    path = edited(
+        tmp_path, "pump-forces", "assignment", '"force_plan_D",', '"force_plan_D", "velocity_plan",'
+    )
     with pytest.raises(AuthoredFileError, match="put the velocity plan on another page") as caught:
         load_assignment(path)
     assert [finding.path for finding in caught.value.findings] == ["$.page[0].figures"]

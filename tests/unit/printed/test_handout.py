@@ -64,7 +64,11 @@ def with_own_accelerations(folder):
     """The pump's force plans after an acceleration plan of the student's own."""
     for kind, given, own in (
         ("rubric", 'accelerations = "given"', 'accelerations = "own"'),
-        ("assignment", "[[page]]", '[[page]]\nkind = "acceleration"\nfigures = ["acceleration_plan"]\n\n[[page]]'),
+        (
+            "assignment",
+            "[[page]]",
+            '[[page]]\nkind = "acceleration"\nfigures = ["acceleration_plan"]\n\n[[page]]',
+        ),
     ):
         path = library() / f"pump-forces.{kind}.toml"
         text = path.read_text(encoding="utf-8").replace(given, own, 1)
