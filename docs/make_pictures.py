@@ -39,11 +39,12 @@ SHOWN_COLUMNS = (0, 1, 2, 5, 6, 10)
 
 
 def reference_picture() -> None:
-    """The reference drawing of one variant."""
-    pump = load_assignment("pump")
-    plan = exact_plan(pump, [pump.variant(7)])
-    sheets = reference_drawing(pump, plan)
-    (PICTURES / "pump-7.svg").write_text(svg([sheet.shapes for sheet in sheets]), encoding="utf-8")
+    """The reference drawings of one variant: its motion, its forces."""
+    for name in ("pump", "pump-forces"):
+        pump = load_assignment(name)
+        plan = exact_plan(pump, [pump.variant(7)])
+        sheets = reference_drawing(pump, plan)
+        (PICTURES / f"{name}-7.svg").write_text(svg([sheet.shapes for sheet in sheets]), encoding="utf-8")
 
 
 # The walk -----------------------------------------------------------------------------------------

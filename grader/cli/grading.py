@@ -146,7 +146,7 @@ def _cluster_module() -> ModuleType:
 def demo(out: Path, lang: str, jobs: int | None) -> None:
     """Grade the bundled samples, and write the page that leads to their classes."""
     classes = {}
-    for name in ("pump", "press", "pump-forces"):
+    for name in ("pump", "press"):
         note(f"Grading the {name} class of the samples")
         # A copy: what is decided on it lies beside it.
         folder = out / "handed-in" / name
