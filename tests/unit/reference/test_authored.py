@@ -110,7 +110,9 @@ def test_bad_toml_a_missing_file_and_text_of_another_encoding_are_told(tmp_path)
 
 
 def test_an_unknown_assignment_is_told_with_the_built_in_ones():
-    built_in = "engine, piston, press, press-all, pump, pump-230, pump-collinear, shaper"
+    built_in = (
+        "engine, piston, press, press-all, press-forces, pump, pump-230, pump-collinear, pump-forces, shaper"
+    )
     with pytest.raises(CallError, match=f"built in are {built_in}"):
         load_assignment("pmup")
     with pytest.raises(AuthoredFileError, match="no such file"):
