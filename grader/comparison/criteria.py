@@ -303,7 +303,7 @@ def _value(charges: Charges, criterion: CriterionTable) -> Outcome:
     used, scale = charges.following.used, charges.following.used[one.scale]
     may_be_drawn = charges.evidence.has_sheets and one.name in rubric.values and not rubric.values_alone
     if one.name not in values or may_be_drawn:
-        expected = expected_quantity(one.name, one.drawn(used), scale, 0.0)
+        expected = expected_quantity(one.name, one.drawn(used), scale, one.turn_rad)
         return _absent(charges, criterion, expected)
     held = HeldValue(rubric, criterion, abs(values[one.name]), scale)
     choice = _chosen(charges, criterion, held)

@@ -12,7 +12,16 @@ from grader.comparison.evidence import DrawnVector, Evidence
 from grader.comparison.task import Task
 from grader.records import MECHANISM
 from grader.rubric import ToleranceTable
-from reference.construction.elements import Coriolis, Normal, Parameters, View
+from reference.construction.elements import (
+    Balance,
+    Coriolis,
+    Inertia,
+    Normal,
+    Parameters,
+    Same,
+    Scaled,
+    View,
+)
 from reference.construction.graph import AngularRate, Construction, Vector, evaluate
 from reference.construction.steps import ArcAndLine, Given, Step, TwoArcs
 from reference.construction.uncertainty import OwnNode
@@ -182,18 +191,26 @@ class _LengthBranches:
             self.part(step.node, positions, made, pair, ends)
 
     def direct(self, node: str, made: Sequence[ComplexArray], ends: Sequence[_Measured]) -> None:
-        """Place a node at the end of the first of some vectors with directions.
+        """Place a node at the end of the first of some vectors with directions on which most of them agree.
 
         Branches in which its step or the other vectors put it elsewhere cost more.
         """
         positions = [self.nodes[one.vector.tail] + (one.drawn.as_complex or 0j) for one in ends]
-        self.nodes[node] = place = positions[0]
-        residuals = [_nearest(made, place), *(np.abs(other - place) for other in positions[1:])]
-        for residual in residuals:
-            squared = (residual / self.sigma_mm) ** 2
-            self.cost = self.cost + np.where(squared <= AS_EXPECTED**2, squared, UNEXPECTED)
+        costs = [
+            self._apart([_nearest(made, place), *(np.abs(other - place) for other in positions)])
+            for place in positions
+        ]
+        # Of two that disagree neither is surer.
+        count = len(ends) if len(ends) > 2 else 1
+        best = min(range(count), key=lambda index: float(costs[index].min()) // UNEXPECTED)
+        self.nodes[node], self.cost = positions[best], self.cost + costs[best]
         self.is_known[node] = np.ones(len(self.cost), np.bool_)
-        self.sources[node] = ends[:1]
+        self.sources[node] = ends[best : best + 1]
+
+    def _apart(self, residuals: Sequence[FloatArray]) -> FloatArray:
+        """The cost of distances at which a node's step and vectors put it elsewhere."""
+        squared = (np.array(residuals) / self.sigma_mm) ** 2
+        return np.asarray(np.where(squared <= AS_EXPECTED**2, squared, UNEXPECTED).sum(axis=0))
 
     def _along(self, step: Step, made: ComplexArray, one: _Measured) -> list[ComplexArray]:
         """Positions at one length along the step's direction; for components laid off, also reversed."""
@@ -307,8 +324,10 @@ def _nearest(made: Sequence[ComplexArray], place: ComplexArray) -> FloatArray:
 
 
 def _is_component(step: Step) -> TypeGuard[Given]:
-    """Return whether a step lays off a normal or Coriolis component: it may be missing, or reversed."""
-    return isinstance(step, Given) and isinstance(step.length, Normal | Coriolis)
+    """Return whether a step lays off a component or a force: it may be missing, or reversed."""
+    if isinstance(step, Given) and isinstance(step.length, Scaled):
+        return step.length.scale == "kF"
+    return isinstance(step, Given) and isinstance(step.length, Normal | Coriolis | Inertia | Same | Balance)
 
 
 def _crossing(

@@ -32,6 +32,7 @@ from reference.construction.mistakes import (
 from reference.construction.steps import ArcAndLine, TwoArcs
 from reference.errors import PlanmarkError
 from reference.geometry import ComplexArray, FloatArray
+from reference.plan import exact_plan
 from reference.quantities import OF_MOTION
 
 Kind = Literal["own", "other_variant", "data_misread"]
@@ -105,7 +106,11 @@ def _all_variants(task: Task) -> ExactDrawings:
     variants = task.assignment.variants()
     one = np.ones(len(variants))
     try:
-        together = parameters_of(task.assignment.mechanism(variants), one, one, one)
+        if task.assignment.forces:
+            wanted = task.rubric.needs_accelerations
+            together = exact_plan(task.assignment, variants, accelerations=wanted).drawing.parameters
+        else:
+            together = parameters_of(task.assignment.mechanism(variants), one, one, one)
         rule = task.assignment.scales(variants)
     except PlanmarkError:
         variants, together = [task.variant], {**task.parameters, **AT_SCALE_ONE}

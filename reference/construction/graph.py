@@ -13,6 +13,7 @@ its pole). It is data, a directed acyclic graph, and one evaluator has all uses:
 - only what is needed: `wanted` names the nodes asked for, ancestors alone are evaluated.
 """
 
+import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -157,6 +158,11 @@ class Vector:
     def is_sum(self) -> bool:
         """Return whether it is the sum of others: a full relative acceleration, a reaction of parts."""
         return self.scale != "kv" and self.link is not None and not self.part
+
+    @property
+    def turn_rad(self) -> float:
+        """The angle from its order of drawing to its own sense: half a turn if it is reversed."""
+        return math.pi if self.reversed else 0.0
 
 
 @dataclass(frozen=True, slots=True)
