@@ -3,7 +3,7 @@
 On each link stand its inertia force, its weight, the loads, and what later groups exert on it. The part of
 a reaction across a link is computed from the moments about the group's inner joint, the given forces follow
 head to tail, and two lines of known direction close the polygon. Nodes are ``B.0``, ``B.1``, ... in the plan
-``force_plan_B``; vectors are named as `Draft` has it: R_12 is the reaction of link 1 on link 2.
+``force_plan_B``. R_12 is the reaction of link 1 on link 2, R_12_n and R_12_t are its parts along and across.
 
 Source of the method: any course of kinetostatics, as Artobolevsky, Theory of Mechanisms, chapter 13.
 """
@@ -47,9 +47,8 @@ from reference.mechanism import (
     named_links,
     short_names,
 )
+from reference.quantities import FORCE_PLAN
 
-FORCE_PLAN = "force_plan_"
-"""Start of a force plan's name; the group's joint follows."""
 Ends = tuple[str, str]
 """Two joints of a link, or two nodes of a plan."""
 Accelerations = str
@@ -313,7 +312,9 @@ class ForcePlans:
         closed = polygon.close(Line(last, Along(q, inner)), Line(start, Along(p, inner)))
         self._closed_at(polygon, link_q, (q, inner), (end, last, closed), back=False)
         self._closed_at(polygon, link_p, (p, inner), (start, second, closed), back=True)
-        polygon.add(self.reaction(link_q, link_p), middle, closed, link=(p, inner))
+        if middle not in {start, end}:
+            # Without forces on either link, the other's reaction passes through it.
+            polygon.add(self.reaction(link_q, link_p), middle, closed, link=(p, inner))
 
     def _slider(self, polygon: Polygon, group: Slider) -> None:
         pin, inner, (rod, slider) = group.pin, group.node, self.links[group.node]
@@ -324,7 +325,7 @@ class ForcePlans:
         closed = polygon.close(Line(end, _across(inner, group.guide)), Line(start, Along(pin, inner)))
         self._on_guide(polygon, slider, group.guide, (end, closed), inner)
         self._closed_at(polygon, rod, (pin, inner), (start, second, closed), back=True)
-        if middle != end:
+        if middle not in {start, end}:
             polygon.add(self.reaction(slider, rod), middle, closed, link=(pin, inner))
 
     def _on_guide(
