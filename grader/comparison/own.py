@@ -12,16 +12,7 @@ from grader.comparison.evidence import DrawnVector, Evidence
 from grader.comparison.task import Task
 from grader.records import MECHANISM
 from grader.rubric import ToleranceTable
-from reference.construction.elements import (
-    Balance,
-    Coriolis,
-    Inertia,
-    Normal,
-    Parameters,
-    Same,
-    Scaled,
-    View,
-)
+from reference.construction.elements import Normal, Parameters, View, is_computed, is_force
 from reference.construction.graph import AngularRate, Construction, Vector, evaluate
 from reference.construction.steps import ArcAndLine, Given, Step, TwoArcs
 from reference.construction.uncertainty import OwnNode
@@ -325,9 +316,7 @@ def _nearest(made: Sequence[ComplexArray], place: ComplexArray) -> FloatArray:
 
 def _is_component(step: Step) -> TypeGuard[Given]:
     """Return whether a step lays off a component or a force: it may be missing, or reversed."""
-    if isinstance(step, Given) and isinstance(step.length, Scaled):
-        return step.length.scale == "kF"
-    return isinstance(step, Given) and isinstance(step.length, Normal | Coriolis | Inertia | Same | Balance)
+    return isinstance(step, Given) and (is_computed(step.length) or is_force(step.length))
 
 
 def _crossing(

@@ -15,13 +15,20 @@ from itertools import combinations
 import numpy as np
 
 from grader.records import MECHANISM
-from reference.construction.elements import Nodes, Scaled
+from reference.construction.elements import Nodes, Scaled, data_in, is_force
 from reference.construction.graph import evaluate
-from reference.construction.mistakes import Drawing, Mistake, commit
+from reference.construction.mistakes import Drawing, Mistake, commit, mistakes_of_forces
 from reference.construction.steps import Given
 from reference.construction.uncertainty import Skill
-from reference.quantities import kind_of, scale_of
-from reference.replay.explanations import RARITY, SLIP, Observations
+from reference.quantities import OF_MOTION, group_of, kind_of, scale_of
+from reference.replay.explanations import (
+    LEAST_FACTOR,
+    MOST_FACTOR,
+    RARITY,
+    SLIP,
+    Observations,
+    rarity_of,
+)
 from reference.replay.nothing import with_nothing
 from reference.replay.replay import Replay, Root, replay
 
@@ -99,10 +106,10 @@ def _searched_further(case: Case, scales: Sequence[Root], explanations: Sequence
     directions were observed, mistakes of the whole drawing are not tried. `scales` are the roots without
     other mistakes than in the scales.
     """
-    best, whole = explanations[0], [Root()]
+    best, whole = explanations[0], [Root(), *_of_forces(case)]
     scales = [*scales, *_scales_of_the_driver(case, best)]
     if not _is_explained(best) or not all(one.has_direction for one in case.observations.entries):
-        whole = [Root(), *_of_the_whole(case)]
+        whole += _of_the_whole(case)
     by_scale = [[_both(scale, one) for one in whole] for scale in scales]
     roots = [one for some in by_scale for one in some]
     cares = sorted({best.care, min(best.care, USUAL)})
@@ -230,6 +237,9 @@ def _is_clear(explanations: Sequence[Replay], case: Case) -> bool:
     }
     joints = {step.node for step in construction.figures[MECHANISM]}
     step = next((one for one in construction.steps if one.node == best.made[0].at), None)
+    if isinstance(step, Given) and data_in(step.length):
+        # What acts on a link may be wrong, and with it all that is computed from that.
+        return False
     return step is not None and places.issuperset({step.node, *step.needs} - joints)
 
 
@@ -253,7 +263,12 @@ def _scales_of_the_driver(case: Case, best: Replay) -> Iterator[Root]:
             if isinstance(one, Given) and isinstance(one.length, Scaled)
         ]
         scale = next((one.scale for one in construction.vectors_of(plan)), "")
-        if not scaled or scaled[-1] not in off or scale in {*case.assumed, *case.followed}:
+        if (
+            not scaled
+            or scale not in OF_MOTION
+            or scaled[-1] not in off
+            or scale in {*case.assumed, *case.followed}
+        ):
             continue
         nodes = evaluate(construction, case.drawing.parameters)
         right_mm = abs(complex(np.ravel(nodes[scaled[-1]] - nodes[pole])[0]))
@@ -293,6 +308,25 @@ def _other_scales(case: Case) -> Iterator[Root]:
         yield Root(made, parameters, cost=RARITY["scale_wrong"] + FURTHER_SCALE * (len(made) - 1))
 
 
+def _of_forces(case: Case) -> Iterator[Root]:
+    """Roots with a mistake in what acts on links, or with a slip in one force: moments have it, too."""
+    for mistake in mistakes_of_forces(case.drawing):
+        yield Root((mistake,), mistake.parameters, cost=RARITY[mistake.code])
+    known, drawn = case.drawing.parameters, {one.node: one for one in case.observations.entries}
+    nodes = evaluate(case.drawing.construction, known) if drawn else {}
+    for step in case.drawing.construction.steps:
+        if not isinstance(step, Given) or not is_force(step.length) or step.node not in drawn:
+            continue
+        start, one, right = drawn.get(step.start), drawn[step.node], nodes[step.node] - nodes[step.start]
+        value = one.value if start is None or one.tail is not None else one.value - start.value
+        factor = float(np.ravel(abs(value) / abs(right))[0])
+        if one.has_direction and LEAST_FACTOR < factor < MOST_FACTOR and abs(math.log(factor)) > LEAST_WRONG:
+            (datum,) = data_in(step.length)
+            changed = {datum: np.asarray(factor * known.get(datum, 1.0))}
+            slip = Mistake(SLIP, step.node, factor=factor, parameters=changed)
+            yield Root((slip,), changed, cost=rarity_of(slip))
+
+
 def _of_the_whole(case: Case) -> Iterator[Root]:
     """Roots with a plan turned as a whole."""
     for plan in case.drawing.construction.poles:
@@ -316,6 +350,7 @@ def _swaps(case: Case, explanation: Replay) -> Iterator[Mistake]:
         images = sorted(
             v.head for v in construction.vectors_of(figure) if v.tail == pole and v.part not in {"n", "c"}
         )
+        images = [] if group_of(figure) else images
         is_off = bool(off) or explanation.care > USUAL
         for pair in combinations(images, 2):
             if off >= set(pair) or (

@@ -1,7 +1,7 @@
 """Judge one submission: comparison, diagnosis and points, in this order."""
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TypeVar
@@ -26,7 +26,7 @@ from grader.rubric import CriterionTable, RubricFile
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.graph import evaluate
 from reference.construction.mistakes import Mistake
-from reference.quantities import OF_MOTION, vector_of_value
+from reference.quantities import OF_MOTION, kind_of, vector_of_value
 from reference.replay.replay import Replay
 
 Read = TypeVar("Read", ReadNode, ReadVector)
@@ -178,6 +178,7 @@ def _judged(task: Task, submission: Submission, comparison: Comparison, owner: O
     read = _swapped_letters(task, submission, mistakes)
     mistakes = (*mistakes, *read)
     mistakes = (*mistakes, *_not_drawn(task, comparison, mistakes))
+    mistakes = (*mistakes, *_pointing_back(task, comparison, mistakes))
     mistakes = (*mistakes, *_slips(task, comparison, mistakes))
     outcomes = letters_charged(
         task,
@@ -266,6 +267,25 @@ def _not_drawn(task: Task, comparison: Comparison, known: Sequence[NamedMistake]
             sure = NOT_DRAWN if evidence.has_sheets else 1.0
             found.append(NamedMistake(Mistake("vector_missing", one.name), (one.criterion,), sure))
     return found
+
+
+def _pointing_back(
+    task: Task, comparison: Comparison, known: Sequence[NamedMistake]
+) -> Iterator[NamedMistake]:
+    """Yield vectors that point the opposite way between nodes where all else that ends there is right."""
+    vectors, explained = task.construction.vectors, {name for one in known for name in one.explains}
+    right = {
+        vectors[one.name].head
+        for one in comparison.outcomes
+        if one.name in vectors and one.verdict in CREDITED
+    }
+    for one in comparison.outcomes:
+        is_back = "reversed" in one.codes and not one.codes & {"too_long", "too_short"}
+        if not is_back or one.verdict not in CHARGED or one.criterion in explained:
+            continue
+        if one.name in vectors and vectors[one.name].head in right:
+            code = "force_reversed" if kind_of(one.name).name == "force" else "sense_reversed"
+            yield NamedMistake(Mistake(code, one.name), (one.criterion,), SLIPPED)
 
 
 def _left_out(task: Task, outcomes: Sequence[Outcome], known: Sequence[NamedMistake]) -> tuple[Outcome, ...]:

@@ -21,7 +21,17 @@ from typing import Literal
 
 import numpy as np
 
-from reference.construction.elements import Errors, Fixed, Line, Moments, Nodes, Parameters, View
+from reference.construction.elements import (
+    Errors,
+    Fixed,
+    Length,
+    Line,
+    Moments,
+    Nodes,
+    Parameters,
+    View,
+    data_in,
+)
 from reference.construction.steps import (
     ArcAndLine,
     Coincide,
@@ -239,6 +249,15 @@ class Construction:
     def needed_for(self, nodes: Collection[str]) -> frozenset[str]:
         """Return the nodes from which some nodes are directly made."""
         return frozenset(need for step in self.steps if step.node in nodes for need in step.needs)
+
+    def data_of(self, name: str) -> frozenset[str]:
+        """Return the names of the data of forces and couples from which a node or a moment is made."""
+        moments = self.moments.get(name)
+        needs = (name,) if moments is None else moments.needs
+        nodes = frozenset[str]().union(*map(self.upstream, needs))
+        lengths = [step.length for step in map(self.step, nodes) if isinstance(step, Given)]
+        parts: list[Length | Moments] = [*lengths, *((moments,) if moments else ())]
+        return frozenset[str]().union(*map(data_in, parts))
 
     def upstream(self, node: str) -> frozenset[str]:
         """Return a node and all nodes that it is made from. Raises KeyError for an unknown node."""

@@ -259,7 +259,7 @@ def _open(drawing: Drawing, roots: Sequence[Root], cares: Sequence[float], cost:
     starts = [(root, care) for care in cares for root in roots]
     known = {name: np.asarray(value) for name, value in drawing.parameters.items()}
     for name in {name for root in roots for name in root.parameters}:
-        usual = known[name]
+        usual = known.get(name, np.asarray(1.0))
         known[name] = np.array([float(np.ravel(root.parameters.get(name, usual))[0]) for root, _ in starts])
     plans = {plan for root in roots for plan in root.turned}
     return _Branches(
