@@ -15,7 +15,7 @@ from itertools import combinations
 import numpy as np
 
 from grader.records import MECHANISM
-from reference.construction.elements import Nodes, Scaled, data_in, is_force
+from reference.construction.elements import Fixed, Nodes, Scaled, data_in, is_force
 from reference.construction.graph import evaluate
 from reference.construction.mistakes import Drawing, Mistake, commit, mistakes_of_forces
 from reference.construction.steps import Given
@@ -24,9 +24,12 @@ from reference.quantities import OF_MOTION, group_of, kind_of, scale_of
 from reference.replay.explanations import (
     LEAST_FACTOR,
     MOST_FACTOR,
+    NOT_THERE,
     RARITY,
     SLIP,
+    SOMETHING_ELSE,
     Observations,
+    cost_of_any,
     rarity_of,
 )
 from reference.replay.nothing import with_nothing
@@ -112,6 +115,7 @@ def _searched_further(case: Case, scales: Sequence[Root], explanations: Sequence
         whole += _of_the_whole(case)
     by_scale = [[_both(scale, one) for one in whole] for scale in scales]
     roots = [one for some in by_scale for one in some]
+    by_scale += [own] if (own := [*_own_forces(case)]) else []
     cares = sorted({best.care, min(best.care, USUAL)})
     # Apart, as a search drops what costs much before anything is observed.
     found = _by_cost(*(_replayed(case, some, cares) for some in by_scale)) or [*explanations]
@@ -206,6 +210,7 @@ def _both(one: Root, other: Root) -> Root:
         {**one.parameters, **other.parameters},
         {**one.turned, **other.turned},
         one.cost + other.cost,
+        (*one.unexplained, *other.unexplained),
     )
 
 
@@ -309,22 +314,33 @@ def _other_scales(case: Case) -> Iterator[Root]:
 
 
 def _of_forces(case: Case) -> Iterator[Root]:
-    """Roots with a mistake in what acts on links, or with a slip in one force: moments have it, too."""
+    """Roots with a mistake in what acts on links: moments have it, too."""
     for mistake in mistakes_of_forces(case.drawing):
-        yield Root((mistake,), mistake.parameters, cost=RARITY[mistake.code])
+        is_blank = mistake.code == "force_missing" and mistake.at in case.observations.blank
+        cost = RARITY[mistake.code] - (NOT_THERE if is_blank else 0.0)
+        yield Root((mistake,), mistake.parameters, cost=cost)
+
+
+def _own_forces(case: Case) -> Iterator[Root]:
+    """Roots with a force as it was drawn: by a slip in its size, or in an unknown way."""
     known, drawn = case.drawing.parameters, {one.node: one for one in case.observations.entries}
     nodes = evaluate(case.drawing.construction, known) if drawn else {}
     for step in case.drawing.construction.steps:
         if not isinstance(step, Given) or not is_force(step.length) or step.node not in drawn:
             continue
-        start, one, right = drawn.get(step.start), drawn[step.node], nodes[step.node] - nodes[step.start]
+        start, one = drawn.get(step.start), drawn[step.node]
+        right = complex(np.ravel(nodes[step.node] - nodes[step.start])[0])
         value = one.value if start is None or one.tail is not None else one.value - start.value
-        factor = float(np.ravel(abs(value) / abs(right))[0])
-        if one.has_direction and LEAST_FACTOR < factor < MOST_FACTOR and abs(math.log(factor)) > LEAST_WRONG:
-            (datum,) = data_in(step.length)
-            changed = {datum: np.asarray(factor * known.get(datum, 1.0))}
-            slip = Mistake(SLIP, step.node, factor=factor, parameters=changed)
-            yield Root((slip,), changed, cost=rarity_of(slip))
+        share = value / right if right and one.has_direction else 1.0
+        if not LEAST_FACTOR < abs(share) < MOST_FACTOR or abs(share - 1.0) < LEAST_WRONG:
+            continue
+        (datum,) = data_in(step.length)
+        changed = {datum: np.asarray(abs(share) * known.get(datum, 1.0))}
+        slip = Mistake(SLIP, step.node, factor=abs(share), parameters=changed)
+        yield Root((slip,), changed, cost=rarity_of(slip))
+        if isinstance(step.along, Fixed):
+            own = {**changed, step.along.angle: np.asarray(np.angle(value))}
+            yield Root((), own, cost=SOMETHING_ELSE + cost_of_any([one]), unexplained=(step.node,))
 
 
 def _of_the_whole(case: Case) -> Iterator[Root]:

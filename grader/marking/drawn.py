@@ -15,9 +15,9 @@ from grader.given_data.owner import Owner
 from grader.marking.diagnosis import Case, explained
 from grader.marking.naming import CERTAIN, LINE_MISTAKES, drawn_instead, sure_of
 from grader.records import MECHANISM
-from reference.construction.elements import Balance, Coriolis, Normal, Parameters
+from reference.construction.elements import Balance, Coriolis, Normal, Parameters, is_force
 from reference.construction.graph import Construction, Vector
-from reference.construction.mistakes import Drawing, Mistake, line_of, made_at
+from reference.construction.mistakes import Drawing, Mistake, laid_off, line_of, made_at
 from reference.construction.steps import Given, TwoLines
 from reference.construction.uncertainty import acts, trace
 from reference.geometry import ComplexArray, FloatArray
@@ -176,10 +176,18 @@ def _components_left_blank(task: Task, evidence: Evidence) -> frozenset[str]:
     return frozenset(
         one.head
         for one in vectors
-        if one.part in {"n", "c"}
+        if (one.part in {"n", "c"} or _acts(task, one))
         and one.scale in drawn
         and evidence.vector(one.name) is None
         and (one.name in evidence.blank or not evidence.has_sheets)
+    )
+
+
+def _acts(task: Task, vector: Vector) -> bool:
+    """Return whether a vector is a force that is laid off, and not computed from moments."""
+    step = task.construction.step(vector.head)
+    return (
+        isinstance(step, Given) and is_force(step.length) and laid_off(step, task.construction) == vector.name
     )
 
 

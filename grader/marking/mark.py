@@ -255,13 +255,13 @@ def _not_drawn(task: Task, comparison: Comparison, known: Sequence[NamedMistake]
 
     None of a component that is known to have been left out.
     """
-    left_out = {one.at for one in known if one.code == "normal_missing"}
+    left_out = {one.at for one in known if one.code in {"normal_missing", "force_missing"}}
     evidence, vectors = comparison.evidence, task.construction.vectors
     found = []
     for one in comparison.outcomes:
         is_table = bool(evidence.measured) and not evidence.has_sheets
         is_left_blank = "not_measured" in one.codes and is_table and one.verdict == "none"
-        if one.name not in vectors or vectors[one.name].head in left_out:
+        if one.name not in vectors or {one.name, vectors[one.name].head} & left_out:
             continue
         if "not_drawn" in one.codes or is_left_blank:
             sure = NOT_DRAWN if evidence.has_sheets else 1.0
@@ -272,7 +272,7 @@ def _not_drawn(task: Task, comparison: Comparison, known: Sequence[NamedMistake]
 def _pointing_back(
     task: Task, comparison: Comparison, known: Sequence[NamedMistake]
 ) -> Iterator[NamedMistake]:
-    """Yield vectors that point the opposite way between nodes where all else that ends there is right."""
+    """Yield vectors that point the opposite way though all else is right, or all else that ends there."""
     vectors, explained = task.construction.vectors, {name for one in known for name in one.explains}
     right = {
         vectors[one.name].head
@@ -283,7 +283,7 @@ def _pointing_back(
         is_back = "reversed" in one.codes and not one.codes & {"too_long", "too_short"}
         if not is_back or one.verdict not in CHARGED or one.criterion in explained:
             continue
-        if one.name in vectors and vectors[one.name].head in right:
+        if one.name in vectors and (not known or vectors[one.name].head in right):
             code = "force_reversed" if kind_of(one.name).name == "force" else "sense_reversed"
             yield NamedMistake(Mistake(code, one.name), (one.criterion,), SLIPPED)
 
@@ -328,7 +328,7 @@ def _slips(task: Task, comparison: Comparison, known: Sequence[NamedMistake]) ->
         factor = value / right if value and right else 1.0
         at = vector_of_value(one.name) or one.name
         slip = NamedMistake(Mistake("arithmetic", at, factor=factor), (one.criterion,), SLIPPED)
-        if one.mistake == "arithmetic":
+        if one.mistake == "arithmetic" or (one.name in task.moments and is_value_off):
             of_vectors.append(slip)
         elif one.mistake == "image_mirrored":
             of_vectors.append(replace(slip, mistake=Mistake("image_mirrored", one.name)))

@@ -478,7 +478,7 @@ class StepContext:
 
     def _rarity(self, mistake: Mistake) -> float:
         """Return the cost of a mistake; less for a component left out if it is not there."""
-        is_blank = mistake.code == "normal_missing" and mistake.at in self.blank
+        is_blank = mistake.code in {"normal_missing", "force_missing"} and mistake.at in self.blank
         return rarity_of(mistake) - (NOT_THERE if is_blank else 0.0)
 
     def _placed(self, step: Step, steps: Sequence[Step]) -> tuple[ComplexArray, ComplexArray | None]:

@@ -364,7 +364,7 @@ class StudentForces:
         first_name = self.reaction(pins[0], first)
         closing = f"{first_name}_n" if part else first_name
         for line_name in (closing, second_name):
-            if self.made("line", line_name) and self.mistake:
+            if self.mistake and self.mistake.kind in {"line", "askew"} and self.mistake.at == line_name:
                 turn = cmath.rect(1.0, math.radians(self.mistake.turn_deg))
                 self.wrong.add(line_name)
                 if line_name == closing:
@@ -511,5 +511,5 @@ def others_for(name: str, variant: Variant, rng: np.random.Generator) -> Iterato
         if one.startswith("F_"):
             yield ForceMistake("turned", one, turn_deg=turn)
         elif one.endswith("_n"):
-            yield ForceMistake("line", one, turn_deg=turn)
+            yield ForceMistake("askew", one, turn_deg=turn)
         yield ForceMistake("entry", one, factor=float(rng.uniform(1.3, 1.8)), turn_deg=turn)
