@@ -116,6 +116,7 @@ def _searched_further(case: Case, scales: Sequence[Root], explanations: Sequence
     by_scale = [[_both(scale, one) for one in whole] for scale in scales]
     roots = [one for some in by_scale for one in some]
     by_scale += [own] if (own := [*_own_forces(case)]) else []
+    roots += own
     cares = sorted({best.care, min(best.care, USUAL)})
     # Apart, as a search drops what costs much before anything is observed.
     found = _by_cost(*(_replayed(case, some, cares) for some in by_scale)) or [*explanations]
@@ -191,14 +192,15 @@ def _with_another_guess(
     """
     seen = {one.node for one in case.observations.entries}
     steps = {step.node for step in case.drawing.construction.steps}
-    first = [one for one in best.made if one.at in steps - seen]
+    kept = {id(one) for root in roots for one in root.made}
+    first = [one for one in best.made if one.at in steps - seen and id(one) not in kept]
     if not first or (len(best.made) == 1 and not best.unexplained):
         return []
     drawing = case.drawing
     for one in first:
         drawing = commit(one, drawing)
-    of_the_whole = {key_of(one) for one in best.made} & {key_of(one) for root in roots for one in root.made}
-    start = next(root for root in roots if {key_of(one) for one in root.made} == of_the_whole)
+    kept &= {id(one) for one in best.made}
+    start = next(root for root in roots if {id(one) for one in root.made} == kept)
     guessed = Root(tuple(first), cost=sum(RARITY[one.code] for one in first))
     return replay(drawing, case.observations, [_both(start, guessed)], case.skill, cares=cares, blind=True)
 

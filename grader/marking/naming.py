@@ -265,9 +265,15 @@ def _record(
     if vector:
         # Nodes of force polygons have no letters.
         letters = mistake.other if mistake.code == "wrong_link" or mistake.other[:1] == (vector,) else ()
-        mistake, line = replace(mistake, at=vector, other=letters), {**line, "line": "force"}
-        line.pop("from", None)
+        across = is_line and _is_across(construction.step(mistake.at), mistake.slot)
+        line = {"line": "force across a guide" if across else "force"}
+        mistake = replace(mistake, at=vector, other=letters)
     return NamedMistake(mistake, explains, min(confidence, 1.0), line, rivals)
+
+
+def _is_across(step: Step, slot: int) -> bool:
+    """Return whether a line of a force plan is across a guide: all others run along links."""
+    return isinstance(step, TwoLines) and (step.first, step.second)[slot].along.quarters % 2 == 1
 
 
 def _vector_of(mistake: Mistake, construction: Construction) -> str:

@@ -1,8 +1,8 @@
 """Simulated students who draw force plans and measure them: a model of its own, group by group.
 
 A student draws the sketch with errors, measures arms on it, computes the parts across the links, draws each
-polygon in an order of the given forces of one's own, and measures every vector with ruler and protractor. Only
-given forces, names and positions are taken from the reference (its closed form); what is judged, the
+polygon in an order of the given forces of one's own, and measures every vector with ruler and protractor.
+Only given forces, names and positions are taken from the reference (its closed form); what is judged, the
 construction, is not used. `StudentForces.due` is the entry that the right step gives from the student's own
 earlier vectors.
 """
@@ -111,7 +111,7 @@ GRAVITY = {"press": "gravity = 9.81\n", "shaper": "gravity = 9.81\n"}
 
 @cache
 def force_task(name: str) -> tuple[Assignment, RubricFile]:
-    """Return an assignment with force plans from given accelerations, and a rubric that asks for everything."""
+    """Return an assignment with force plans by given accelerations, and a rubric that asks for everything."""
     folder = Path(tempfile.mkdtemp())
     text = (RUBRICS / f"{name}.assignment.toml").read_text(encoding="utf-8")
     text = re.sub(r"(?m)^rubric = .*$", 'rubric = "forces"', text)
@@ -202,6 +202,8 @@ class StudentForces:
 
     def __post_init__(self) -> None:
         plan = exact_plan(self.task, [self.variant], accelerations=False)
+        assert plan.forces is not None
+        assert plan.scales.kF is not None
         self.mechanism, self.names = plan.mechanism, short_names(plan.mechanism)
         self.carriers, self.links = carriers(plan.mechanism), named_links(plan.mechanism)
         self.kl, self.kf = float(plan.scales.kL[0]), float(np.ravel(plan.scales.kF)[0])
@@ -300,7 +302,7 @@ class StudentForces:
             self.wrong.add(name)
         if self.mistake and self.mistake.kind == "wrong_arm" and self.mistake.at.split()[0] == link:
             self.wrong.add(name)
-        if self.mistake and self.mistake.at in {f"M_i{self.names[link]}"}:
+        if self.mistake and self.mistake.at == f"M_i{self.names[link]}":
             self.wrong.add(name)
         drawn = self.laid(drawn)
         self.note(name, drawn, due)
@@ -321,7 +323,7 @@ class StudentForces:
             self.note(one.name, drawn, one.right)
         return total
 
-    def handed_over(self, name: str, joint: str, on: str, force: complex) -> None:
+    def handed_over(self, joint: str, on: str, force: complex) -> None:
         """Let the opposite of a drawn reaction act on the link that carries the joint."""
         carrier = self.carriers[joint]
         if carrier != GROUND:
@@ -385,9 +387,9 @@ class StudentForces:
             self.note(name, on_second, due_second)
         inner_name = reaction(self.names, second, first)
         self.note(inner_name, -(whole + one), -(due + one))
-        self.handed_over(first_name, pins[0], first, whole)
+        self.handed_over(pins[0], first, whole)
         if guide is None:
-            self.handed_over(name, pins[1], second, on_second)
+            self.handed_over(pins[1], second, on_second)
 
     def slotted(self, group: SlottedLink, links: Sequence[str]) -> None:
         """Draw the polygon of a link with a slot: the block's reaction across it, then the pivot's."""
