@@ -85,7 +85,7 @@ EXAMPLES: Mapping[str, str] = {
     "examples": "1:5, 5 cm/cm", "exit": "-11", "figure": "the velocity plan", "fits": "80\u00a0%",
     "form": "velocity", "given": "2", "graded": "n = 7", "grey": "40", "kind": "PNG", "lengths": "40",
     "letters": "王", "long_side": "600", "longer": "1.5\u00a0%", "looks": "n = 9", "markers": "2",
-    "shorter": "1.5\u00a0%",
+    "shorter": "1.5\u00a0%", "group": "D",
     "measurements": "1:4", "millions": "400", "more": "12", "near": "s08", "numbers": "7, 9", "page": "3",
     "pitch": "@5.0 mm", "places": "a.csv, b.csv", "positions": "1, 2", "printed": "9", "read": "1:5",
     "readings": "1:5, 1:4", "rival": "2\u00a0%", "roster": "1:5", "rows": "30", "said": "0.036",

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Literal, Self, cast
+from typing import Annotated, Literal, Self, TypedDict, cast
 
 from pydantic import Field, model_validator
 
@@ -279,9 +279,7 @@ class RubricFile(Authored):
     @property
     def needs_accelerations(self) -> bool:
         """True if any criterion needs the acceleration plan."""
-        return self.accelerations == "own" or any(
-            kind_of(c.name).omegas == 2 or (c.point or "").startswith("J") for c in self.criterion
-        )
+        return any(kind_of(c.name).omegas == 2 or (c.point or "").startswith("J") for c in self.criterion)
 
     def tolerance_of(self, asked: CriterionTable | str) -> ToleranceTable:
         """Return the tolerance of a criterion, or of the vector, angular quantity, scale or link so named.
@@ -353,7 +351,7 @@ class Asked:
 
 def asked_of(assignment: Assignment, rubric: RubricFile) -> Asked:
     """Return what must be read for a rubric."""
-    construction = construction_for(assignment, accelerations=rubric.needs_accelerations)
+    construction = construction_for(assignment, **plans_asked(assignment, rubric))
     known = [construction.vectors[name] for name in rubric.vectors if name in construction.vectors]
     plans = dict.fromkeys(construction.figure_of(vector.head) for vector in known)
     figures = frozenset({MECHANISM, *plans} if plans else ())
@@ -363,14 +361,26 @@ def asked_of(assignment: Assignment, rubric: RubricFile) -> Asked:
 
 def scales_asked(assignment: Assignment, rubric: RubricFile) -> tuple[str, ...]:
     """Return the scales that students declare: the assignment's, ka only if accelerations are needed."""
-    return tuple(name for name in assignment.scale_names if name != "ka" or rubric.needs_accelerations)
+    needed = plans_asked(assignment, rubric)["accelerations"]
+    return tuple(name for name in assignment.scale_names if name != "ka" or needed)
 
 
 def accelerations_of(assignment: Assignment, rubric: RubricFile) -> Literal["given", "own"] | None:
     """Return where the accelerations of the inertia forces are from; None if no page shows a force plan."""
-    if "kF" not in assignment.scale_names:
-        return None
-    return rubric.accelerations or ("own" if "acceleration_plan" in assignment.figures else "given")
+    return assignment.forces and (rubric.accelerations or assignment.forces)
+
+
+class PlansAsked(TypedDict):
+    """The plans that a construction needs, as its function takes them."""
+
+    accelerations: bool
+    forces: Literal["given", "own"] | None
+
+
+def plans_asked(assignment: Assignment, rubric: RubricFile) -> PlansAsked:
+    """Return which plans the construction of an assignment needs for a rubric."""
+    forces = accelerations_of(assignment, rubric)
+    return {"accelerations": rubric.needs_accelerations or forces == "own", "forces": forces}
 
 
 def _check_accelerations(assignment: Assignment, rubric: RubricFile) -> Iterator[Finding]:

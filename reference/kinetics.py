@@ -38,7 +38,6 @@ from reference.mechanism import (
     SlottedLink,
     Yoke,
     carriers,
-    guides_of,
     named_links,
     short_names,
     sliders_of,
@@ -69,7 +68,7 @@ class Reaction:
     Attributes
     ----------
     moment : of a guide, about the joint; zero at a hinge
-    along : the guide's direction, to which the force is perpendicular; None at a hinge
+    along : the guide's direction; None at a hinge
     """
 
     joint: str
@@ -87,17 +86,6 @@ class Reaction:
 
 
 @dataclass(frozen=True, slots=True)
-class Balancing:
-    """The moment on the driving crank or, where a slider or a cylinder drives, the force on it; else zero."""
-
-    on: str
-    by: str
-    moment: FloatArray
-    force: ComplexArray
-    is_force: bool
-
-
-@dataclass(frozen=True, slots=True)
 class Forces:
     """All forces of a mechanism, arrays of shape (N,).
 
@@ -105,7 +93,9 @@ class Forces:
     ----------
     given : inertia forces, weights, loads
     hinges : by joint; a further hinge at a joint by joint and link, ``B_4``
-    guides : by the slider's short name
+    guides : by the slider's short name; their forces are across the guide
+    balancing : the moment on the driving crank; or the force along its guide on the slider that drives, or
+        on the block in the cylinder that does
     power_residual : the power of all given forces and of the balancing one, relative to the sum of the
         products of forces and speeds; zero apart from rounding
     predicted_error : of forces, relative to the largest one; of moments, relative to the largest force
@@ -115,7 +105,7 @@ class Forces:
     given: tuple[Given, ...]
     hinges: Mapping[str, Reaction]
     guides: Mapping[str, Reaction]
-    balancing: Balancing
+    balancing: Reaction
     power_residual: FloatArray
     predicted_error: FloatArray
 
@@ -247,11 +237,9 @@ def _turning(mechanism: Mechanism) -> dict[str, tuple[str, str, str]]:
             case SlottedLink(link=link, pivot=pivot):
                 found |= dict.fromkeys(links, (link, pivot, node))
             case Yoke(guide=MovingGuide(link=link)):
-                found |= dict.fromkeys(links, found[link])
-        for link, guide in zip(links[-len(guides_of(group)) :], guides_of(group), strict=False):
-            if isinstance(guide, MovingGuide):
-                found[link] = found[guide.link]
-    return found
+                found[links[1]] = found[link]
+    guides = sliders_of(mechanism).items()
+    return found | {link: found[guide.link] for link, guide in guides if isinstance(guide, MovingGuide)}
 
 
 class _Statics:
@@ -350,10 +338,13 @@ class _Statics:
         self._act(by, joint, -force, -couple)
         if along is None and self.carriers[joint] == on:
             on, by, force = by, on, -force
+        self.reactions.append(self._reaction(joint, on, by, force, couple, along))
+
+    def _reaction(
+        self, joint: str, on: str, by: str, force: _Near, moment: _Near, along: Complex
+    ) -> Reaction:
         direction = None if along is None else _rounded(along)
-        self.reactions.append(
-            Reaction(joint, on, by, _rounded(force.value), _rounded(couple.value), direction)
-        )
+        return Reaction(joint, on, by, _rounded(force.value), _rounded(moment.value), direction)
 
     def _close(self, joint: str, on: str, by: str = "") -> None:
         """Add the reaction at a hinge, by default on the link of its pin, that balances all other forces."""
@@ -369,10 +360,8 @@ class _Statics:
         if isinstance(guide, MovingGuide):
             base = self._arm(*guide.base)
             return guide.link, base.over(_Near(abs(base.value)))
-        return GROUND, self._heading(guide.angle_rad)
-
-    def _heading(self, angle_rad: FloatArray) -> _Near:
-        return _Near(self.zero + assur.heading(self.take(angle_rad)), SAFETY * EPSILON)
+        along = self.zero + assur.heading(self.take(guide.angle_rad))
+        return GROUND, _Near(along, SAFETY * EPSILON)
 
     def _balance(self, group: Group) -> None:
         """Add the reactions of a group on which all but its own reactions act."""
@@ -412,7 +401,9 @@ class _Statics:
 
     def _balance_yoke(self, group: Yoke, links: tuple[str, ...]) -> None:
         rail, pin = self._rail(group.guide), group.pin
-        slot = self._heading(group.slot_rad) if isinstance(group.guide, FixedGuide) else rail[1].left
+        slot = rail[1].left
+        if isinstance(group.guide, FixedGuide):
+            slot = self._rail(replace(group.guide, angle_rad=group.slot_rad))[1]
         (yoke, _), (block, _) = (self._sum(link, pin) for link in links)
         along = rail[1].by(yoke + block, dot)
         force = _from_moments(rail[1].left, along, slot.left, slot.by(block, dot))
@@ -422,8 +413,8 @@ class _Statics:
 
     def _balance_slotted(
         self, group: SlottedLink, links: tuple[str, ...], crank: Crank | None = None
-    ) -> _Near:
-        """Balance a slotted link; return the force on its block, of the cylinder that drives the crank."""
+    ) -> tuple[_Near, Complex]:
+        """Balance a slotted link; return the force on its block if it drives the crank, and its direction."""
         d, offset, side = self._arm(group.pivot, group.pin), self.take(group.offset_m), self.take(group.side)
         reach, direction, _ = assur.rpr_place(d.value, offset, side)
         along, length = _Near(direction, d.slack / abs(reach)), _Near(reach, d.slack * abs(d.value / reach))
@@ -441,41 +432,36 @@ class _Statics:
             self._act(link, group.pin, along.by(one), _Near(self.zero.real))
         self._guide(group.pin, links[1], (links[0], along))
         self._close(group.pivot, links[0])
-        return along.by(thrust)
+        return along.by(thrust), direction
 
-    def _drive(self, cylinder: SlottedLink | None) -> Balancing:
+    def _drive(self, cylinder: SlottedLink | None) -> Reaction:
         """Balance the driving link, and the cylinder that drives it."""
         driver, moment, force = self.mechanism.driver, _Near(self.zero.real), _Near(self.zero)
-        on, by, crank = driver.link, GROUND, isinstance(driver, Crank)
+        on, by, along = driver.link, GROUND, None
         if isinstance(driver, DrivingSlider):
-            along = self._heading(driver.guide_rad)
-            self._guide(driver.pin, on, (GROUND, along))
-            force = along.by(-along.by(self._sum(on, driver.pin)[0], dot))
+            rail = self._rail(FixedGuide(driver.guide_m, driver.guide_rad))
+            self._guide(driver.pin, on, rail)
+            force, along = rail[1].by(-rail[1].by(self._sum(on, driver.pin)[0], dot)), rail[1].value
         elif cylinder is not None:
             by, on = self.named[cylinder.node]
-            force, crank = self._balance_slotted(cylinder, (by, on), driver), False
+            force, along = self._balance_slotted(cylinder, (by, on), driver)
         else:
             moment = -self._sum(on, driver.pivot)[1]
         if isinstance(driver, Crank):
             self._close(driver.pivot, driver.link, GROUND)
         self._act(GROUND, driver.pin, force, moment)
-        return Balancing(on, by, _rounded(moment.value), _rounded(force.value), is_force=not crank)
+        return self._reaction(driver.pin, on, by, force, moment, along)
 
-    def _power(self, given: tuple[Given, ...], balancing: Balancing, cylinder: SlottedLink | None) -> Number:
+    def _power(self, given: tuple[Given, ...], balancing: Reaction, cylinder: SlottedLink | None) -> Number:
         """Return the power of all given forces and of the balancing one, relative to what it could be."""
         speeds = {name: _rounded(joint.velocity) for name, joint in self.solution.joints.items()}
-        driver = self.mechanism.driver
-        rate = speeds[driver.pin] - (speeds[cylinder.node] if cylinder else 0.0)
-        acts = [(one.force, speeds[one.point], one.couple, self._rate(one.link)) for one in given]
-        acts.append((balancing.force, rate, balancing.moment, self._rate(driver.link)))
+        rates = {link: _rounded(self.solution.omega[turns]) for link, (turns, *_) in self.turning.items()}
+        rate = speeds[balancing.joint] - (speeds[cylinder.node] if cylinder else 0.0)
+        acts = [(one.force, speeds[one.point], one.couple, rates.get(one.link, 0.0)) for one in given]
+        acts.append((balancing.force, rate, balancing.moment, rates.get(balancing.on, 0.0)))
         power = sum(dot(force, v) + couple * omega for force, v, couple, omega in acts)
         most = sum(abs(force) * abs(v) + abs(couple * omega) for force, v, couple, omega in acts)
         return power / where(most == 0.0, 1.0, most)
-
-    def _rate(self, link: str) -> Number:
-        return _rounded(
-            self.solution.omega[self.turning[link][0]] if link in self.turning else self.zero.real
-        )
 
 
 def _rounded(number: Number) -> Any:  # noqa: ANN401 - an array of doubles, or of extended floats

@@ -93,6 +93,18 @@ def construction_for(
     )
 
 
+def parameters_for(assignment: Assignment, variants: list[Variant], scales: Scales) -> dict[str, FloatArray]:
+    """Return the parameters of some variants' drawings, without lengths that are measured on the sketch.
+
+    Raises MechanismError where a variant of an assignment with force plans does not assemble.
+    """
+    mechanism = assignment.mechanism(variants)
+    known = parameters_of(mechanism, scales.kL, scales.kv, scales.ka)
+    if assignment.forces is None or scales.kF is None:
+        return known
+    return {**known, "kF": scales.kF, **data_of_forces(mechanism, forces_of(mechanism, move(mechanism)))}
+
+
 def exact_plan(
     assignment: Assignment,
     variants: list[Variant],

@@ -43,7 +43,8 @@ RANGES = {"n": "{ from = 1, to = 30 }", "position": "{ from = 0, to = 7 }"}
 _UNITS = {
     "a length": "{length}", "an angle": "°", "revolutions per minute": "rev/min",
     "an angular velocity": "rad/s", "an angular acceleration": "rad/s²", "a speed": "{length}/s",
-    "an acceleration": "{length}/s²",
+    "an acceleration": "{length}/s²", "a mass": "kg", "a moment of inertia": "kg m²", "a force": "N",
+    "a moment": "N m",
 }  # fmt: skip
 """Units of the keys of a mechanism, by the kind of quantity."""
 
@@ -77,9 +78,9 @@ _POINTS = {"scale": 1.0, "link": 0.5, "vector": 2.0, "angular": 0.5}
 _OPTIONAL = {"scale", "link", "angular"}
 """Items that a student may leave out without losing points."""
 KEYS_OF_A_CRITERION = """\
-# One for each thing judged: exactly one of vector, value, angular, sense, scale, link and point. Of its other
-# keys: points for full marks; optional = true: not judged where it was not handed in; direction = false: only
-# the length counts."""
+# One for each thing judged: exactly one of vector, value, angular, moment, sense, scale, link and point. Of
+# its other keys: points for full marks; optional = true: not judged where it was not handed in; direction =
+# false: only the length counts."""
 """Replaces the start's comments, which stand at keys that not every criterion has."""
 _PLANS_MM = 60.0
 """Length of a plan's first vector at the trial scales from which round ones are derived."""

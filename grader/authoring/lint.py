@@ -45,7 +45,7 @@ from grader.documents import (
     LintWorst,
 )
 from grader.language import LANGUAGES
-from grader.rubric import RubricFile, check_rubric
+from grader.rubric import RubricFile, check_rubric, plans_asked
 from reference.authored.assignment import SCALE_NAMES, TRADITIONS, Assignment, Variant
 from reference.authored.formula import Formula
 from reference.authored.toml_file import LENGTH_UNITS_M, SideText, Text
@@ -94,8 +94,9 @@ def lint(assignment: Assignment, rubric: RubricFile) -> Lint:
     these are examined one by one.
     """
     variants = assignment.variants()
-    accelerations = rubric.needs_accelerations or "acceleration_plan" in assignment.figures
-    construction = construction_for(assignment, variants, accelerations=accelerations)
+    needed = plans_asked(assignment, rubric)
+    needed["accelerations"] |= "acceleration_plan" in assignment.figures
+    construction = construction_for(assignment, variants, **needed)
     broken = broken_variants(assignment, variants)
     findings = [*broken_findings(assignment, broken), *_odd_sizes(assignment)]
     findings += data_findings(assignment, rubric, construction)
@@ -103,7 +104,7 @@ def lint(assignment: Assignment, rubric: RubricFile) -> Lint:
     sound = [variant for variant in variants if variant not in rows]
     if not sound:
         return Lint(assignment, tuple(rows.values()), _sorted(findings))
-    plan = exact_plan(assignment, sound, accelerations=accelerations)
+    plan = exact_plan(assignment, sound, **needed)
     conditions, asked, extents = conditions_of(plan), asked_vectors(rubric, plan), extents_of(plan)
     rooms = {
         index: room_of(figures, extents, assignment.file.page[index].grid)
@@ -310,6 +311,7 @@ def _with_their_own(assignment: Assignment, names: Iterable[str]) -> set[str]:
 def _unused_values(assignment: Assignment) -> Iterator[LintFinding]:
     file = assignment.file
     outside = names_in(assignment.mechanism_file) | names_in(file.scales) | names_in(file.given)
+    outside |= names_in(file.body) | names_in(file.load)
     needed = _with_their_own(assignment, outside)
     for name in file.variant.values:
         if name not in needed:

@@ -126,7 +126,8 @@ def _point(joint: str, at: np.ndarray, count: int) -> tuple[Column, ...]:
 def _rate(plan: Plan, name: str) -> FloatArray:
     """Return an angular quantity, exactly zero if the vector that it comes from is."""
     values = np.broadcast_to(plan.rates[name], (len(plan.variants),))
-    return np.where(plan.is_zero(plan.construction.rates[name].vector), 0.0, values) + 0.0
+    rate = plan.construction.rates.get(name)
+    return np.where(rate is not None and plan.is_zero(rate.vector), 0.0, values) + 0.0
 
 
 def _vector(plan: Plan, name: str) -> tuple[Column, ...]:

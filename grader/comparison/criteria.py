@@ -489,7 +489,7 @@ def _rate(charges: Charges, criterion: CriterionTable) -> Outcome:
     """
     task, following, values = charges.task, charges.following, charges.evidence.values
     name, unit = criterion.turning or "", unit_of(criterion.turning or "")
-    rate, right = task.construction.rates.get(name), {**task.rates, **task.moments}[name]
+    rate, right = task.construction.rates.get(name), task.rates[name]
     value, sense = values.get(name), values.get(f"{name}_sense")
     if criterion.sense is not None:
         # A magnitude alone has none.
@@ -525,7 +525,7 @@ def _rate(charges: Charges, criterion: CriterionTable) -> Outcome:
 def _uncertainty_of(charges: Charges, name: str, per_mm: float) -> EndSpread:
     """The propagated drafting error: of an angular quantity, that of the vector that turns the link."""
     task, following = charges.task, charges.following
-    if name in task.moments:
+    if name in task.construction.moments:
         return following.moment(name, per_mm).uncertainty
     source = task.segments[task.construction.rates[name].vector]
     return following.uncertainty_of(source, source.drawn(following.used))
@@ -534,7 +534,7 @@ def _uncertainty_of(charges: Charges, name: str, per_mm: float) -> EndSpread:
 def _own_turnings(charges: Charges, name: str, value: float, per_mm: float) -> Iterator[Expectation]:
     """Yield the angular quantity or moment that the student's own drawing gives; none without any."""
     task, following = charges.task, charges.following
-    if name in task.moments:
+    if name in task.construction.moments:
         yield following.moment(name, per_mm)
         wrong = frozenset(charges.charged | charges.doubtful)
         for basis in (following.own_forces(name, wrong), following.instead):

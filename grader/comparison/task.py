@@ -8,9 +8,9 @@ from typing import TypeVar, cast
 
 import numpy as np
 
-from grader.rubric import RubricFile, ToleranceTable
+from grader.rubric import RubricFile, ToleranceTable, plans_asked
 from reference.authored.assignment import Assignment, Variant
-from reference.construction.elements import Parameters, View
+from reference.construction.elements import Parameters
 from reference.construction.graph import Construction, evaluate
 from reference.construction.uncertainty import Skill, TracedDrawing, trace
 from reference.mechanism import Crank, Dyad, Mechanism, Slider
@@ -66,8 +66,7 @@ class Task:
     construction, parameters : how it is drawn; the parameters' scales are those of the rule
     real : exact vectors, complex SI, by name, in the order of drawing
     segments : the vectors and the links of the sketch, by name
-    rates : exact angular quantities, rad/s and rad/s^2
-    moments : exact moments, N m
+    rates : exact angular quantities, rad/s and rad/s^2, and moments, N m
     lengths_m : by angular quantity, the real length of its link
     pin : of the driving link
     yardstick : the crank; where a slider drives, the first link of given length; None without any
@@ -84,7 +83,6 @@ class Task:
     real: Mapping[str, complex]
     segments: Mapping[str, TaskSegment]
     rates: Mapping[str, float]
-    moments: Mapping[str, float]
     lengths_m: Mapping[str, float]
     pin: str
     yardstick: Yardstick | None
@@ -101,7 +99,8 @@ class Task:
     def driving_vector(self, name: str) -> str:
         """The vector by the data of the kind of a vector or scale: it shows the scale and the turn.
 
-        It is the driving link's; of forces, which have none, the largest given one of the vector's plan.
+        It is the driving link's; of forces, which have none, the largest given one of the vector's plan, of
+        those that are asked for if there are any.
         """
         kind, vectors, figure = kind_of(name), self.construction.vectors, self.construction.figure_of
         if kind.omegas is not None:
@@ -109,7 +108,8 @@ class Task:
         given = [one for one in vectors.values() if one.scale == kind.scale and one.name in self.parameters]
         if name in vectors:
             given = [one for one in given if figure(one.head) == figure(vectors[name].head)]
-        largest = max(given, key=lambda one: abs(self.real[one.name]), default=None)
+        asked = [one for one in given if one.name in self.rubric.vectors] or given
+        largest = max(asked, key=lambda one: abs(self.real[one.name]), default=None)
         return name if largest is None else largest.name
 
     def tolerance_at(self, node: str) -> ToleranceTable:
@@ -202,7 +202,7 @@ def tasks_at_speed(task: Task, speed: tuple[float, float]) -> tuple[Task, ...]:
 
 
 def _made(assignment: Assignment, rubric: RubricFile, variant: Variant) -> Task:
-    plan = exact_plan(assignment, [variant], accelerations=rubric.needs_accelerations)
+    plan = exact_plan(assignment, [variant], **plans_asked(assignment, rubric))
     construction, driver = plan.construction, plan.mechanism.driver
     ratio = driver.gear_ratio if isinstance(driver, Crank) else None
     parameters = {name: np.asarray(np.ravel(value)[0]) for name, value in plan.drawing.parameters.items()}
@@ -217,8 +217,6 @@ def _made(assignment: Assignment, rubric: RubricFile, variant: Variant) -> Task:
         name: TaskSegment(name, tail, head, "kL", places[head] - places[tail])
         for name, (tail, head) in construction.links.items()
     }
-    right = View(evaluate(construction, parameters), parameters) if construction.moments else None
-    moments = {name: float(np.ravel(one.at(right))[0]) for name, one in construction.moments.items() if right}
     return Task(
         assignment=assignment,
         rubric=rubric,
@@ -228,7 +226,6 @@ def _made(assignment: Assignment, rubric: RubricFile, variant: Variant) -> Task:
         real=real,
         segments=segments,
         rates={name: float(rate[0]) for name, rate in plan.rates.items()},
-        moments=moments,
         lengths_m={name: float(parameters[rate.length]) for name, rate in construction.rates.items()},
         pin=driver.pin,
         yardstick=_yardstick(plan.mechanism),

@@ -26,6 +26,7 @@ from grader.lms.grades import in_a_row
 from grader.marking.trust import said_of
 from grader.overlay.covered import Keep, bare_png, covered, painted, reopened, upright_pixels
 from grader.records import MECHANISM, ZONE_SLACK_MM, Box, FloatArray, Reason, ScannedPage, Sheet
+from grader.rubric import plans_asked
 from grader.scan.decode.pages import decode
 from grader.scan.handwriting.lines import find_lines
 from grader.scan.pixels import TITLE_BLOCK_MM, mapped
@@ -219,9 +220,8 @@ def _known(batch: Batch, graded: Graded) -> Iterator[Known]:
         variant = job.submission.variant
         if variant is None or not report.criteria:
             continue
-        construction = construction_for(
-            batch.assignment, [variant], accelerations=batch.rubric.needs_accelerations
-        )
+        asked = plans_asked(batch.assignment, batch.rubric)
+        construction = construction_for(batch.assignment, [variant], **asked)
         by = vouched(report, construction)
         for page, read in zip(pages_read(batch, graded.cache, job), report.reading.sheets, strict=True):
             if page.sheet is None or not read.figures:

@@ -17,14 +17,15 @@ from grader.folder.cache import digest_of
 from grader.marking.decided import NOT_APPLIED, strokes_on, why_not
 from grader.printed.layout import PAGE_MM
 from grader.records import PageRef, Reason, Value
-from grader.rubric import RubricFile
+from grader.rubric import RubricFile, plans_asked
 from grader.tables.decisions import FILE_NAME, Decision, read_table
 from grader.tables.measurements import StudentSubmission
 from grader.tables.reader import at, near, short
 from grader.tables.roster import Roster, RosterRow
 from grader.texts.spoken import ENGLISH, clause, unmatched_document
 from reference.authored.assignment import Assignment, Variant
-from reference.construction.derive import construction_of
+from reference.authored.bodies import Masses
+from reference.plan import construction_for
 
 _DIGITS = 8
 """Digits of each digest: two of a class are the same by chance once in 10^5 classes."""
@@ -90,6 +91,8 @@ def _task(assignment: Assignment, variant: Variant | None) -> object:
         return assignment.id, mechanism
     numbers = {**assignment.values([variant]), **assignment.scales([variant]).by_name}
     told = {name: f"{float(np.ravel(number)[0]):.9g}" for name, number in numbers.items()}
+    if assignment.file.has_forces:
+        mechanism += assignment.file.model_dump_json(include={*Masses.model_fields})
     return assignment.id, mechanism, assignment.file.plate_images, told
 
 
@@ -307,8 +310,7 @@ class _Check:
     @cached_property
     def nodes(self) -> Mapping[str, list[str]]:
         """The nodes of each figure, the same of all variants."""
-        mechanism = self.assignment.mechanism(self.assignment.variants()[:1])
-        construction = construction_of(mechanism, accelerations=self.rubric.needs_accelerations)
+        construction = construction_for(self.assignment, **plans_asked(self.assignment, self.rubric))
         return {figure: [step.node for step in steps] for figure, steps in construction.figures.items()}
 
     def fault_of(self, row: Decision) -> tuple[str, Reason] | None:

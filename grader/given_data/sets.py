@@ -19,9 +19,9 @@ import numpy as np
 from grader.comparison.evidence import DrawnVector
 from grader.comparison.task import Task
 from grader.records import MECHANISM
-from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
+from reference.authored.assignment import SCALE_NAMES, Assignment, Scales, Variant
 from reference.construction.elements import Nodes, Parameters, View
-from reference.construction.graph import Construction, evaluate, parameters_of
+from reference.construction.graph import Construction, evaluate
 from reference.construction.mistakes import (
     Drawing,
     Mistake,
@@ -32,7 +32,7 @@ from reference.construction.mistakes import (
 from reference.construction.steps import ArcAndLine, TwoArcs
 from reference.errors import PlanmarkError
 from reference.geometry import ComplexArray, FloatArray
-from reference.plan import exact_plan
+from reference.plan import parameters_for
 from reference.quantities import OF_MOTION
 
 Kind = Literal["own", "other_variant", "data_misread"]
@@ -106,11 +106,7 @@ def _all_variants(task: Task) -> ExactDrawings:
     variants = task.assignment.variants()
     one = np.ones(len(variants))
     try:
-        if task.assignment.forces:
-            wanted = task.rubric.needs_accelerations
-            together = exact_plan(task.assignment, variants, accelerations=wanted).drawing.parameters
-        else:
-            together = parameters_of(task.assignment.mechanism(variants), one, one, one)
+        together = parameters_for(task.assignment, variants, Scales(one, one, one, one))
         rule = task.assignment.scales(variants)
     except PlanmarkError:
         variants, together = [task.variant], {**task.parameters, **AT_SCALE_ONE}

@@ -328,7 +328,7 @@ def _slips(task: Task, comparison: Comparison, known: Sequence[NamedMistake]) ->
         factor = value / right if value and right else 1.0
         at = vector_of_value(one.name) or one.name
         slip = NamedMistake(Mistake("arithmetic", at, factor=factor), (one.criterion,), SLIPPED)
-        if one.mistake == "arithmetic" or (one.name in task.moments and is_value_off):
+        if one.mistake == "arithmetic" or (one.name in task.construction.moments and is_value_off):
             of_vectors.append(slip)
         elif one.mistake == "image_mirrored":
             of_vectors.append(replace(slip, mistake=Mistake("image_mirrored", one.name)))

@@ -134,14 +134,10 @@ class _Entries:
                 continue
             segment, table = task.segments[name], task.rubric.tolerance_of(name)
             # As entered, in the vector's own sense.
-            exact = segment.drawn(used) * cmath.rect(1.0, segment.turn_rad)
+            exact, turn = segment.drawn(used) * cmath.rect(1.0, segment.turn_rad), one.turn_rad
             length = abs(exact)
             is_directed = one.direction_rad is not None and length >= max(table.least_mm, 1.0)
-            turned = (
-                one.direction_rad + one.turn_rad
-                if is_directed and one.direction_rad is not None
-                else math.nan
-            )
+            turned = one.direction_rad + turn if is_directed and one.direction_rad is not None else math.nan
             across = math.atan(table.across_mm / max(length, table.across_mm))
             rows.append(
                 (
@@ -346,8 +342,8 @@ def _values(
     followed = {name: one.used.used / (one.other or one.used.used) for name, one in settled.items()}
     vectors = task.construction.vectors
     right = {name: abs(real) * followed.get(vectors[name].scale, 1.0) for name, real in task.real.items()}
-    for name, rate in ((name, task.rates[name]) for name in task.construction.rates):
-        right[name] = rate * followed.get(vectors[task.construction.rates[name].vector].scale, 1.0)
+    for name, rate in task.construction.rates.items():
+        right[name] = task.rates[name] * followed.get(vectors[rate.vector].scale, 1.0)
     ratios = {name: abs(value / float(right[name])) for name, value in values.items() if right.get(name)}
     known = {name: ratio for name, ratio in ratios.items() if 0.0 < ratio < math.inf}
     for unit, (kinds, factor) in VALUE_UNITS.items():

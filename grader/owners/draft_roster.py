@@ -29,10 +29,10 @@ from grader.tables.reader import written
 from grader.tables.roster import COLUMNS, DRAFT_COLUMNS, Roster, RosterRow
 from grader.texts.spoken import ENGLISH, clause, clauses, sentence
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
-from reference.construction.graph import Construction, bars, evaluate, parameters_of
+from reference.construction.graph import Construction, bars, evaluate
 from reference.errors import CallError
 from reference.geometry import ComplexArray
-from reference.plan import construction_for
+from reference.plan import construction_for, parameters_for
 
 SURE, CHECK = "yes", "check"
 LIKE_MM = 150.0
@@ -276,9 +276,8 @@ def figure_similarity(ends_mm: FloatArray, assignment: Assignment, variants: Seq
 
 def _outlines(assignment: Assignment, variants: list[Variant]) -> list[ComplexArray]:
     """(lines, 2, variants) ends of the lines of each figure, in drawn mm at the proposed scales, y up."""
-    mechanism, scales = assignment.mechanism(variants), assignment.scales(variants)
     construction = construction_for(assignment, variants)
-    nodes = evaluate(construction, parameters_of(mechanism, scales.kL, scales.kv, scales.ka))
+    nodes = evaluate(construction, parameters_for(assignment, variants, assignment.scales(variants)))
     shape = (len(variants),)
     return [
         np.array([[np.broadcast_to(nodes[name], shape) for name in pair] for pair in pairs])

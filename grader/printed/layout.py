@@ -15,10 +15,10 @@ from pydantic import BaseModel, ConfigDict
 
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, FloatArray, Identity
 from reference.authored.assignment import SCALE_NAMES, Assignment, PageKind, PageTable, Scales, Variant
-from reference.construction.graph import Construction, evaluate, parameters_of
+from reference.construction.graph import Construction, evaluate
 from reference.drawing.canvas import A3_MM
 from reference.geometry import ComplexArray
-from reference.plan import construction_for
+from reference.plan import construction_for, parameters_for
 from reference.quantities import scale_of, value_name, vector_of_value
 
 # The code's text ----------------------------------------------------------------------------------
@@ -395,7 +395,8 @@ class TemplateFit:
 
 def page_construction(assignment: Assignment, figures: Sequence[str]) -> Construction:
     """Return the construction of an assignment, without accelerations if no figure needs them."""
-    return construction_for(assignment, assignment.variants(), accelerations=ACCELERATION_PLAN in figures)
+    accelerations = ACCELERATION_PLAN in figures or assignment.forces == "own"
+    return construction_for(assignment, assignment.variants(), accelerations=accelerations)
 
 
 def places_mm(
@@ -420,8 +421,7 @@ def _drawn(
 ) -> tuple[Scales, Mapping[str, ComplexArray]]:
     """Return the assignment's own scales, and all nodes drawn at them."""
     scales = assignment.scales(variants)
-    parameters = parameters_of(assignment.mechanism(variants), scales.kL, scales.kv, scales.ka)
-    return scales, evaluate(construction, parameters)
+    return scales, evaluate(construction, parameters_for(assignment, variants, scales))
 
 
 def values_of(

@@ -38,7 +38,6 @@ from grader.records import (
 from reference.authored.assignment import Assignment, Scales, Variant
 from reference.construction.mistakes import Drawing
 from reference.geometry import ComplexArray
-from reference.quantities import DRAWN
 
 LEAST_SKETCH = 15.0
 LEAST_PLAN = 12.0
@@ -359,6 +358,9 @@ def _readings(pages: Sequence[_PageReading], drawing: Drawing, wanted: Collectio
     return readings
 
 
+_NO_PLAN = {"kv": "no_velocity_plan", "ka": "no_acceleration_plan", "kF": "no_force_plan"}
+
+
 def _nowhere(drawing: Drawing, names: Sequence[str]) -> Iterator[Unread]:
     on_sketch = drawing.construction.on_sketch
     for name in (name for name in names if name not in on_sketch):
@@ -366,7 +368,7 @@ def _nowhere(drawing: Drawing, names: Sequence[str]) -> Iterator[Unread]:
         if vector is None:
             yield Unread(name, Reason("not_of_assignment"))
         else:
-            yield Unread(name, Reason(f"no_{DRAWN[vector.scale].figure}"))
+            yield Unread(name, Reason(_NO_PLAN[vector.scale]))
 
 
 # Named nodes and vectors with their errors ---------------------------------------------------------

@@ -9,12 +9,11 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from grader.documents import ScaleName
 from reference.authored.assignment import Assignment, Variant
 from reference.construction.graph import Construction
 from reference.geometry import ComplexArray, FloatArray
 from reference.kinematics.motion import Motion
-from reference.kinetics import Balancing, Forces, Given, Reaction
+from reference.kinetics import Forces, Given, Reaction
 from reference.mechanism import Crank, Mechanism
 from reference.plan import Plan, conditioning
 from reference.quantities import unit_of
@@ -161,7 +160,7 @@ class PlanDocument(_Document):
     assignment: str
     variant: dict[str, int]
     position: int | None
-    scales: dict[ScaleName, float]
+    scales: dict[str, float]
     """Real units per millimetre on paper: m/mm, (m/s)/mm, (m/s^2)/mm, N/mm."""
     points_m: dict[str, tuple[float, float]]
     vectors: dict[str, PlanVector]
@@ -269,7 +268,7 @@ def _forces(forces: Forces, motion: Motion, index: int) -> ForcesDocument:
         size, angle = abs(force[index]), math.degrees(np.angle(force[index])) % 360.0 % 360.0
         return float(size), float(angle) if size > least else None
 
-    def reaction(one: Reaction | Balancing) -> dict[str, Any]:
+    def reaction(one: Reaction) -> dict[str, Any]:
         (size, direction), force = directed(one.force), complex(one.force[index])
         x, y = force.real + 0.0, force.imag + 0.0
         links = {"on": one.on, "by": one.by}
@@ -291,7 +290,7 @@ def _forces(forces: Forces, motion: Motion, index: int) -> ForcesDocument:
         joints={name: ForceDocument(**reaction(joint)) for name, joint in forces.hinges.items()},
         guides={name: guide(slider) for name, slider in forces.guides.items()},
         inertia={one.link: inertia(one) for one in forces.given if one.kind == "inertia"},
-        balancing=ForceDocument(**reaction(last)) if last.is_force else moment,
+        balancing=ForceDocument(**reaction(last)) if last.along is not None else moment,
         power_residual=float(forces.power_residual[index]),
     )
 

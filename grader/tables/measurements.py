@@ -184,7 +184,7 @@ class Names:
 def names_of(assignment: Assignment) -> Names:
     """The names that an assignment's measurement files may hold."""
     mechanism = assignment.mechanism(assignment.variants()[:1])
-    construction: Construction = construction_of(mechanism)
+    construction: Construction = construction_of(mechanism, forces=assignment.forces)
     joints = mechanism.joints
     abouts = [*joints, *(f"{head}{tail}" for head in joints for tail in joints if head != tail)]
     possible = [f"v_{about}" for about in abouts]

@@ -123,7 +123,7 @@ class LoadTable(Authored):
 
 
 class Masses(Authored):
-    """What an assignment says of masses and forces. Without bodies and loads it has no force plans."""
+    """Masses and given forces of an assignment. Without bodies and loads it has no forces."""
 
     gravity: FormulaText | None = None
     """Acceleration of gravity, m/s^2, downwards; weights are neglected where it is left out."""
@@ -264,9 +264,9 @@ def _check_tables(mechanism: Mechanism, points: Points, bodies: Sequence[BodyTab
         yield from _check_link(link, points, f"{where}.link")
         if link in seen:
             yield Finding(f"{where}.link", f"link {link} has a [[body]] already: leave one of them out")
-        seen.add(link)
-        if link not in points:
+        if link in seen or link not in points:
             continue
+        seen.add(link)
         held = ", ".join(points[link])
         if link in sliding and centre is not None and centre.joint not in points[link]:
             yield Finding(f"{where}.centre", f"the mass of a slider is at its joint {held}: leave out centre")

@@ -128,10 +128,9 @@ def table_rows(subject: Subject, figures: Sequence[str]) -> Iterator[TableRow]:
             "–" if subject.is_zero(vector.name) else wording.number(angle),
         )
     names = {vector.name for vector in shown}
-    for name, values in plan.rates.items():
-        rate = plan.construction.rates[name]
+    for name, rate in plan.construction.rates.items():
         if rate.vector in names:
-            turns = 0.0 if subject.is_zero(rate.vector) else subject.number(values)
+            turns = 0.0 if subject.is_zero(rate.vector) else subject.number(plan.rates[name])
             unit = wording.unit(unit_of(name))
             value = wording.number(f"{four_digits(abs(turns))}")
             yield TableRow(subject.letter(name), "", "", f"{value} {unit}", "" if turns else "–", turns)

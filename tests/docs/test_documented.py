@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from grader.cli.app import app
 from grader.cli.exporting import MODELS
 from grader.rubric import CriterionTable, RubricFile, ToleranceTable
-from reference.authored import assignment, mechanism
+from reference.authored import assignment, bodies, mechanism
 from reference.construction.mistakes import CODES
 from reference.errors import PlanmarkError
 
@@ -124,6 +124,8 @@ TABLES = [
     assignment.ScalesTable,
     assignment.PageTable,
     assignment.GivenTable,
+    bodies.BodyTable,
+    bodies.LoadTable,
     RubricFile,
     CriterionTable,
     ToleranceTable,

@@ -41,6 +41,36 @@ def test_the_plan_as_json_is_what_its_schema_says(planmark, call):
     assert document["assignment"] == call.split()[0]
 
 
+def test_masses_and_loads_give_forces_as_json_and_in_the_table(planmark, tmp_path):
+    text = (library() / "pump.assignment.toml").read_text(encoding="utf-8")
+    masses = '[[body]]\nlink = "slider_D"\nmass = 20\n[[load]]\nlink = "slider_D"\nforce = 900\n'
+    path = tmp_path / "own.assignment.toml"
+    path.write_text(f'{text}\n{masses}motion = "against"\n', encoding="utf-8")
+    document = json.loads(planmark("plan", path.name, "--n", 7, "--json").stdout)
+    jsonschema.validate(document, schema("plan"))
+    forces, drive = document["forces"], document["vectors"]["a_D"]
+    assert forces["inertia"]["slider_D"]["force_N"] == pytest.approx(20 * drive["value"])
+    turned = forces["inertia"]["slider_D"]["direction_deg"] - drive["direction_deg"]
+    assert abs(turned) == pytest.approx(180.0)
+    assert set(forces["guides"]["D"]) == {
+        "on", "by", "x_N", "y_N", "value_N", "direction_deg", "moment_Nm", "at_m",
+    }  # fmt: skip
+    # The crank gives what the piston takes: the moment times omega is the power of the load and of inertia.
+    load = 900 + 20 * drive["value"] * (
+        1 if drive["direction_deg"] == document["vectors"]["v_D"]["direction_deg"] else -1
+    )
+    omega = document["angular"]["omega_1"]
+    power = load * document["vectors"]["v_D"]["value"]
+    assert forces["balancing"] == {"on": "1", "moment_Nm": pytest.approx(power / omega)}
+    assert abs(forces["power_residual"]) < 1e-12
+    (row,) = [
+        line.split()
+        for line in planmark("plan", path.name, "--n", 7).stdout.splitlines()
+        if "balancing" in line
+    ]
+    assert float(row[-1]) == pytest.approx(power / omega, rel=1e-3)
+
+
 def test_a_zero_vector_has_no_direction(planmark):
     document = json.loads(planmark("plan", "press", "--position", 0, "--json").stdout)
     assert document["vectors"]["v_B"]["direction_deg"] is None

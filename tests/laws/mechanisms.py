@@ -457,13 +457,13 @@ def loaded(mechanism: Mechanism, seed: int) -> Mechanism:
             bodies.append(Body(link, str(lot.choice(joints)), array(size), array(inertia)))
         if lot.random() < 0.4:
             force = 10.0 ** lot.uniform(0, 4) * turn_to(lot.uniform(-np.pi, np.pi))
-            loads.append(Load(f"L{len(loads)}", link, str(lot.choice(joints)), array(force), array(0.0)))
+            loads.append(Load(f"L{len(loads)}", link, str(lot.choice(joints)), array(force)))
         if lot.random() < 0.2:
             couple = array(lot.uniform(-100, 100))
-            loads.append(Load(f"L{len(loads)}", link, joints[0], array(0j), couple))
+            loads.append(Load(f"L{len(loads)}", link, joints[0], couple=couple))
         if isinstance(sliders_of(mechanism).get(link), FixedGuide):
             force = array(complex(lot.uniform(-1000, 1000)))
-            loads.append(Load(f"L{len(loads)}", link, joints[0], force, array(0.0), joints[0]))
+            loads.append(Load(f"L{len(loads)}", link, joints[0], force, slider=joints[0]))
     driver = mechanism.driver
     for group in slots.values():
         grounded = mechanism.ground_m.keys() - {getattr(driver, "pivot", "")}
@@ -562,8 +562,13 @@ def transformed(mechanism: Mechanism, turn: complex, *, mirror=False, factor=1.0
         )
 
     def load_of(load):
-        force = load.force if load.slider else (np.conj(load.force) if mirror else load.force) * turn
-        return replace(load, force=force, couple=sign * load.couple)
+        if load.force is None:
+            return replace(load, couple=sign * load.couple)
+        return (
+            load
+            if load.slider
+            else replace(load, force=(np.conj(load.force) if mirror else load.force) * turn)
+        )
 
     ground = {joint: place(z) for joint, z in mechanism.ground_m.items()}
     groups, loads = (tuple(map(*each)) for each in ((group_of, mechanism.groups), (load_of, mechanism.loads)))

@@ -143,12 +143,13 @@ class Equations:
             couple = -self.number(body.inertia) * rates.get(turning, mp.mpf(0))
             self.act(body.link, body.centre, force, couple)
         for load in mechanism.loads:
-            force = self.number(load.force)
+            force = mp.mpc(0) if load.force is None else self.number(load.force)
+            couple = mp.mpf(0) if load.couple is None else self.number(load.couple)
             if load.slider is not None:
                 slider = joints[load.slider]
                 motion = slider.velocity or slider.acceleration
                 force = force.real * motion / abs(motion) if motion else mp.mpc(0)
-            self.act(load.link, load.point, force, self.number(load.couple))
+            self.act(load.link, load.point, force, couple)
 
     def act(self, link, point, force, couple):
         for row, part in enumerate((force.real, force.imag, cross(self.at[point], force) + couple)):
@@ -196,10 +197,8 @@ def errors(mechanism: Mechanism) -> tuple[float, float] | None:
         for one in forces.guides.values():
             pairs.append((one.force, truth["force", one.joint, one.on, one.by], 1))
             pairs.append((one.moment, truth["moment", one.joint, one.on, one.by], reach))
-        one = forces.balancing
-        pairs.append(
-            (one.force if one.is_force else one.moment, truth["balancing"], 1 if one.is_force else reach)
-        )
+        one, is_force = forces.balancing, forces.balancing.along is not None
+        pairs.append((one.force if is_force else one.moment, truth["balancing"], 1 if is_force else reach))
         assert len(truth) == 2 * len(pairs) - 1
         given = [abs(complex(one.force[0])) for one in forces.given]
         given += [abs(float(one.couple[0])) / reach for one in forces.given]
@@ -222,7 +221,7 @@ def random_loaded(number: int, least_sine: float = LEAST_SINE) -> Mechanism:
 
 
 BLOCKS = [0, *slow(*range(1, 10))]
-"""Of fifty mechanisms each."""
+"""Fifty mechanisms each."""
 
 
 @pytest.mark.parametrize("block", BLOCKS)

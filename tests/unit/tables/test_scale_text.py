@@ -44,6 +44,11 @@ ROUNDING = 1e-12
         ("ka", "0.108 m*s^-2/mm", 0.108),
         ("ka", "0.108 m/s^(2)/mm", 0.108),
         ("ka", "0.108 [m/s**2]/mm", 0.108),
+        ("kF", "25 N/mm", 25.0),
+        ("kF", "0,025 кН/мм", 25.0),
+        ("kF", "μF = 250 Н/см", 25.0),
+        ("kF", "1 mm = 25 N", 25.0),
+        ("kF", "1 cm : 0.25 kN", 25.0),
     ],
 )
 def test_a_scale_with_its_unit_is_understood(name, text, per_mm):

@@ -1,0 +1,174 @@
+"""Vectors of force plans, their scale and the balancing moment are judged as other quantities are."""
+
+import cmath
+import math
+
+import pytest
+
+from grader.comparison.criteria import compare
+from grader.comparison.evidence import Submission
+from grader.comparison.task import task_of
+from grader.rubric import rubric_of
+from grader.tables.measurements import columns_of, measurements_in, names_of
+from reference.authored.assignment import Variant, library, load_assignment
+from reference.errors import AuthoredFileError
+from reference.numbers import cross
+
+LOADED = """
+[[page]]
+kind = "forces"
+figures = ["mechanism", "force_plan_D", "force_plan_B", "force_plan_A"]
+[[body]]
+link = "3"
+mass = 2.5
+inertia = 0.02
+centre = { base = ["A", "B"], ratio = 0.5 }
+[[load]]
+link = "slider_D"
+force = 800
+motion = "against"
+"""
+ASKED = (
+    'scale = "kF"',
+    'vector = "F_D"',
+    'vector = "R_0D"',
+    'vector = "R_02"',
+    'vector = "R_31"',
+    'moment = "M_b"',
+    'sense = "M_b"',
+)
+HEAD = 'schema_version = 1\nid = "f"\ntitle = { en = "Forces" }\n'
+RUBRIC = f"{HEAD}weights = {{ force_plans = 8 }}\n" + "".join(
+    f'[[criterion]]\nid = "c{index}"\ntitle = {{ en = "x" }}\npoints = 1\n{one}\n'
+    for index, one in enumerate(ASKED)
+)
+
+
+@pytest.fixture
+def forces(tmp_path):
+    """The pump's assignment with one page of force plans."""
+
+    def load(*changes, rubric=RUBRIC):
+        text = (library() / "pump.assignment.toml").read_text(encoding="utf-8")
+        pages, data = text.index("# A sheet that"), text.index("# A datum")
+        text = text[:pages] + LOADED + text[data:]
+        ours = (
+            ('ka = "omega**2 * kL"', 'ka = "omega**2 * kL"\nkF = "force / 50"'),
+            ('rubric = "pump"', 'rubric = "f"'),
+        )
+        for old, new in (*ours, *changes):
+            assert old in text
+            text = text.replace(old, new)
+        (tmp_path / "f.assignment.toml").write_text(text, encoding="utf-8")
+        (tmp_path / "f.rubric.toml").write_text(rubric, encoding="utf-8")
+        return load_assignment(tmp_path / "f.assignment.toml")
+
+    return load
+
+
+@pytest.fixture
+def judged(forces):
+    """Marks what a student enters; the verdicts by name."""
+    assignment = forces()
+    task = task_of(assignment, rubric_of(assignment), Variant(7))
+
+    def mark(longer=1.0, scale="16 N/mm", **cells):
+        """Arguments: `longer`, how much longer R_02 was drawn, from which R_31 and the moment follow."""
+        real = {name: task.real[name] for name in ("F_D", "R_0D", "R_02", "R_31", "F_i3", "R_43", "R_13_t")}
+        real["R_31"] += (longer - 1.0) * real["R_02"]
+        entered = {"kF": scale}
+        for name, force in (real | {"R_02": longer * real["R_02"]}).items():
+            entered |= {
+                name: f"{abs(force) / 16.0:.2f}",
+                f"{name}_deg": f"{math.degrees(cmath.phase(force)):.2f}",
+            }
+        measured = measurements_in({**entered, **cells}, names_of(assignment), "", "en")
+        assert measured.problems == ()
+        handed_in = Submission(measured=measured.reading, values=measured.values, declared=measured.scales)
+        return {one.name: one for one in compare(task, handed_in).outcomes}
+
+    arm = task.nodes(task.rule_scales)["A"]
+    follows = task.real["R_31"] + 0.5 * task.real["R_02"]
+    mark.right = task.rates["M_b"]
+    mark.follows = mark.right * cross(arm, follows) / cross(arm, task.real["R_31"])
+    return mark
+
+
+def verdicts(outcomes):
+    return {name: one.verdict for name, one in outcomes.items()}
+
+
+def test_a_right_force_sheet_gets_full_marks(judged):
+    found = judged(M_b_value=f"{abs(judged.right):.1f} {'ccw' if judged.right > 0 else 'cw'}")
+    assert set(verdicts(found).values()) == {"full"}
+    assert found["M_b"].expected.unit == "N m"
+
+
+def test_a_moment_of_the_other_sense_is_wrong(judged):
+    found = judged(M_b_value=f"{-judged.right:.1f}")
+    assert (found["M_b"].verdict, found["M_b_sense"].verdict) == ("none", "none")
+    assert "value_reversed" in found["M_b"].codes
+
+
+def test_a_moment_follows_from_the_student_s_own_reactions(judged):
+    assert abs(judged.follows / judged.right - 1.0) > 0.05
+    found = judged(longer=1.5, M_b_value=f"{judged.follows:.1f}")
+    assert found["R_02"].verdict == "none"
+    assert (found["R_31"].verdict, found["M_b"].verdict) == ("follow_through", "follow_through")
+    assert judged(M_b_value=f"{judged.follows:.1f}")["M_b"].verdict in {"none", "partial"}
+
+
+def test_a_declared_scale_of_forces_is_held_against_a_given_force(judged):
+    assert verdicts(judged(scale="0.016 kN/mm"))["kF"] == "full"
+    found = judged(scale="1 mm = 20 N")
+    assert found["kF"].verdict == "none"
+    assert "scale_off" in found["kF"].codes
+
+
+def test_the_columns_are_those_of_the_rubric_and_of_the_sheet_s_own_scales(forces):
+    assignment = forces()
+    columns = columns_of(assignment, rubric_of(assignment))
+    assert columns == {
+        "kL": "m/mm", "kF": "N/mm", "F_D": "mm", "F_D_deg": "°", "R_0D": "mm", "R_0D_deg": "°",
+        "R_02": "mm", "R_02_deg": "°", "R_31": "mm", "R_31_deg": "°",
+        "M_b_value": "N m", "M_b_sense": "cw/ccw",
+    }  # fmt: skip
+    assert [one.section for one in rubric_of(assignment).criterion] == ["scales", *["force_plans"] * 6]
+
+
+@pytest.mark.parametrize(
+    ("change", "path", "words"),
+    [
+        (
+            ('"force_plan_B"', '"force_plan_C"'),
+            "$.page[0].figures[2]",
+            "C names no group.*force_plan_D, force_pl",
+        ),
+        (('"force_plan_B"', '"forceplan_B"'), "$.page[0].figures[2]", "force_plan_ and the joint of a group"),
+        (('\nkF = "force / 50"', ""), "$.scales.kF", "is missing: a page shows a force plan"),
+        (('kF = "force / 50"', 'kF = "forces"'), "$.scales.kF", "unknown name forces"),
+    ],
+)
+def test_a_fault_of_a_page_of_forces_is_told_at_its_path(forces, change, path, words):
+    with pytest.raises(AuthoredFileError, match=words) as error:
+        forces(change)
+    assert error.value.findings[0].path == path
+
+
+@pytest.mark.parametrize(
+    ("name", "told", "words"),
+    [
+        ("f", "own", "no page shows the acceleration plan"),
+        ("pump", "given", "no page of the assignment shows"),
+    ],
+)
+def test_accelerations_that_no_page_shows_are_a_fault(forces, name, told, words):
+    pages = () if name == "f" else ((LOADED[: LOADED.index("[[body]]")], PAGE),)
+    assignment = forces(*pages, rubric=f'accelerations = "{told}"\n{RUBRIC if name == "f" else VELOCITIES}')
+    with pytest.raises(AuthoredFileError, match=words) as error:
+        rubric_of(assignment)
+    assert error.value.findings[-1].path == "$.accelerations"
+
+
+PAGE = '[[page]]\nkind = "velocity"\nfigures = ["velocity_plan"]\n'
+VELOCITIES = HEAD + '[[criterion]]\nid = "v"\ntitle = { en = "x" }\npoints = 1\nvector = "v_B"\n'
