@@ -537,7 +537,9 @@ def _own_turnings(charges: Charges, name: str, value: float, per_mm: float) -> I
     if name in task.construction.moments:
         yield following.moment(name, per_mm)
         wrong = frozenset(charges.charged | charges.doubtful)
-        for basis in (following.own_forces(name, wrong), following.instead):
+        scales = replace(following.right(following.followed), name="scales", wrong=following.wrong_scales)
+        own = following.own_forces(name, wrong)
+        for basis in (scales if scales.wrong else None, own, following.instead):
             if basis is not None:
                 yield following.moment(name, per_mm, basis)
         return
