@@ -223,7 +223,7 @@ Rail = tuple[str, _Near]
 """The link that has a guide, and the guide's direction."""
 
 
-def _turning(mechanism: Mechanism) -> dict[str, tuple[str, str, str]]:
+def turning(mechanism: Mechanism) -> dict[str, tuple[str, str, str]]:
     """Return for every link that turns the one whose rate it has (a slider: its guide's), and two joints."""
     driver, named = mechanism.driver, named_links(mechanism)
     found = {driver.link: (driver.link, driver.pivot, driver.pin)} if isinstance(driver, Crank) else {}
@@ -252,7 +252,7 @@ class _Statics:
         self.mechanism, self.solution, self.error = mechanism, solution, error
         self.take, self.at = solution.take, {name: one.position for name, one in solution.joints.items()}
         self.named, self.carriers = named_links(mechanism), carriers(mechanism)
-        self.names, self.turning = short_names(mechanism), _turning(mechanism)
+        self.names, self.turning = short_names(mechanism), turning(mechanism)
         self.zero = 0.0 * self.at[mechanism.driver.pin]
         self.reach = reduce(larger, map(abs, self.at.values()))
         self.acting: dict[str, list[tuple[str, _Near, _Near]]] = {}

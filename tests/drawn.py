@@ -3,7 +3,9 @@
 from functools import cache
 
 from reference.authored.assignment import load_assignment
+from reference.mechanism import SLIDER, named_links, points_of
 from reference.plan import exact_plan
+from tests import every_group
 
 _HEAD = """
 schema_version = 1
@@ -126,6 +128,57 @@ BUILT_IN = {
     "shaper 5": ("shaper", 5, None), "piston 5": ("piston", 5, None),
 }  # fmt: skip
 CASES = (*BUILT_IN, *MECHANISMS)
+
+
+CYLINDER = """
+ground = { O1 = [0, 0], O2 = [200, -50] }
+[mechanism.crank]
+pivot = "O1"
+pin = "A"
+length = 100
+cylinder = { pivot = "O2", length = 150, speed = 40, side = "left" }
+[[mechanism.group]]
+type = "RPR"
+node = "A3"
+pin = "A"
+pivot = "O2"
+link = "3"
+"""
+WITH_FORCES = (*MECHANISMS, "every group", "cylinder")
+"""Mechanisms that `loaded` gives bodies; a cylinder that drives has none."""
+
+
+@cache
+def loaded(case, folder, *, own):
+    """The assignment and plan of a case whose links all have bodies; with its own accelerations or given."""
+    head, _, inner = (_HEAD + MECHANISMS.get(case, "")).partition("[mechanism]")
+    if case == "every group":
+        inner = every_group.MECHANISM.replace("40 + n", "43")
+    inner += CYLINDER if case == "cylinder" else ""
+    name = f"f{WITH_FORCES.index(case)}{'own' if own else ''}"
+    head = head.format(name=name).replace("[scales]", "[scales]\nkF = 5")
+    text = f"{head}[mechanism]{inner.replace('{{', '{').replace('}}', '}').replace('{name}', name)}"
+    file = folder / f"{name}.assignment.toml"
+    file.write_text(text, encoding="utf-8")
+    bare = load_assignment(str(file))
+    mechanism = bare.mechanism(bare.variants())
+    cylinder = getattr(mechanism.driver, "cylinder", None)
+    plans = [node for node, links in named_links(mechanism).items() if links and cylinder not in links]
+    plans.append(mechanism.driver.pin)
+    figures = ["mechanism", *(["acceleration_plan"] if own else []), *(f"force_plan_{one}" for one in plans)]
+    text = text.replace('"mechanism", "velocity_plan", "acceleration_plan"', str(figures)[1:-1])
+    text = text.replace("[scales]", "gravity = 9.81\n[scales]")
+    loaded_links = {
+        link: points for link, points in points_of(mechanism).items() if cylinder is None or link == "1"
+    }
+    for link, points in loaded_links.items():
+        centre = "" if link.startswith(SLIDER) else f'centre = "{points[-1]}"'
+        text += f'\n[[body]]\nlink = "{link}"\nmass = 2\ninertia = 0.05\n{centre}\n'
+    link, points = [*loaded_links.items()][-1]
+    text += f'[[load]]\nlink = "{link}"\npoint = "{points[0]}"\nforce = 300\nangle_deg = 200\n'
+    file.write_text(text, encoding="utf-8")
+    assignment = load_assignment(str(file))
+    return assignment, exact_plan(assignment, assignment.variants())
 
 
 @cache

@@ -22,7 +22,7 @@ from grader.solution.sentences import Speaker, speaker_of, wording_of
 from grader.solution.steps import computed
 from reference.authored.assignment import Assignment, Variant
 from reference.construction.elements import Along, Coriolis
-from reference.construction.equations import equations
+from reference.construction.equations import Equation, equations
 from reference.construction.steps import Coincide, Divide, Given, Similar, Step, TwoLines
 from reference.drawing.subject import Subject
 from reference.drawing.triangles import triangles
@@ -62,17 +62,18 @@ def redo(subject: Subject, tongue: Tongue, node: str, *, with_numbers: bool) -> 
     told = [*_told_steps(speaker, own[:MOST_STEPS], with_numbers=with_numbers)]
     later = [step.node for step in (*own[MOST_STEPS:], *(step for step in touched if step not in own))]
     if later:
-        told.append(speaker.say(THEN, nodes=speaker.names(tuple(later))))
+        drawn = tuple(dict.fromkeys(map(speaker.drawn_at, later)))
+        told.append(speaker.say(THEN, nodes=speaker.names(drawn)))
     return [line.unescape() for line in told if line]
 
 
 def _told_steps(speaker: Speaker, steps: Sequence[Step], *, with_numbers: bool) -> Iterator[Markup]:
     """Yield each equation before the first step that draws a part of it: rows of cells, then the steps."""
-    known, written = equations(speaker.subject.plan.construction), set[str]()
+    known, written = equations(speaker.subject.plan.construction), set[Equation]()
     for step in steps:
         equation = known.get(step.node)
-        if equation is not None and equation.sums and equation.left.vector not in written:
-            written.add(equation.left.vector)
+        if equation is not None and equation.sums and equation not in written:
+            written.add(equation)
             rows = grid_of(speaker, equation, with_numbers=with_numbers).rows
             yield escape("\n".join("\t".join(map(plain, row)) for row in rows))
         yield _text(speaker, step, with_numbers=with_numbers)
@@ -99,6 +100,8 @@ def _text(speaker: Speaker, step: Step, *, with_numbers: bool) -> Markup:
 def _text_without_numbers(speaker: Speaker, step: Step) -> Iterator[Markup]:
     """Describe what is drawn in a step without a number."""
     match step:
+        case Given() | TwoLines() if not speaker.has_letters(step.node):
+            yield sentences.force(speaker, step, with_numbers=False)
         case TwoLines() | Coincide():
             yield sentences.sentence(speaker, step)
         case Given(along=Along()) | Given(length=Coriolis()):

@@ -7,12 +7,24 @@ from dataclasses import replace
 import numpy as np
 
 from grader.language import N_
+from grader.solution.forces import balance_of, force_formula, moment_formula
 from grader.solution.formulas import TICK, Formula, Fraction, Grid, Name
 from grader.solution.sentences import NEXT_TO_NOTHING, Speaker, guided
 from reference.authored.assignment import SCALE_NAMES
 from reference.authored.formula import Formula as AuthoredFormula
 from reference.authored.formula import Value
-from reference.construction.elements import Along, Coriolis, Length, Normal, side_at
+from reference.construction.elements import (
+    Along,
+    Balance,
+    Coriolis,
+    Fixed,
+    Inertia,
+    Length,
+    Normal,
+    Same,
+    Scaled,
+    side_at,
+)
 from reference.construction.equations import Equation, Proportion, Term
 from reference.drawing.canvas import Piece, pieces_of
 from reference.geometry import cross
@@ -30,20 +42,26 @@ KNOWN, UNKNOWN = TICK, "?"
 def grid_of(speaker: Speaker, equation: Equation, *, with_numbers: bool) -> Grid:
     """Return an equation with rows for size and direction; with numbers also real and drawn sizes."""
     terms = equation.terms
-    signs = ["=" if terms and not at else "+" for terms in equation.sums for at, _ in enumerate(terms)]
+    signs = [
+        "−" if term.is_negative else "+" if at else "="
+        for terms in equation.sums
+        for at, term in enumerate(terms)
+    ]
+    is_zero = equation.left is None
+    signs = [*signs[1:], "="] if is_zero else signs
 
-    def row(head: str, cells: list[Formula], between: list[str]) -> tuple[Formula, ...]:
-        rest = zip(between, cells[1:], strict=True)
+    def row(head: str, cells: list[Formula], between: list[str], zero: str = "") -> tuple[Formula, ...]:
+        rest = zip(between, [*cells[1:], *([zero] if is_zero else [])], strict=True)
         return (head, cells[0], *(part for pair in rest for part in pair))
 
     blank = [""] * len(signs)
     _ = speaker.tongue.gettext
     rows = [
-        row("", [replace(speaker.symbol(term.vector), is_vector=True) for term in terms], signs),
+        row("", [replace(speaker.symbol(term.vector), is_vector=True) for term in terms], signs, "0"),
         row(_(SIZE), [_size(speaker, term) for term in terms], blank),
     ]
     if with_numbers:
-        scale = kind_of(equation.left.vector).scale
+        scale = kind_of(terms[0].vector).scale
         drawn = [_drawn_mm(speaker, term) if term.is_drawn or term.size else None for term in terms]
         real = ["" if mm is None else speaker.bare(mm * speaker.scale_value(scale)) for mm in drawn]
         paper = ["" if mm is None else speaker.tongue.number(mm, 2) for mm in drawn]
@@ -51,7 +69,7 @@ def grid_of(speaker: Speaker, equation: Equation, *, with_numbers: bool) -> Grid
         rows += [row(f"{_(PAPER)}, {speaker.tongue.unit('mm')}", [*paper], blank)]
     rows.append(row(_(DIRECTION), [_direction(speaker, term) for term in terms], blank))
     lines = (0, terms[0].known, *(part for term in terms[1:] for part in (0, term.known)))
-    return Grid(tuple(rows), lines)
+    return Grid(tuple(rows), (*lines, 0, 0) if is_zero else lines)
 
 
 def _size(speaker: Speaker, term: Term) -> Formula:
@@ -60,7 +78,7 @@ def _size(speaker: Speaker, term: Term) -> Formula:
             return KNOWN if term.is_drawn else UNKNOWN
         case Proportion(base=base, model=(q, p, x)):
             return Fraction((speaker.symbol(*base[::-1]), " · ", speaker.symbol(p, x)), speaker.symbol(q, p))
-    formula = size_formula(speaker, term.size, term.head)
+    formula = None if isinstance(term.size, Balance) else size_formula(speaker, term.size, term.head)
     return KNOWN if formula is None else formula[0]
 
 
@@ -71,18 +89,21 @@ def _direction(speaker: Speaker, term: Term) -> Formula:
                 return ("⊥ ", speaker.symbol(tail, head))
             if term.size is None:
                 return ("∥ ", speaker.symbol(tail, head))
-            turned = (quarters % 4 == 2) != (side_at(side, speaker.view) < 0)
+            back = isinstance(term.size, Balance) and float(term.size.at(speaker.view)) < 0.0
+            turned = ((quarters % 4 == 2) != (side_at(side, speaker.view) < 0)) != back
             first, second = (head, tail) if turned else (tail, head)
             return (speaker.symbol(first), " → ", speaker.symbol(second))
         case None:
             if isinstance(term.size, Proportion):
                 return _turned(speaker, term.size, term.head)
             return KNOWN if term.is_drawn else UNKNOWN
-        case along:
+        case Fixed() as along if guided(along)[0] in {"slot", "guide"}:
             kind, joint = guided(along)
             text = SLOT if kind == "slot" else GUIDE
             before, after = speaker.tongue.gettext(text).split("%(joint)s")
-            return ("∥ ", before, speaker.symbol(joint), after)
+            return ("⊥ " if along.quarters % 2 else "∥ ", before, speaker.symbol(joint), after)
+        case _:
+            return KNOWN
 
 
 def _turned(speaker: Speaker, similar: Proportion, end: str) -> Formula:
@@ -120,6 +141,11 @@ def size_formula(speaker: Speaker, length: Length, node: str) -> tuple[Formula, 
             names = (speaker.symbol(f"omega_{carrier}"), " · ", speaker.symbol(speaker.vector(*slide)))
             numbers = (speaker.bare(turn), " · ", _speed(speaker, *slide))
             return ("2 · ", names), ("2 · ", numbers)
+        case Balance():
+            total = balance_of(speaker, node)
+            return None if total is None else moment_formula(speaker, total)
+        case Inertia() | Same() | Scaled(scale="kF"):
+            return force_formula(speaker, length)
     driver = speaker.subject.plan.mechanism.driver
     quantity = getattr(length, "quantity", "")
     if not isinstance(driver, Crank) or kind_of(quantity).scale not in OF_MOTION:
@@ -208,6 +234,7 @@ def _symbols(speaker: Speaker) -> Callable[[str], Formula]:
     """Return how to write a name of the assignment's formulas."""
     driver = speaker.subject.plan.mechanism.driver
     known: dict[str, Formula] = {scale: speaker.scale(scale) for scale in SCALE_NAMES}
+    known["force"] = speaker.symbol("F_max")
     if isinstance(driver, Crank):
         arm = speaker.symbol(driver.pivot, driver.pin)
         drawn = Piece(speaker.tongue.gettext(DRAWN), -1)

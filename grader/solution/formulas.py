@@ -116,8 +116,8 @@ def _element(formula: Formula) -> Markup:
             if text in SIGNS:
                 return Markup("<mo>{}</mo>").format(text)
             tag = "mn" if text[:1].isdecimal() else "mtext"
-            space = "\N{NO-BREAK SPACE}" * (formula[:1] == " ")
-            return Markup("<{0}>{1}{2}</{0}>").format(tag, space, text)
+            before, after = ("\N{NO-BREAK SPACE}" * (end == " ") for end in (formula[:1], formula[-1:]))
+            return Markup("<{0}>{1}{2}{3}</{0}>").format(tag, before, text, after)
         case Name():
             return _name(formula)
         case Fraction(over=over, under=under):
@@ -164,7 +164,7 @@ def grid_html(grid: Grid) -> Markup:
     """Return an equation as a table whose cells are MathML."""
     rows = []
     for number, row in enumerate(grid.rows):
-        cells = [Markup("<th>{}</th>").format(plain(row[0]))]
+        cells = [Markup("<th>{}</th>").format(row[0] if isinstance(row[0], str) else mathml(row[0]))]
         for count, cell in zip(grid.underlines[1:], row[1:], strict=True):
             mark = Markup(' class="known-{}"').format(count) if count and not number else ""
             cells.append(Markup("<td{}>{}</td>").format(mark, mathml(cell) if cell else ""))

@@ -23,7 +23,17 @@ from reportlab.platypus import (
 
 from grader.language import N_, Tongue
 from grader.printed.pdf import REGULAR, embed_fonts, put_shapes, with_marks
-from grader.solution.formulas import Formula, grid_html, grid_shapes, mathml, plain, typeset, unicode_name
+from grader.solution.formulas import (
+    Formula,
+    Grid,
+    grid_html,
+    grid_shapes,
+    grid_text,
+    mathml,
+    plain,
+    typeset,
+    unicode_name,
+)
 from grader.solution.steps import CENTRES, NOTES, ExplainedStep, PlanSection, explain
 from reference.drawing import sheets
 from reference.drawing.canvas import (
@@ -33,6 +43,7 @@ from reference.drawing.canvas import (
     bounds,
     picture_svg,
 )
+from reference.drawing.forces import LEVER, lever_of, scheme_of
 from reference.drawing.sheets import figures_of
 from reference.drawing.subject import DrawnFigure, Subject
 
@@ -95,19 +106,28 @@ class Illustrated:
 
 @dataclass(frozen=True, slots=True)
 class Chapter:
-    """A section with its pictures."""
+    """A section with its pictures; `picture` shows what its table is about."""
 
     section: PlanSection
     steps: tuple[Illustrated, ...]
+    picture: Cutout | None = None
 
 
 def chapters(subject: Subject, tongue: Tongue) -> list[Chapter]:
     """Return every figure's steps with their pictures."""
     figures = figures_of(subject)
     return [
-        Chapter(section, tuple(_illustrated(subject, figures, section)))
+        Chapter(section, tuple(_illustrated(subject, figures, section)), _scheme(subject, section))
         for section in explain(subject, tongue)
     ]
+
+
+def _scheme(subject: Subject, section: PlanSection) -> Cutout | None:
+    """Return the picture of the forces in a section's table."""
+    if section.table is None:
+        return None
+    drawn = lever_of(subject) if section.figure == LEVER else scheme_of(subject, section.figure)
+    return Cutout(drawn.shapes, _box(drawn.shapes))
 
 
 def _illustrated(
@@ -115,6 +135,8 @@ def _illustrated(
 ) -> Iterator[Illustrated]:
     if section.figure == CENTRES:
         yield from _centres(subject, figures["mechanism"], section)
+        return
+    if not section.steps:
         return
     figure, mechanism = figures[section.figure], figures["mechanism"]
     nodes = subject.nodes(section.figure)
@@ -188,6 +210,7 @@ def text_page(subject: Subject, tongue: Tongue) -> str:
             [plain(one, in_unicode=True) for one in group] for group in (section.formulas, section.rates)
         )
         parts += [section.title.upper(), "\n".join((*formulas, section.introduction.unescape()))]
+        parts += [grid_text(section.table)] if section.table else []
         parts += [f"{step.number}.\n{step.text}" for step in section.steps]
         parts.append("\n".join(rates))
     return "\n\n".join(part for part in parts if part) + "\n"
@@ -253,6 +276,10 @@ def _printed_chapter(chapter: Chapter) -> Iterator[Flowable]:
     yield Spacer(1, 1 * mm)
     yield from map(_formula, section.formulas)
     yield _paragraph(section.introduction, 9)
+    if section.table is not None:
+        yield from (Spacer(1, 2 * mm), _grid(section.table))
+    if chapter.picture is not None:
+        yield from (Spacer(1, 2 * mm), _Drawn(chapter.picture))
     for step in chapter.steps:
         yield Spacer(1, 4 * mm)
         yield KeepTogether([*_printed_step(step)])
@@ -263,9 +290,7 @@ def _printed_chapter(chapter: Chapter) -> Iterator[Flowable]:
 def _printed_step(step: Illustrated) -> Iterator[Flowable]:
     explanation = step.explanation
     if explanation.equation is not None:
-        shapes = grid_shapes(explanation.equation, EQUATION_MM)
-        yield _Drawn(Cutout(shapes, bounds(shapes)), widest_mm=2 * COLUMN_MM + GAP_MM)
-        yield Spacer(1, 1 * mm)
+        yield from (_grid(explanation.equation), Spacer(1, 1 * mm))
     head = Markup("{}. {}").format(explanation.number, explanation.sentence)
     words: list[Flowable] = [*map(_formula, explanation.before)]
     words += [_paragraph(head, 9.5), *map(_formula, explanation.after)]
@@ -275,6 +300,12 @@ def _printed_step(step: Illustrated) -> Iterator[Flowable]:
     style = [("VALIGN", (0, 0), (-1, -1), "TOP"), ("LEFTPADDING", (0, 0), (-1, -1), 0)]
     picture = _Drawn(step.picture) if step.picture is not None else ""
     yield Table([[words, picture]], colWidths=widths, style=style)
+
+
+def _grid(grid: Grid) -> Flowable:
+    """Return an equation or a table, as wide as the page at most."""
+    shapes = grid_shapes(grid, EQUATION_MM)
+    return _Drawn(Cutout(shapes, bounds(shapes)), widest_mm=2 * COLUMN_MM + GAP_MM)
 
 
 def _formula(formula: Formula) -> Flowable:

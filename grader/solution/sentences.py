@@ -1,6 +1,6 @@
 """The steps of a construction in the words of the textbook, in each language."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,10 +18,12 @@ from reference.construction.elements import (
     FixedLine,
     Length,
     Line,
+    Parallel,
     Scaled,
     View,
     side_at,
 )
+from reference.construction.graph import Vector
 from reference.construction.steps import (
     ArcAndLine,
     Coincide,
@@ -40,7 +42,7 @@ from reference.construction.steps import (
 from reference.drawing.canvas import pieces_of, scale_pieces
 from reference.drawing.subject import Subject, Wording
 from reference.mechanism import SlottedLink, Yoke, moving_guides
-from reference.quantities import unit_of
+from reference.quantities import group_of, unit_of
 
 PERPENDICULAR = N_("perpendicular to %(link)s")
 PARALLEL = N_("parallel to %(link)s")
@@ -52,6 +54,8 @@ TURNED_RIGHT = N_("perpendicular to %(link)s, a quarter turn clockwise from the 
 GUIDE = N_("parallel to the guide of %(joint)s")
 ACROSS_GUIDE = N_("perpendicular to the guide of %(joint)s")
 SLOT = N_("parallel to the slot of %(joint)s")
+ACROSS_SLOT = N_("perpendicular to the slot of %(joint)s")
+OPPOSITE = N_("opposite to %(vector)s, in the direction %(angle)s")
 AT_ANGLE = N_("in the direction %(angle)s")
 ALONG_GUIDE = N_("along the guide of %(joint)s, in the direction %(angle)s")
 TITLES = {
@@ -59,6 +63,10 @@ TITLES = {
     "velocity_plan": N_("Velocity plan"),
     "acceleration_plan": N_("Acceleration plan"),
     "force_plan": N_("Force plan of the group of {group}"),
+    "driving_force_plan": N_("Force plan of the driving link"),
+    "scheme": N_("Links of the group of {group}"),
+    "driving_scheme": N_("Driving link"),
+    "lever": N_("Zhukovsky's lever"),
     "centres": N_("Instantaneous centres and acceleration poles"),
 }
 VARIANT = {"n": N_("n"), "position": N_("position")}
@@ -181,6 +189,16 @@ class Speaker:
         vectors = self.subject.plan.construction.vectors.values()
         return next(vector.name for vector in vectors if (vector.tail, vector.head) == (tail, head))
 
+    def has_letters(self, node: str) -> bool:
+        """Return whether the nodes of a node's figure have letters; those of a force plan have none."""
+        return not group_of(self.subject.plan.construction.figure_of(node))
+
+    def drawn_at(self, node: str) -> str:
+        """Return a node with a letter; of a force plan the vector that its step draws."""
+        vectors = self.subject.plan.construction.vectors.values()
+        drawn = (one.name for one in vectors if one.head == node and not one.is_sum)
+        return node if self.has_letters(node) else next(drawn)
+
     def link_of(self, node: str) -> Name:
         """Return the link of the normal component that ends in a node."""
         vectors = self.subject.plan.construction.vectors.values()
@@ -202,16 +220,19 @@ class Speaker:
 
     def line_direction(self, along: Direction) -> Markup:
         """Describe the direction of a line, without a sense."""
-        if isinstance(along, Along):
+        if isinstance(along, Along | Parallel):
             text = PERPENDICULAR if along.quarters % 2 else PARALLEL
             return self.say(text, link=(along.tail, along.head))
         kind, joint = guided(along)
         if kind == "slot":
-            return self.say(SLOT, joint=joint)
+            return self.say(ACROSS_SLOT if along.quarters % 2 else SLOT, joint=joint)
         return self.say(ACROSS_GUIDE if along.quarters % 2 else GUIDE, joint=joint)
 
     def vector_direction(self, along: Direction, sign: float) -> Markup:
         """Describe the direction of a vector: a negative length reverses it."""
+        if isinstance(along, Parallel):
+            vector = self.vector(along.tail, along.head)
+            return self.say(OPPOSITE, vector=vector, angle=complex(along.at(self.view)))
         if not isinstance(along, Along):
             angle = complex(along.at(self.view)) * (-1.0 if sign < 0.0 else 1.0)
             kind, joint = guided(along)
@@ -313,7 +334,9 @@ def sentence(speaker: Speaker, step: Step) -> Markup:
     match step:
         case Pole(node=node):
             return speaker.say(
-                POLE, node=node, fixed=speaker.names(tuple(speaker.subject.plan.mechanism.ground_m))
+                POLE if speaker.has_letters(node) else START,
+                node=node,
+                fixed=speaker.names(tuple(speaker.subject.plan.mechanism.ground_m)),
             )
         case Pivot(node=node):
             return _pivot(speaker, node)
@@ -341,6 +364,81 @@ def sentence(speaker: Speaker, step: Step) -> Markup:
             raise ValueError(f"a step with words is expected, not {type(step).__name__}")
 
 
+START = N_("Mark the point at which the force plan begins.")
+LAY_FIRST = N_("From the beginning of the plan lay off %(force)s, %(direction)s.")
+LAY_NEXT = N_("From the end of %(other)s lay off %(force)s, %(direction)s.")
+LAY_TO_END = N_("Lay off %(force)s, %(direction)s, so that it ends where %(other)s ends.")
+LAY_TO_START = N_("Lay off %(force)s, %(direction)s, so that it ends where %(other)s begins.")
+ITS_DIRECTION = N_("in its direction")
+NO_FORCE = N_("%(name)s is zero here: nothing is laid off.")
+MEET = N_(
+    "From the end of %(last)s draw a line %(first_direction)s for %(first)s, and from the beginning of the "
+    "plan a line %(second_direction)s for %(second)s. Where they meet, %(first)s ends and %(second)s begins."
+)
+CLOSING = N_("%(name)s closes the polygon.")
+INNER = N_("%(name)s runs from the end of %(other)s to the same point.")
+
+
+def force(speaker: Speaker, step: Given | TwoLines, *, with_numbers: bool = True) -> Markup:
+    """Describe a step of a force plan, whose nodes have no letters, by the vectors that it draws."""
+    construction = speaker.subject.plan.construction
+    whole = construction.vectors_of(construction.figure_of(step.node))
+    vectors = [one for one in whole if not one.is_sum]
+    ends = {(one.tail, one.head): one.name for one in reversed(vectors)}
+    if isinstance(step, Given):
+        drawn = {name := ends[step.start, step.node]}
+        told = _lay_off(speaker, step, construction.vectors[name], vectors, with_numbers=with_numbers)
+    else:
+        lines = [line for line in (step.first, step.second) if isinstance(line, Line)]
+        drawn = {ends[line.through, step.node] for line in lines}
+        first, second = (speaker.line_direction(line.along) for line in lines)
+        told = speaker.say(
+            MEET, last=_ending(lines[0].through, vectors), first_direction=first, second_direction=second,
+            first=ends[lines[0].through, step.node], second=ends[lines[1].through, step.node],
+        )  # fmt: skip
+    closing = [
+        speaker.say(CLOSING, name=name)
+        for (_, head), name in ends.items()
+        if head == step.node and name not in drawn
+    ]
+    inner = [
+        speaker.say(INNER, name=one.name, other=other)
+        for one in whole
+        if one.is_sum
+        and one.head == step.node
+        and f"{one.name}_n" not in construction.vectors
+        and (other := _ending(one.tail, vectors))
+    ]
+    return Markup(" ").join((told, *closing, *inner))
+
+
+def _ending(node: str, vectors: Sequence[Vector]) -> str:
+    """Return the first vector of a force plan whose arrow ends in a node; empty if none does."""
+    return next((one.name for one in vectors if node == (one.tail if one.reversed else one.head)), "")
+
+
+def _lay_off(
+    speaker: Speaker, step: Given, own: Vector, vectors: Sequence[Vector], *, with_numbers: bool
+) -> Markup:
+    mm = _length(speaker, step.length)
+    if speaker.is_nothing(step.node, mm):
+        return speaker.say(NO_FORCE, name=own.name)
+    others = [one for one in vectors if one is not own]
+    other = _ending(step.start, others)
+    text = LAY_FIRST if step.start in speaker.subject.plan.construction.poles.values() else LAY_NEXT
+    if own.reversed:
+        text = LAY_TO_END if other else LAY_TO_START
+        other = other or next(one.name for one in others if step.start == one.head)
+    told = Markup("{} = {}").format(speaker.name(own.name), speaker.mm(abs(mm)))
+    direction = speaker.say(ITS_DIRECTION)
+    if with_numbers or isinstance(step.along, Along):
+        direction = speaker.vector_direction(step.along, mm * (-1.0 if own.reversed else 1.0))
+    return speaker.say(
+        text, force=told if with_numbers else own.name, direction=direction,
+        other=other,
+    )  # fmt: skip
+
+
 def _length(speaker: Speaker, length: Length) -> float:
     return float(length.at(speaker.view))
 
@@ -356,6 +454,8 @@ def _pivot(speaker: Speaker, node: str) -> Markup:
 
 
 def _given(speaker: Speaker, step: Given) -> Markup:
+    if not speaker.has_letters(step.node):
+        return force(speaker, step)
     mm = _length(speaker, step.length)
     if speaker.is_nothing(step.node, mm):
         name = speaker.vector(step.start, step.node)
@@ -375,6 +475,8 @@ def direction_of(speaker: Speaker, step: Given) -> Markup:
 
 
 def _two_lines(speaker: Speaker, step: TwoLines) -> Markup:
+    if not speaker.has_letters(step.node):
+        return force(speaker, step)
     if isinstance(step.first, Line) and isinstance(step.second, Line):
         return speaker.say(
             TWO_LINES, node=step.node, first=step.first.through, second=step.second.through,

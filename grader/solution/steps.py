@@ -1,13 +1,23 @@
 """Explain the whole construction step by step: sentences, the numbers behind them, and the results."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from markupsafe import Markup
 
 from grader.language import N_, Tongue
 from grader.solution import sentences
 from grader.solution.equations import driving_speed, grid_of, scale_formula, size_formula
+from grader.solution.forces import LEVER as ON_THE_LEVER
+from grader.solution.forces import (
+    balance_of,
+    lever_lines,
+    lever_table,
+    moment_lines,
+    results,
+    sense,
+    table_of,
+)
 from grader.solution.formulas import Formula, Fraction, Grid, Name, grid_text, plain
 from grader.solution.sentences import TITLES, Speaker, speaker_of
 from reference.construction.elements import Length, Scaled
@@ -15,8 +25,9 @@ from reference.construction.equations import Equation, equations
 from reference.construction.graph import AngularRate, Vector
 from reference.construction.steps import Given, Step
 from reference.drawing.canvas import Piece
+from reference.drawing.forces import LEVER
 from reference.drawing.subject import Subject
-from reference.quantities import kind_of, scale_of, unit_of
+from reference.quantities import group_of, kind_of, scale_of, sort_of, unit_of
 
 CENTRES = "centres"
 INTRODUCTIONS = {
@@ -33,7 +44,6 @@ INTRODUCTIONS = {
         "(acceleration poles J) at this moment, by Mehmke's similarity."
     ),
 }
-COUNTER_CLOCKWISE, CLOCKWISE = N_("counter-clockwise"), N_("clockwise")
 LENGTHS_MM = N_("Directions count counter-clockwise from the horizontal to the right.")
 
 
@@ -71,7 +81,7 @@ class ExplainedStep:
 
 @dataclass(frozen=True, slots=True)
 class PlanSection:
-    """The steps of one figure; `formulas` come before them, `rates` after them."""
+    """The steps of one figure; `formulas` and a `table` come before them, `rates` after them."""
 
     figure: str
     title: str
@@ -79,6 +89,7 @@ class PlanSection:
     steps: tuple[ExplainedStep, ...]
     formulas: tuple[Formula, ...] = ()
     rates: tuple[Formula, ...] = ()
+    table: Grid | None = None
 
 
 def explain(
@@ -102,9 +113,17 @@ def explain(
         formulas.append(scale_formula(speaker, scale))
         vectors = {vector.name for vector in construction.vectors_of(figure)}
         found = (one for one in construction.rates.values() if one.vector in vectors and not one.drives)
-        rates = [_turning(speaker, rate) for rate in found]
-        title = tongue.titled(TITLES, figure)
-        sections.append(PlanSection(figure, title, introduction, tuple(told), tuple(formulas), tuple(rates)))
+        rates = [*(_turning(speaker, rate) for rate in found), *results(speaker, figure)]
+        title = tongue.gettext(TITLES[subject.title_key(sort_of(figure), figure)])
+        title = title.replace("{group}", subject.shown(group_of(figure)))
+        table = table_of(speaker, figure) if group_of(figure) else None
+        sections.append(
+            PlanSection(figure, title, introduction, tuple(told), tuple(formulas), tuple(rates), table)
+        )
+    if subject.plan.forces is not None:
+        introduction = speaker.say(ON_THE_LEVER, scale=speaker.write(speaker.scale("kv")))
+        lines, table = tuple(lever_lines(speaker)), lever_table(speaker)
+        sections.append(PlanSection(LEVER, tongue.gettext(TITLES[LEVER]), introduction, (), (), lines, table))
     centres = tuple(
         ExplainedStep(number + k, step, sentences.sentence(speaker, step))
         for k, step in enumerate(_centre_steps(speaker), start=1)
@@ -137,13 +156,16 @@ def computed(speaker: Speaker, step: Step) -> Iterator[Formula]:
         real = mm * speaker.scale_value(scale)
         if real == 0.0 or speaker.is_nothing(step.node, mm):
             continue
+        if (total := balance_of(speaker, step.node)) is not None:
+            yield from moment_lines(speaker, total)
         if isinstance(step, Given) and on_plan:
             name = speaker.symbol(speaker.vector(step.start, step.node))
         else:
             name = _datum(speaker, length)
         formula = size_formula(speaker, length, step.node)
         if formula is not None:
-            yield (name, " = ", formula[0], " = ", formula[1], " = ", speaker.real(real, kind_of(scale).unit))
+            shown = (part for one in formula if one for part in (" = ", one))
+            yield (name, *shown, " = ", speaker.real(real, kind_of(scale).unit))
         numbers = Fraction(speaker.bare(real), speaker.bare(speaker.scale_value(scale)))
         yield (Fraction(name, speaker.scale(scale)), " = ", numbers, " = ", speaker.mm(mm))
 
@@ -160,8 +182,15 @@ def _datum(speaker: Speaker, length: Length) -> Name:
 def _read_off(speaker: Speaker, step: Step) -> Iterator[Formula]:
     """Yield the vectors that end in the step's node and were not laid off."""
     laid_off = (step.start, step.node) if isinstance(step, Given) else None
-    for vector in speaker.subject.plan.construction.vectors.values():
+    vectors = speaker.subject.plan.construction.vectors
+    for vector in vectors.values():
         if vector.head == step.node and (vector.tail, vector.head) != laid_off:
+            parts = [f"{vector.name}_{part}" for part in "nt"]
+            if not speaker.has_letters(step.node) and vectors.keys() >= {*parts}:
+                whole, n, t = (
+                    replace(speaker.symbol(name), is_vector=True) for name in (vector.name, *parts)
+                )
+                yield (whole, " = ", n, " + ", t)
             yield _measured(speaker, vector)
 
 
@@ -169,10 +198,14 @@ def _measured(speaker: Speaker, vector: Vector) -> Formula:
     """Write a measured vector: drawn length times scale."""
     mm = 0.0 if speaker.subject.is_zero(vector.name) else speaker.distance(vector.tail, vector.head)
     by = speaker.scale_value(vector.scale)
-    drawn = (speaker.symbol(vector.tail, vector.head), " · ", speaker.scale(vector.scale))
     numbers = f"{speaker.tongue.number(mm, 2)} · {speaker.bare(by)}"
     real = speaker.real(mm * by, unit_of(vector.name))
-    return (speaker.symbol(vector.name), " = ", drawn, " = ", numbers, " = ", real)
+    if speaker.has_letters(vector.head):
+        drawn = (speaker.symbol(vector.tail, vector.head), " · ", speaker.scale(vector.scale))
+        return (speaker.symbol(vector.name), " = ", drawn, " = ", numbers, " = ", real)
+    value = speaker.subject.vector(speaker.subject.plan.vectors_si[vector.name])
+    angle = f", {speaker.degrees(value)}" if mm else ""
+    return (speaker.symbol(vector.name), " = ", numbers, " = ", real, angle)
 
 
 def _turning(speaker: Speaker, rate: AngularRate) -> Formula:
@@ -188,4 +221,4 @@ def _turning(speaker: Speaker, rate: AngularRate) -> Formula:
     )  # fmt: skip
     if turn == 0.0:
         return told
-    return (*told, f", {speaker.tongue.gettext(COUNTER_CLOCKWISE if turn > 0 else CLOCKWISE)}")
+    return (*told, f", {speaker.tongue.gettext(sense(turn))}")

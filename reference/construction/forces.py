@@ -65,15 +65,19 @@ def with_force_plans(mechanism: Mechanism, plans: Construction, accelerations: A
     figures = {name: tuple(polygon.steps) for name, polygon in forces.figures.items()}
     poles = {name: polygon.steps[0].node for name, polygon in forces.figures.items()}
     vectors = {name: one for polygon in forces.figures.values() for name, one in polygon.vectors.items()}
+    acting: dict[str, tuple[Force | Couple, ...]] = {
+        link: (*one.forces, *one.couples) for link, one in forces.loaded.items()
+    }
     if accelerations == "given":
-        figures = {"mechanism": plans.figures["mechanism"], **figures}
-        return Construction(figures, poles, vectors, {}, pairs=plans.pairs, moments=forces.moments)
+        sketch = {"mechanism": plans.figures["mechanism"]}
+        plans = Construction(sketch, {}, {}, {}, pairs=plans.pairs)
     return replace(
         plans,
         figures={**plans.figures, **figures},
         poles={**plans.poles, **poles},
         vectors={**plans.vectors, **vectors},
         moments=forces.moments,
+        acting=acting,
     )
 
 

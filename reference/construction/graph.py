@@ -22,8 +22,10 @@ from typing import Literal
 import numpy as np
 
 from reference.construction.elements import (
+    Couple,
     Errors,
     Fixed,
+    Force,
     Length,
     Line,
     Moments,
@@ -209,6 +211,7 @@ class Construction:
         and acceleration poles (``J3``) of links that turn about no fixed pivot
     pairs : the joints between which links, slots and slides run, from the earlier joint
     moments : the balancing moment (``M_b``) of what acts on the driving link, N m
+    acting : what acts on each link but the reactions of its own group: given, or taken over
     """
 
     figures: Mapping[str, tuple[Step, ...]]
@@ -219,6 +222,7 @@ class Construction:
     centres: Mapping[str, Similar] = field(default_factory=dict)
     pairs: tuple[tuple[str, str], ...] = ()
     moments: Mapping[str, Moments] = field(default_factory=dict)
+    acting: Mapping[str, tuple[Force | Couple, ...]] = field(default_factory=dict)
 
     @cached_property
     def steps(self) -> tuple[Step, ...]:

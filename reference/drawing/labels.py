@@ -300,3 +300,25 @@ def _joined(subject: Subject, nodes: Sequence[str]) -> tuple[Piece, ...]:
     for node in nodes:
         pieces += [*([Piece(", ")] if pieces else []), *subject.letter(node)]
     return tuple(pieces)
+
+
+# Names of vectors ----------------------------------------------------------------------------------
+
+VECTOR_GAP_MM = 0.6
+
+
+def names_of_vectors(
+    subject: Subject, nodes: dict[str, complex], drawn: Sequence[Shape], style: Style
+) -> Iterator[Part]:
+    """Place the name of each vector beside its middle; those with the same ends share a place."""
+    together: dict[tuple[str, str], list[str]] = {}
+    for vector in subject.plan.construction.vectors.values():
+        if {vector.tail, vector.head} <= nodes.keys() and not subject.is_zero(vector.name):
+            together.setdefault((vector.tail, vector.head), []).append(vector.name)
+    wanted = [
+        Wanted(head, point((nodes[tail] + nodes[head]) / 2.0), _joined(subject, names), style.small,
+               style.colour, VECTOR_GAP_MM)
+        for (tail, head), names in together.items()
+    ]  # fmt: skip
+    for one in place_labels(wanted, drawn):
+        yield from (Part(one.wanted.node, shape) for shape in one.shapes)

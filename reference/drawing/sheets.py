@@ -28,12 +28,14 @@ from reference.drawing.canvas import (
     Stroke,
     shifted,
 )
+from reference.drawing.forces import with_scheme
 from reference.drawing.labels import segments_of
 from reference.drawing.sketch import LETTER_MM, PLATE_FILL, polygon, sketch
 from reference.drawing.subject import PLAN_COLOURS, DrawnFigure, Subject, Wording
 from reference.drawing.symbols import point, unit
 from reference.drawing.tables import column
 from reference.plan import Plan
+from reference.quantities import group_of
 
 FRAME: Bounds = (20.0, 10.0, 410.0, 287.0)
 COLOURS = {"mechanism": INK, **PLAN_COLOURS}
@@ -94,10 +96,11 @@ def _on_several_sheets(subject: Subject, figures: Sequence[DrawnFigure]) -> list
 
 def figures_of(subject: Subject) -> dict[str, DrawnFigure]:
     """Return each figure of a plan by its name."""
-    return {
-        name: sketch(subject) if name == "mechanism" else polygon(subject, name)
-        for name in subject.plan.nodes_mm
-    }
+    figures = {}
+    for name in subject.plan.nodes_mm:
+        figure = sketch(subject) if name == "mechanism" else polygon(subject, name)
+        figures[name] = with_scheme(subject, figure) if group_of(name) else figure
+    return figures
 
 
 def _sheet(subject: Subject, figures: Sequence[DrawnFigure]) -> DrawnSheet:

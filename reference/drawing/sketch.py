@@ -5,16 +5,17 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from reference.construction.elements import Line, View
-from reference.construction.steps import Step, TwoLines
+from reference.construction.graph import Vector
+from reference.construction.steps import Given, Step, TwoLines
 from reference.drawing import symbols
-from reference.drawing.canvas import CONSTRUCTION, INK, Area, Curve, Label, Shape, Stroke, pieces_of
-from reference.drawing.labels import Style, Wanted, lengths_inside, letters, segments_of
+from reference.drawing.canvas import CONSTRUCTION, INK, Area, Curve, Label, Shape, Stroke, Text, pieces_of
+from reference.drawing.labels import Style, Wanted, lengths_inside, letters, names_of_vectors, segments_of
 from reference.drawing.subject import PLAN_COLOURS, DrawnFigure, Part, Subject
 from reference.drawing.symbols import HAIR_MM, LINK_MM, THIN_MM, Bar, bars, blocks, hinged_on, point, unit
 from reference.drawing.triangles import altitudes
 from reference.geometry import FloatArray
 from reference.mechanism import Crank, DrivingSlider, Mechanism, Plate, PointOnLine, SlotPoint, SlottedLink
-from reference.quantities import sort_of
+from reference.quantities import group_of, sort_of
 
 LETTER_MM, SMALL_LETTER_MM = 4.2, 3.2
 LINK_NUMBER_MM = 3.0
@@ -39,10 +40,12 @@ def scheme(subject: Subject) -> DrawnFigure:
     return DrawnFigure("mechanism", (*drawn, *named))
 
 
-def captioned(subject: Subject, name: str, parts: tuple[Part, ...], colour: str) -> DrawnFigure:
-    """Return a figure with its title and scale above it."""
+def captioned(
+    subject: Subject, name: str, parts: tuple[Part, ...], colour: str, text: Text = ""
+) -> DrawnFigure:
+    """Return a figure with its title and scale, or another text, above it."""
     left, top, _right, _bottom = DrawnFigure(name, parts).bounds
-    caption = Label((left, top - CAPTION_GAP_MM), subject.caption(name), CAPTION_MM, colour=colour)
+    caption = Label((left, top - CAPTION_GAP_MM), text or subject.caption(name), CAPTION_MM, colour=colour)
     return DrawnFigure(name, (*parts, Part("", caption)))
 
 
@@ -330,7 +333,8 @@ def polygon(subject: Subject, figure: str) -> DrawnFigure:
     pole = subject.plan.construction.poles[figure]
     drawn.append(Part(pole, symbols.marked_point(nodes[pole], colour)))
     style = Style(NODE_LETTER_MM, SMALL_NODE_LETTER_MM, colour, symbols.POINT_RADIUS_MM)
-    named = letters(subject, nodes, [part.shape for part in drawn], style)
+    make = names_of_vectors if group_of(figure) else letters
+    named = make(subject, nodes, [part.shape for part in drawn], style)
     return captioned(subject, figure, (*drawn, *named), colour)
 
 
@@ -354,11 +358,21 @@ def construction_lines(step: Step, view: View, nodes: dict[str, complex]) -> Ite
 
 def _vectors(subject: Subject, figure: str, nodes: dict[str, complex]) -> Iterator[Part]:
     """Draw each vector of non-zero length; of several along one line, the longest lowest."""
-    pole, colour = subject.plan.construction.poles[figure], PLAN_COLOURS[sort_of(figure)]
+    colour = PLAN_COLOURS[sort_of(figure)]
     for vector in subject.plan.construction.vectors_of(figure):
         if subject.is_zero(vector.name):
             continue
-        width = ABSOLUTE_MM if vector.tail == pole else RELATIVE_MM
+        width = ABSOLUTE_MM if _is_main(subject, figure, vector) else RELATIVE_MM
         style = (THIN_MM, colour, SUM_HEAD_MM, SUM_DASH) if vector.is_sum else (width, colour)
-        for shape in symbols.arrow(nodes[vector.tail], nodes[vector.head], *style):
+        ends = (nodes[vector.tail], nodes[vector.head])
+        for shape in symbols.arrow(*(ends[::-1] if vector.reversed else ends), *style):
             yield Part(vector.head, shape)
+
+
+def _is_main(subject: Subject, figure: str, vector: Vector) -> bool:
+    """Return whether a vector is drawn wide: from a pole that has a letter, or a force that is known."""
+    construction = subject.plan.construction
+    if not group_of(figure):
+        return vector.tail == construction.poles[figure]
+    step = construction.step(vector.head)
+    return isinstance(step, Given) and step.start == vector.tail and not vector.part

@@ -8,7 +8,7 @@ import numpy as np
 from reference.authored.assignment import Assignment, Variant
 from reference.construction.elements import View
 from reference.drawing.canvas import Bounds, Piece, Shape, Text, bounds, pieces_of, scale_pieces
-from reference.geometry import FloatArray
+from reference.geometry import ComplexArray, FloatArray
 from reference.plan import ZERO_SHARE, Plan
 from reference.quantities import group_of, scale_of, sort_of, unit_of
 
@@ -30,6 +30,10 @@ class Wording:
             "velocity_plan": "Velocity plan",
             "acceleration_plan": "Acceleration plan",
             "force_plan": "Force plan of the group of {group}",
+            "driving_force_plan": "Force plan of the driving link",
+            "scheme": "Links of the group of {group}",
+            "driving_scheme": "Driving link",
+            "lever": "Zhukovsky's lever",
         }
     )
     variant: Mapping[str, str] = field(default_factory=lambda: {"n": "n", "position": "position"})
@@ -38,10 +42,6 @@ class Wording:
     too_large: str = "does not fit A3 at these scales"
     units: Mapping[str, str] = field(default_factory=dict)
     sides: Mapping[str, str] = field(default_factory=dict)
-
-    def title(self, figure: str) -> str:
-        """Return the title of a figure."""
-        return self.titles[sort_of(figure)].replace("{group}", group_of(figure))
 
     def unit(self, unit: str) -> str:
         """Return a unit in the language's letters, `m/s^2` with a superscript."""
@@ -86,6 +86,12 @@ class DrawnFigure:
         """The box that it fills."""
         return bounds(self.shapes)
 
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height."""
+        left, top, right, bottom = self.bounds
+        return right - left, bottom - top
+
 
 @dataclass(frozen=True, slots=True)
 class Subject:
@@ -108,13 +114,13 @@ class Subject:
         """Return the variant's number, from an array over variants or a number common to all."""
         return float(values[self.index] if np.ndim(values) else values)
 
+    def vector(self, values: ComplexArray) -> complex:
+        """Return the variant's complex number, from an array over variants or a number common to all."""
+        return complex(np.broadcast_to(values, (len(self.plan.variants),))[self.index])
+
     def nodes(self, figure: str) -> dict[str, complex]:
         """Return a figure's nodes, complex millimetres about its origin, y up."""
-        count = len(self.plan.variants)
-        return {
-            node: complex(np.broadcast_to(at, (count,))[self.index])
-            for node, at in self.plan.nodes_mm[figure].items()
-        }
+        return {node: self.vector(at) for node, at in self.plan.nodes_mm[figure].items()}
 
     @property
     def view(self) -> View:
@@ -154,12 +160,25 @@ class Subject:
         """Return a node's or a vector's name, typeset."""
         return pieces_of(self.shown(name))
 
-    def scale_with_value(self, scale: str) -> tuple[Piece, ...]:
+    def scale_with_value(self, scale: str, times: float = 1.0) -> tuple[Piece, ...]:
         """Return a scale with its value: kL = 0.005 m/mm."""
-        value = self.wording.number(f"{self.number(getattr(self.plan.scales, scale)):.5g}")
+        value = self.wording.number(f"{self.number(getattr(self.plan.scales, scale)) * times:.5g}")
         unit = self.wording.unit(unit_of(scale))
         return (*scale_pieces(self.shown(scale)), Piece(f" = {value} {unit}"))
 
+    def captioned(self, title: str, scale: str, times: float = 1.0) -> Text:
+        """Return a title with a scale, or with some times it."""
+        return (Piece(f"{title},  "), *self.scale_with_value(scale, times))
+
     def caption(self, figure: str) -> Text:
         """Return the caption above a figure: its title and scale."""
-        return (Piece(f"{self.wording.title(figure)},  "), *self.scale_with_value(scale_of(figure)))
+        return self.captioned(self.title_of(sort_of(figure), figure), scale_of(figure))
+
+    def title_of(self, sort: str, figure: str) -> str:
+        """Return the title of a figure, or of what stands beside it."""
+        title = self.wording.titles[self.title_key(sort, figure)]
+        return title.replace("{group}", self.shown(group_of(figure)))
+
+    def title_key(self, sort: str, figure: str) -> str:
+        """Return the key of that title: the driving link is no group."""
+        return f"driving_{sort}" if group_of(figure) == self.plan.mechanism.driver.pin else sort

@@ -19,7 +19,7 @@ from reference.drawing.canvas import (
     wrapped,
 )
 from reference.drawing.subject import Subject
-from reference.quantities import unit_of
+from reference.quantities import group_of, unit_of
 
 COLUMN_MM = 96.0
 EDGE_MM = 3.0
@@ -122,15 +122,18 @@ def table_rows(subject: Subject, figures: Sequence[str]) -> Iterator[TableRow]:
         angle = f"{subject.number(plan.direction_deg(vector.name)):.2f}°"
         yield TableRow(
             subject.letter(vector.name),
-            (*subject.letter(vector.tail), Piece(" "), *subject.letter(vector.head)),
+            ""
+            if group_of(plan.construction.figure_of(vector.head))
+            else (*subject.letter(vector.tail), Piece(" "), *subject.letter(vector.head)),
             wording.number(f"{drawn:.2f}"),
             wording.number(f"{four_digits(real)}") + f" {wording.unit(unit_of(vector.name))}",
             "–" if subject.is_zero(vector.name) else wording.number(angle),
         )
     names = {vector.name for vector in shown}
-    for name, rate in plan.construction.rates.items():
-        if rate.vector in names:
-            turns = 0.0 if subject.is_zero(rate.vector) else subject.number(plan.rates[name])
+    for name, values in plan.rates.items():
+        rate = plan.construction.rates.get(name)
+        if rate.vector in names if rate else plan.mechanism.driver.pin in map(group_of, figures):
+            turns = 0.0 if rate and subject.is_zero(rate.vector) else subject.number(values)
             unit = wording.unit(unit_of(name))
             value = wording.number(f"{four_digits(abs(turns))}")
             yield TableRow(subject.letter(name), "", "", f"{value} {unit}", "" if turns else "–", turns)

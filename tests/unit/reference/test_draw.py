@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 
 from reference.authored.assignment import load_assignment
-from reference.drawing.canvas import A3_MM, svg
+from reference.drawing.canvas import A3_MM, Label, svg
+from reference.drawing.forces import acting_on
 from reference.drawing.sheets import COLOURS, reference_drawing
+from reference.drawing.sketch import polygon
+from reference.drawing.subject import Subject
 from reference.plan import exact_plan
+from tests.drawn import WITH_FORCES, loaded
 
 PRINTED_MM = 0.0015
 """The SVG tells thousandths of a millimetre: two ends, half a unit each in x and y."""
@@ -102,3 +106,45 @@ def test_zero_vectors_are_not_drawn_at_a_dead_point():
     shown = [v for v in plan.construction.vectors_of("velocity_plan") if abs(plan.drawn_mm(v.name)[0]) > 1e-6]
     assert len(tips(root, COLOURS["velocity_plan"])) == len(shown) < 5
     assert np.isfinite(plan.size_mm("velocity_plan")[0])
+
+
+# Force plans ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("case", WITH_FORCES)
+def test_every_force_is_drawn_true_with_its_arrowhead_and_its_name(case, tmp_path_factory):
+    assignment, plan = loaded(case, tmp_path_factory.mktemp("forces"), own=False)
+    subject = Subject(assignment, plan)
+    for figure in plan.construction.poles:
+        drawn = polygon(subject, figure)
+        root = ET.fromstring(svg([drawn.shapes]))
+        starts = [start for start, _ in segments(root, COLOURS["force_plan"])]
+        arrows = [tip - start for start, tip in zip(starts, tips(root, COLOURS["force_plan"]), strict=True)]
+        wanted = [one for one in plan.construction.vectors_of(figure) if not subject.is_zero(one.name)]
+        assert len(arrows) == len(wanted)
+        for vector, arrow in zip(wanted, arrows, strict=True):
+            assert abs(arrow - plan.drawn_mm(vector.name)[0]) <= PRINTED_MM
+        names = " ".join(
+            "".join(piece.text for piece in one.text)
+            for one in drawn.shapes
+            if isinstance(one, Label) and one.italic
+        )
+        for vector in wanted:
+            assert "".join(piece.text for piece in subject.letter(vector.name)) in names
+            assert not any(mark in names for mark in (vector.tail, vector.head))
+
+
+@pytest.mark.parametrize("case", WITH_FORCES)
+def test_the_forces_on_a_scheme_are_in_balance(case, tmp_path_factory):
+    assignment, plan = loaded(case, tmp_path_factory.mktemp("forces"), own=False)
+    subject = Subject(assignment, plan)
+    at = {joint: place[0] for joint, place in plan.motion.position.items()}
+    for figure in plan.construction.poles:
+        acting = acting_on(subject, figure)
+        total = sum(one.force for one in acting)
+        turning = sum(
+            one.moment + float(np.imag(np.conj(at[one.at] + one.aside_m) * one.force)) for one in acting
+        )
+        size = max(abs(one.force) for one in acting)
+        assert abs(total) <= 1e-9 * size
+        assert abs(turning) <= 1e-9 * size

@@ -11,6 +11,7 @@ from reference.authored.assignment import load_assignment
 from reference.construction.graph import ancestors
 from reference.drawing.subject import Subject
 from reference.plan import exact_plan
+from tests.drawn import loaded
 
 
 def subject(name="pump", n=12, position=None, lang="en"):
@@ -46,6 +47,16 @@ def test_all_that_hangs_on_the_point_is_named_and_nothing_else(node):
 def test_without_numbers_no_step_says_one(name, n, position, lang):
     one = subject(name, n, position, lang)
     for step in one.plan.construction.steps:
+        for line in redo(one, tongue(lang), step.node, with_numbers=False):
+            assert not re.search(r"\d[.,]\d|\d\s*(?:mm|мм|°)", line.replace("90°", "")), line
+
+
+@pytest.mark.parametrize("lang", LANGUAGES)
+@pytest.mark.parametrize("own", [False, True])
+def test_steps_of_force_plans_name_vectors_and_say_no_number(own, lang, tmp_path):
+    assignment, plan = loaded("slider on a moving link", tmp_path, own=own)
+    one = Subject(assignment, plan, 0, wording_of(tongue(lang)))
+    for step in plan.construction.steps:
         for line in redo(one, tongue(lang), step.node, with_numbers=False):
             assert not re.search(r"\d[.,]\d|\d\s*(?:mm|мм|°)", line.replace("90°", "")), line
 

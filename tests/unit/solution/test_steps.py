@@ -11,7 +11,7 @@ import pytest
 from grader.language import LANGUAGES, tongue
 from grader.solution import formulas
 from grader.solution.equations import grid_of
-from grader.solution.formulas import mathml, typeset, unicode_name
+from grader.solution.formulas import grid_text, mathml, typeset, unicode_name
 from grader.solution.pages import chapters, html_page, pdf, pdf_pages
 from grader.solution.sentences import sentence, speaker_of, wording_of
 from grader.solution.steps import explain
@@ -19,10 +19,11 @@ from reference.authored.assignment import load_assignment
 from reference.construction.equations import equations
 from reference.construction.steps import Given, Pole
 from reference.drawing.canvas import Label, Ring, pieces_of, set_pieces
+from reference.drawing.forces import scheme_of
 from reference.drawing.sheets import BEFORE, NOW, reference_drawing
 from reference.drawing.subject import Subject
 from reference.plan import exact_plan
-from tests.drawn import CASES, planned
+from tests.drawn import CASES, WITH_FORCES, loaded, planned
 
 A3_POINTS, A4_POINTS = (1190.55, 841.89), (595.28, 841.89)
 POINT = 0.01
@@ -358,3 +359,92 @@ def test_the_drawing_and_the_steps_are_the_same_shapes_in_the_pdf(folder):
 
 def test_digits_in_the_middle_of_a_joints_name_are_set_below():
     assert [(piece.text, piece.height) for piece in pieces_of("a3'")] == [("a", 0), ("3", -1), ("'", 0)]
+
+
+# Force plans ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("lang", LANGUAGES)
+@pytest.mark.parametrize("own", [False, True])
+@pytest.mark.parametrize("case", WITH_FORCES)
+def test_every_force_is_told_with_its_value_and_no_node_of_a_force_plan_is_named(case, own, lang, folder):
+    assignment, plan = loaded(case, folder, own=own)
+    subject = Subject(assignment, plan, 0, wording_of(tongue(lang)))
+    speaker = speaker_of(subject, tongue(lang))
+    for section in (one for one in explain(subject, tongue(lang)) if one.figure.startswith("force_plan")):
+        whole = "\n".join([grid_text(section.table), *(step.text for step in section.steps)])
+        assert not re.search(r"\b\w+\.\d\b(?! mm)", re.sub(r"\d+\.\d+", "", plain(whole))), whole
+        assert "%(" not in whole
+        assert "nan" not in whole
+        for vector in plan.construction.vectors_of(section.figure):
+            told = f"{unicode_name(speaker.symbol(vector.name))} ="
+            size = speaker.bare(abs(plan.vectors_si[vector.name][0]))
+            lines = [line for line in plain(whole).split("\n") if line.startswith(told)]
+            assert (
+                subject.is_zero(vector.name)
+                or any(size in line for line in lines)
+                or (f"{size}\N{NO-BREAK SPACE}" in whole)
+            ), vector.name
+
+
+@pytest.mark.parametrize("own", [False, True])
+@pytest.mark.parametrize("case", WITH_FORCES)
+def test_the_forces_of_every_equation_add_up_to_nothing_and_two_properties_are_unknown(case, own, folder):
+    _, plan = loaded(case, folder, own=own)
+    known = equations(plan.construction)
+    for figure in (one for one in plan.construction.poles if one.startswith("force_plan")):
+        nodes = {step.node for step in plan.construction.figures[figure]} - {plan.construction.poles[figure]}
+        assert nodes <= known.keys()
+        for equation in {known[node] for node in nodes}:
+            assert equation.left is None
+            forces = [plan.vectors_si[one.vector][0] * (-1) ** one.is_negative for one in equation.terms]
+            assert abs(sum(forces)) <= 1e-9 * max(map(abs, forces))
+            assert sum(2 - term.known for term in equation.terms) == 2
+
+
+@pytest.mark.parametrize("case", WITH_FORCES)
+def test_the_lever_gives_the_same_balance_as_the_force_plans(case, folder):
+    assignment, plan = loaded(case, folder, own=False)
+    subject = Subject(assignment, plan, 0, wording_of(tongue("en")))
+    lever = next(one for one in explain(subject, tongue("en")) if one.figure == "lever")
+    found = float(re.findall(r"= ([\d.]+)\sN", in_unicode(lever.rates[-1]))[0])
+    balancing = plan.forces.balancing
+    assert found == pytest.approx(abs(balancing.moment[0]) + abs(balancing.force[0]), rel=1e-4)
+    assert len(lever.table.rows) > len(plan.mechanism.bodies)
+
+
+def test_moments_are_told_with_arms_as_they_are_dimensioned(folder):
+    assignment, plan = loaded("driving slider", folder, own=False)
+    subject = Subject(assignment, plan, 0, wording_of(tongue("en")))
+    section = next(one for one in explain(subject, tongue("en")) if one.figure == "force_plan_B")
+    arms = {
+        line.split(" ")[0]: float(re.findall(r"= ([\d.]+)\sm$", line)[0])
+        for step in section.steps
+        for line in map(in_unicode, step.before)
+        if line.startswith("h")
+    }
+    labels = [
+        "".join(piece.text for piece in one.text)
+        for one in scheme_of(subject, "force_plan_B").shapes
+        if isinstance(one, Label) and isinstance(one.text, tuple)
+    ]
+    drawn = {
+        f"h{'₀₁₂₃₄₅'[int(one[1])]}": float(one.split(" = ")[1].split(" ")[0])
+        for one in labels
+        if one.startswith("h")
+    }
+    assert len(arms) == 3
+    assert drawn == pytest.approx({name: 1e3 * arm for name, arm in arms.items()}, rel=1e-3)
+    assert "ΣM_B = " in "\n".join(in_unicode(line) for step in section.steps for line in step.before)
+
+
+def test_pages_show_the_scheme_of_each_group_and_the_lever(folder):
+    assignment, plan = loaded("two crossed guides", folder, own=False)
+    subject = Subject(assignment, plan, 0, wording_of(tongue("en")))
+    shown = [chapter for chapter in chapters(subject, tongue("en")) if chapter.picture is not None]
+    assert [one.section.figure for one in shown] == [*plan.construction.poles, "lever"]
+    page = html_page(subject, tongue("en"))
+    assert page.count("<svg") == sum(
+        1 + sum((step.picture is not None) + (step.model is not None) for step in one.steps) for one in shown
+    ) + sum(1 for one in chapters(subject, tongue("en"))[0].steps)
+    assert len(pypdfium2.PdfDocument(pdf_pages(subject, tongue("en")))) > 2
