@@ -544,9 +544,9 @@ def _own_turnings(charges: Charges, name: str, value: float, per_mm: float) -> I
                 yield following.moment(name, per_mm, basis)
         return
     rate = task.construction.rates[name]
-    own, source = _own_rate(charges, rate, value), task.segments[rate.vector]
-    if own is not None:
-        yield Expectation(own / per_mm, "vector", source.name, frozenset({source.head}))
+    turned, source = _own_rate(charges, rate, value), task.segments[rate.vector]
+    if turned is not None:
+        yield Expectation(turned / per_mm, "vector", source.name, frozenset({source.head}))
 
 
 def _own_rate(charges: Charges, rate: AngularRate, value: float) -> float | None:
