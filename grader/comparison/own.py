@@ -182,21 +182,25 @@ class _LengthBranches:
             self.part(step.node, positions, made, pair, ends)
 
     def direct(self, node: str, made: Sequence[ComplexArray], ends: Sequence[_Measured]) -> None:
-        """Place a node at the end of the first of some vectors with directions on which most of them agree.
+        """Place a node at the end of the first of some vectors with directions.
 
-        Branches in which its step or the other vectors put it elsewhere cost more.
+        Of one that points the opposite way from where the others end, these count. Branches in which its step
+        or the other vectors put it elsewhere cost more.
         """
-        positions = [self.nodes[one.vector.tail] + (one.drawn.as_complex or 0j) for one in ends]
-        costs = [
-            self._apart([_nearest(made, place), *(np.abs(other - place) for other in positions)])
-            for place in positions
-        ]
-        # Of two that disagree neither is surer.
-        count = len(ends) if len(ends) > 2 else 1
-        best = min(range(count), key=lambda index: float(costs[index].min()) // UNEXPECTED)
-        self.nodes[node], self.cost = positions[best], self.cost + costs[best]
+        tails, drawn = (
+            [self.nodes[one.vector.tail] for one in ends],
+            [one.drawn.as_complex or 0j for one in ends],
+        )
+        positions = [tail + vector for tail, vector in zip(tails, drawn, strict=True)]
+        back, near = tails[0] - drawn[0], AS_EXPECTED * self.sigma_mm
+        is_back = [float(np.abs(back - place).min()) <= near < abs(drawn[0]) for place in positions]
+        first = is_back.index(True) if any(is_back) else 0
+        self.nodes[node] = place = positions[first]
+        self.cost = self.cost + self._apart(
+            [_nearest(made, place), *(np.abs(one - place) for one in positions)]
+        )
         self.is_known[node] = np.ones(len(self.cost), np.bool_)
-        self.sources[node] = ends[best : best + 1]
+        self.sources[node] = ends[first : first + 1]
 
     def _apart(self, residuals: Sequence[FloatArray]) -> FloatArray:
         """The cost of distances at which a node's step and vectors put it elsewhere."""
