@@ -120,6 +120,9 @@ class Charges:
         """Record what a vector or link has shown of the node where it ends."""
         self.charged |= choice.shown
         if choice.is_trivial:
+            # It follows from what was charged.
+            self.cleared.add(segment.head)
+            self.inherited.add(segment.head)
             return
         self.remember(segment.head, choice.mark)
         drawn = self.evidence.vector(segment.name)

@@ -201,8 +201,12 @@ class FollowThrough:
     ) -> Expectation:
         """The vector constructed from the student's own nodes upstream; the exact one without any."""
         found, own = self.traced(scales, basis, by_similarity=by_similarity), self.own(scales, basis)
-        upstream = self.task.construction.upstream
-        relies_on = (known(own) & (upstream(segment.head) | upstream(segment.tail))) - {segment.head}
+        upstream, step = self.task.construction.upstream, self.task.construction.step(segment.head)
+        ends: tuple[str, ...] = segment.head, segment.tail
+        if isinstance(step, Given) and step.start == segment.tail:
+            # Laid off, wherever it starts.
+            ends = (*step.length.needs, *step.along.needs)
+        relies_on = (known(own) & frozenset[str]().union(*map(upstream, ends))) - {segment.head}
         if not relies_on and basis is None:
             exact = segment.drawn(scales)
             return Expectation(exact, "nodes", "", relies_on, self.uncertainty_of(segment, exact))
