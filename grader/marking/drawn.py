@@ -151,12 +151,14 @@ def _nodes_observed(task: Task, evidence: Evidence, nodes: "_Nodes") -> list[Obs
 
 
 def _lengths_observed(task: Task, evidence: Evidence, parameters: Parameters) -> list[Observation]:
-    """The vectors that lead to none of the nodes."""
+    """The vectors that do not run between the nodes."""
     construction, entries = task.construction, []
-    traced = None
+    traced, nodes = None, {*evidence.nodes, *task.construction.poles.values()}
     for name, vector in construction.vectors.items():
         drawn = evidence.vector(name)
-        if drawn is None or drawn.confidence < task.rubric.least_confidence or vector.head in evidence.nodes:
+        if drawn is None or drawn.confidence < task.rubric.least_confidence:
+            continue
+        if vector.head in nodes and (vector.tail in nodes or drawn.direction_rad is None):
             continue
         value, read_mm = drawn.as_complex, math.hypot(LEAST_ERROR_MM, drawn.se_mm, task.rubric.hand.ruler_mm)
         if value is not None:

@@ -272,7 +272,7 @@ def _not_drawn(task: Task, comparison: Comparison, known: Sequence[NamedMistake]
 def _pointing_back(
     task: Task, comparison: Comparison, known: Sequence[NamedMistake]
 ) -> Iterator[NamedMistake]:
-    """Yield vectors that point the opposite way though all else is right, or all else that ends there."""
+    """Yield forces that point the opposite way though all else is right, or all else that ends there."""
     vectors, explained = task.construction.vectors, {name for one in known for name in one.explains}
     right = {
         vectors[one.name].head
@@ -283,9 +283,9 @@ def _pointing_back(
         is_back = "reversed" in one.codes and not one.codes & {"too_long", "too_short"}
         if not is_back or one.verdict not in CHARGED or one.criterion in explained:
             continue
-        if one.name in vectors and (not known or vectors[one.name].head in right):
-            code = "force_reversed" if kind_of(one.name).name == "force" else "sense_reversed"
-            yield NamedMistake(Mistake(code, one.name), (one.criterion,), SLIPPED)
+        is_force = kind_of(one.name).name == "force"
+        if is_force and (not known or vectors[one.name].head in right):
+            yield NamedMistake(Mistake("force_reversed", one.name), (one.criterion,), SLIPPED)
 
 
 def _left_out(task: Task, outcomes: Sequence[Outcome], known: Sequence[NamedMistake]) -> tuple[Outcome, ...]:

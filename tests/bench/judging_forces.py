@@ -99,7 +99,7 @@ def count_names(tally: Tally, label: str, student: StudentForces, judgement: Jud
         return
     at = made.at.split()[-1] if made.kind != "wrong_arm" else ""
     tally.made[made.kind] += 1
-    if any(code in NAMES[made.kind] and at in {"", where} for code, where in told):
+    if any(code in NAMES[made.kind] and (where.startswith(at) or not at) for code, where in told):
         tally.named[made.kind] += 1
     else:
         tally.missed.append(f"{label}: {sorted(told)}")
