@@ -20,7 +20,7 @@ from grader.comparison.scales import Scale
 from grader.comparison.task import Made, Task, TaskSegment
 from grader.comparison.verdicts import NO_SPREAD, Expectation
 from grader.records import MECHANISM
-from reference.construction.elements import Coriolis, Fixed, Normal, Scaled, View, data_in, is_force
+from reference.construction.elements import Coriolis, Fixed, Normal, Same, Scaled, View, data_in, is_force
 from reference.construction.graph import AngularRate, Vector
 from reference.construction.mistakes import Drawing, Mistake, commit, laid_off, line_of
 from reference.construction.steps import Divide, Given, Similar, TwoLines
@@ -451,6 +451,12 @@ class FollowThrough:
                 yield from self.normal(segment, self.named(tail, head), scales)
             case Given(length=Coriolis() as length):
                 yield from self.coriolis(segment, length, scales)
+            case Given(length=Same(tail=tail, head=head), along=along):
+                source = self.named(tail, head)
+                one = None if source is None else self.evidence.vector(source)
+                if source is not None and one is not None and one.as_complex is not None:
+                    found = one.as_complex * 1j**along.quarters
+                    yield Expectation(found, "vector", source, frozenset({head}))
             case Divide(base=base) | Similar(base=base) if segment.tail in base:
                 pole, other = base if segment.tail == base[0] else base[::-1]
                 source = self.named(pole, other)
