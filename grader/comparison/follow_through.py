@@ -451,11 +451,11 @@ class FollowThrough:
                 yield from self.normal(segment, self.named(tail, head), scales)
             case Given(length=Coriolis() as length):
                 yield from self.coriolis(segment, length, scales)
-            case Given(length=Same(tail=tail, head=head), along=along):
+            case Given(length=Same(tail=tail, head=head), along=turned):
                 source = self.named(tail, head)
                 one = None if source is None else self.evidence.vector(source)
                 if source is not None and one is not None and one.as_complex is not None:
-                    found = one.as_complex * 1j**along.quarters
+                    found = one.as_complex * 1j**turned.quarters
                     yield Expectation(found, "vector", source, frozenset({head}))
             case Divide(base=base) | Similar(base=base) if segment.tail in base:
                 pole, other = base if segment.tail == base[0] else base[::-1]
