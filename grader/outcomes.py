@@ -166,6 +166,8 @@ def _detail(mistake: Mistake) -> dict[str, float | str]:
             return found if abs(factor) == 1.0 else {**found, "factor": factor}
         case Mistake(code="rpm_not_converted", other=(slip, formula, right), factor=factor):
             return {"factor": factor, "slip": slip, "formula": formula, "instead_of": right}
+        case Mistake(code="arithmetic", other=(slip,)):
+            return {"slip": slip}
         case Mistake(code="scale_wrong" | "rpm_not_converted" | "arithmetic", factor=factor):
             return {} if factor == 1.0 else {"factor": factor}
         case Mistake(code="wrong_intersection", other=(name,)) if kind_of(name).name != "length":

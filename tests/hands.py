@@ -154,9 +154,11 @@ def drawn_by(
     return drawn_with_instruments(drawing.construction, drawing.parameters, hand, lot)
 
 
-def handed_in(task: Task, nodes: Mapping[str, complex], source: str) -> Submission:
+def handed_in(
+    task: Task, nodes: Mapping[str, complex], source: str, declared: Mapping[str, str] | None = None
+) -> Submission:
     """Drawn nodes as a sheet that was read, or as measured with ruler and protractor or the ruler alone."""
-    declared = declared_texts(rule_scales(task))
+    declared = declared or declared_texts(rule_scales(task))
     exact = drawn_nodes(task)
     moved = {name: nodes[name] - exact[name] for name in nodes}
     read = sheet(task, moved=moved)

@@ -22,10 +22,11 @@ from grader.language import Tongue, tongue
 from grader.options import CycleOptions, PlanOptions
 from grader.solution.document import plan_documents
 from grader.texts.spoken import failure
-from reference.authored.assignment import SCALE_NAMES, Assignment, Variant, load_assignment
+from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, MechanismError, counted
 from reference.kinematics.cycle import cycle
 from reference.plan import Plan, exact_plan
+from reference.quantities import unit_of
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -105,17 +106,19 @@ def _print_pages(assignment: Assignment, plan: Plan, pdf: Path, *, drawings: boo
 
 
 def _show_table(assignment: Assignment, plan: Plan) -> None:
-    """Scales, and the drawn lengths of absolute vectors: what is asked for most while correcting."""
+    """Scales, and the drawn lengths of absolute vectors and reactions: what is asked for most."""
     from rich.console import Console
 
     console = Console()
     console.print(f"[bold]{assignment.file.title.en}[/bold], drawn lengths in mm", highlight=False)
     joints = {joint for joint in plan.motion.position if not plan.mechanism.is_ground(joint)}
-    names = [name for name in plan.vectors_si if name.removeprefix(name[:2]) in joints]
-    table = new_table("variant", "kL\nm/mm", "kv\n(m/s)/mm", "ka\n(m/s^2)/mm", *names)
+    wholes = (name for name in plan.vectors_si if name.count("_") == 1)
+    names = [name for name in wholes if name.startswith("R_") or name.removeprefix(name[:2]) in joints]
+    scale_names = assignment.scale_names
+    table = new_table("variant", *(f"{name}\n{unit_of(name)}" for name in scale_names), *names)
     lengths = {name: abs(plan.drawn_mm(name)) for name in names}
     for index, variant in enumerate(plan.variants):
-        scales = [f"{getattr(plan.scales, name)[index]:.4g}" for name in SCALE_NAMES]
+        scales = [f"{getattr(plan.scales, name)[index]:.4g}" for name in scale_names]
         table.add_row(str(variant), *scales, *(f"{lengths[name][index]:.2f}" for name in names))
     console.print(table)
     console.print("all vectors, values and directions: --csv FILE, --pdf FILE or --json", style="dim")

@@ -158,9 +158,8 @@ def index_page(
         has_open=bool(open_shares(results)),
         hardest=hardest(results),
         commonest=[
-            (MISTAKES[code].title, len(reports), [link(report) for report in reports])
-            for code, reports in commonest(results)
-            if code in MISTAKES
+            (title, len(reports), [link(report) for report in reports])
+            for title, reports in commonest(results)
         ],
         followed=followed,
         followers=[link(report) for report in followed.reports],

@@ -7,6 +7,7 @@ from math import floor
 from statistics import mean, median
 
 from grader.documents import CriterionDocument, CriterionMovedDocument, ReportDocument, ResultsDocument
+from grader.feedback.mistakes import MISTAKES, mistake_title
 from grader.feedback.numbers import shown
 from grader.outcomes import CHARGED, CREDITED
 
@@ -130,11 +131,11 @@ def follow_through(results: ResultsDocument) -> Followed:
 
 
 def commonest(results: ResultsDocument) -> list[tuple[str, list[ReportDocument]]]:
-    """Return codes of mistakes with the reports that show them, commonest first."""
+    """Return titles of mistakes, keys of the catalogues, with the reports that show them, commonest first."""
     reports: dict[str, list[ReportDocument]] = {}
     for report in results.reports:
-        for code in dict.fromkeys(mistake.code for mistake in report.mistakes):
-            reports.setdefault(code, []).append(report)
+        for title in dict.fromkeys(mistake_title(one) for one in report.mistakes if one.code in MISTAKES):
+            reports.setdefault(title, []).append(report)
     return sorted(reports.items(), key=lambda item: -len(item[1]))[:COMMONEST]
 
 

@@ -8,7 +8,9 @@ import re
 from collections.abc import Collection
 from dataclasses import dataclass
 
+from grader.documents import MistakeDocument, RivalDocument
 from grader.language import N_
+from reference.construction.mistakes import RIGHT_TRIANGLE
 
 ALONG_GUIDE = "guide"
 """Value of a mistake's detail `line` for a line along a moving guide."""
@@ -250,6 +252,14 @@ _DRIVING_ALONG: dict[str, Words] = {
            " then redo the plan."),
     ),
 }  # fmt: skip
+_BY_TRIANGLE: dict[str, Words] = {
+    "arithmetic": Words(
+        N_("right triangle at scales that do not allow it"),
+        N_("At %(at)s, the normal component was drawn by the right triangle on the sketch."),
+        N_("The triangle gives the component at the scale ka only where kL·ka = kv². With your scales compute"
+           " v²/l, divide it by ka, and lay that off."),
+    ),
+}  # fmt: skip
 _DRIVING = Words(
     N_("sense reversed"),
     N_("%(at)s turns the other way."),
@@ -297,6 +307,7 @@ _ACROSS_GUIDE: dict[str, Words] = {
 _BY_LINE = {ALONG_GUIDE: _ALONG_GUIDE, DRIVING_ACROSS: _DRIVING_ACROSS, DRIVING_ALONG: _DRIVING_ALONG}
 _BY_LINE |= {OF_FORCE: _FORCE, ACROSS_GUIDE: _ACROSS_GUIDE}
 _BY_LINE |= {"driven across": _DRIVING_ACROSS, "driven along": _DRIVING_ALONG}  # earlier versions
+_BY_LINE[RIGHT_TRIANGLE] = _BY_TRIANGLE
 
 
 PRECISE: dict[str, tuple[str, ...]] = {
@@ -362,6 +373,7 @@ PRECISE_ALONG_GUIDE: dict[str, tuple[str, ...]] = {
         N_("The line from %(from)s to %(at)s was drawn along %(other)s instead of along the guide."),
     ),
 }  # fmt: skip
+_PRECISE_BY_TRIANGLE = (N_("The normal component %(vector)s was drawn by the right triangle on the sketch."),)
 GIVING_AWAY = frozenset({"factor", "degrees", "n", "position", "crank_deg"})
 """Details of a mistake that are shown only to those who may see the answers."""
 
@@ -377,13 +389,15 @@ def precise(code: str, at: str, line: str, known: Collection[str]) -> str | None
         texts = ()
     elif line == ALONG_GUIDE:
         texts = PRECISE_ALONG_GUIDE.get(code, texts)
+    elif line == RIGHT_TRIANGLE:
+        texts = _PRECISE_BY_TRIANGLE
     return next((text for text in texts if set(_NAMED.findall(text)) <= set(known)), None)
 
 
 def words_of(code: str, at: str = "", line: str = "") -> Words:
     """Return the words for a mistake of this code made there, in a `line` along a guide or across a link.
 
-    For a slip of units, `line` is its kind.
+    For a slip of units, `line` is its kind; for a wrong length, its cause.
 
     Raises KeyError for an unknown code.
     """
@@ -395,6 +409,12 @@ def words_of(code: str, at: str = "", line: str = "") -> Words:
     if code == "sense_reversed" and at.startswith(("omega", "epsilon")):
         return _DRIVING
     return _BY_LINE.get(line, {}).get(code, usual)
+
+
+def mistake_title(cause: MistakeDocument | RivalDocument) -> str:
+    """Return the title of a report's mistake, a key of the catalogues."""
+    line = cause.parameters.get("line", cause.parameters.get("slip", ""))
+    return words_of(cause.code, cause.at, str(line)).title
 
 
 QUESTIONS: dict[str, str] = {

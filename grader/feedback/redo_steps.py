@@ -23,6 +23,7 @@ from grader.solution.steps import computed
 from reference.authored.assignment import Assignment, Variant
 from reference.construction.elements import Along, Coriolis
 from reference.construction.equations import Equation, equations
+from reference.construction.mistakes import RIGHT_TRIANGLE
 from reference.construction.steps import Coincide, Divide, Given, Similar, Step, TwoLines
 from reference.drawing.subject import Subject
 from reference.drawing.triangles import triangles
@@ -40,6 +41,7 @@ THEN = N_("Then draw again what follows from it: %(nodes)s.")
 HALF_TURN = N_(
     "If it was found by the right triangle on the sketch, the half turn about %(joint)s is missing."
 )
+RATIO = N_("With your scales kL·ka / kv² = %(ratio)s: it is drawn %(ratio)s times as long as it should be.")
 RATIO_WITHIN = 0.02
 """Relative: scales at which the right triangle holds, as students round them."""
 
@@ -135,17 +137,19 @@ def with_mistakes_explained(
     told = []
     for document, mistake in zip(report.mistakes, judgement.mistakes, strict=True):
         said, *rivals = mistake_sentences(mistake, speaker, level, names)
-        said += _half_turn(subject, mistake, speaker)
+        said += _by_triangle(subject, mistake, speaker, level)
         redrawn = {"redo": _redo(subject, mistake, speaker, level)}
         told.append(document.model_copy(update={**_told(document, [said, *rivals]), **redrawn}))
     return report.model_copy(update={"mistakes": told})
 
 
-def _half_turn(subject: Subject, mistake: NamedMistake, speaker: Tongue) -> str:
-    """Return what the right triangle has to do with a reversed normal component; empty if nothing."""
+def _by_triangle(subject: Subject, mistake: NamedMistake, speaker: Tongue, level: Level) -> str:
+    """Return what the right triangle has to do with a wrong normal component; empty if nothing."""
     scales = subject.plan.scales
-    is_by_triangle = np.all(np.abs(scales.kL * scales.ka / scales.kv**2 - 1.0) <= RATIO_WITHIN)
-    known = triangles(subject.plan.construction) if is_by_triangle else ()
+    ratio = float(np.ravel(scales.kL * scales.ka / scales.kv**2)[0])
+    if level == "full" and mistake.detail.get("slip") == RIGHT_TRIANGLE:
+        return " " + speaker.gettext(RATIO) % {"ratio": speaker.trimmed(ratio, 3)}
+    known = triangles(subject.plan.construction) if abs(ratio - 1.0) <= RATIO_WITHIN else ()
     joint = next((one.joint for one in known if mistake.at in (one.vector.head, one.vector.name)), "")
     reversed_at = joint if mistake.code == "normal_reversed" else ""
     return " " + speaker.gettext(HALF_TURN) % {"joint": reversed_at} if reversed_at else ""

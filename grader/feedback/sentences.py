@@ -231,5 +231,5 @@ _CENTRE = re.compile("[IJ][0-9A-Za-z]+")
 
 
 def line_of(mistake: NamedMistake) -> str:
-    """Return the kind of line or unit slip, as `words_of` takes it; empty if the code suffices."""
+    """Return the kind of line or slip, as `words_of` takes it; empty if the code suffices."""
     return str(mistake.detail.get("line", mistake.detail.get("slip", "")))

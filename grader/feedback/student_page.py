@@ -18,7 +18,7 @@ from grader.documents import (
     ScaleName,
 )
 from grader.feedback import words
-from grader.feedback.mistakes import MISTAKES, words_of
+from grader.feedback.mistakes import MISTAKES, mistake_title
 from grader.feedback.numbers import (
     added_text,
     quantity_cells,
@@ -381,7 +381,7 @@ class StudentPage:
         verdicts = {one.verdict for one in explained}
         off = {one.drawn for one in explained if one.verdict in CHARGED | {"review"}}
         causes: list[MistakeDocument | RivalDocument] = [mistake, *mistake.rivals]
-        titles = dict.fromkeys(_title(cause, self.speaker) for cause in causes)
+        titles = dict.fromkeys(self.speaker.gettext(mistake_title(cause)) for cause in causes)
         joined = f" {self.speaker.gettext(OR)} ".join(list(titles)[:MOST_TITLES])
         return Action(
             title=joined[:1].upper() + joined[1:],
@@ -425,10 +425,6 @@ class StudentPage:
 def _is_left_out(criterion: CriterionDocument) -> bool:
     """Return whether it is optional and was not handed in."""
     return criterion.verdict == "not_judged" and criterion.reasons[:1] == ["optional"]
-
-
-def _title(cause: MistakeDocument | RivalDocument, speaker: Tongue) -> str:
-    return speaker.gettext(words_of(cause.code, cause.at, str(cause.parameters.get("line", ""))).title)
 
 
 # Files --------------------------------------------------------------------------------------------

@@ -17,16 +17,24 @@ import numpy as np
 from grader.records import MECHANISM
 from reference.construction.elements import Fixed, Nodes, Scaled, data_in, is_force
 from reference.construction.graph import evaluate
-from reference.construction.mistakes import Drawing, Mistake, commit, mistakes_of_forces
+from reference.construction.mistakes import (
+    RIGHT_TRIANGLE,
+    SLIP,
+    Drawing,
+    Mistake,
+    commit,
+    mistakes_of_forces,
+)
 from reference.construction.steps import Given
 from reference.construction.uncertainty import Skill
 from reference.quantities import OF_MOTION, group_of, kind_of, scale_of
 from reference.replay.explanations import (
+    BY_TRIANGLE,
     LEAST_FACTOR,
     MOST_FACTOR,
     NOT_THERE,
+    RARER,
     RARITY,
-    SLIP,
     SOMETHING_ELSE,
     Observations,
     cost_of_any,
@@ -40,8 +48,9 @@ Key = tuple[str, str]
 
 
 def key_of(mistake: Mistake) -> Key:
-    """Return a mistake's code and place, which distinguish it from others."""
-    return mistake.code, mistake.at
+    """Return a mistake's code, with the cause of a slip, and place, which distinguish it from others."""
+    cause = mistake.other if mistake.code == SLIP else ()
+    return " ".join((mistake.code, *cause)), mistake.at
 
 
 # The explanations of a drawing ---------------------------------------------------------------------
@@ -126,6 +135,7 @@ def _searched_further(case: Case, scales: Sequence[Root], explanations: Sequence
     if scale is not None:
         further = [_both(scale, one) for one in roots]
         found = _by_cost(found, *(_replayed(case, further, cares, swap) for swap in (None, *swaps)))
+    found = _by_cost(found, _by_triangles(case, roots, found, cares))
     found = _by_cost(found, _with_a_guess(case, roots, swaps, found[0], cares))
     return _by_cost(found, _with_another_guess(case, roots, found[0], cares))
 
@@ -146,21 +156,40 @@ def _by_cost(*found: Sequence[Replay]) -> list[Replay]:
     return sorted((one for some in found for one in some), key=lambda explanation: explanation.cost)
 
 
+SEVERAL = 2
+"""So many wrong lengths may have one cause."""
 ONE_FACTOR = 0.08
 """Largest difference of the logarithms of slips that are one wrong scale."""
 
 
 def _scale_of_slips(case: Case, best: Replay) -> Root | None:
     """The scale that computed components follow, where several are off by one factor; else None."""
-    slips = [one for one in best.made if one.code == SLIP]
+    slips = [one for one in best.made if one.code == SLIP and not one.other]
     logs = [math.log(one.factor) for one in slips]
-    if len(logs) < 2 or max(logs) - min(logs) > ONE_FACTOR:
+    if len(logs) < SEVERAL or max(logs) - min(logs) > ONE_FACTOR:
         return None
     factor = math.exp(sum(logs) / len(logs))
     scale = scale_of(case.drawing.construction.figure_of(slips[-1].at))
     made = () if scale in case.assumed else (Mistake("scale_wrong", scale, factor=factor),)
     parameters = {scale: np.asarray(case.drawing.parameters[scale] / factor)}
     return Root(made, parameters, cost=RARITY["scale_wrong"])
+
+
+def _by_triangles(
+    case: Case, roots: Sequence[Root], found: Sequence[Replay], cares: Sequence[float]
+) -> list[Replay]:
+    """The explanations in which all wrong normal components were drawn by the right triangle: one mistake."""
+    by_triangle = dict.fromkeys(one for some in found for one in some.made if one.other == (RIGHT_TRIANGLE,))
+    slips = ({one.at for one in some.made if one.code == SLIP} for some in found)
+    several = next((nodes for nodes in slips if len(nodes) >= SEVERAL), set())
+    made = tuple(one for one in by_triangle if one.at in several)
+    if len(made) < SEVERAL:
+        return []
+    drawing = case.drawing
+    for one in made:
+        drawing = commit(one, drawing)
+    drawn = Root(made, cost=BY_TRIANGLE - RARER)
+    return replay(drawing, case.observations, [_both(one, drawn) for one in roots], case.skill, cares=cares)
 
 
 def _with_a_guess(

@@ -17,6 +17,7 @@ from reference.construction.elements import Along, Line
 from reference.construction.graph import Construction
 from reference.construction.mistakes import (
     RPM_FACTOR,
+    SLIP,
     Drawing,
     Mistake,
     affected,
@@ -27,7 +28,6 @@ from reference.construction.mistakes import (
 )
 from reference.construction.steps import Given, Step, TwoLines
 from reference.quantities import group_of, kind_of
-from reference.replay.explanations import SLIP
 from reference.replay.replay import Replay
 
 # What was drawn by mistake, where that is certain --------------------------------------------------
@@ -90,7 +90,7 @@ def named(
     best, shares = explanations[0], _Shares(explanations)
     all_thought_of = ALL_THOUGHT_OF if has_directions else ALL_THOUGHT_OF_BY_LENGTHS
     known = all_thought_of if len(best.made) > 1 else 1.0
-    slips = sum(one.code == SLIP for one in best.made)
+    slips = sum(one.code == SLIP and not one.other for one in best.made)
     explains, mistakes = _losses_explained(best, construction, lost), []
     record = partial(_record, construction, lost.gear_ratio)
     for mistake in _in_order(best.made, construction):
@@ -98,7 +98,7 @@ def named(
         rivals = shares.rivals(key, {key_of(one) for one in best.made})
         together = share + sum(shares.instead(key, key_of(one)) for one in rivals)
         is_sure = share >= LEAST_CONFIDENCE or (together >= SURE_TOGETHER and rivals)
-        is_shown = explains[mistake] and (mistake.code != SLIP or slips <= MOST_SLIPS)
+        is_shown = explains[mistake] and (mistake.code != SLIP or mistake.other or slips <= MOST_SLIPS)
         if is_shown and is_sure and not _is_slight(mistake, best):
             others = tuple(record(one, (), known * shares.instead(key, key_of(one))) for one in rivals)
             mistakes.append(record(mistake, tuple(explains[mistake]), known * share, others))

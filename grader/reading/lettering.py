@@ -153,7 +153,7 @@ def fitting_letters(
         return np.zeros(len(at))
     signs = _signs(name, poles, renamed, letters)
     high = letters.height_mm
-    gap = _gaps(letters.box_mm, at)
+    gap = gaps(letters.box_mm, at)
     near = (gap.min(axis=1) < REACH_MM) & (high > LEAST_MM) & (high < MOST_MM)
     chance = letters.probability[:, signs].sum(axis=1)[near]
     if not len(chance):
@@ -168,7 +168,7 @@ def primes_beside(at: ComplexArray, letters: Letters | None) -> int:
     """Count the primes near some nodes: those of an acceleration plan have them, others have not."""
     if letters is None or "'" not in letters.column or not len(letters):
         return 0
-    primes = _gaps(letters.box_mm[letters.chance("'") > LIKELY_PRIME], at)
+    primes = gaps(letters.box_mm[letters.chance("'") > LIKELY_PRIME], at)
     return int(np.count_nonzero(primes.min(axis=1, initial=np.inf) < REACH_MM))
 
 
@@ -191,7 +191,7 @@ def lettering(
     signs = [_signs(name, poles, renamed or {}, letters) for _, name in nodes]
     at = np.array(list(nodes.values()))
     high = letters.height_mm
-    gap = _gaps(letters.box_mm, at)
+    gap = gaps(letters.box_mm, at)
     near = (gap.min(axis=1) < REACH_MM) & (high > LEAST_MM) & (high < MOST_MM)
     columns = sorted({column for of_node in signs for column in of_node})
     known = letters.probability[:, columns].sum(axis=1)
@@ -216,7 +216,7 @@ def _signs(name: str, poles: Collection[str], renamed: Mapping[str, str], letter
     return sorted({letters.column[sign] for sign in signs if sign in letters.column})
 
 
-def _gaps(box_mm: FloatArray, at: ComplexArray) -> FloatArray:
+def gaps(box_mm: FloatArray, at: ComplexArray) -> FloatArray:
     """Return (k, n) distances from boxes to points, 0 inside."""
     x, y, w, h = (side[:, None] for side in box_mm.T)
     across = np.maximum(np.maximum(x - at.real, at.real - x - w), 0.0)

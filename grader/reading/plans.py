@@ -183,12 +183,13 @@ class PlanReading:
         return self.placed.edges, taken.tobytes(), self.assignment.shared.tobytes()
 
 
-def regular_plans(problem: PlanProblem, drawing: Drawing) -> list[PlanReading]:
+def regular_plans(problem: PlanProblem, drawing: Drawing, count: int = 2) -> list[PlanReading]:
     """Return readings of a plan as it should be drawn, best first.
 
-    Arguments: `drawing` has the construction and the parameters of the student's variant.
+    Arguments: `drawing` has the construction and the parameters of the student's variant; `count` is the
+    number of poses of the expected size.
     """
-    plans = _anywhere(problem, regular(drawing, problem.figure))
+    plans = _anywhere(problem, regular(drawing, problem.figure), count)
     sizes = {round(math.log(plan.pose.size), 1): plan.pose.size for plan in plans[:3]}
     for size in sizes.values():
         if abs(math.log(size)) <= SAME_SIZE:
@@ -196,7 +197,7 @@ def regular_plans(problem: PlanProblem, drawing: Drawing) -> list[PlanReading]:
         # Drafting errors are millimetres on paper: expect the plan again at the size it has there.
         larger = Drawing(drawing.construction, resized(drawing, problem.figure, size))
         bases = [replace(base, cost=base.cost + COST_OF_SIZE) for base in regular(larger, problem.figure)]
-        plans.extend(_anywhere(problem, bases))
+        plans.extend(_anywhere(problem, bases, count))
     return sorted(plans, key=lambda plan: -plan.score)
 
 
@@ -227,17 +228,19 @@ def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) 
 # Where a plan may lie -----------------------------------------------------------------------------
 
 
-def _anywhere(problem: PlanProblem, hypotheses: Sequence[PlanHypothesis]) -> list[PlanReading]:
+def _anywhere(problem: PlanProblem, hypotheses: Sequence[PlanHypothesis], count: int) -> list[PlanReading]:
     """Return readings of some hypotheses in any position, best first."""
     cases: list[_PlanCase] = []
     for hypothesis in hypotheses:
         expected = problem.expected(hypothesis)
         if expected is not None:
-            cases.extend(_PlanCase(hypothesis, expected, pose) for pose in _poses(expected, problem.lines))
+            cases.extend(
+                _PlanCase(hypothesis, expected, pose) for pose in _poses(expected, problem.lines, count)
+            )
     return sorted(_read(cases, problem.lines), key=lambda plan: -plan.score)
 
 
-def _poses(expected: Expected, lines: Lines) -> list[Pose]:
+def _poses(expected: Expected, lines: Lines, count: int) -> list[Pose]:
     """Return possible poses: upright at the expected size, upright at any size, turned by quarters.
 
     Each search has its own poses: a plan of nearly parallel vectors fits a bundle at any size.
@@ -250,9 +253,9 @@ def _poses(expected: Expected, lines: Lines) -> list[Pose]:
     smallest = max(SMALLEST_MM / largest, LEAST_FIRST_MM / max(expected.length_mm(first), SPECK_MM))
     any_size = Search(sizes=(0.0,), smallest=smallest, largest=max(smallest, LARGEST_MM / largest))
     turned = replace(any_size, turns_rad=QUARTERS, sizes=(1.0, 0.0))
-    searches = (Search(), any_size, turned)
+    searches = ((Search(), count), (any_size, 2), (turned, 2))
     long = lines.take(lines.length > LEAST_LAID_MM)
-    laid = [pose for search in searches for pose in poses(expected, long, search, count=2)]
+    laid = [pose for search, most in searches for pose in poses(expected, long, search, most)]
     best = max((pose.score for pose in laid), default=0.0)
     return [pose for pose in laid if pose.score > best - WORSE]
 

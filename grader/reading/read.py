@@ -8,6 +8,7 @@ from functools import cache, partial
 
 import numpy as np
 
+from grader.reading.apart import told_apart
 from grader.reading.by_ink import Look
 from grader.reading.expected import Edge
 from grader.reading.lettering import lettered, support
@@ -42,15 +43,12 @@ from reference.geometry import ComplexArray
 LEAST_SKETCH = 15.0
 LEAST_PLAN = 12.0
 """Nats: a figure with a smaller score may be chance."""
+LEAST_EXPECTED = 8.0
+"""The same where a sheet has a plan of each position: at a dead point it is one stroke."""
 SURE_PLAN = 40.0
 """Nats from which a plan's strokes belong to no other plan."""
 MOST_SHARED = 0.5
 """Share of a plan's strokes that another plan may take as well: both may use a line or two."""
-BESIDE_OTHERS = 0.85
-"""Most confidence on a plain sheet of several positions, told apart by their directions alone: of 139 vectors
-read with 0.9 and more 2 were off, none of 160 on printed sheets."""
-APART_MM = 15.0
-"""Strokes as near to a node of another position's plan belong to it, unless the own plan has some there."""
 LEAST_DRAWN_MM, MOST_DRAWN_MM = 15.0, 200.0
 """Lengths of the vectors given at the start of a plan: they fit on a sheet and can be measured."""
 SAME_SCALE = 0.95
@@ -69,8 +67,14 @@ class _PageReading:
     ink: Ink
     sheet: Sheet
     look: Look | None
-    beside: Sequence[Drawing] = ()
-    """Drawings of other positions, whose plans may stand on the sheet as well."""
+    position: int | None
+    """The student's own one."""
+    least: float
+    """Least nats of a plan there."""
+    beside: Mapping[int, Drawing] = field(default_factory=dict)
+    """Drawings of all positions, by number, if all of them may stand on the sheet."""
+    told: float = 1.0
+    """The chance that the plan read there is the own position's."""
     sketch: SketchReading | None = None
     plans: dict[str, PlanReading] = field(default_factory=dict)
 
@@ -95,13 +99,15 @@ def read_figures(
 
     Returns one Reading per sheet.
     """
-    beside = _other_positions(assignment, variant, scales)
+    every = _all_positions(assignment, variant, scales)
+    own_position = None if variant is None else variant.position
+    least = LEAST_EXPECTED if every else LEAST_PLAN
     pages = [
-        _PageReading(
-            lines_of(ink), ink, sheet, places and partial(places, ink.where), () if sheet.zones else beside
-        )
+        _PageReading(lines_of(ink), ink, sheet, places and partial(places, ink.where), own_position, least)
         for ink, sheet in drawn
     ]
+    for page in (one for one in pages if not one.sheet.zones):
+        page.beside = every
     own, others = _drawings(assignment, variant, scales)
     renamed = assignment.file.names
     for page in pages:
@@ -111,7 +117,7 @@ def read_figures(
             page.sketch = sketch
     followed = [page.sketch.drawing for page in pages if page.sketch is not None] if variant is None else []
     drawing = _measurable((followed or own)[0], assignment, variant)
-    if beside and any(page.sketch is None for page in pages):
+    if every and any(page.sketch is None for page in pages):
         # Such a sheet has one figure: the mechanisms, or the plans.
         for page in (one for one in pages if one.sketch is not None):
             page.lines = page.lines.take(np.zeros(0, np.int64))
@@ -125,10 +131,7 @@ def read_figures(
             page.plans.clear()
             _find_plan(pages, [drawing], ACCELERATION_PLAN, {}, renamed)
     readings = [
-        no_surer(
-            lettered(reading, page.ink.letters, drawing.construction, renamed),
-            BESIDE_OTHERS if page.beside else 1.0,
-        )
+        no_surer(lettered(reading, page.ink.letters, drawing.construction, renamed), page.told)
         for reading, page in zip(_readings(pages, drawing, wanted), pages, strict=True)
     ]
     added = [name for name in wanted if name in drawing.construction.on_sketch]
@@ -158,12 +161,15 @@ def _drawings(
     return drawings(assignment, [variant], scales), cache(lambda: drawings(assignment, others, None))
 
 
-def _other_positions(assignment: Assignment, variant: Variant | None, scales: Scales | None) -> list[Drawing]:
-    """Return the drawings of the student's other positions, if a sheet may have all of them."""
-    if variant is None:
-        return []
-    positions = [one for one in assignment.shared_positions if one != variant.position]
-    return drawings(assignment, [replace(variant, position=position) for position in positions], scales)
+def _all_positions(
+    assignment: Assignment, variant: Variant | None, scales: Scales | None
+) -> dict[int, Drawing]:
+    """Return the drawings of the student's positions, by number, if a sheet may have all of them."""
+    if variant is None or variant.position is None:
+        return {}
+    numbers = assignment.shared_positions
+    every = drawings(assignment, [replace(variant, position=number) for number in numbers], scales)
+    return dict(zip(numbers, every, strict=True))
 
 
 def _measurable(drawing: Drawing, assignment: Assignment, variant: Variant | None) -> Drawing:
@@ -227,7 +233,9 @@ def _find_plan(
         problem = PlanProblem(page.lines, figure, given, page.ink.letters, renamed, links, page.look)
         for drawing in at_scales:
             turned = Drawing(drawing.construction, {**drawing.parameters, "turn": np.asarray(guide_turn)})
-            problem = _without_others(problem, turned, page.beside)
+            if page.beside and page.position is not None:
+                every = {**page.beside, page.position: turned}
+                problem, page.told = told_apart(problem, every, page.position)
             laid.append(_LaidPlan(page, problem, turned, regular_plans(problem, turned)))
         if figure in page.sheet.zones and any(one.is_explained for one in laid):
             break
@@ -242,7 +250,7 @@ def _find_plan(
         plan = best_plan(one.problem, one.drawing, one.plans)
         if plan is not None and (best is None or plan.score > best[1].score):
             best = one.page, plan
-    if best is None or best[1].score < LEAST_PLAN:
+    if best is None or best[1].score < best[0].least:
         return None
     best[0].plans[figure] = best[1]
     return best[1]
@@ -266,26 +274,6 @@ class _LaidPlan:
     def is_explained(self) -> bool:
         """True if the best one is taken as drawn."""
         return bool(self.plans) and self.plans[0].pose.score > EXPLAINED
-
-
-def _without_others(problem: PlanProblem, drawing: Drawing, beside: Sequence[Drawing]) -> PlanProblem:
-    """Leave out the strokes in and about a plan that another position explains better than the own one."""
-    exact, lines = replace(problem, given={}), problem.lines
-    own = next(iter(regular_plans(exact, drawing)), None) if beside else None
-    taken = np.zeros(len(lines), dtype=bool)
-    for other in beside:
-        plan = next(iter(regular_plans(exact, other)), None)
-        if plan is None or plan.score < LEAST_PLAN:
-            continue
-        same = own is not None and np.isin(own.members, plan.members).mean() > MOST_SHARED
-        if same and own is not None and own.score >= plan.score:
-            continue
-        taken |= np.isin(lines.members, plan.members).any(axis=1)
-        off = np.abs(lines.middle[:, None] - plan.fit.at[np.isfinite(plan.fit.at)])
-        about = (off.min(axis=1, initial=np.inf) < APART_MM) | taken
-        if own is None or same or not np.isin(own.members, lines.members[about]).any():
-            taken |= about
-    return replace(problem, lines=lines.take(np.flatnonzero(~taken)))
 
 
 def _without_accelerations(laid: _LaidPlan) -> _LaidPlan:

@@ -23,6 +23,7 @@ from grader.self_check.results import Checked, Result, certain_mistakes, checked
 from grader.texts.reasons import reason_sentence
 from grader.texts.spoken import place
 from reference.authored.assignment import SCALE_NAMES, Assignment
+from reference.construction.mistakes import RIGHT_TRIANGLE
 from reference.quantities import kind_of
 
 RESULTS: Mapping[Result, tuple[str, str]] = {
@@ -188,6 +189,7 @@ _OF_FORCES = {
     "sense_reversed": _BY_MOMENTS,
     "arithmetic": _BY_MOMENTS,
 }
+_BY_TRIANGLE = {"arithmetic": N_("The right triangle gives v²/l at the scale ka only where kL·ka = kv².")}
 _SAME = N_("The same mistake as at %(name)s.")
 
 
@@ -281,6 +283,6 @@ def law_of(mistake: NamedMistake) -> str:
     if mistake.at.startswith(CORIOLIS_END):
         return _CORIOLIS.get(mistake.code, usual)
     line = line_of(mistake)
-    known = {ALONG_GUIDE: _GUIDE, OF_FORCE: _OF_FORCES, ACROSS_GUIDE: _OF_FORCES, **_DRIVING}
-    others = known.get(line, {})
+    known = {**_DRIVING, ALONG_GUIDE: _GUIDE, RIGHT_TRIANGLE: _BY_TRIANGLE}
+    others = {**known, OF_FORCE: _OF_FORCES, ACROSS_GUIDE: _OF_FORCES}.get(line, {})
     return others.get(mistake.code, usual)

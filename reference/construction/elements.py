@@ -163,7 +163,8 @@ class Normal(FromNodes):
     """A normal component v^2 / l, from a velocity as drawn and a real length, at the scale ka.
 
     `measured` are the sketch's joints between which the length is measured if the mechanism's data do not
-    give it: the distance of a slotted link's point from its pivot.
+    give it: the distance of a slotted link's point from its pivot. By the right triangle on the sketch its
+    drawn length is made from drawn lengths alone, whatever the scales: right only where kL ka = kv^2.
     """
 
     reads = ("tail", "head", "measured")
@@ -171,13 +172,16 @@ class Normal(FromNodes):
     head: str
     length: str
     measured: tuple[str, str] | None = None
+    by_triangle: bool = False
 
     def at(self, view: View) -> FloatArray:
         """Return the length in drawn millimetres."""
         known = view.parameters
-        speed = np.abs(view.nodes[self.head] - view.nodes[self.tail]) * known["kv"]
+        drawn_mm = np.abs(view.nodes[self.head] - view.nodes[self.tail])
         length = known[self.length] if self.measured is None else view.real_length(*self.measured)
-        return np.asarray(speed**2 / (length * known["ka"]))
+        if self.by_triangle:
+            return np.asarray(drawn_mm**2 * known["kL"] / length)
+        return np.asarray((drawn_mm * known["kv"]) ** 2 / (length * known["ka"]))
 
 
 @dataclass(frozen=True, slots=True)

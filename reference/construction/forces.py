@@ -89,7 +89,7 @@ def reaction(names: Mapping[str, str], by: str, on: str) -> str:
 
 @dataclass(slots=True)
 class Loaded:
-    """What acts on a link, as far as it is known."""
+    """Forces and couples that act on a link, as far as they are known."""
 
     forces: list[Force] = field(default_factory=list)
     couples: list[Couple] = field(default_factory=list)

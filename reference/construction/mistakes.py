@@ -83,6 +83,9 @@ FACTORS: dict[str, float | None] = {
 """By which a mistake multiplies a length that is laid off; None: by its own factor."""
 RPM_FACTOR = 30.0 / math.pi
 """Error factor of omega = n instead of omega = pi n / 30."""
+SLIP, RIGHT_TRIANGLE = "arithmetic", "right_triangle"
+"""A computed length that is wrong, and its cause if the length was drawn by the right triangle at scales that
+do not allow it (`Mistake.other`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +105,8 @@ class Mistake:
     code : one of `CODES`
     at : the node, vector, scale or figure where it is made
     slot : index of the step's line (0 or 1), or of the force with a wrong arm
-    other : what is used instead: two joints, a node, a vector (for its line), the two nodes swapped
+    other : what is used instead: two joints, a node, a vector (for its line), the two nodes swapped; of a
+        wrong length its cause
     factor : of a length, speed or scale
     quarters : quarter turns of a figure or of the driving link's vector, counter-clockwise
     n, position : the other student's variant
@@ -156,6 +160,8 @@ def changed_step(mistake: Mistake, construction: Construction) -> Step:
     """
     step = construction.step(mistake.at)
     match mistake.code, step:
+        case "arithmetic", Given(length=Normal() as length) if mistake.other == (RIGHT_TRIANGLE,):
+            return replace(step, length=replace(length, by_triangle=True))
         case code, Given() if code in FACTORS:
             factor = FACTORS[code]
             return replace(step, factor=step.factor * (mistake.factor if factor is None else factor))
@@ -365,14 +371,17 @@ def _wrong_feet(
 def rarer_mistakes_of_step(step: Step, construction: Construction) -> Iterator[Mistake]:
     """Yield rarer mistakes in one step of a plan, in addition to `mistakes_of_step`.
 
-    The driving link's vector along the link instead of across it, or across instead of along; a line by the
-    radius from a pivot that carries no link; a line through any earlier point, or any earlier line.
+    The driving link's vector along the link instead of across it, or across instead of along; a normal
+    component by the right triangle (a mistake only at scales that do not allow it); a line by the radius from
+    a pivot that carries no link; a line through any earlier point, or any earlier line.
     """
     figure = construction.figure_of(step.node)
     if figure == "mechanism":
         return
     if isinstance(step, Given) and isinstance(step.length, Scaled) and isinstance(step.along, Along):
         yield from (Mistake("parallel_for_perpendicular", step.node, quarters=one) for one in (1, 3))
+    if isinstance(step, Given) and isinstance(step.length, Normal):
+        yield Mistake(SLIP, step.node, other=(RIGHT_TRIANGLE,))
     if not isinstance(step, TwoLines):
         return
     known = {(one.code, one.slot, frozenset(one.other)) for one in mistakes_of_step(step, construction)}

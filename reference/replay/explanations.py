@@ -14,7 +14,14 @@ import numpy as np
 from reference import geometry
 from reference.construction.elements import Along, Direction, Errors, Line, View, is_computed
 from reference.construction.graph import Construction
-from reference.construction.mistakes import Mistake, changed_step, mistakes_of_step, rarer_mistakes_of_step
+from reference.construction.mistakes import (
+    RIGHT_TRIANGLE,
+    SLIP,
+    Mistake,
+    changed_step,
+    mistakes_of_step,
+    rarer_mistakes_of_step,
+)
 from reference.construction.steps import Given, Step, TwoLines
 from reference.construction.uncertainty import SMALL, Skill, step_errors
 from reference.geometry import ComplexArray, FloatArray
@@ -51,6 +58,10 @@ KNOWN_SLIP = 11.0
 """Cost of a slip by one of `SLIPS`: less rare than any other."""
 SLIPS = (0.1, 0.5, 2.0, 10.0)
 """A decimal point, a half or a double: the commonest slips in computing a length."""
+BY_TRIANGLE = 13.0
+"""Cost of a length drawn by the right triangle: if one of `SLIPS` fits as well, this is its rival."""
+LEAST_RATIO = 0.1
+"""Least logarithm of kL ka / kv^2 at which the right triangle is a mistake."""
 RARER = 3.0
 """Extra cost of a mistake that is seldom made."""
 ANOTHER_WAY = 2.0
@@ -275,7 +286,6 @@ def _squared_length_residual(
 
 LEAST_FACTOR, MOST_FACTOR = 0.02, 30.0
 """A computed length that is wrong by a factor outside this range is not a slip in its computation."""
-SLIP = "arithmetic"
 
 WrongSteps = tuple[tuple[Mistake, Step], ...]
 
@@ -322,6 +332,8 @@ def _known_slips(step: Step) -> Iterator[Mistake]:
 
 def rarity_of(mistake: Mistake) -> float:
     """Return the cost of a mistake."""
+    if mistake.other == (RIGHT_TRIANGLE,):
+        return BY_TRIANGLE
     if mistake.code == SLIP and mistake.factor in SLIPS:
         return KNOWN_SLIP
     is_line = mistake.code == "wrong_intersection" and kind_of(mistake.other[0]).name != "length"
@@ -369,7 +381,8 @@ class StepAlternatives:
         mistake = self.mistakes[choice]
         if mistake is None:
             return ()
-        if mistake.code == SLIP and mistake.factor == 1.0 and self.factors is not None:
+        is_any = mistake.code == SLIP and mistake.factor == 1.0 and not mistake.other
+        if is_any and self.factors is not None:
             mistake = replace(mistake, factor=float(self.factors[branch]))
         return (mistake,)
 
@@ -473,11 +486,18 @@ class StepContext:
             return StepAlternatives(empty.astype(np.complex128), empty, empty, ())
         place, shifts = self._placed(step, [changed for _, changed in steps])
         misfit, cost = self.observed.misfit_and_cost(place, shifts, self.nodes)
-        rarity = np.array([0.0 if one is None else self._rarity(one) for one in mistakes])
-        return StepAlternatives(place, cost + rarity[:, None], misfit, mistakes)
+        for row, mistake in enumerate(mistakes):
+            cost[row] += 0.0 if mistake is None else self._rarity(mistake)
+        return StepAlternatives(place, cost, misfit, mistakes)
 
-    def _rarity(self, mistake: Mistake) -> float:
-        """Return the cost of a mistake; less for a component left out if it is not there."""
+    def _rarity(self, mistake: Mistake) -> float | FloatArray:
+        """Return the cost of a mistake; less for a component left out if it is not there.
+
+        By the right triangle it is infinite in branches where the scales allow that.
+        """
+        if mistake.other == (RIGHT_TRIANGLE,):
+            ratio = self.known["kL"] * self.known["ka"] / self.known["kv"] ** 2
+            return np.where(np.abs(np.log(ratio)) < LEAST_RATIO, np.inf, rarity_of(mistake))
         is_blank = mistake.code in {"normal_missing", "force_missing"} and mistake.at in self.blank
         return rarity_of(mistake) - (NOT_THERE if is_blank else 0.0)
 

@@ -15,6 +15,7 @@ from reference.construction.mistakes import Mistake
         (Mistake("figure_rotated", "velocity_plan", quarters=3), {"degrees": 270.0}),
         (Mistake("wrong_link", "b", other=("A", "B")), {"other": "AB"}),
         (Mistake("arithmetic", "b", factor=2.0), {"factor": 2.0}),
+        (Mistake("arithmetic", "n_B", other=("right_triangle",)), {"slip": "right_triangle"}),
         (Mistake("normal_reversed", "n_BA"), {}),
     ],
 )

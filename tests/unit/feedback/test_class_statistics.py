@@ -2,7 +2,7 @@
 
 import re
 
-from grader.documents import DecidedDocument, Quantity, ScaleDocument
+from grader.documents import DecidedDocument, MistakeDocument, Quantity, ScaleDocument
 from grader.feedback.class_page import distribution_svg
 from grader.feedback.class_statistics import (
     commonest,
@@ -49,7 +49,22 @@ def test_the_hardest_criterion_comes_first():
 def test_a_mistake_made_twice_by_one_student_counts_once():
     twice = report(mistakes=[*report().mistakes, *report().mistakes])
     made = results(twice, report())
-    assert commonest(made) == [("normal_reversed", made.reports)]
+    assert commonest(made) == [("normal component reversed", made.reports)]
+
+
+def test_a_slip_of_known_cause_is_counted_apart():
+    slips = [
+        report(
+            mistakes=[
+                MistakeDocument(code="arithmetic", at="n_B", explains=[], confidence=0.9, parameters=found)
+            ]
+        )
+        for found in ({"factor": 0.5}, {"slip": "right_triangle"}, {"slip": "right_triangle"})
+    ]
+    assert [(title, len(reports)) for title, reports in commonest(results(*slips))] == [
+        ("right triangle at scales that do not allow it", 2),
+        ("slip in the arithmetic", 1),
+    ]
 
 
 def test_there_is_no_chart_without_scores():

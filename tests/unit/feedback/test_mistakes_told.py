@@ -128,3 +128,19 @@ def test_a_reversed_normal_names_the_half_turn_where_the_right_triangle_holds(na
     (mistake,) = explained.mistakes
     assert mistake.code == "normal_reversed"
     assert ("the half turn about D is missing" in mistake.feedback) == (name == "pump")
+
+
+@pytest.mark.parametrize("lang", LANGUAGES)
+@pytest.mark.parametrize("level", ["hint", "full"])
+def test_a_normal_by_the_right_triangle_is_told_with_the_ratio_of_the_scales(lang, level):
+    task = task_for("press", None, 1)
+    reading = measured(task, mistakes=(Mistake("arithmetic", "n_B", other=("right_triangle",)),))
+    judgement = judge(task, Submission(measured=reading))
+    report = report_of(task, judgement, "s01", language=lang, sentences={})
+    explained = with_mistakes_explained(
+        report, judgement, load_assignment("press"), task.variant, lang, level
+    )
+    (mistake,) = explained.mistakes
+    assert "kL·ka = kv²" in mistake.feedback
+    assert "a_B_n" in mistake.feedback
+    assert (tongue(lang).number(0.556, 3) in mistake.feedback) == (level == "full")

@@ -19,6 +19,7 @@ from grader.language import symbols
         ("omega_3", "<i>ω</i><sub>3</sub>"),
         ("epsilon_2", "<i>ε</i><sub>2</sub>"),
         ("kL", "<i>k</i><sub>L</sub>"),
+        ("kL·ka = kv²", "<i>k</i><sub>L</sub>·<i>k</i><sub>a</sub> = <i>k</i><sub>v</sub>²"),
         ("along O2B", "along O<sub>2</sub>B"),
         ("from O1", "from O<sub>1</sub>"),
         ("μv", "<i>μ</i><sub>v</sub>"),

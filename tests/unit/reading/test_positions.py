@@ -70,14 +70,11 @@ def test_a_grid_that_cannot_be_printed_is_refused(page, said):
         AssignmentFile.model_validate(told)
 
 
-@pytest.fixture(scope="module")
-def scans(tmp_path_factory):
+def _drawn(folder, printed):
     """The two sheets of one student, opened, and their truths."""
-    sheets = make_sheets(ALL, ROWS)
-    printed = printed_sheets(sheets.pdf, sheets.layout)
     pen = PenStyle(erased=0.0, construction_lines=0.3, smudges=0)
     own = Settings(CAREFUL, pen=pen, scan=replace(CLEAN_SCAN, dpi=200.0, dpi_tag=200.0))
-    folder, opened, truths = tmp_path_factory.mktemp("all"), [], []
+    opened, truths = [], []
     for number, page in enumerate(simulate_positions(ALL, None, 5, own, printed=printed)):
         path = page.sheet.save(folder / f"s01_{number}")
         opened.append(open_page(PageRef(path.name, path=path)))
@@ -85,11 +82,56 @@ def scans(tmp_path_factory):
     return opened, truths
 
 
+def _read(pages, position):
+    submission = StudentSubmission("s01", Variant(None, position), tuple(page.ref for page in pages), {})
+    return read_submission(submission, pages, ALL, asked_of(ALL, rubric_of(ALL)))
+
+
+@pytest.fixture(scope="module")
+def scans(tmp_path_factory):
+    sheets = make_sheets(ALL, ROWS)
+    return _drawn(tmp_path_factory.mktemp("all"), printed_sheets(sheets.pdf, sheets.layout))
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    return _drawn(tmp_path_factory.mktemp("plain"), None)
+
+
+@pytest.mark.parametrize("position", [0, 3, 4])
+def test_plans_on_plain_paper_are_told_apart(plain, position):
+    """Positions 0 and 4 are dead points: both plans are one upright line."""
+    pages, truths = plain
+    plan, true = _read(pages, position)[1].reading.figures["velocity_plan"], truths[1][position]
+    for name in ("o", "a"):
+        at = complex(*np.multiply(true["figures"]["velocity_plan"]["nodes"][name], (1, -1)))
+        assert abs(plan.nodes[name].at - at) < 1.0
+
+
+@pytest.mark.parametrize(("written", "stands"), [("4", True), ("1", False), ("o", None)])
+def test_the_number_beside_a_plan_tells_the_position(plain, written, stands):
+    """The plan of position 0 taken for that of 4 by a number alone; without one nothing of either is sure."""
+    pages, truths = plain
+    letters = pages[1].ink.letters
+    x, y = truths[1][0]["figures"]["velocity_plan"]["nodes"]["o"]
+    probability = np.zeros((1, letters.probability.shape[1]))
+    probability[0, letters.column[written]] = 1.0
+    one = replace(
+        letters, box_mm=np.array([[x + 2, y, 2, 3]]), probability=probability, whole=np.ones(1, bool)
+    )
+    pages = [pages[0], replace(pages[1], ink=replace(pages[1].ink, letters=one))]
+    plan = _read(pages, 4)[1].reading.figures["velocity_plan"]
+    middle = (plan.nodes["o"].at + plan.nodes["a"].at) / 2.0
+    if stands is None:
+        assert max(vector.confidence for vector in plan.vectors.values()) < 0.9
+    else:
+        assert (abs(middle - complex(x, -y)) < 40.0) is stands
+
+
 @pytest.mark.parametrize("position", [1, 5, 7])
 def test_each_position_is_read_in_its_own_zone(scans, position):
     pages, truths = scans
-    submission = StudentSubmission("s01", Variant(None, position), tuple(page.ref for page in pages), {})
-    read = read_submission(submission, pages, ALL, asked_of(ALL, rubric_of(ALL)))
+    read = _read(pages, position)
     assert [page.ref.identity.position for page in read] == [None, None]
     plan, true = read[1].reading.figures["velocity_plan"], truths[1][position]["figures"]["velocity_plan"]
     for name, vector in true["vectors"].items():

@@ -7,6 +7,7 @@ import pytest
 
 from reference.authored.assignment import load_assignment
 from reference.construction.graph import evaluate
+from reference.construction.mistakes import Mistake, commit
 from reference.drawing.triangles import RATIO_TOLERANCE, altitude_nodes, triangles, with_triangles
 from reference.errors import CallError
 from reference.plan import exact_plan
@@ -45,6 +46,25 @@ def test_the_triangle_has_its_right_angle_at_the_end_of_the_velocity():
         second = nodes[triangle.beyond] - nodes[triangle.end]
         cosine = (np.conj(first) * second).real / np.abs(first) / np.abs(second)
         assert np.all(np.abs(cosine) <= RELATIVE)
+
+
+@pytest.mark.parametrize("name", ["pump", "press", "shaper", "piston"])
+def test_used_at_other_scales_it_gives_the_mistaken_component(name):
+    """The mistake is the triangle itself, drawn at scales at which it is not the normal component."""
+    plan = plan_of(name, ka=6.0)
+    known = plan.drawing.parameters
+    ratio = known["kL"] * known["ka"] / known["kv"] ** 2
+    assert np.any(np.abs(ratio - 1.0) > 0.1)
+    nodes = evaluate(with_triangles(plan.construction), known)
+    size = np.max(np.abs(list(plan.nodes_mm["mechanism"].values())))
+    for triangle in triangles(plan.construction):
+        at = triangle.vector.head
+        wrong = commit(Mistake("arithmetic", at, other=("right_triangle",)), plan.drawing)
+        mistaken = evaluate(wrong.construction, known)
+        component = mistaken[at] - mistaken[triangle.vector.tail]
+        drawn = nodes[triangle.turned] - nodes[triangle.joint]
+        assert np.all(np.abs(component - drawn) <= RELATIVE * size)
+        assert np.all(np.abs(component - ratio * plan.drawn_mm(triangle.vector.name)) <= RELATIVE * size)
 
 
 def test_a_velocity_of_zero_gives_a_normal_component_of_zero():

@@ -83,6 +83,7 @@ def test_every_mistake_but_a_missing_vector_has_a_law():
         (Mistake("parallel_for_perpendicular", "a"), DRIVING_ACROSS, "across the line to the pivot"),
         (Mistake("parallel_for_perpendicular", "a'"), DRIVING_ALONG, "along the link"),
         (Mistake("wrong_link", "d"), ALONG_GUIDE, "its own guide"),
+        (Mistake("arithmetic", "n_B", other=("right_triangle",)), "", "only where kL·ka = kv²"),
     ],
 )
 def test_a_law_suits_the_line_that_the_mistake_was_made_in(mistake, line, word):
