@@ -73,7 +73,7 @@ def choose(
             if mark.is_better(chosen.mark) or mark.best > chosen.mark.best:
                 better = the_better(mark, chosen.mark, *charges.why(one))
                 if following.is_trivial(segment, one.vector):
-                    chosen = replace(chosen, is_trivial=chosen.is_trivial or better.is_full)
+                    chosen = replace(chosen, is_trivial=chosen.is_trivial or better.best == FULL)
                 else:
                     chosen = Choice(better, one, is_followed=True)
         if chosen.mark.is_full:

@@ -118,13 +118,17 @@ def _searched_further(case: Case, scales: Sequence[Root], explanations: Sequence
     directions were observed, mistakes of the whole drawing are not tried. `scales` are the roots without
     other mistakes than in the scales.
     """
-    best, whole = explanations[0], [Root(), *_of_forces(case)]
+    best, construction = explanations[0], case.drawing.construction
+    off = {*best.unexplained, *(one.at for one in best.made)} & {one.node for one in construction.steps}
+    is_of_forces = best.care > USUAL or any(group_of(construction.figure_of(node)) for node in off)
+    whole = [Root(), *(_of_forces(case) if is_of_forces else ())]
     scales = [*scales, *_scales_of_the_driver(case, best)]
     if not _is_explained(best) or not all(one.has_direction for one in case.observations.entries):
         whole += _of_the_whole(case)
     by_scale = [[_both(scale, one) for one in whole] for scale in scales]
     roots = [one for some in by_scale for one in some]
-    by_scale += [own] if (own := [*_own_forces(case)]) else []
+    own = [*_own_forces(case)] if is_of_forces else []
+    by_scale += [own] if own else []
     roots += own
     cares = sorted({best.care, min(best.care, USUAL)})
     # Apart, as a search drops what costs much before anything is observed.

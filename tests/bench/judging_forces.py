@@ -31,6 +31,8 @@ from tests.bench.force_students import (
 
 CLEAR = 2.5
 """Tolerances beyond which a wrong vector must be charged."""
+RELATIVE = 0.02
+"""Tolerance of the balancing moment."""
 NAMES: Mapping[str, frozenset[str]] = {
     "reversed": frozenset({"inertia_reversed", "force_reversed", "couple_reversed"}),
     "missing": frozenset({"force_missing", "couple_missing"}),
@@ -78,6 +80,11 @@ def count(tally: Tally, label: str, student: StudentForces, judgement: Judgement
         tally.clear += 1
         if not charged and any(said[name] in CREDITED for name in wrong):
             tally.wrong.append(f"{label}: {sorted(wrong)} credited")
+    moment, due = student.moment or 0.0, student.moment_due or 0.0
+    if "M_b" not in student.wrong and abs(moment - due) <= RELATIVE * abs(due):
+        tally.clear += 1
+        if said["M_b"] in CHARGED:
+            tally.wrong.append(f"{label}: M_b {said['M_b']}")
     for name, verdict in said.items():
         tally.waiting += verdict == "review"
         if name in student.wrong or name not in student.due or not student.drawn[name]:
