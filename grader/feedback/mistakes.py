@@ -300,8 +300,8 @@ _ACROSS_GUIDE: dict[str, Words] = {
     "parallel_for_perpendicular": Words(
         N_("reaction along the guide instead of across it"),
         N_("Drawn along the guide instead of perpendicular to it: %(at)s."),
-        N_("Without friction a guide only presses across its direction: draw its reaction perpendicular to"
-           " it, and close the polygon again."),
+        N_("Without friction a guide only presses across itself: draw its reaction perpendicular to it, and"
+           " close the polygon again."),
     ),
 }  # fmt: skip
 _BY_LINE = {ALONG_GUIDE: _ALONG_GUIDE, DRIVING_ACROSS: _DRIVING_ACROSS, DRIVING_ALONG: _DRIVING_ALONG}
