@@ -427,6 +427,9 @@ def _absent(charges: Charges, criterion: CriterionTable, expected: Quantity) -> 
         length = 0.0
     if length is not None and length < least:
         short = Reason("too_short_to_judge", {"length_mm": length, "least_mm": least})
+        if segment is not None and is_blank:
+            # What follows without it counts.
+            charges.either.add(segment.head)
         return left("not_judged", (short, reason))
     if not evidence.has_sheets:
         blank = "none" if rubric.missing == "review" else rubric.missing

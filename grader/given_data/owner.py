@@ -163,7 +163,7 @@ def _turned_by(task: Task, drawn: DrawnParts, name: str) -> float:
 
 
 def _drawn(task: Task, evidence: Evidence) -> dict[str, dict[str, DrawnVector]]:
-    """Return the drawn vectors by part, as read, else as measured; all force plans are one, under the first."""
+    """Return the drawn vectors by part, as read, else as measured; all force plans are one part."""
     parts: dict[str, str] = {}
     for figure in (MECHANISM, *task.construction.poles):
         parts.setdefault(sort_of(figure), figure)
