@@ -261,7 +261,8 @@ def _not_drawn(task: Task, comparison: Comparison, known: Sequence[NamedMistake]
     for one in comparison.outcomes:
         is_table = bool(evidence.measured) and not evidence.has_sheets
         is_left_blank = "not_measured" in one.codes and is_table and one.verdict == "none"
-        if one.name not in vectors or {one.name, vectors[one.name].head} & left_out:
+        is_left_out = one.name.startswith(tuple(left_out))
+        if one.name not in vectors or is_left_out or vectors[one.name].head in left_out:
             continue
         if "not_drawn" in one.codes or is_left_blank:
             sure = NOT_DRAWN if evidence.has_sheets else 1.0
