@@ -492,6 +492,4 @@ def affected(mistake: Mistake, construction: Construction) -> frozenset[str]:
     at = {mistake.at}
     if mistake.parameters and mistake.code not in {"other_variant", "data_misread"}:
         at.update(_with_data(mistake.parameters, construction))
-    return frozenset(
-        {mistake.at, *(one.node for one in construction.steps if at & construction.upstream(one.node))}
-    )
+    return frozenset(one.node for one in construction.steps if at & construction.upstream(one.node))
