@@ -12,7 +12,7 @@ from grader.marking.mark import judge
 from grader.marking.report import report_of
 from grader.outcomes import CHARGED, CREDITED
 from grader.overlay.measured import measured_picture
-from reference.construction.mistakes import OF_FORCES
+from reference.construction.mistakes import OF_FORCES, affected, made_at, mistakes_of_forces
 from reference.plan import exact_plan
 from tests.bench.force_students import HANDS, ForceMistake, StudentForces, force_task
 from tests.bench.judging_forces import measure_forces
@@ -92,6 +92,15 @@ def test_no_node_of_a_polygon_is_named_in_a_report_or_a_sentence():
             report = with_mistakes_explained(report, judgement, assignment, student.variant, lang)
             said = [report.model_dump_json(), *(mistake_feedback(one, lang) for one in judgement.mistakes)]
             assert not [node for node in nodes for text in said if f" {node} " in text or f'"{node}"' in text]
+
+
+def test_a_mistake_in_what_acts_moves_nodes_and_is_made_at_some():
+    assignment, _ = force_task("pump")
+    drawing = exact_plan(assignment, [assignment.variants()[4]]).drawing
+    nodes = {step.node for step in drawing.construction.steps}
+    for mistake in mistakes_of_forces(drawing):
+        assert affected(mistake, drawing.construction) <= nodes
+        assert made_at(mistake, drawing.construction) <= nodes | {"M_b"}
 
 
 def test_every_mistake_of_forces_has_words():
