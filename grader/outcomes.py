@@ -65,6 +65,7 @@ from dataclasses import dataclass, field
 from grader.documents import Quantity, Tolerance, Verdict
 from grader.records import Reason
 from reference.construction.mistakes import Mistake
+from reference.quantities import kind_of
 
 CREDITED: frozenset[str] = frozenset({"full", "follow_through"})
 CHARGED: frozenset[str] = frozenset({"none", "partial"})
@@ -169,7 +170,7 @@ def _detail(mistake: Mistake) -> dict[str, float | str]:
             return {"slip": slip}
         case Mistake(code="scale_wrong" | "rpm_not_converted" | "arithmetic", factor=factor):
             return {} if factor == 1.0 else {"factor": factor}
-        case Mistake(code="wrong_intersection", other=(name,)) if name[:2] in {"v_", "a_"}:
+        case Mistake(code="wrong_intersection", other=(name,)) if kind_of(name).name != "length":
             return {"instead": name}
         case Mistake(code="labels_swapped", other=(first, second)):
             return {"first": first, "second": second}

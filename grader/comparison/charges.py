@@ -73,7 +73,10 @@ def choose(
             if mark.is_better(chosen.mark) or mark.best > chosen.mark.best:
                 better = the_better(mark, chosen.mark, *charges.why(one))
                 if following.is_trivial(segment, one.vector):
-                    chosen = replace(chosen, is_trivial=better.is_full)
+                    by_hand = better.best == FULL and any(
+                        why.code == "hand_may_miss" for why in better.reasons
+                    )
+                    chosen = replace(chosen, is_trivial=chosen.is_trivial or better.is_full or by_hand)
                 else:
                     chosen = Choice(better, one, is_followed=True)
         if chosen.mark.is_full:
@@ -120,6 +123,9 @@ class Charges:
         """Record what a vector or link has shown of the node where it ends."""
         self.charged |= choice.shown
         if choice.is_trivial:
+            # It follows from what was charged.
+            self.cleared.add(segment.head)
+            self.inherited.add(segment.head)
             return
         self.remember(segment.head, choice.mark)
         drawn = self.evidence.vector(segment.name)

@@ -10,7 +10,7 @@ later node are no mistake. Verdicts are `Outcome`s with reasons as data (`grader
 
 import math
 import statistics
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -53,6 +53,7 @@ from grader.outcomes import CHARGED, Outcome, UsedScale
 from grader.records import Reason
 from grader.rubric import CriterionTable
 from reference.authored.assignment import SCALE_NAMES
+from reference.construction.elements import is_force
 from reference.construction.graph import AngularRate
 from reference.construction.mistakes import line_of
 from reference.construction.steps import Given
@@ -150,12 +151,12 @@ ORDER = ("length", "velocity", "omega", "acceleration", "epsilon", "force", "mom
 def _in_order(following: FollowThrough) -> list[CriterionTable]:
     """The criteria as they are drawn: the driving omega, scales, sketch, plans, what is added to the sketch.
 
-    Of vectors that end at one node, those on wrong lines come first; a computed value comes after its vector.
-    The rubric's order changes nothing.
+    Forces that act come before what is made from them. Of vectors that end at one node, those on wrong lines
+    come first; a computed value comes after its vector. The rubric's order changes nothing.
     """
     task = following.task
     steps = {step.node: place for place, step in enumerate(task.construction.steps)}
-    names = list(task.segments)
+    names, plans = list(task.segments), list(task.construction.figures)
 
     def place(criterion: CriterionTable) -> tuple[int, ...]:
         name = criterion.value or criterion.name
@@ -169,8 +170,10 @@ def _in_order(following: FollowThrough) -> list[CriterionTable]:
         if name not in task.segments:
             return kind, 0
         one = task.segments[name]
-        is_value = int(criterion.value is not None)
-        return kind, steps[one.head], _rank(following, one), names.index(name), is_value
+        is_value, step = int(criterion.value is not None), task.construction.step(one.head)
+        is_made = not (isinstance(step, Given) and is_force(step.length) and step.start == one.tail)
+        where = plans.index(task.construction.figure_of(one.head)), int(is_made), steps[one.head]
+        return kind, *where, _rank(following, one), names.index(name), is_value
 
     return sorted(task.rubric.criterion, key=place)
 
@@ -219,7 +222,7 @@ def _scale(charges: Charges, criterion: CriterionTable) -> Outcome:
 def _chosen(charges: Charges, criterion: CriterionTable, held: Held) -> Choice:
     """The expectation of a vector or link that counts; what it has shown is recorded."""
     segment, follows = charges.task.segments[criterion.name], charges.task.rubric.follows_through(criterion)
-    wrong = charges.charged | charges.doubtful
+    wrong = frozenset(charges.charged | charges.doubtful)
     expectations = charges.following.expectations(segment, wrong, follows_through=follows)
     choice = choose(charges, segment, expectations, held)
     charges.record(segment, choice)
@@ -303,7 +306,7 @@ def _value(charges: Charges, criterion: CriterionTable) -> Outcome:
     used, scale = charges.following.used, charges.following.used[one.scale]
     may_be_drawn = charges.evidence.has_sheets and one.name in rubric.values and not rubric.values_alone
     if one.name not in values or may_be_drawn:
-        expected = expected_quantity(one.name, one.drawn(used), scale, 0.0)
+        expected = expected_quantity(one.name, one.drawn(used), scale, one.turn_rad)
         return _absent(charges, criterion, expected)
     held = HeldValue(rubric, criterion, abs(values[one.name]), scale)
     choice = _chosen(charges, criterion, held)
@@ -330,7 +333,7 @@ def _computed(charges: Charges, criterion: CriterionTable, name: str) -> Outcome
         return _absent(charges, criterion, expected)
     value, drawn, sure = evidence.values[name], evidence.vector(name), evidence.sure.get(name, 1.0)
     held = HeldValue(rubric, criterion, abs(value), following.used[one.scale])
-    wrong = charges.charged | charges.doubtful
+    wrong = frozenset(charges.charged | charges.doubtful)
     by_nodes = follows and drawn is None
     choice = choose(charges, one, following.expectations(one, wrong, follows_through=by_nodes), held)
     charges.charged |= choice.shown
@@ -424,6 +427,9 @@ def _absent(charges: Charges, criterion: CriterionTable, expected: Quantity) -> 
         length = 0.0
     if length is not None and length < least:
         short = Reason("too_short_to_judge", {"length_mm": length, "least_mm": least})
+        if segment is not None and is_blank:
+            # What follows without it counts.
+            charges.either.add(segment.head)
         return left("not_judged", (short, reason))
     if not evidence.has_sheets:
         blank = "none" if rubric.missing == "review" else rubric.missing
@@ -507,8 +513,7 @@ def _rate(charges: Charges, criterion: CriterionTable) -> Outcome:
         mark = held.against(exact)
     charges.remember(criterion.name, mark)
     follows = not mark.is_full and is_drawn and task.rubric.follows_through(criterion)
-    one = _own_turning(charges, name, value, per_mm) if follows else None
-    if one is not None:
+    for one in _own_turnings(charges, name, value, per_mm) if follows else ():
         candidate, shown = charges.credited(one, held.against(one))
         charges.charged |= shown
         if candidate.is_better(mark):
@@ -529,14 +534,22 @@ def _uncertainty_of(charges: Charges, name: str, per_mm: float) -> EndSpread:
     return following.uncertainty_of(source, source.drawn(following.used))
 
 
-def _own_turning(charges: Charges, name: str, value: float, per_mm: float) -> Expectation | None:
-    """The angular quantity or moment that the student's own drawing gives; None without any."""
-    task = charges.task
+def _own_turnings(charges: Charges, name: str, value: float, per_mm: float) -> Iterator[Expectation]:
+    """Yield the angular quantity or moment that the student's own drawing gives; none without any."""
+    task, following = charges.task, charges.following
     if name in task.construction.moments:
-        return charges.following.moment(name, per_mm)
+        yield following.moment(name, per_mm)
+        wrong = frozenset(charges.charged | charges.doubtful)
+        scales = replace(following.right(following.followed), name="scales", wrong=following.wrong_scales)
+        own = following.own_forces(name, wrong)
+        for basis in (scales if scales.wrong else None, own, following.instead):
+            if basis is not None:
+                yield following.moment(name, per_mm, basis)
+        return
     rate = task.construction.rates[name]
-    own, source = _own_rate(charges, rate, value), task.segments[rate.vector]
-    return None if own is None else Expectation(own / per_mm, "vector", source.name, frozenset({source.head}))
+    turned, source = _own_rate(charges, rate, value), task.segments[rate.vector]
+    if turned is not None:
+        yield Expectation(turned / per_mm, "vector", source.name, frozenset({source.head}))
 
 
 def _own_rate(charges: Charges, rate: AngularRate, value: float) -> float | None:

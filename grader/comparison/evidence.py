@@ -36,7 +36,10 @@ class Submission:
 
 @dataclass(frozen=True, slots=True)
 class DrawnVector:
-    """A vector as drawn; direction in radians from the assignment's +x, None where not known."""
+    """A vector as drawn; direction in radians from the assignment's +x, None where not known.
+
+    Inside, a vector that closes a force polygon has the direction in which it is drawn.
+    """
 
     length_mm: float
     se_mm: float
@@ -44,7 +47,8 @@ class DrawnVector:
     se_deg: float
     confidence: float
     turn_rad: float = 0.0
-    """Turn of the sketch on its sheet: the sheet's direction is `direction_rad` + this."""
+    """Turn of the sketch on its sheet, and half a turn of a vector that closes a polygon: what was entered or
+    read, and what is told of it, is `direction_rad` + this."""
     others: tuple[OtherReading, ...] = ()
     """Other readings, the likeliest first, as on the sheet."""
 
@@ -111,7 +115,7 @@ def gather(task: Task, submission: Submission) -> Evidence:
     sheets = _Sheets(task, turn=_turn_of_sketches(task, submission.readings))
     for reading in submission.readings:
         sheets.take(reading)
-    measured = _measured(submission.measured)
+    measured = _measured(task, submission.measured)
     own = sheets.nodes if submission.readings else _nodes_from(task, measured)
     written = {name: one for reading in submission.readings for name, one in reading.lengths.items()}
     values = {name: written[value_name(name)] for name in task.rubric.values if value_name(name) in written}
@@ -168,13 +172,13 @@ class _Sheets:
         if sketch:
             self.lengths.extend(_yardstick(self.task, sketch))
             self.add_vectors(_links(self.task, sketch, turn, se_turn))
-            self.add_vectors(_vectors(sketch, sketch.vectors, turn, se_turn))
+            self.add_vectors(_vectors(self.task, sketch, sketch.vectors, turn, se_turn))
             joints = _mechanism_nodes(self.task, sketch, turn)
             self.add_nodes(joints, sketch)
         for figure, read in reading.figures.items():
             if figure != MECHANISM:
                 names = [vector.name for vector in self.task.construction.vectors_of(figure)]
-                self.add_vectors(_vectors(read, names, turn, se_turn))
+                self.add_vectors(_vectors(self.task, read, names, turn, se_turn))
                 self.add_nodes(_plan_nodes(self.task, figure, read, turn), read)
                 if joints:
                     self.sketches.setdefault(figure, joints)
@@ -226,19 +230,26 @@ def held_against_cells(
 
 
 def _vectors(
-    read: Figure, names: Iterable[str], turn: float = 0.0, se_turn: float = 0.0
+    task: Task, read: Figure, names: Iterable[str], turn: float = 0.0, se_turn: float = 0.0
 ) -> dict[str, DrawnVector]:
     """Vectors of a figure whose lengths are known, by name; `turn` is that of its sheet."""
     found = {}
     for name in names:
         one = read.vectors.get(name)
         if one is not None and one.length_mm is not None:
-            direction = None if one.direction_deg is None else math.radians(one.direction_deg) - turn
+            whole = turn + _own_turn(task, name)
+            direction = None if one.direction_deg is None else math.radians(one.direction_deg) - whole
             se_deg = math.hypot(one.se_deg or 0.0, math.degrees(se_turn))
             found[name] = DrawnVector(
-                one.length_mm, one.se_mm, direction, se_deg, one.confidence, turn, one.others
+                one.length_mm, one.se_mm, direction, se_deg, one.confidence, whole, one.others
             )
     return found
+
+
+def _own_turn(task: Task, name: str) -> float:
+    """The angle from a vector's order of drawing to its own sense."""
+    vector = task.construction.vectors.get(name)
+    return 0.0 if vector is None else vector.turn_rad
 
 
 def _links(task: Task, sketch: Figure, turn: float, se_turn: float) -> dict[str, DrawnVector]:
@@ -290,9 +301,9 @@ def _yardstick(task: Task, sketch: Figure) -> list[tuple[float, float]]:
     return [(length, math.hypot(tail.se_mm, head.se_mm))] if length > 0.0 else []
 
 
-def _measured(reading: Reading | None) -> dict[str, DrawnVector]:
+def _measured(task: Task, reading: Reading | None) -> dict[str, DrawnVector]:
     figures = reading.figures.values() if reading else ()
-    return {name: one for read in figures for name, one in _vectors(read, read.vectors).items()}
+    return {name: one for read in figures for name, one in _vectors(task, read, read.vectors).items()}
 
 
 def _refused(reading: Reading | None, values: Collection[str]) -> dict[str, tuple[str, ...]]:
@@ -387,7 +398,9 @@ def _turn_of_sketches(task: Task, readings: Sequence[Reading]) -> tuple[float, f
 def _turns(task: Task, reading: Reading) -> list[float]:
     """Return the turn of each vector of a sheet's plans from the exact one, radians, -pi to pi."""
     return [
-        math.remainder(math.radians(drawn.direction_deg) - cmath.phase(task.real[name]), math.tau)
+        math.remainder(
+            math.radians(drawn.direction_deg) - _own_turn(task, name) - cmath.phase(task.real[name]), math.tau
+        )
         for figure in reading.figures.values()
         for name, drawn in figure.vectors.items()
         if drawn.direction_deg is not None

@@ -8,7 +8,7 @@ drawing follows.
 
 import cmath
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import cast
 
@@ -20,12 +20,12 @@ from grader.comparison.scales import Scale
 from grader.comparison.task import Made, Task, TaskSegment
 from grader.comparison.verdicts import NO_SPREAD, Expectation
 from grader.records import MECHANISM
-from reference.construction.elements import Coriolis, Normal, View
-from reference.construction.graph import AngularRate
-from reference.construction.mistakes import Drawing, Mistake, commit, line_of
+from reference.construction.elements import Coriolis, Fixed, Normal, Same, Scaled, View, data_in, is_force
+from reference.construction.graph import AngularRate, Vector
+from reference.construction.mistakes import Drawing, Mistake, commit, laid_off, line_of
 from reference.construction.steps import Divide, Given, Similar, TwoLines
 from reference.construction.uncertainty import EndSpread, OwnNode, TracedDrawing, spread, trace
-from reference.geometry import ComplexArray
+from reference.geometry import ComplexArray, FloatArray
 from reference.numbers import dot
 from reference.replay.replay import Replay
 
@@ -104,7 +104,7 @@ class FollowThrough:
     # A criterion's expectations -------------------------------------------------------------------
 
     def expectations(
-        self, segment: TaskSegment, wrong: Collection[str] = (), *, follows_through: bool
+        self, segment: TaskSegment, wrong: frozenset[str] = frozenset(), *, follows_through: bool
     ) -> Iterator[Expectation]:
         """Yield the expectations of a vector or link, each made when it is asked for.
 
@@ -136,6 +136,9 @@ class FollowThrough:
         if basis is not None and not basis.blames(segment.name, segment.head):
             one = self.from_nodes(segment, self.followed, basis)
             yield replace(one, causes=others | self.causes_of(segment.head, basis))
+        basis = self.own_forces(segment.head, wrong)
+        if basis is not None:
+            yield replace(self.from_nodes(segment, self.followed, basis), causes=others | basis.wrong)
         if others:
             yield replace(self.from_nodes(segment, self.followed), causes=others)
             for one in self.from_vectors(segment, self.followed):
@@ -198,8 +201,12 @@ class FollowThrough:
     ) -> Expectation:
         """The vector constructed from the student's own nodes upstream; the exact one without any."""
         found, own = self.traced(scales, basis, by_similarity=by_similarity), self.own(scales, basis)
-        upstream = self.task.construction.upstream
-        relies_on = (known(own) & (upstream(segment.head) | upstream(segment.tail))) - {segment.head}
+        upstream, step = self.task.construction.upstream, self.task.construction.step(segment.head)
+        ends: tuple[str, ...] = segment.head, segment.tail
+        if isinstance(step, Given) and step.start == segment.tail:
+            # Laid off, wherever it starts.
+            ends = (*step.length.needs, *step.along.needs)
+        relies_on = (known(own) & frozenset[str]().union(*map(upstream, ends))) - {segment.head}
         if not relies_on and basis is None:
             exact = segment.drawn(scales)
             return Expectation(exact, "nodes", "", relies_on, self.uncertainty_of(segment, exact))
@@ -207,10 +214,42 @@ class FollowThrough:
         uncertainty, se = self.spreads(found.shifts(segment.tail, segment.head), found.drafting_count, vector)
         return Expectation(vector, "nodes", "", relies_on, uncertainty, se)
 
-    def moment(self, name: str, per_mm: float) -> Expectation:
+    def own_forces(self, at: str, wrong: frozenset[str]) -> PlanBasis | None:
+        """The right construction with the own wrong forces from which a node or moment is made; None without.
+
+        Arguments: `wrong` are nodes that are wrong, among them where such forces end.
+        """
+        construction, changed, heads = self.task.construction, dict[str, FloatArray](), set[str]()
+        data = construction.data_of(at)
+        for step in construction.steps:
+            if not isinstance(step, Given) or step.node == at or step.node not in wrong:
+                continue
+            if is_force(step.length) and not data.isdisjoint(data_in(step.length)):
+                changed |= self._own_force(construction.vectors[laid_off(step, construction)], step)
+                heads.add(step.node)
+        if not heads:
+            return None
+        right, name = self.right(self.followed), f"forces {' '.join(sorted(heads))}"
+        return PlanBasis(name, construction, {**right.parameters, **changed}, frozenset(heads))
+
+    def _own_force(self, vector: Vector, step: Given) -> dict[str, FloatArray]:
+        """The data by which a force is what the student has drawn; zero for one that was not."""
+        own, traced = self.evidence.vector(vector.name), self.traced(self.followed)
+        made = traced.made[vector.head].at - traced.nodes[vector.tail].at
+        drawn = 0j if own is None else own.as_complex
+        drawn = cmath.rect(own.length_mm, cmath.phase(made)) if drawn is None and own else drawn or 0j
+        (datum,) = data_in(step.length)
+        known = self.right(self.followed).parameters
+        if isinstance(step.length, Scaled) and isinstance(step.along, Fixed):
+            size = np.asarray(abs(drawn) * self.followed[vector.scale])
+            return {datum: size, step.along.angle: np.asarray(cmath.phase(drawn))}
+        share = (drawn * made.conjugate()).real / max(abs(made) ** 2, 1e-9)
+        return {datum: np.asarray(share * known.get(datum, 1.0))}
+
+    def moment(self, name: str, per_mm: float, basis: PlanBasis | None = None) -> Expectation:
         """The moment that the student's own nodes give, as millimetres of so many N m."""
-        construction, traced, known_as = self.task.construction, self.traced(self.used), self.right(self.used)
-        moment = construction.moments[name]
+        construction, traced = self.task.construction, self.traced(self.used, basis)
+        known_as, moment = basis or self.right(self.used), construction.moments[name]
         nodes = {node: traced.nodes[node] for node in moment.needs}
         placed = {node: np.asarray(one.at) for node, one in nodes.items()}
         shifted = {node: np.asarray(one.at + one.shifts) for node, one in nodes.items()}
@@ -218,7 +257,8 @@ class FollowThrough:
         shifts = np.asarray(moved - found, dtype=np.complex128)
         uncertainty, se = self.spreads(shifts, traced.drafting_count, complex(found))
         relies_on = frozenset[str]().union(*map(construction.upstream, nodes)) & known(self.own(self.used))
-        return Expectation(complex(found), "nodes", "", relies_on, uncertainty, se)
+        causes = frozenset[str]() if basis is None else basis.wrong
+        return Expectation(complex(found), "nodes", "", relies_on, uncertainty, se, causes=causes)
 
     def spreads(
         self, shifts: ComplexArray, drafting_count: int, along: complex
@@ -323,7 +363,9 @@ class FollowThrough:
     def between_own_nodes(self, segment: TaskSegment) -> Expectation | None:
         """The vector between the student's own nodes, for one that joins what other vectors have made."""
         construction, own = self.task.construction, self.own(self.followed)
-        if line_of(construction.vectors[segment.name], construction) is not None:
+        step = construction.step(segment.head)
+        line = line_of(construction.vectors[segment.name], construction)
+        if line and not (isinstance(step, Given) and laid_off(step, construction) != segment.name):
             return None
         nodes = {name: node for figure in construction.poles for name, node in own.get(figure, {}).items()}
         nodes |= {pole: OwnNode(0j) for pole in construction.poles.values()}
@@ -409,6 +451,12 @@ class FollowThrough:
                 yield from self.normal(segment, self.named(tail, head), scales)
             case Given(length=Coriolis() as length):
                 yield from self.coriolis(segment, length, scales)
+            case Given(length=Same(tail=tail, head=head), along=turned):
+                source = self.named(tail, head)
+                one = None if source is None else self.evidence.vector(source)
+                if source is not None and one is not None and one.as_complex is not None:
+                    found = one.as_complex * 1j**turned.quarters
+                    yield Expectation(found, "vector", source, frozenset({head}))
             case Divide(base=base) | Similar(base=base) if segment.tail in base:
                 pole, other = base if segment.tail == base[0] else base[::-1]
                 source = self.named(pole, other)

@@ -12,7 +12,7 @@ from grader.comparison.evidence import DrawnVector, Evidence
 from grader.comparison.task import Task
 from grader.records import MECHANISM
 from grader.rubric import ToleranceTable
-from reference.construction.elements import Coriolis, Normal, Parameters, View
+from reference.construction.elements import Normal, Parameters, View, is_computed, is_force
 from reference.construction.graph import AngularRate, Construction, Vector, evaluate
 from reference.construction.steps import ArcAndLine, Given, Step, TwoArcs
 from reference.construction.uncertainty import OwnNode
@@ -184,16 +184,28 @@ class _LengthBranches:
     def direct(self, node: str, made: Sequence[ComplexArray], ends: Sequence[_Measured]) -> None:
         """Place a node at the end of the first of some vectors with directions.
 
-        Branches in which its step or the other vectors put it elsewhere cost more.
+        Of one that points the opposite way from where the others end, these count. Branches in which its step
+        or the other vectors put it elsewhere cost more.
         """
-        positions = [self.nodes[one.vector.tail] + (one.drawn.as_complex or 0j) for one in ends]
-        self.nodes[node] = place = positions[0]
-        residuals = [_nearest(made, place), *(np.abs(other - place) for other in positions[1:])]
-        for residual in residuals:
-            squared = (residual / self.sigma_mm) ** 2
-            self.cost = self.cost + np.where(squared <= AS_EXPECTED**2, squared, UNEXPECTED)
+        tails, drawn = (
+            [self.nodes[one.vector.tail] for one in ends],
+            [one.drawn.as_complex or 0j for one in ends],
+        )
+        positions = [tail + vector for tail, vector in zip(tails, drawn, strict=True)]
+        back, near = tails[0] - drawn[0], AS_EXPECTED * self.sigma_mm
+        is_back = [float(np.abs(back - place).min()) <= near < abs(drawn[0]) for place in positions]
+        first = is_back.index(True) if any(is_back) else 0
+        self.nodes[node] = place = positions[first]
+        self.cost = self.cost + self._apart(
+            [_nearest(made, place), *(np.abs(one - place) for one in positions)]
+        )
         self.is_known[node] = np.ones(len(self.cost), np.bool_)
-        self.sources[node] = ends[:1]
+        self.sources[node] = ends[first : first + 1]
+
+    def _apart(self, residuals: Sequence[FloatArray]) -> FloatArray:
+        """The cost of distances at which a node's step and vectors put it elsewhere."""
+        squared = (np.array(residuals) / self.sigma_mm) ** 2
+        return np.asarray(np.where(squared <= AS_EXPECTED**2, squared, UNEXPECTED).sum(axis=0))
 
     def _along(self, step: Step, made: ComplexArray, one: _Measured) -> list[ComplexArray]:
         """Positions at one length along the step's direction; for components laid off, also reversed."""
@@ -307,8 +319,8 @@ def _nearest(made: Sequence[ComplexArray], place: ComplexArray) -> FloatArray:
 
 
 def _is_component(step: Step) -> TypeGuard[Given]:
-    """Return whether a step lays off a normal or Coriolis component: it may be missing, or reversed."""
-    return isinstance(step, Given) and isinstance(step.length, Normal | Coriolis)
+    """Return whether a step lays off a component or a force: it may be missing, or reversed."""
+    return isinstance(step, Given) and (is_computed(step.length) or is_force(step.length))
 
 
 def _crossing(

@@ -40,8 +40,9 @@ class TaskSegment:
 
     Attributes
     ----------
-    real : exact, complex SI
+    real : exact, complex SI, in the order of drawing
     scale : ``kL``, ``kv``, ``ka`` or ``kF``
+    turn_rad : from the order of drawing to the vector's own sense
     """
 
     name: str
@@ -49,6 +50,7 @@ class TaskSegment:
     head: str
     scale: str
     real: complex
+    turn_rad: float = 0.0
 
     def drawn(self, scales: Mapping[str, float]) -> complex:
         """The exact one on paper, millimetres, at these scales."""
@@ -62,7 +64,7 @@ class Task:
     Attributes
     ----------
     construction, parameters : how it is drawn; the parameters' scales are those of the rule
-    real : exact vectors, complex SI, by name
+    real : exact vectors, complex SI, by name, in the order of drawing
     segments : the vectors and the links of the sketch, by name
     rates : exact angular quantities, rad/s and rad/s^2, and moments, N m
     lengths_m : by angular quantity, the real length of its link
@@ -204,10 +206,11 @@ def _made(assignment: Assignment, rubric: RubricFile, variant: Variant) -> Task:
     construction, driver = plan.construction, plan.mechanism.driver
     ratio = driver.gear_ratio if isinstance(driver, Crank) else None
     parameters = {name: np.asarray(np.ravel(value)[0]) for name, value in plan.drawing.parameters.items()}
-    real = {name: complex(vector[0]) for name, vector in plan.vectors_si.items()}
+    back = {name for name, one in construction.vectors.items() if one.reversed}
+    real = {name: complex(one[0]) * (-1.0 if name in back else 1.0) for name, one in plan.vectors_si.items()}
     places = {name: complex(np.ravel(place)[0]) for name, place in plan.motion.position.items()}
     segments = {
-        v.name: TaskSegment(v.name, v.tail, v.head, v.scale, real[v.name])
+        v.name: TaskSegment(v.name, v.tail, v.head, v.scale, real[v.name], v.turn_rad)
         for v in construction.vectors.values()
     }
     segments |= {

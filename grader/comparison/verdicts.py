@@ -391,7 +391,12 @@ class HeldValue:
             large = abs(value) > abs(expected)
             reason = Reason("value_too_large" if large else "value_too_small", params)
         plain = table.length_at(abs(one.vector)) * self.per_mm
-        return mark([Limit("value", residual, allowed, plain, 0.0, table, reason)])
+        found = mark([Limit("value", residual, allowed, plain, 0.0, table, reason)])
+        on_paper = widened(table, math.inf, one, with_direction=False).length_mm or 0.0
+        if self.criterion.moment is not None and residual <= on_paper * self.per_mm:
+            # The arms are short: drafting errors beyond `at_most` explain it.
+            return open_between(found.worst, FULL, found, Reason("hand_may_miss"))
+        return found
 
 
 Held = HeldVector | HeldValue

@@ -16,6 +16,8 @@ ALONG_GUIDE = "guide"
 """Value of a mistake's detail `line` for a line along a moving guide."""
 DRIVING_ACROSS, DRIVING_ALONG = "driving across", "driving along"
 """Its values for the driving link's vectors: one is perpendicular to the link, one points along it."""
+OF_FORCE, ACROSS_GUIDE = "force", "force across a guide"
+"""Its values in force plans."""
 CORIOLIS_END, NORMAL_END = "k_", "n_"
 """First letters of the nodes at the ends of Coriolis and normal components."""
 _NAMED = re.compile(r"%\((\w+)\)s")
@@ -124,6 +126,43 @@ MISTAKES: dict[str, Words] = {
         N_("The number at %(at)s does not follow from what it was computed from."),
         N_("Compute it once more; the drawing before it can stay."),
     ),
+    "inertia_reversed": Words(
+        N_("inertia force along the acceleration"),
+        N_("Laid off in the sense of the acceleration, not against it: %(at)s."),
+        N_("An inertia force points against the acceleration of the centre of mass: lay it off the other way,"
+           " and compute its moment anew."),
+    ),
+    "force_missing": Words(
+        N_("force left out"),
+        N_("Left out of the force plan: %(at)s."),
+        N_("On a link act its inertia force, its weight, the loads and what other links exert on it: add what"
+           " is missing to the polygon and to the moments."),
+    ),
+    "force_reversed": Words(
+        N_("force with the opposite sense"),
+        N_("Drawn with the opposite sense: %(at)s."),
+        N_("A reaction taken over from another group changes its sense (R_43 = −R_34), and in a closed"
+           " polygon all arrows follow one another: turn it round, then redo what follows from it."),
+    ),
+    "couple_missing": Words(
+        N_("moment left out"),
+        N_("Left out of the sum of moments: %(at)s."),
+        N_("A link with an angular acceleration has the moment −I·ε of its inertia forces: add what is"
+           " missing to the sum of moments, then redo what follows from it."),
+    ),
+    "couple_reversed": Words(
+        N_("moment with the opposite sense"),
+        N_("Counted with the opposite sign in the sum of moments: %(at)s."),
+        N_("The moment of the inertia forces acts against the angular acceleration: change its sign, then"
+           " redo what follows from it."),
+    ),
+    "wrong_arm": Words(
+        N_("wrong arm of a moment"),
+        N_("In the sum of moments for %(at)s, an arm was measured to a force's point instead of to its"
+           " line."),
+        N_("The arm is the perpendicular from the joint to the force's line of action: measure it anew, and"
+           " compute the sum of moments again."),
+    ),
     "units": Words(
         N_("other units or signs"),
         N_("%(at)s were entered in other units, or with other signs, than the assignment asks for."),
@@ -226,7 +265,47 @@ _DRIVING = Words(
     N_("%(at)s turns the other way."),
     N_("Take the sense in which the driving link turns from the assignment."),
 )
+_FORCE: dict[str, Words] = {
+    "parallel_for_perpendicular": Words(
+        N_("perpendicular to the link instead of along it"),
+        N_("Drawn perpendicular to the link instead of along it: %(at)s."),
+        N_("The part across a link is found from moments, the other part acts along the link: draw it so, and"
+           " close the polygon again."),
+    ),
+    "wrong_link": Words(
+        N_("line drawn by the wrong link"),
+        N_("Drawn by another link than its own: %(at)s."),
+        N_("Take its line along its own link, or across its own guide, and close the polygon again."),
+    ),
+    "wrong_intersection": Words(
+        N_("polygon closed from the wrong point"),
+        N_("Its line was drawn through the wrong point of the polygon: %(at)s."),
+        N_("Lay off all known forces head to tail; the two closing lines pass through the two ends of this"
+           " chain."),
+    ),
+    "sense_reversed": Words(
+        N_("sense reversed"),
+        N_("Laid off the wrong way round: %(at)s."),
+        N_("Its sense follows from the sum of moments about the inner joint, each moment with its sign."),
+    ),
+    "arithmetic": Words(
+        N_("slip in the arithmetic"),
+        N_("Its size does not follow from what it was computed from: %(at)s."),
+        N_("Compute it once more: m·a for an inertia force, m·g for a weight, the sum of moments divided by"
+           " its arm for the part across a link; then redo what follows from it."),
+    ),
+}  # fmt: skip
+_ACROSS_GUIDE: dict[str, Words] = {
+    **_FORCE,
+    "parallel_for_perpendicular": Words(
+        N_("reaction along the guide instead of across it"),
+        N_("Drawn along the guide instead of perpendicular to it: %(at)s."),
+        N_("Without friction a guide only presses across itself: draw its reaction perpendicular to it, and"
+           " close the polygon again."),
+    ),
+}  # fmt: skip
 _BY_LINE = {ALONG_GUIDE: _ALONG_GUIDE, DRIVING_ACROSS: _DRIVING_ACROSS, DRIVING_ALONG: _DRIVING_ALONG}
+_BY_LINE |= {OF_FORCE: _FORCE, ACROSS_GUIDE: _ACROSS_GUIDE}
 _BY_LINE |= {"driven across": _DRIVING_ACROSS, "driven along": _DRIVING_ALONG}  # earlier versions
 _BY_LINE[RIGHT_TRIANGLE] = _BY_TRIANGLE
 
@@ -306,6 +385,8 @@ def precise(code: str, at: str, line: str, known: Collection[str]) -> str | None
     texts = PRECISE.get(code, ())
     if code == "units":
         texts = _PRECISE_UNITS.get(line, ())
+    elif line in {OF_FORCE, ACROSS_GUIDE}:
+        texts = ()
     elif line == ALONG_GUIDE:
         texts = PRECISE_ALONG_GUIDE.get(code, texts)
     elif line == RIGHT_TRIANGLE:
@@ -356,6 +437,12 @@ QUESTIONS: dict[str, str] = {
     "labels_swapped": N_("At which points of your plan do the letters %(first)s and %(second)s stand?"),
     "figure_rotated": N_("Is all of %(at)s turned against the mechanism, or only its first vector?"),
     "arithmetic": N_("What length did you compute for the component that ends in %(at)s, and from what?"),
+    "inertia_reversed": N_("In which sense did you lay off %(at)s?"),
+    "force_missing": N_("Did you lay off %(at)s?"),
+    "force_reversed": N_("In which sense did you lay off %(at)s?"),
+    "couple_missing": N_("Did you count %(at)s in the sum of moments?"),
+    "couple_reversed": N_("With which sign did you count %(at)s in the sum of moments?"),
+    "wrong_arm": N_("How did you measure the arms in the sum of moments for %(at)s?"),
     "units": N_("In which unit, in which sense and from which axis did you measure?"),
 }
 """A question to the student that distinguishes a mistake from others with the same effect."""

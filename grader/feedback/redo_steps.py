@@ -174,7 +174,7 @@ def _subject(judgement: Judgement, assignment: Assignment, variant: Variant, spe
 def _redo(subject: Subject, mistake: NamedMistake, speaker: Tongue, level: Level) -> list[str]:
     """Return the steps from the mistake on; none if it was made at no single step."""
     vectors = subject.plan.construction.vectors
-    if mistake.code == "arithmetic" and mistake.at in vectors:
+    if mistake.code == "arithmetic" and mistake.at in vectors and not mistake.line:
         # Its value is wrong, the drawing can stay.
         return []
     node = vectors[mistake.at].head if mistake.at in vectors else mistake.at

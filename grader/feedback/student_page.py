@@ -335,7 +335,8 @@ class StudentPage:
         return Markup("{}: {}").format(said, self._source(picture))
 
     def _caption(self, view: PageView) -> str:
-        return self.speaker.gettext({**PLACES, "sheet": SHEET, "detail": DETAIL}[view.kind])
+        titles = {**PLACES, "sheet": SHEET, "detail": DETAIL}
+        return self.speaker.titled(titles, view.kind, self.about.names)
 
     def _source(self, picture: Picture) -> str:
         """Return the file and the page."""

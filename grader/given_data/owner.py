@@ -38,7 +38,7 @@ from grader.outcomes import NamedMistake
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN
 from reference.construction.mistakes import Mistake
 from reference.geometry import FloatArray
-from reference.quantities import OF_MOTION
+from reference.quantities import OF_MOTION, sort_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,12 +163,15 @@ def _turned_by(task: Task, drawn: DrawnParts, name: str) -> float:
 
 
 def _drawn(task: Task, evidence: Evidence) -> dict[str, dict[str, DrawnVector]]:
-    """Return the drawn vectors by part, as read, else as measured."""
-    found: dict[str, dict[str, DrawnVector]] = {part: {} for part in (MECHANISM, *task.construction.poles)}
+    """Return the drawn vectors by part, as read, else as measured; all force plans are one part."""
+    parts: dict[str, str] = {}
+    for figure in (MECHANISM, *task.construction.poles):
+        parts.setdefault(sort_of(figure), figure)
+    found: dict[str, dict[str, DrawnVector]] = {part: {} for part in parts.values()}
     for name, segment in task.segments.items():
         one = evidence.vector(name)
         if one is not None and one.length_mm > 0.0:
-            found[task.construction.figure_of(segment.head)][name] = one
+            found[parts[sort_of(task.construction.figure_of(segment.head))]][name] = one
     return found
 
 

@@ -122,7 +122,8 @@ class _Row:
 def _direction(task: Task, evidence: Evidence, name: str, one: DrawnVector, expected: ComplexArray) -> _Row:
     shifts, length = _shifts(task, name), min(one.length_mm, max(abs(expected[0]), LEAST_TURNED_MM))
     with np.errstate(invalid="ignore"):
-        off = np.angle(np.exp(1j * ((one.direction_rad or 0.0) + one.turn_rad)) * np.conj(expected))
+        on_sheet = (one.direction_rad or 0.0) + one.turn_rad - task.segments[name].turn_rad
+        off = np.angle(np.exp(1j * on_sheet) * np.conj(expected))
     is_back = np.abs(off) > math.pi / 2.0
     off = np.where(is_back, off - np.copysign(math.pi, off), off)
     off = np.where(np.abs(expected) < ZERO_MM, NO_DIRECTION, off)

@@ -25,8 +25,8 @@ from grader.tables.decisions import Decision
 from grader.tables.measurements import StudentSubmission
 from grader.texts.spoken import problem_documents
 from reference.authored.assignment import Assignment
-from reference.construction.derive import construction_of
 from reference.construction.graph import Construction
+from reference.plan import construction_for
 
 NOT_APPLIED = "decision_not_applied"
 """The problem of a decision that does not fit what was read; its parameter names the criterion."""
@@ -143,7 +143,7 @@ def with_nodes(
     places = {row.node: row.place for row in submission.decided if row.kind == "node"}
     if not places:
         return list(pages), []
-    construction = construction_of(assignment.mechanism(assignment.variants()[:1]))
+    construction = construction_for(assignment)
     changed, astray = corrected(pages, places, construction)
     return changed, [_not_applied(f"node:{figure}:{node}", "no_page_has_figure") for figure, node in astray]
 

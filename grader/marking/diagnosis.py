@@ -15,13 +15,31 @@ from itertools import combinations
 import numpy as np
 
 from grader.records import MECHANISM
-from reference.construction.elements import Nodes, Scaled
+from reference.construction.elements import Fixed, Nodes, Scaled, data_in, is_force
 from reference.construction.graph import evaluate
-from reference.construction.mistakes import RIGHT_TRIANGLE, SLIP, Drawing, Mistake, commit
+from reference.construction.mistakes import (
+    RIGHT_TRIANGLE,
+    SLIP,
+    Drawing,
+    Mistake,
+    commit,
+    mistakes_of_forces,
+)
 from reference.construction.steps import Given
 from reference.construction.uncertainty import Skill
-from reference.quantities import kind_of, scale_of
-from reference.replay.explanations import BY_TRIANGLE, RARER, RARITY, Observations
+from reference.quantities import OF_MOTION, group_of, kind_of, scale_of
+from reference.replay.explanations import (
+    BY_TRIANGLE,
+    LEAST_FACTOR,
+    MOST_FACTOR,
+    NOT_THERE,
+    RARER,
+    RARITY,
+    SOMETHING_ELSE,
+    Observations,
+    cost_of_any,
+    rarity_of,
+)
 from reference.replay.nothing import with_nothing
 from reference.replay.replay import Replay, Root, replay
 
@@ -100,12 +118,18 @@ def _searched_further(case: Case, scales: Sequence[Root], explanations: Sequence
     directions were observed, mistakes of the whole drawing are not tried. `scales` are the roots without
     other mistakes than in the scales.
     """
-    best, whole = explanations[0], [Root()]
+    best, construction = explanations[0], case.drawing.construction
+    off = {*best.unexplained, *(one.at for one in best.made)} & {one.node for one in construction.steps}
+    is_of_forces = best.care > USUAL or any(group_of(construction.figure_of(node)) for node in off)
+    whole = [Root(), *(_of_forces(case) if is_of_forces else ())]
     scales = [*scales, *_scales_of_the_driver(case, best)]
     if not _is_explained(best) or not all(one.has_direction for one in case.observations.entries):
-        whole = [Root(), *_of_the_whole(case)]
+        whole += _of_the_whole(case)
     by_scale = [[_both(scale, one) for one in whole] for scale in scales]
     roots = [one for some in by_scale for one in some]
+    own = [*_own_forces(case)] if is_of_forces else []
+    by_scale += [own] if own else []
+    roots += own
     cares = sorted({best.care, min(best.care, USUAL)})
     # Apart, as a search drops what costs much before anything is observed.
     found = _by_cost(*(_replayed(case, some, cares) for some in by_scale)) or [*explanations]
@@ -201,14 +225,15 @@ def _with_another_guess(
     """
     seen = {one.node for one in case.observations.entries}
     steps = {step.node for step in case.drawing.construction.steps}
-    first = [one for one in best.made if one.at in steps - seen]
+    kept = {id(one) for root in roots for one in root.made}
+    first = [one for one in best.made if one.at in steps - seen and id(one) not in kept]
     if not first or (len(best.made) == 1 and not best.unexplained):
         return []
     drawing = case.drawing
     for one in first:
         drawing = commit(one, drawing)
-    of_the_whole = {key_of(one) for one in best.made} & {key_of(one) for root in roots for one in root.made}
-    start = next(root for root in roots if {key_of(one) for one in root.made} == of_the_whole)
+    kept &= {id(one) for one in best.made}
+    start = next(root for root in roots if {id(one) for one in root.made} == kept)
     guessed = Root(tuple(first), cost=sum(RARITY[one.code] for one in first))
     return replay(drawing, case.observations, [_both(start, guessed)], case.skill, cares=cares, blind=True)
 
@@ -220,6 +245,7 @@ def _both(one: Root, other: Root) -> Root:
         {**one.parameters, **other.parameters},
         {**one.turned, **other.turned},
         one.cost + other.cost,
+        (*one.unexplained, *other.unexplained),
     )
 
 
@@ -251,6 +277,9 @@ def _is_clear(explanations: Sequence[Replay], case: Case) -> bool:
     }
     joints = {step.node for step in construction.figures[MECHANISM]}
     step = next((one for one in construction.steps if one.node == best.made[0].at), None)
+    if isinstance(step, Given) and data_in(step.length):
+        # What acts on a link may be wrong, and with it all that is computed from that.
+        return False
     return step is not None and places.issuperset({step.node, *step.needs} - joints)
 
 
@@ -274,7 +303,12 @@ def _scales_of_the_driver(case: Case, best: Replay) -> Iterator[Root]:
             if isinstance(one, Given) and isinstance(one.length, Scaled)
         ]
         scale = next((one.scale for one in construction.vectors_of(plan)), "")
-        if not scaled or scaled[-1] not in off or scale in {*case.assumed, *case.followed}:
+        if (
+            not scaled
+            or scale not in OF_MOTION
+            or scaled[-1] not in off
+            or scale in {*case.assumed, *case.followed}
+        ):
             continue
         nodes = evaluate(construction, case.drawing.parameters)
         right_mm = abs(complex(np.ravel(nodes[scaled[-1]] - nodes[pole])[0]))
@@ -314,6 +348,36 @@ def _other_scales(case: Case) -> Iterator[Root]:
         yield Root(made, parameters, cost=RARITY["scale_wrong"] + FURTHER_SCALE * (len(made) - 1))
 
 
+def _of_forces(case: Case) -> Iterator[Root]:
+    """Roots with a mistake in what acts on links: moments have it, too."""
+    for mistake in mistakes_of_forces(case.drawing):
+        is_blank = mistake.code == "force_missing" and mistake.at in case.observations.blank
+        cost = RARITY[mistake.code] - (NOT_THERE if is_blank else 0.0)
+        yield Root((mistake,), mistake.parameters, cost=cost)
+
+
+def _own_forces(case: Case) -> Iterator[Root]:
+    """Roots with a force as it was drawn: by a slip in its size, or in an unknown way."""
+    known, drawn = case.drawing.parameters, {one.node: one for one in case.observations.entries}
+    nodes = evaluate(case.drawing.construction, known) if drawn else {}
+    for step in case.drawing.construction.steps:
+        if not isinstance(step, Given) or not is_force(step.length) or step.node not in drawn:
+            continue
+        start, one = drawn.get(step.start), drawn[step.node]
+        right = complex(np.ravel(nodes[step.node] - nodes[step.start])[0])
+        value = one.value if start is None or one.tail is not None else one.value - start.value
+        share = value / right if right and one.has_direction else 1.0
+        if not LEAST_FACTOR < abs(share) < MOST_FACTOR or abs(share - 1.0) < LEAST_WRONG:
+            continue
+        (datum,) = data_in(step.length)
+        changed = {datum: np.asarray(abs(share) * known.get(datum, 1.0))}
+        slip = Mistake(SLIP, step.node, factor=abs(share), parameters=changed)
+        yield Root((slip,), changed, cost=rarity_of(slip))
+        if isinstance(step.along, Fixed):
+            own = {**changed, step.along.angle: np.asarray(np.angle(value))}
+            yield Root((), own, cost=SOMETHING_ELSE + cost_of_any([one]), unexplained=(step.node,))
+
+
 def _of_the_whole(case: Case) -> Iterator[Root]:
     """Roots with a plan turned as a whole."""
     for plan in case.drawing.construction.poles:
@@ -337,6 +401,7 @@ def _swaps(case: Case, explanation: Replay) -> Iterator[Mistake]:
         images = sorted(
             v.head for v in construction.vectors_of(figure) if v.tail == pole and v.part not in {"n", "c"}
         )
+        images = [] if group_of(figure) else images
         is_off = bool(off) or explanation.care > USUAL
         for pair in combinations(images, 2):
             if off >= set(pair) or (

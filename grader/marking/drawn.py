@@ -15,11 +15,11 @@ from grader.given_data.owner import Owner
 from grader.marking.diagnosis import Case, explained
 from grader.marking.naming import CERTAIN, LINE_MISTAKES, drawn_instead, sure_of
 from grader.records import MECHANISM
-from reference.construction.elements import Coriolis, Normal, Parameters
+from reference.construction.elements import Balance, Coriolis, Normal, Parameters, is_force
 from reference.construction.graph import Construction, Vector
-from reference.construction.mistakes import Drawing, Mistake, line_of
+from reference.construction.mistakes import Drawing, Mistake, laid_off, line_of, made_at
 from reference.construction.steps import Given, TwoLines
-from reference.construction.uncertainty import trace
+from reference.construction.uncertainty import acts, trace
 from reference.geometry import ComplexArray, FloatArray
 from reference.quantities import OF_MOTION, kind_of
 from reference.replay.explanations import AREA_MM, Covariance, Observation, Observations
@@ -54,7 +54,7 @@ def explain(
     basis = PlanBasis("instead", drawn.construction, drawn.parameters, wrong, lines) if is_needed else None
     nearly = sure_of(explanations, NEARLY_CERTAIN)
     left_out = frozenset(one.at for one in nearly if one.code == "normal_missing")
-    at = frozenset(one.at for one in nearly)
+    at = frozenset(node for one in nearly for node in made_at(one, construction))
     return ReplayResult(explanations, basis, _blamed(nearly, construction), at, left_out)
 
 
@@ -74,7 +74,8 @@ def _blamed(mistakes: Iterable[Mistake], construction: Construction) -> frozense
     """The vectors in which mistakes of single steps were made."""
     found: set[str] = set()
     for mistake in mistakes:
-        here = {one.name for one in construction.vectors.values() if one.head == mistake.at}
+        at = made_at(mistake, construction)
+        here = {one.name for one in construction.vectors.values() if one.head in at}
         found |= (here & _on_wrong_lines([mistake], construction)) or here
     return frozenset(found)
 
@@ -150,12 +151,14 @@ def _nodes_observed(task: Task, evidence: Evidence, nodes: "_Nodes") -> list[Obs
 
 
 def _lengths_observed(task: Task, evidence: Evidence, parameters: Parameters) -> list[Observation]:
-    """The vectors that lead to none of the nodes."""
+    """The vectors that do not run between the nodes."""
     construction, entries = task.construction, []
-    traced = None
+    traced, nodes = None, {*evidence.nodes, *task.construction.poles.values()}
     for name, vector in construction.vectors.items():
         drawn = evidence.vector(name)
-        if drawn is None or drawn.confidence < task.rubric.least_confidence or vector.head in evidence.nodes:
+        if drawn is None or drawn.confidence < task.rubric.least_confidence:
+            continue
+        if vector.head in nodes and (vector.tail in nodes or drawn.direction_rad is None):
             continue
         value, read_mm = drawn.as_complex, math.hypot(LEAST_ERROR_MM, drawn.se_mm, task.rubric.hand.ruler_mm)
         if value is not None:
@@ -175,10 +178,18 @@ def _components_left_blank(task: Task, evidence: Evidence) -> frozenset[str]:
     return frozenset(
         one.head
         for one in vectors
-        if one.part in {"n", "c"}
+        if (one.part in {"n", "c"} or _acts(task, one))
         and one.scale in drawn
         and evidence.vector(one.name) is None
         and (one.name in evidence.blank or not evidence.has_sheets)
+    )
+
+
+def _acts(task: Task, vector: Vector) -> bool:
+    """Return whether a vector is a force that is laid off, and not computed from moments."""
+    step = task.construction.step(vector.head)
+    return (
+        isinstance(step, Given) and is_force(step.length) and laid_off(step, task.construction) == vector.name
     )
 
 
@@ -209,12 +220,22 @@ def _with_computing(task: Task, evidence: Evidence, node: str, read: Covariance 
     vector = next((one for one in task.construction.vectors.values() if one.head == node), None)
     drawn = None if vector is None else evidence.vector(vector.name)
     along = None if drawn is None else drawn.as_complex
-    rows = NO_ERRORS
-    if along:
+    rows, step = NO_ERRORS, task.construction.step(node)
+    if isinstance(step, Given) and isinstance(step.length, Balance) and not evidence.has_sketch:
+        rows = _arms_measured(task, step)
+    elif along:
         each_mm = LEAST_ERROR_MM if evidence.has_sheets else task.rubric.hand.ruler_mm
         rows = np.array([along * _computed_within(task, evidence, node, math.sqrt(2.0) * each_mm)])
     xx, xy, yy = _covariance(rows, LEAST_ERROR_MM)
     return (xx, xy, yy) if read is None else (xx + read[0], xy + read[1], yy + read[2])
+
+
+def _arms_measured(task: Task, step: Given) -> ComplexArray:
+    """The shifts of a force that is computed from moments, by the errors of the sketch on which arms are."""
+    traced = task.traced(task.rule_scales)
+    of_sketch = [task.construction.figure_of(node) == MECHANISM for node, *_ in acts(task.construction)]
+    shifts = traced.made[step.node].shifts - traced.nodes[step.start].shifts
+    return np.asarray(shifts[: traced.drafting_count] * of_sketch)
 
 
 # Measured vectors that close polygons --------------------------------------------------------------

@@ -1,7 +1,7 @@
 """Judge one submission: comparison, diagnosis and points, in this order."""
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TypeVar
@@ -26,7 +26,7 @@ from grader.rubric import CriterionTable, RubricFile
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.graph import evaluate
 from reference.construction.mistakes import Mistake
-from reference.quantities import OF_MOTION, vector_of_value
+from reference.quantities import OF_MOTION, kind_of, vector_of_value
 from reference.replay.replay import Replay
 
 Read = TypeVar("Read", ReadNode, ReadVector)
@@ -178,6 +178,7 @@ def _judged(task: Task, submission: Submission, comparison: Comparison, owner: O
     read = _swapped_letters(task, submission, mistakes)
     mistakes = (*mistakes, *read)
     mistakes = (*mistakes, *_not_drawn(task, comparison, mistakes))
+    mistakes = (*mistakes, *_pointing_back(task, comparison, mistakes))
     mistakes = (*mistakes, *_slips(task, comparison, mistakes))
     outcomes = letters_charged(
         task,
@@ -254,18 +255,38 @@ def _not_drawn(task: Task, comparison: Comparison, known: Sequence[NamedMistake]
 
     None of a component that is known to have been left out.
     """
-    left_out = {one.at for one in known if one.code == "normal_missing"}
+    left_out = {one.at for one in known if one.code in {"normal_missing", "force_missing"}}
     evidence, vectors = comparison.evidence, task.construction.vectors
     found = []
     for one in comparison.outcomes:
         is_table = bool(evidence.measured) and not evidence.has_sheets
         is_left_blank = "not_measured" in one.codes and is_table and one.verdict == "none"
-        if one.name not in vectors or vectors[one.name].head in left_out:
+        is_left_out = one.name.startswith(tuple(left_out))
+        if one.name not in vectors or is_left_out or vectors[one.name].head in left_out:
             continue
         if "not_drawn" in one.codes or is_left_blank:
             sure = NOT_DRAWN if evidence.has_sheets else 1.0
             found.append(NamedMistake(Mistake("vector_missing", one.name), (one.criterion,), sure))
     return found
+
+
+def _pointing_back(
+    task: Task, comparison: Comparison, known: Sequence[NamedMistake]
+) -> Iterator[NamedMistake]:
+    """Yield forces that point the opposite way though all else is right, or all else that ends there."""
+    vectors, explained = task.construction.vectors, {name for one in known for name in one.explains}
+    right = {
+        vectors[one.name].head
+        for one in comparison.outcomes
+        if one.name in vectors and one.verdict in CREDITED
+    }
+    for one in comparison.outcomes:
+        is_back = "reversed" in one.codes and not one.codes & {"too_long", "too_short"}
+        if not is_back or one.verdict not in CHARGED or one.criterion in explained:
+            continue
+        is_force = kind_of(one.name).name == "force"
+        if is_force and (not known or vectors[one.name].head in right):
+            yield NamedMistake(Mistake("force_reversed", one.name), (one.criterion,), SLIPPED)
 
 
 def _left_out(task: Task, outcomes: Sequence[Outcome], known: Sequence[NamedMistake]) -> tuple[Outcome, ...]:
@@ -308,7 +329,7 @@ def _slips(task: Task, comparison: Comparison, known: Sequence[NamedMistake]) ->
         factor = value / right if value and right else 1.0
         at = vector_of_value(one.name) or one.name
         slip = NamedMistake(Mistake("arithmetic", at, factor=factor), (one.criterion,), SLIPPED)
-        if one.mistake == "arithmetic":
+        if one.mistake == "arithmetic" or (one.name in task.construction.moments and is_value_off):
             of_vectors.append(slip)
         elif one.mistake == "image_mirrored":
             of_vectors.append(replace(slip, mistake=Mistake("image_mirrored", one.name)))

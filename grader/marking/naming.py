@@ -15,9 +15,19 @@ from grader.records import MECHANISM
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.elements import Along, Line
 from reference.construction.graph import Construction
-from reference.construction.mistakes import RPM_FACTOR, SLIP, Drawing, Mistake, affected, commit
+from reference.construction.mistakes import (
+    RPM_FACTOR,
+    SLIP,
+    Drawing,
+    Mistake,
+    affected,
+    commit,
+    laid_off,
+    line_of,
+    made_at,
+)
 from reference.construction.steps import Given, Step, TwoLines
-from reference.quantities import kind_of
+from reference.quantities import group_of, kind_of
 from reference.replay.replay import Replay
 
 # What was drawn by mistake, where that is certain --------------------------------------------------
@@ -38,7 +48,8 @@ def drawn_instead(explanations: Sequence[Replay], case: Case) -> tuple[Drawing, 
     drawing = case.drawing
     for one in certain:
         drawing = commit(one, drawing)
-    return drawing, frozenset(MECHANISM if one.at in joints else one.at for one in certain)
+    wrong = frozenset(node for one in certain for node in made_at(one, drawing.construction))
+    return drawing, (wrong - joints) | (frozenset({MECHANISM}) if wrong & joints else frozenset())
 
 
 # The mistakes that are named -----------------------------------------------------------------------
@@ -250,7 +261,34 @@ def _record(
         mistake = speed_mistake(mistake, ratio)
     is_line = mistake.code in LINE_MISTAKES
     line = _line_of(construction.step(mistake.at), mistake.slot) if is_line else {}
+    vector = _vector_of(mistake, construction)
+    if vector:
+        # Nodes of force polygons have no letters.
+        letters = mistake.other if mistake.code == "wrong_link" or mistake.other[:1] == (vector,) else ()
+        across = is_line and _is_across(construction.step(mistake.at), mistake.slot)
+        line = {"line": "force across a guide" if across else "force"}
+        mistake = replace(mistake, at=vector, other=letters)
     return NamedMistake(mistake, explains, min(confidence, 1.0), line, rivals)
+
+
+def _is_across(step: Step, slot: int) -> bool:
+    """Return whether a line of a force plan is across a guide: all others run along links."""
+    return isinstance(step, TwoLines) and (step.first, step.second)[slot].along.quarters % 2 == 1
+
+
+def _vector_of(mistake: Mistake, construction: Construction) -> str:
+    """The vector of a force plan in which a mistake was made at a node; empty for any other mistake."""
+    try:
+        step = construction.step(mistake.at)
+    except KeyError:
+        return ""
+    if not group_of(construction.figure_of(mistake.at)):
+        return ""
+    if isinstance(step, Given):
+        return laid_off(step, construction)
+    here = [one for one in construction.vectors.values() if one.head == mistake.at]
+    line = (step.first, step.second)[mistake.slot] if isinstance(step, TwoLines) else None
+    return next((one.name for one in here if line_of(one, construction) == line), here[0].name)
 
 
 def _line_of(step: Step, slot: int) -> dict[str, str]:

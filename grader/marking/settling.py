@@ -16,7 +16,7 @@ from grader.outcomes import CHARGED, NamedMistake, Outcome, Unfit
 from grader.records import Reason
 from grader.rubric import RubricFile
 from reference.authored.assignment import SCALE_NAMES
-from reference.quantities import vector_of_value
+from reference.quantities import sort_of, vector_of_value
 
 
 def settled(outcome: Outcome, share: float, sure: float, *reasons: Reason) -> Outcome:
@@ -53,7 +53,8 @@ def is_of(task: Task, name: str, part: str) -> bool:
     """Return whether a criterion is about a part of the drawing: a plan, or all of it."""
     if part not in task.construction.poles:
         return True
-    return name == task.construction.vectors_of(part)[0].scale or _is_in(task, name, frozenset({part}))
+    alike = frozenset(one for one in task.construction.poles if sort_of(one) == sort_of(part))
+    return name == task.construction.vectors_of(part)[0].scale or _is_in(task, name, alike)
 
 
 def _of_another(outcome: Outcome, named: NamedMistake, *, earns_none: bool) -> Outcome:

@@ -6,6 +6,7 @@ A slip of the drawing's entries counts only where both plans show it; what is le
 explained both ways, and the slip is undone where that explains it better.
 """
 
+import cmath
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -132,10 +133,11 @@ class _Entries:
             if name not in task.construction.vectors:
                 continue
             segment, table = task.segments[name], task.rubric.tolerance_of(name)
-            exact = segment.drawn(used)
+            # As entered, in the vector's own sense.
+            exact, turn = segment.drawn(used) * cmath.rect(1.0, segment.turn_rad), one.turn_rad
             length = abs(exact)
             is_directed = one.direction_rad is not None and length >= max(table.least_mm, 1.0)
-            turned = one.direction_rad if is_directed and one.direction_rad is not None else math.nan
+            turned = one.direction_rad + turn if is_directed and one.direction_rad is not None else math.nan
             across = math.atan(table.across_mm / max(length, table.across_mm))
             rows.append(
                 (

@@ -23,6 +23,7 @@ from grader.overlay.scene import (
 )
 from grader.records import Reading, on_sheet
 from reference.construction.graph import Construction, Vector
+from reference.quantities import group_of
 
 MARGIN_MM = 14.0
 GAP_MM = 22.0
@@ -80,11 +81,12 @@ def _plan(
         elif along:
             steps[name] = one.length_mm * along / abs(along)
     vectors = [vector for vector in construction.vectors_of(figure) if vector.name in steps]
+    steps |= {vector.name: -steps[vector.name] for vector in vectors if vector.reversed}
     nodes = _nodes(pole, vectors, steps)
     arrows = tuple(_arrows(figure, vectors, steps, nodes, outcomes))
     ghosts = tuple(ghosts_of(arrows, outcomes)) if show_expected else ()
     dots = tuple(
-        Dot(name, on_sheet(place), doubtful=False, lettered=True, figure=figure)
+        Dot(name, on_sheet(place), doubtful=False, lettered=not group_of(figure), figure=figure)
         for name, place in nodes.items()
     )
     return Scene((0.0, 0.0), arrows, ghosts, dots)
@@ -109,10 +111,11 @@ def _arrows(
 ) -> Iterator[Arrow]:
     for vector in vectors:
         if vector.tail in nodes:
-            tail, outcome = nodes[vector.tail], outcomes.get(vector.name)
+            first, outcome = nodes[vector.tail], outcomes.get(vector.name)
             verdict = "not_judged" if outcome is None else outcome.verdict
-            tip = on_sheet(tail + steps[vector.name])
-            yield Arrow(vector.name, figure, on_sheet(tail), tip, verdict, doubtful=verdict == "review")
+            ends = on_sheet(first), on_sheet(first + steps[vector.name])
+            tail, tip = ends[::-1] if vector.reversed else ends
+            yield Arrow(vector.name, figure, tail, tip, verdict, doubtful=verdict == "review")
 
 
 def _side_by_side(plans: list[Scene]) -> Scene:

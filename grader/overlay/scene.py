@@ -209,9 +209,10 @@ def _arrows(
                 continue
             outcome = outcomes.get(name)
             verdict = "not_judged" if outcome is None else outcome.verdict
-            tail, tip = on_sheet(figure.nodes[ends.tail].at), on_sheet(figure.nodes[ends.head].at)
+            foot, tip = (ends.head, ends.tail) if ends.reversed else (ends.tail, ends.head)
+            start, end = on_sheet(figure.nodes[foot].at), on_sheet(figure.nodes[tip].at)
             doubtful = verdict == "review" or read.confidence < LEAST_SURE
-            yield Arrow(name, kind, tail, tip, verdict, doubtful)
+            yield Arrow(name, kind, start, end, verdict, doubtful)
 
 
 def _links(

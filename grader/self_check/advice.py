@@ -6,7 +6,14 @@ A mistake that the diagnosis names with certainty is explained by the law that i
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from grader.feedback.mistakes import ALONG_GUIDE, CORIOLIS_END, DRIVING_ACROSS, DRIVING_ALONG
+from grader.feedback.mistakes import (
+    ACROSS_GUIDE,
+    ALONG_GUIDE,
+    CORIOLIS_END,
+    DRIVING_ACROSS,
+    DRIVING_ALONG,
+    OF_FORCE,
+)
 from grader.feedback.sentences import line_of
 from grader.language import N_, Tongue
 from grader.options import Level
@@ -17,6 +24,7 @@ from grader.texts.reasons import reason_sentence
 from grader.texts.spoken import place
 from reference.authored.assignment import SCALE_NAMES, Assignment
 from reference.construction.mistakes import RIGHT_TRIANGLE
+from reference.quantities import kind_of
 
 RESULTS: Mapping[Result, tuple[str, str]] = {
     "right": ("✓", N_("right")),
@@ -66,6 +74,7 @@ SENSE = {
     "driving": N_("Look at the sense in which the driving link moves."),
     "n": N_("Look at the point that it must point towards."),
     "c": N_("Look at the sense in which the guide turns."),
+    "force": N_("Look at which link acts on which, and at how the arrows follow one another."),
     "": _LETTERS,
 }
 VALUE = {
@@ -142,6 +151,12 @@ LAWS: dict[str, str] = {
     "labels_swapped": N_("The vector from the pole to a letter belongs to the point with that letter."),
     "figure_rotated": N_("All directions of a plan are taken from the mechanism in the same position."),
     "arithmetic": N_("Drawn length = real value / scale."),
+    "inertia_reversed": N_("F_i = −m·a: an inertia force points against the acceleration."),
+    "force_missing": N_("A force polygon holds every force that acts on the links of its group."),
+    "force_reversed": N_("R_ij = −R_ji, and in a closed polygon all arrows follow one another."),
+    "couple_missing": N_("The sum of moments holds every force and every moment on the link."),
+    "couple_reversed": N_("M_i = −I·ε: it acts against the angular acceleration."),
+    "wrong_arm": N_("An arm is the perpendicular from the joint to the force's line of action."),
     "units": N_(
         "Lengths are in millimetres, directions in degrees counter-clockwise from the +x axis, values in SI"
         " units."
@@ -164,6 +179,15 @@ _DRIVING = {
         )
     },
     DRIVING_ALONG: {"parallel_for_perpendicular": N_("a_n lies along the link, towards the pivot.")},
+}
+_BY_MOMENTS = N_("The sum of moments about the inner joint gives the size and the sense of the part across.")
+_BY_LINES = N_("Without friction a guide presses across itself; what moments leave acts along the link.")
+_OF_FORCES = {
+    "parallel_for_perpendicular": _BY_LINES,
+    "wrong_link": _BY_LINES,
+    "wrong_intersection": LAWS["force_missing"],
+    "sense_reversed": _BY_MOMENTS,
+    "arithmetic": _BY_MOMENTS,
 }
 _BY_TRIANGLE = {"arithmetic": N_("The right triangle gives v²/l at the scale ka only where kL·ka = kv².")}
 _SAME = N_("The same mistake as at %(name)s.")
@@ -247,6 +271,8 @@ def _kind(name: str, driving: str) -> str:
         return "scale"
     if name.startswith(("omega", "epsilon")):
         return "rate"
+    if kind_of(name).name == "force":
+        return "force"
     _, about, part = f"{name}__".split("_")[:3]
     return "driving" if about == driving and part != "sketch" else part
 
@@ -257,5 +283,6 @@ def law_of(mistake: NamedMistake) -> str:
     if mistake.at.startswith(CORIOLIS_END):
         return _CORIOLIS.get(mistake.code, usual)
     line = line_of(mistake)
-    others = {**_DRIVING, ALONG_GUIDE: _GUIDE, RIGHT_TRIANGLE: _BY_TRIANGLE}.get(line, {})
+    known = {**_DRIVING, ALONG_GUIDE: _GUIDE, RIGHT_TRIANGLE: _BY_TRIANGLE}
+    others = {**known, OF_FORCE: _OF_FORCES, ACROSS_GUIDE: _OF_FORCES}.get(line, {})
     return others.get(mistake.code, usual)

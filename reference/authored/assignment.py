@@ -264,9 +264,9 @@ class Assignment:
 
     @property
     def scale_names(self) -> tuple[str, ...]:
-        """The scales of the drawings: kL, kv and ka; with force plans, those of the pages' figures."""
+        """The scales of the drawings: kL, kv and ka; with force plans from given accelerations, kL and kF."""
         drawn = {scale_of(figure) for figure in self.figures}
-        usual = USUAL_SCALES if "kF" not in drawn else USUAL_SCALES[:1]
+        usual = USUAL_SCALES if self.forces != "given" else USUAL_SCALES[:1]
         return tuple(name for name in SCALE_NAMES if name in drawn or name in usual)
 
     def variants(self) -> list[Variant]:

@@ -277,6 +277,8 @@ def construction_of(
     forces : with force plans, the accelerations being ``given`` (then the other plans are left out), or
         the student's ``own``, as drawn
     """
+    # Couples of inertia need the links' angular accelerations, wherever these come from.
+    accelerations = accelerations or forces is not None
     form = (_form_of(mechanism), accelerations, plate_by_similarity, forces)
     if form not in _cache:
         if len(_cache) >= CACHED:

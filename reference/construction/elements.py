@@ -355,14 +355,28 @@ class Balance(FromNodes):
 Length = Scaled | Normal | Coriolis | Component | Same | Inertia | Balance
 
 
-def data_in(length: Length) -> frozenset[str]:
-    """Return the names of the data of forces and couples on which a length depends."""
+def is_force(length: Length) -> bool:
+    """Return whether a length is that of a force that acts, whatever else does: not one from moments."""
+    return isinstance(length, Inertia | Same) or (isinstance(length, Scaled) and length.scale == "kF")
+
+
+def is_computed(length: Length) -> bool:
+    """Return whether a length is computed by the student, so that it may have a slip."""
+    return isinstance(length, Normal | Coriolis | Inertia | Balance) or (
+        isinstance(length, Scaled) and length.scale == "kF"
+    )
+
+
+def data_in(length: "Length | Moments") -> frozenset[str]:
+    """Return the names of the data of forces and couples on which a length or moment depends."""
     match length:
         case Scaled(quantity=name) | Inertia(mass=name) | Same(sense=name):
             return frozenset((name,))
         case Balance(moments=moments):
-            of_forces = (name for force in moments.forces for name in data_in(force.size))
-            return frozenset((*of_forces, *(one.inertia or one.name for one in moments.couples)))
+            return data_in(moments)
+        case Moments(forces=forces, couples=couples):
+            of_forces = (name for force in forces for name in data_in(force.size))
+            return frozenset((*of_forces, *(one.inertia or one.name for one in couples)))
     return frozenset()
 
 

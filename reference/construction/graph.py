@@ -13,6 +13,7 @@ its pole). It is data, a directed acyclic graph, and one evaluator has all uses:
 - only what is needed: `wanted` names the nodes asked for, ancestors alone are evaluated.
 """
 
+import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -25,11 +26,13 @@ from reference.construction.elements import (
     Errors,
     Fixed,
     Force,
+    Length,
     Line,
     Moments,
     Nodes,
     Parameters,
     View,
+    data_in,
 )
 from reference.construction.steps import (
     ArcAndLine,
@@ -169,6 +172,11 @@ class Vector:
         """Return whether it is the sum of others: a full relative acceleration, a reaction of parts."""
         return self.scale != "kv" and self.link is not None and not self.part
 
+    @property
+    def turn_rad(self) -> float:
+        """The angle from its order of drawing to its own sense: half a turn if it is reversed."""
+        return math.pi if self.reversed else 0.0
+
 
 @dataclass(frozen=True, slots=True)
 class AngularRate:
@@ -252,6 +260,15 @@ class Construction:
     def needed_for(self, nodes: Collection[str]) -> frozenset[str]:
         """Return the nodes from which some nodes are directly made."""
         return frozenset(need for step in self.steps if step.node in nodes for need in step.needs)
+
+    def data_of(self, name: str) -> frozenset[str]:
+        """Return the names of the data of forces and couples from which a node or a moment is made."""
+        moments = self.moments.get(name)
+        needs = (name,) if moments is None else moments.needs
+        nodes = frozenset[str]().union(*map(self.upstream, needs))
+        lengths = [step.length for step in map(self.step, nodes) if isinstance(step, Given)]
+        parts: list[Length | Moments] = [*lengths, *((moments,) if moments else ())]
+        return frozenset[str]().union(*map(data_in, parts))
 
     def upstream(self, node: str) -> frozenset[str]:
         """Return a node and all nodes that it is made from. Raises KeyError for an unknown node."""

@@ -5,7 +5,7 @@ hypotheses, the diagnosis as explanations. Their codes are part of the published
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
@@ -17,15 +17,14 @@ from reference.construction.elements import (
     Coriolis,
     Direction,
     Fixed,
-    Inertia,
     Line,
     Moments,
     Normal,
     Parameters,
-    Same,
     Scaled,
     View,
     data_in,
+    is_force,
 )
 from reference.construction.graph import Construction, Vector
 from reference.construction.steps import (
@@ -38,6 +37,7 @@ from reference.construction.steps import (
     TwoArcs,
     TwoLines,
 )
+from reference.quantities import DRAWN, OF_MOTION, scale_of
 
 Code = Literal[
     "parallel_for_perpendicular",
@@ -70,6 +70,17 @@ OF_FORCES = frozenset[str](
     ("inertia_reversed", "force_missing", "force_reversed", "couple_missing", "couple_reversed")
 )
 """Mistakes in what acts on a link: its moments and its polygon have them alike."""
+FACTORS: dict[str, float | None] = {
+    "sense_reversed": -1.0,
+    "normal_reversed": -1.0,
+    "inertia_reversed": -1.0,
+    "force_reversed": -1.0,
+    "normal_missing": 0.0,
+    "force_missing": 0.0,
+    "arithmetic": None,
+    "scale_wrong": None,
+}
+"""By which a mistake multiplies a length that is laid off; None: by its own factor."""
 RPM_FACTOR = 30.0 / math.pi
 """Error factor of omega = n instead of omega = pi n / 30."""
 SLIP, RIGHT_TRIANGLE = "arithmetic", "right_triangle"
@@ -122,13 +133,13 @@ def commit(mistake: Mistake, drawing: Drawing) -> Drawing:
     match mistake.code:
         case "rpm_not_converted":
             return Drawing(construction, _with_speed(parameters, mistake.factor))
-        case "scale_wrong" if mistake.at in {"kL", "kv", "ka"}:
+        case "scale_wrong" if mistake.at in DRAWN:
             scaled = np.asarray(parameters[mistake.at] * mistake.factor)
             return Drawing(construction, {**parameters, mistake.at: scaled})
         case "other_variant" | "data_misread":
-            scales = {name: parameters[name] for name in ("kL", "kv", "ka", "turn") if name in parameters}
+            scales = {name: parameters[name] for name in (*DRAWN, "turn") if name in parameters}
             return Drawing(construction, {**parameters, **mistake.parameters, **scales})
-        case code if code in OF_FORCES:
+        case _ if mistake.parameters:
             return Drawing(construction, {**parameters, **mistake.parameters})
         case "vector_missing":
             kept = {name: one for name, one in construction.vectors.items() if name != mistake.at}
@@ -151,12 +162,9 @@ def changed_step(mistake: Mistake, construction: Construction) -> Step:
     match mistake.code, step:
         case "arithmetic", Given(length=Normal() as length) if mistake.other == (RIGHT_TRIANGLE,):
             return replace(step, length=replace(length, by_triangle=True))
-        case (
-            "sense_reversed" | "normal_reversed" | "normal_missing" | "arithmetic" | "scale_wrong",
-            Given(),
-        ):
-            factor = {"normal_missing": 0.0, "arithmetic": mistake.factor, "scale_wrong": mistake.factor}
-            return replace(step, factor=step.factor * factor.get(mistake.code, -1.0))
+        case code, Given() if code in FACTORS:
+            factor = FACTORS[code]
+            return replace(step, factor=step.factor * (mistake.factor if factor is None else factor))
         case "wrong_arm", Given(length=Balance(moments=moments) as length):
             wrong = replace(moments.forces[mistake.slot], whole_arm=True)
             forces = (*moments.forces[: mistake.slot], wrong, *moments.forces[mistake.slot + 1 :])
@@ -277,10 +285,10 @@ def single_mistakes(drawing: Drawing, figure: str) -> Iterator[Mistake]:
             if mistake.code != "image_mirrored" or not _is_in_line(step, drawing):
                 yield mistake
     if figure != "mechanism":
-        scale = "kv" if figure == "velocity_plan" else "ka"
+        scale = scale_of(figure)
         yield from (Mistake("scale_wrong", scale, factor=f) for f in (0.1, 0.5, 2.0, 10.0))
         yield from (Mistake("figure_rotated", figure, quarters=q) for q in (1, 2, 3))
-        if "angle crank" in drawing.parameters:
+        if "angle crank" in drawing.parameters and scale in OF_MOTION:
             yield Mistake("rpm_not_converted", figure, factor=RPM_FACTOR)
 
 
@@ -320,6 +328,11 @@ def _mistakes_of_given(step: Given, construction: Construction) -> Iterator[Mist
                 for slot, force in enumerate(forces)
                 if force.point != about
             )
+        case _ if is_force(step.length):
+            # In the polygon alone: the moments had it right.
+            name = laid_off(step, construction)
+            yield Mistake("inertia_reversed" if name.startswith("F_i") else "force_reversed", step.node)
+            yield Mistake("force_missing", step.node)
         case _ if not isinstance(step.along, Fixed) or step.start in construction.poles.values():
             yield Mistake("sense_reversed", step.node)
 
@@ -401,13 +414,21 @@ def _further_lines(step: TwoLines, slot: int, line: Line, construction: Construc
                 yield Mistake("wrong_intersection", step.node, slot, other=(vector.name,))
 
 
+def laid_off(step: Given, construction: Construction) -> str:
+    """Return the name of the vector that a step lays off; empty for a link of the sketch."""
+    vectors = construction.vectors.values()
+    return next((one.name for one in vectors if (one.tail, one.head) == (step.start, step.node)), "")
+
+
 def mistakes_of_forces(drawing: Drawing) -> Iterator[Mistake]:
     """Yield mistakes in what acts on links: of one force or couple, and of all of one kind.
 
     An inertia force along the acceleration, a force or couple left out or with the wrong sense, among them a
-    reaction taken over from another group with the sense that it had there.
+    reaction taken over from another group with the sense that it had there. One force's is made at the node
+    where it ends.
     """
     changes: dict[tuple[str, float], dict[str, str]] = {}
+    vectors = drawing.construction.vectors
     for name, datum in _data_of_forces(drawing.construction):
         kind = "couple" if name.startswith("M_") else "inertia" if name.startswith("F_i") else "force"
         if not name.startswith("G_"):
@@ -417,7 +438,8 @@ def mistakes_of_forces(drawing: Drawing) -> Iterator[Mistake]:
             changes.setdefault((code, 0.0), {})[name] = datum
     for (code, factor), data in changes.items():
         for name, datum in data.items():
-            yield Mistake(code, name, factor=factor, parameters=_changed(drawing, factor, datum))
+            at = vectors[name].head if name in vectors else name
+            yield Mistake(code, at, factor=factor, parameters=_changed(drawing, factor, datum))
         for start in ("F_i", "G_", "M_i"):
             alike = [datum for name, datum in data.items() if name.startswith(start)]
             if len(alike) > 1:
@@ -428,11 +450,7 @@ def _data_of_forces(construction: Construction) -> Iterator[tuple[str, str]]:
     """Yield each force that is laid off, and each couple, with the name of its datum."""
     for vector in construction.vectors.values():
         step = construction.step(vector.head)
-        if (
-            vector.scale == "kF"
-            and isinstance(step, Given)
-            and isinstance(step.length, Scaled | Inertia | Same)
-        ):
+        if isinstance(step, Given) and is_force(step.length) and laid_off(step, construction) == vector.name:
             (datum,) = data_in(step.length)
             yield vector.name, datum
     lengths = [step.length for step in construction.steps if isinstance(step, Given)]
@@ -445,20 +463,33 @@ def _changed(drawing: Drawing, factor: float, *names: str) -> Parameters:
     return {name: np.asarray(factor * drawing.parameters.get(name, 1.0)) for name in names}
 
 
+def made_at(mistake: Mistake, construction: Construction) -> frozenset[str]:
+    """Return the nodes at which a mistake is made: of a couple, those of the moments that it changes."""
+    nodes = {step.node for step in construction.steps}
+    if mistake.at in nodes or not mistake.parameters or mistake.code not in OF_FORCES:
+        return frozenset((mistake.at,))
+    vectors = (one for one in construction.vectors.values() if one.name.startswith(mistake.at))
+    if not mistake.at.startswith("M_"):
+        return frozenset(one.head for one in vectors)
+    found = frozenset(_with_data(mistake.parameters, construction))
+    return found or frozenset((next(iter(construction.moments), mistake.at),))
+
+
+def _with_data(data: Iterable[str], construction: Construction) -> Iterator[str]:
+    """Yield the nodes that are laid off by some data of forces or couples."""
+    for step in construction.steps:
+        if isinstance(step, Given) and not data_in(step.length).isdisjoint(data):
+            yield step.node
+
+
 def affected(mistake: Mistake, construction: Construction) -> frozenset[str]:
     """Return the nodes that a mistake moves: its own and those drawn from it."""
     is_of_data = mistake.code in {"other_variant", "data_misread"} and mistake.at not in construction.poles
-    if mistake.at in {"kL", "kv", "ka"} or mistake.code == "rpm_not_converted" or is_of_data:
+    if mistake.at in DRAWN or mistake.code == "rpm_not_converted" or is_of_data:
         return frozenset(step.node for step in construction.steps)
     if mistake.at in construction.figures:
         return frozenset(step.node for step in construction.figures[mistake.at])
-    if mistake.code in OF_FORCES:
-        data = frozenset(mistake.parameters)
-        at = {
-            step.node
-            for step in construction.steps
-            if isinstance(step, Given) and data & data_in(step.length)
-        }
-        return frozenset(one.node for one in construction.steps if at & construction.upstream(one.node))
-    made_from = (step.node for step in construction.steps if mistake.at in construction.upstream(step.node))
-    return frozenset({mistake.at, *made_from})
+    at = {mistake.at}
+    if mistake.parameters and mistake.code not in {"other_variant", "data_misread"}:
+        at.update(_with_data(mistake.parameters, construction))
+    return frozenset(one.node for one in construction.steps if at & construction.upstream(one.node))

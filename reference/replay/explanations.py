@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from reference import geometry
-from reference.construction.elements import Along, Coriolis, Direction, Errors, Line, Normal, View
+from reference.construction.elements import Along, Direction, Errors, Line, View, is_computed
 from reference.construction.graph import Construction
 from reference.construction.mistakes import (
     RIGHT_TRIANGLE,
@@ -26,6 +26,7 @@ from reference.construction.steps import Given, Step, TwoLines
 from reference.construction.uncertainty import SMALL, Skill, step_errors
 from reference.geometry import ComplexArray, FloatArray
 from reference.numbers import dot
+from reference.quantities import kind_of
 
 RARITY: Mapping[str, float] = {
     "parallel_for_perpendicular": 13.0,
@@ -42,6 +43,12 @@ RARITY: Mapping[str, float] = {
     "figure_rotated": 14.0,
     "scale_wrong": 10.0,
     "arithmetic": 22.0,
+    "inertia_reversed": 11.0,
+    "force_missing": 12.0,
+    "force_reversed": 12.0,
+    "couple_missing": 12.0,
+    "couple_reversed": 13.0,
+    "wrong_arm": 13.0,
 }
 """Cost of each mistake: one step in about a hundred goes wrong, in one of about ten ways; a slip in a
 computation may give any length."""
@@ -319,17 +326,17 @@ class Repertoire:
 
 def _known_slips(step: Step) -> Iterator[Mistake]:
     """Yield the commonest slips in a computed length."""
-    if isinstance(step, Given) and isinstance(step.length, Normal | Coriolis):
+    if isinstance(step, Given) and is_computed(step.length):
         yield from (Mistake(SLIP, step.node, factor=factor) for factor in SLIPS)
 
 
-def _rarity(mistake: Mistake) -> float:
+def rarity_of(mistake: Mistake) -> float:
     """Return the cost of a mistake."""
     if mistake.other == (RIGHT_TRIANGLE,):
         return BY_TRIANGLE
     if mistake.code == SLIP and mistake.factor in SLIPS:
         return KNOWN_SLIP
-    is_line = mistake.code == "wrong_intersection" and mistake.other[0][:2] in {"v_", "a_"}
+    is_line = mistake.code == "wrong_intersection" and kind_of(mistake.other[0]).name != "length"
     return RARITY[mistake.code] + (AN_OTHER_LINE if is_line else 0.0)
 
 
@@ -440,7 +447,7 @@ class StepContext:
         """Return the right direction with a wrongly computed length, as drawn; None if none is computed."""
         entries, view = self.observed.entries, View(self.nodes, self.known)
         one = next((one for one in entries if one.tail == step.start or one.has_direction), None)
-        if one is None or not isinstance(step.length, Normal | Coriolis):
+        if one is None or not is_computed(step.length):
             return None
         right = step.factor * step.length.at(view)
         if one.has_direction:
@@ -490,9 +497,9 @@ class StepContext:
         """
         if mistake.other == (RIGHT_TRIANGLE,):
             ratio = self.known["kL"] * self.known["ka"] / self.known["kv"] ** 2
-            return np.where(np.abs(np.log(ratio)) < LEAST_RATIO, np.inf, _rarity(mistake))
-        is_blank = mistake.code == "normal_missing" and mistake.at in self.blank
-        return _rarity(mistake) - (NOT_THERE if is_blank else 0.0)
+            return np.where(np.abs(np.log(ratio)) < LEAST_RATIO, np.inf, rarity_of(mistake))
+        is_blank = mistake.code in {"normal_missing", "force_missing"} and mistake.at in self.blank
+        return rarity_of(mistake) - (NOT_THERE if is_blank else 0.0)
 
     def _placed(self, step: Step, steps: Sequence[Step]) -> tuple[ComplexArray, ComplexArray | None]:
         """Return positions that steps give, and shifts by usual errors (steps, errors, branches)."""

@@ -46,12 +46,14 @@ class Root:
     parameters : those that differ
     turned : by plan, the factor by which it is turned as a whole
     cost : of these mistakes
+    unexplained : nodes whose steps were made in an unknown way, by data of their own
     """
 
     made: tuple[Mistake, ...] = ()
     parameters: Parameters = field(default_factory=dict)
     turned: Mapping[str, complex] = field(default_factory=dict)
     cost: float = 0.0
+    unexplained: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -259,7 +261,7 @@ def _open(drawing: Drawing, roots: Sequence[Root], cares: Sequence[float], cost:
     starts = [(root, care) for care in cares for root in roots]
     known = {name: np.asarray(value) for name, value in drawing.parameters.items()}
     for name in {name for root in roots for name in root.parameters}:
-        usual = known[name]
+        usual = known.get(name, np.asarray(1.0))
         known[name] = np.array([float(np.ravel(root.parameters.get(name, usual))[0]) for root, _ in starts])
     plans = {plan for root in roots for plan in root.turned}
     return _Branches(
@@ -270,6 +272,6 @@ def _open(drawing: Drawing, roots: Sequence[Root], cares: Sequence[float], cost:
         care=np.array([care for _, care in starts]),
         is_blind=np.zeros(len(starts), np.bool_),
         made=[root.made for root, _ in starts],
-        unexplained=[()] * len(starts),
+        unexplained=[root.unexplained for root, _ in starts],
         right={},
     )
