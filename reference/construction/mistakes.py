@@ -342,7 +342,10 @@ def _mistakes_of_lines(step: TwoLines, construction: Construction, figure: str) 
     joints = construction.figures["mechanism"]
     under = {joint.node: joint.other for joint in joints if isinstance(joint, Coincide)}
     for slot, line in enumerate((step.first, step.second)):
-        if not isinstance(line, Line) or not isinstance(line.along, Along | Fixed):
+        if isinstance(line.along, Fixed) and line.along.quarters % 2:
+            # A reaction along a fixed guide, not across it.
+            yield Mistake("parallel_for_perpendicular", step.node, slot)
+        if not isinstance(line, Line) or not isinstance(line.along, Along):
             continue
         own = {under.get(joint, joint) for joint in line.along.needs}
         yield Mistake("parallel_for_perpendicular", step.node, slot)
