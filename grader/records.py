@@ -516,10 +516,15 @@ class ReadVector:
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A mechanism sketch, velocity plan or acceleration plan as read."""
+    """A mechanism sketch or a plan as read.
+
+    The forces of a force polygon may be drawn in another order than the construction's: its nodes are where
+    the vectors put them in that order, and `drawn` has the ends of each vector on the sheet.
+    """
 
     nodes: Mapping[str, ReadNode]
     vectors: Mapping[str, ReadVector]
+    drawn: Mapping[str, tuple[complex, complex]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,7 @@ from grader.marking.naming import LEAST_CONFIDENCE, Lost, drawn_instead, named, 
 from grader.marking.settling import at_stake, is_of, of_another, of_nothing, settled
 from grader.marking.units import EXCHANGED, Undone, undone, with_scales_exchanged
 from grader.outcomes import CHARGED, CREDITED, Judgement, NamedMistake, Outcome, Score
-from grader.records import Figure, FloatArray, ReadNode, ReadVector, Reason
+from grader.records import FloatArray, ReadNode, ReadVector, Reason
 from grader.rubric import CriterionTable, RubricFile
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.graph import evaluate
@@ -491,7 +491,9 @@ def _confirmed(task: Task, submission: Submission, comparison: Comparison) -> Su
         replace(
             one,
             figures={
-                plan: Figure(_at_least(figure.nodes, ends), _at_least(figure.vectors, surer))
+                plan: replace(
+                    figure, nodes=_at_least(figure.nodes, ends), vectors=_at_least(figure.vectors, surer)
+                )
                 for plan, figure in one.figures.items()
             },
         )

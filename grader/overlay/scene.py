@@ -188,7 +188,7 @@ def scene_of(
     dots = tuple(
         Dot(name, on_sheet(node.at), node.confidence < LEAST_SURE, figure=kind)
         for kind, figure in reading.figures.items()
-        for name, node in figure.nodes.items()
+        for name, node in (figure.nodes.items() if not figure.drawn else ())
     )
     ghosts = tuple(ghosts_of(arrows, outcomes)) if show_expected else ()
     return Scene(page_mm, tuple(arrows), ghosts, dots)
@@ -207,10 +207,10 @@ def _arrows(
             ends = vectors.get(name)
             if ends is None or ends.tail not in figure.nodes or ends.head not in figure.nodes:
                 continue
+            places = figure.drawn.get(name) or tuple(figure.nodes[node].at for node in ends.arrow)
             outcome = outcomes.get(name)
             verdict = "not_judged" if outcome is None else outcome.verdict
-            foot, tip = (ends.head, ends.tail) if ends.reversed else (ends.tail, ends.head)
-            start, end = on_sheet(figure.nodes[foot].at), on_sheet(figure.nodes[tip].at)
+            start, end = map(on_sheet, places)
             doubtful = verdict == "review" or read.confidence < LEAST_SURE
             yield Arrow(name, kind, start, end, verdict, doubtful)
 

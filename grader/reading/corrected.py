@@ -177,7 +177,7 @@ def _with_nodes(
         ends = {vector.tail, vector.head}
         if not ends & moved.keys() or not ends <= nodes.keys():
             continue
-        tail, head = nodes[vector.tail], nodes[vector.head]
+        tail, head = (nodes[node] for node in vector.arrow)
         known = vectors.get(vector.name)
         if known is None and not _is_drawn(page.ink, tail.at, head.at):
             continue

@@ -7,9 +7,16 @@ import numpy as np
 
 from grader.reading.lines import Lines
 from grader.records import MECHANISM, FloatArray, Reason
-from reference.construction.elements import Normal, Scaled
+from reference.construction.elements import Normal, Same, Scaled
 from reference.construction.graph import Construction, bars, coincident, evaluate
-from reference.construction.mistakes import Drawing, Mistake, commit, single_mistakes
+from reference.construction.mistakes import (
+    Drawing,
+    Mistake,
+    affected,
+    commit,
+    mistakes_of_forces,
+    single_mistakes,
+)
 from reference.construction.steps import Given, Similar, Step
 from reference.construction.uncertainty import acts_of
 from reference.geometry import ComplexArray
@@ -26,6 +33,7 @@ class DraftingErrors:
     ----------
     angle_rad, shift_mm : of a line's direction, and of its foot to the side
     length_mm, relative : of a length laid off, and in addition this share of it
+    computed : that share of a length that is computed from others
     mark_mm : of a point's mark, along x and along y
     """
 
@@ -33,6 +41,7 @@ class DraftingErrors:
     shift_mm: float = 0.35
     length_mm: float = 0.7
     relative: float = 0.02
+    computed: float = 0.04
     mark_mm: float = 0.15
 
     def of(self, step: Step, kind: str, size_mm: float) -> float:
@@ -48,7 +57,8 @@ class DraftingErrors:
                 return self.shift_mm
             case "length" if isinstance(step, Given):
                 # A computed length is laid off after one more measurement than a given one.
-                share = self.relative if isinstance(step.length, Scaled) else 2.0 * self.relative
+                is_given = isinstance(step.length, Scaled | Same)
+                share = self.relative if is_given else self.computed
                 return self.length_mm + share * size_mm
             case "length":
                 return self.length_mm
@@ -186,10 +196,15 @@ def vectors_of(construction: Construction, figure: str, absent: Iterable[str] = 
     """Return the vectors of a plan, optional ones last, without those at nodes that are not drawn."""
     index = {step.node: row for row, step in enumerate(construction.figures[figure])}
     gone = set(absent)
+    own = construction.vectors_of(figure)
+    # Two opposite forces have one line.
+    ends = [(vector.tail, vector.head) for vector in own if not vector.is_sum]
+    again = {one.name for one in own if one.reversed and ends.count((one.tail, one.head)) > 1}
     return tuple(
-        Edge(vector.name, index[vector.tail], index[vector.head], vector.is_sum)
-        for vector in sorted(construction.vectors_of(figure), key=lambda vector: vector.is_sum)
-        if not {vector.tail, vector.head} & gone and vector.tail in index
+        Edge(vector.name, index[tail], index[head], vector.is_sum or vector.name in again)
+        for vector in sorted(own, key=lambda vector: vector.is_sum)
+        for tail, head in [vector.arrow]
+        if not {tail, head} & gone and vector.tail in index
     )
 
 
@@ -217,12 +232,14 @@ class PlanHypothesis:
     drawing : the construction as this student would follow it
     absent : nodes that are not drawn then, with the reason
     cost : nats, the prior cost before strokes are considered
+    order : of a force polygon's sides, if it is not the usual one
     """
 
     label: str
     drawing: Drawing
     absent: Mapping[str, Reason]
     cost: float
+    order: tuple[int, ...] = ()
 
     def is_side(self, name: str) -> bool:
         """Return whether a similar triangle's side is drawn where the vector of this name would be."""
@@ -242,7 +259,10 @@ def regular(drawing: Drawing, figure: str) -> list[PlanHypothesis]:
 
 def mistaken(base: PlanHypothesis, figure: str) -> Iterator[tuple[PlanHypothesis, Mistake]]:
     """Yield every single mistake that can be made on top of a hypothesis."""
-    for mistake in single_mistakes(base.drawing, figure):
+    construction = base.drawing.construction
+    own = frozenset(step.node for step in construction.figures[figure])
+    of_forces = (one for one in mistakes_of_forces(base.drawing) if affected(one, construction) & own)
+    for mistake in (*single_mistakes(base.drawing, figure), *of_forces):
         if mistake.code in OF_THE_WHOLE or mistake.at in base.absent:
             continue
         absent = dict(base.absent)
@@ -254,7 +274,8 @@ def mistaken(base: PlanHypothesis, figure: str) -> Iterator[tuple[PlanHypothesis
             continue
         label = " ".join([mistake.code, mistake.at, *mistake.other])
         label = label if base.label in REGULAR else f"{base.label}, {label}"
-        yield PlanHypothesis(label, changed, absent, base.cost + COST_OF_MISTAKE), mistake
+        cost = base.cost + COST_OF_MISTAKE
+        yield replace(base, label=label, drawing=changed, absent=absent, cost=cost), mistake
 
 
 def _by_similarity(construction: Construction, figure: str) -> tuple[Construction, dict[str, Reason]]:
@@ -364,16 +385,23 @@ def _proposals(expected: Expected, lines: Lines, search: Search, edges: Sequence
     """Return (m, 4) origin x, y, size, turn: each of the edges laid on each stroke."""
     proposed = [np.zeros((0, 4))]
     for edge in (expected.edges[index] for index in edges):
-        tail, head = complex(expected.at[edge.tail]), complex(expected.at[edge.head])
-        # A stroke has no sense: it may lie either way.
-        for start, end in ((lines.start, lines.end), (lines.end, lines.start)):
-            turn_all = np.angle((end - start) / (head - tail))
-            for turn in search.turns_rad:
-                rest = np.abs(np.angle(np.exp(1j * (turn_all - turn))))
-                turned = np.flatnonzero(rest < search.give_rad)
-                for size in search.sizes:
-                    proposed.extend(_laid((tail, head), (start[turned], end[turned]), size, search))
+        ends = complex(expected.at[edge.tail]), complex(expected.at[edge.head])
+        proposed.append(lay(ends, lines, search))
     return np.concatenate(proposed)
+
+
+def lay(edge: tuple[complex, complex], lines: Lines, search: Search) -> FloatArray:
+    """Return (m, 4) origin x, y, size, turn: an edge laid on each stroke."""
+    laid = [np.zeros((0, 4))]
+    # A stroke has no sense: it may lie either way.
+    for start, end in ((lines.start, lines.end), (lines.end, lines.start)):
+        turn_all = np.angle((end - start) / (edge[1] - edge[0]))
+        for turn in search.turns_rad:
+            rest = np.abs(np.angle(np.exp(1j * (turn_all - turn))))
+            turned = np.flatnonzero(rest < search.give_rad)
+            for size in search.sizes:
+                laid.extend(_laid(edge, (start[turned], end[turned]), size, search))
+    return np.concatenate(laid)
 
 
 def _laid(
@@ -411,12 +439,12 @@ def _scores(expected: Expected, lines: Lines, proposed: FloatArray, edges: Seque
         farthest = np.maximum(np.abs(tail - origin), np.abs(head - origin))
         long = lines.length > 0.3 * size.min()
         strokes = lines.start[long], lines.along[long], lines.length[long]
-        total += weight * _support(strokes, tail, head, RESIDUAL_MM + RESIDUAL_PER_MM * farthest)
+        total += weight * support(strokes, tail, head, RESIDUAL_MM + RESIDUAL_PER_MM * farthest)
         weights += weight
     return np.asarray(total / np.maximum(weights, 1e-9))
 
 
-def _support(
+def support(
     strokes: tuple[ComplexArray, ComplexArray, FloatArray],
     tail: ComplexArray,
     head: ComplexArray,

@@ -17,6 +17,7 @@ import numpy as np
 from grader.records import MECHANISM, Figure, FloatArray, IntArray, Letters, Reading, Swapped
 from reference.construction.graph import Construction
 from reference.geometry import ComplexArray
+from reference.quantities import group_of
 
 REACH_MM = 8.0
 """Writing farther from every node is no label of one."""
@@ -107,6 +108,7 @@ def lettered(
         (figure, name): node.at
         for figure, read in reading.figures.items()
         for name, node in read.nodes.items()
+        if not group_of(figure)
     }
     writing = lettering(nodes, letters, poles, renamed)
     if writing is None:

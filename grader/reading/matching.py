@@ -32,6 +32,8 @@ class EndPrior:
     beyond_share: float = 0.36
     short_mm: float = 1.5
     short_share: float = 0.07
+    marked_share: float = 0.0
+    """Share of ends on a stroke that serves two edges that a tip shows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -259,6 +261,8 @@ COST_OF_OPTIONAL = 5.0
 drawings were taken for them."""
 COST_OF_BARENESS = 1e3
 """Nats for leaving an edge without the stroke that is fixed to it: more than any evidence."""
+STRAY_TIPS_MM = 40.0
+"""Mean distance of tips along a stroke that mark no end of an edge."""
 BAND_MM = 0.3
 """Distance of a line from the middle of a band of ink, if two lines lie in it."""
 SHARED_RADIUS2_MM2 = 1.0
@@ -482,6 +486,8 @@ def _strokes_taken(states: _States, edge: int, problem: _AssignmentProblem) -> _
     alone = -0.5 * (distance + log_det)[state, place] - np.log(2 * np.pi) + np.log(size) + gains
     alone -= chance[state]
     both = _log_of_sharing(residual[:, state, place], spread[:, state, place])
+    if problem.prior.marked_share:
+        both += _log_of_marks(spans, lines, problem.prior)
     score = states.score[state] + np.where(shared, both, alone)
     score -= COST_OF_OPTIONAL if problem.edges[edge].optional else 0.0
     return _Choices(state, rows[place], shared, ended & ~shared[:, None], score).take(covers)
@@ -492,6 +498,18 @@ def _log_of_sharing(residual: FloatArray, spread: FloatArray) -> FloatArray:
     distance, log_det = mahalanobis(residual, spread + np.array([BAND_MM**2, 0.0, BAND_MM**2])[:, None])
     density = np.exp(-0.5 * (distance + log_det)) / (2 * np.pi)
     return np.asarray(np.log(np.minimum(1.0, density * SHARED_RADIUS2_MM2) + 1e-12) - COST_OF_SHARING)
+
+
+def _log_of_marks(spans: Spans, lines: Lines, prior: EndPrior) -> FloatArray:
+    """Return the log likelihood of the tips near both nodes of edges that share their strokes."""
+    forward = (lines.along * np.conj(spans.head - spans.tail)).real > 0
+    total = np.zeros(len(lines))
+    for slot, node in enumerate((spans.tail, spans.head)):
+        variance = (spans.cov[2 * slot] * _squares(lines.along)).sum(axis=1) + prior.at_mm**2
+        tips, sure = _tips_from(lines, node, forward == bool(slot), head=slot == 1)
+        marked = _tip_density(tips, sure, variance) * STRAY_TIPS_MM
+        total += np.log(1.0 - prior.marked_share + prior.marked_share * marked)
+    return total
 
 
 def _in_use(states: _States, lines: Lines) -> BoolArray:

@@ -89,7 +89,7 @@ def no_surer(reading: Reading, most: float) -> Reading:
         vectors = {
             key: replace(one, confidence=min(one.confidence, most)) for key, one in figure.vectors.items()
         }
-        figures[name] = Figure(nodes, vectors)
+        figures[name] = replace(figure, nodes=nodes, vectors=vectors)
     return replace(reading, figures=figures)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from grader.reading.by_ink import Look, held_against_ink
 from grader.reading.expected import (
     LEFT_OUT,
+    REGULAR,
     DraftingErrors,
     Expected,
     PlanHypothesis,
@@ -37,13 +38,19 @@ from grader.reading.matching import (
     assign_strokes,
 )
 from grader.reading.nodes import NodeFit, fit_nodes
-from grader.records import IntArray, Letters
+from grader.reading.orders import orders_by_ink, reordered, ring_of, to_usual
+from grader.records import FloatArray, IntArray, Letters
 from reference.construction.graph import ancestors, coincident
-from reference.construction.mistakes import Drawing, affected
+from reference.construction.mistakes import OF_FORCES, Drawing, affected
 from reference.geometry import ComplexArray
+from reference.quantities import group_of
 
 DRAFTING_ERRORS = DraftingErrors()
+FORCE_ERRORS = DraftingErrors(length_mm=0.4, relative=0.006, computed=0.03)
+"""Given forces are laid off by the ruler alone, which tells their orders apart."""
 END_PRIOR = EndPrior()
+FORCE_ENDS = EndPrior(marked_share=0.5)
+"""Forces in one line, one after the other, often make one stroke."""
 BY_LETTERS = "by letters"
 """Label of the hypotheses that follow letters and strokes instead of the construction."""
 COST_OF_GRAPH = 6.0
@@ -63,6 +70,8 @@ FAR_WORSE = 30.0
 QUARTERS = (np.pi / 2, -np.pi / 2, np.pi)
 """A plan may be turned as a whole: velocities are perpendicular to links."""
 COST_OF_TURN = 6.0
+COST_OF_ORDER = 2.0
+"""Nats for each order of forces other than the usual one."""
 COST_OF_SIZE = 4.0
 """Nats for a plan turned by quarters, and for one at a scale that was not declared."""
 SAME_SIZE = 0.06
@@ -130,10 +139,16 @@ class PlanProblem:
         """The lines that no other figure needs."""
         return self.lines.take(np.flatnonzero(~np.isin(self.lines.members, self.elsewhere).any(axis=1)))
 
+    @property
+    def prior(self) -> EndPrior:
+        """The prior for the ends of strokes."""
+        return FORCE_ENDS if group_of(self.figure) else END_PRIOR
+
     def expected(self, hypothesis: PlanHypothesis) -> Expected | None:
         """Return the plan about its own pole; None if it cannot be drawn."""
         edges = vectors_of(tied(hypothesis), self.figure, hypothesis.absent)
-        expected = expect(hypothesis.drawing, self.figure, self.given, DRAFTING_ERRORS, edges)
+        errors = FORCE_ERRORS if group_of(self.figure) else DRAFTING_ERRORS
+        expected = expect(hypothesis.drawing, self.figure, self.given, errors, edges)
         known = np.abs(expected.at).max() < FARTHEST_MM and expected.cov.max() < VAGUE_MM**2
         return expected if known else None
 
@@ -169,6 +184,16 @@ class PlanReading:
         return self.by_ink or fit_nodes(self.assignment, self.lines)
 
     @property
+    def figure(self) -> str:
+        """The plan that is read."""
+        return self.hypothesis.drawing.construction.figure_of(self.placed.names[0])
+
+    @property
+    def usual(self) -> FloatArray | None:
+        """(n, n) that gives the nodes of the usual order from a force polygon's own; None without."""
+        return to_usual(self.hypothesis.order) if self.hypothesis.order else None
+
+    @property
     def members(self) -> IntArray:
         """The numbers of the strokes that it takes."""
         stroke = self.assignment.stroke
@@ -189,16 +214,32 @@ def regular_plans(problem: PlanProblem, drawing: Drawing, count: int = 2) -> lis
     Arguments: `drawing` has the construction and the parameters of the student's variant; `count` is the
     number of poses of the expected size.
     """
-    plans = _anywhere(problem, regular(drawing, problem.figure), count)
+    plans = _anywhere(problem, _regular(problem, drawing), count)
     sizes = {round(math.log(plan.pose.size), 1): plan.pose.size for plan in plans[:3]}
     for size in sizes.values():
         if abs(math.log(size)) <= SAME_SIZE:
             continue
         # Drafting errors are millimetres on paper: expect the plan again at the size it has there.
         larger = Drawing(drawing.construction, resized(drawing, problem.figure, size))
-        bases = [replace(base, cost=base.cost + COST_OF_SIZE) for base in regular(larger, problem.figure)]
+        bases = [replace(base, cost=base.cost + COST_OF_SIZE) for base in _regular(problem, larger)]
         plans.extend(_anywhere(problem, bases, count))
     return sorted(plans, key=lambda plan: -plan.score)
+
+
+def _regular(problem: PlanProblem, drawing: Drawing) -> list[PlanHypothesis]:
+    """Return the right hypotheses, a force polygon in every order of its sides that the strokes support."""
+    hypotheses = regular(drawing, problem.figure)
+    ring = ring_of(drawing.construction, problem.figure) if group_of(problem.figure) else None
+    expected = None if ring is None else problem.expected(hypotheses[0])
+    if ring is None or expected is None:
+        return hypotheses
+    long = problem.lines.take(problem.lines.length > LEAST_LAID_MM)
+    for order in orders_by_ink(expected, ring, long):
+        if order != ring.usual:
+            construction = reordered(drawing.construction, problem.figure, ring, order)
+            drawn = Drawing(construction, drawing.parameters)
+            hypotheses.append(PlanHypothesis(REGULAR[0], drawn, {}, COST_OF_ORDER, order))
+    return hypotheses
 
 
 def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) -> PlanReading | None:
@@ -213,13 +254,14 @@ def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) 
     if plans:
         bases = {plan.hypothesis.label: plan.hypothesis for plan in reversed(plans)}
         everything.extend(_with_mistakes(problem, plans[0], bases.values()))
-    if not plans or plans[0].pose.score < EXPLAINED or _suspects(plans[0]):
+    is_lettered = not group_of(problem.figure)
+    if is_lettered and (not plans or plans[0].pose.score < EXPLAINED or _suspects(plans[0])):
         for base in regular(drawing, problem.figure):
             everything.extend(_by_letters(problem, base))
     if not everything:
         return None
     best, *rivals = _with_letters(problem, everything)
-    rivals = [*rivals[: RIVALS - 1], *_without_each_stroke(best)]
+    rivals = [*rivals[: RIVALS - 1], *_without_each_stroke(best, problem.prior)]
     drawn = [best.placed.edges[index] for index in best.placed.required]
     by_ink = problem.look and held_against_ink(best.fit, drawn, problem.look)
     return replace(best, rivals=tuple(rivals), by_ink=by_ink)
@@ -234,13 +276,13 @@ def _anywhere(problem: PlanProblem, hypotheses: Sequence[PlanHypothesis], count:
     for hypothesis in hypotheses:
         expected = problem.expected(hypothesis)
         if expected is not None:
-            cases.extend(
-                _PlanCase(hypothesis, expected, pose) for pose in _poses(expected, problem.lines, count)
-            )
-    return sorted(_read(cases, problem.lines), key=lambda plan: -plan.score)
+            is_turnable = not group_of(problem.figure)
+            found = _poses(expected, problem.lines, count, is_turnable=is_turnable)
+            cases.extend(_PlanCase(hypothesis, expected, pose) for pose in found)
+    return sorted(_read(cases, problem.lines, problem.prior), key=lambda plan: -plan.score)
 
 
-def _poses(expected: Expected, lines: Lines, count: int) -> list[Pose]:
+def _poses(expected: Expected, lines: Lines, count: int, *, is_turnable: bool) -> list[Pose]:
     """Return possible poses: upright at the expected size, upright at any size, turned by quarters.
 
     Each search has its own poses: a plan of nearly parallel vectors fits a bundle at any size.
@@ -255,7 +297,12 @@ def _poses(expected: Expected, lines: Lines, count: int) -> list[Pose]:
     turned = replace(any_size, turns_rad=QUARTERS, sizes=(1.0, 0.0))
     searches = ((Search(), count), (any_size, 2), (turned, 2))
     long = lines.take(lines.length > LEAST_LAID_MM)
-    laid = [pose for search, most in searches for pose in poses(expected, long, search, most)]
+    if is_turnable:
+        laid = [pose for search, most in searches for pose in poses(expected, long, search, most)]
+    else:
+        laid = poses(expected, long, searches[0][0], count=3)
+        if max((pose.score for pose in laid), default=0.0) < EXPLAINED:
+            laid += poses(expected, long, any_size, count=2)
     best = max((pose.score for pose in laid), default=0.0)
     return [pose for pose in laid if pose.score > best - WORSE]
 
@@ -272,13 +319,14 @@ def _with_mistakes(
     here = replace(best.pose, at=complex(best.assignment.expected.at[0]))
     cases: list[_PlanCase] = []
     for hypothesis, mistake in (pair for base in bases for pair in mistaken(base, problem.figure)):
-        if suspect is not None and mistake.at not in suspect:
+        touched = affected(mistake, hypothesis.drawing.construction)
+        made_at = touched if mistake.code in OF_FORCES else {mistake.at}
+        if suspect is not None and not made_at & suspect:
             continue
         expected = problem.expected(hypothesis)
         if expected is not None:
-            touched = affected(mistake, hypothesis.drawing.construction)
             cases.append(_PlanCase(hypothesis, expected, here, touched))
-    return _read(cases, problem.lines, best)
+    return _read(cases, problem.lines, problem.prior, best)
 
 
 def _suspects(plan: PlanReading) -> frozenset[str]:
@@ -295,7 +343,7 @@ def _suspects(plan: PlanReading) -> frozenset[str]:
     return ancestors(plan.hypothesis.drawing.construction, odd)
 
 
-def _without_each_stroke(plan: PlanReading) -> list[PlanReading]:
+def _without_each_stroke(plan: PlanReading, prior: EndPrior) -> list[PlanReading]:
     """Return for every edge the best explanation in which it does not have its stroke."""
     assignment = plan.assignment
     edges = assignment.expected.edges
@@ -312,7 +360,7 @@ def _without_each_stroke(plan: PlanReading) -> list[PlanReading]:
     if not constraints:
         return []
     doubted = [plan.placed] * len(constraints)
-    best = assign_strokes(doubted, plan.lines, END_PRIOR, BEAM_OF_DOUBTS, constraints)
+    best = assign_strokes(doubted, plan.lines, prior, BEAM_OF_DOUBTS, constraints)
     cost = assignment.score - plan.score
     return [
         replace(plan, assignment=rival, score=rival.score - cost)
@@ -346,7 +394,7 @@ def _by_letters(problem: PlanProblem, base: PlanHypothesis) -> list[PlanReading]
         edges = vectors_of(tied(hypothesis), problem.figure, absent)
         expected = Expected(names, at, cov, edges, pairs)
         cases.append(_PlanCase(hypothesis, expected, Pose(0j, 1.0, 0.0, 0.0)))
-    return _read(cases, problem.free)
+    return _read(cases, problem.free, problem.prior)
 
 
 def _named_by(letters_nats: float, hypothesis: PlanHypothesis) -> float:
@@ -364,7 +412,7 @@ def _with_letters(problem: PlanProblem, plans: Sequence[PlanReading]) -> list[Pl
         if plan.score >= least and plan.strokes not in scored:
             expected = plan.assignment.expected
             nodes = ((problem.figure, name) for name in expected.names)
-            at = dict(zip(nodes, expected.at.tolist(), strict=True))
+            at = dict(zip(nodes, expected.at.tolist(), strict=True)) if not group_of(problem.figure) else {}
             writing = lettering(at, problem.letters, poles, problem.renamed)
             nats = 0.0 if writing is None else writing.log()
             named = _named_by(nats, plan.hypothesis)
@@ -402,7 +450,9 @@ class _PlanCase:
         return self.expected.placed(self.pose, Slack(relative=0.03 if self.has_expected_size else 0.08))
 
 
-def _read(cases: Sequence[_PlanCase], lines: Lines, base: PlanReading | None = None) -> list[PlanReading]:
+def _read(
+    cases: Sequence[_PlanCase], lines: Lines, prior: EndPrior, base: PlanReading | None = None
+) -> list[PlanReading]:
     """Return the best explanations of plans at their poses: several of each if they are nearly as good.
 
     Arguments: `base` is the plan in which mistakes were made; its strokes stay if they do not affect it.
@@ -417,7 +467,7 @@ def _read(cases: Sequence[_PlanCase], lines: Lines, base: PlanReading | None = N
 
     beam = BEAM if base is None else BEAM_OF_MISTAKES
     plans: list[PlanReading] = []
-    for index, best, around in assign_groups(placed, lines, _near, END_PRIOR, beam, constrain):
+    for index, best, around in assign_groups(placed, lines, _near, prior, beam, constrain):
         case = cases[index]
         plans.extend(
             PlanReading(case.hypothesis, case.pose, placed[index], one, one.score - case.cost, around)

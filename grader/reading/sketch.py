@@ -16,6 +16,7 @@ from reference.construction.elements import FixedLine
 from reference.construction.graph import Construction, parameters_of
 from reference.construction.mistakes import Drawing, commit, single_mistakes
 from reference.construction.steps import ArcAndLine, OnGuide, Step, TwoLines
+from reference.plan import exact_plan
 
 LEAST_LINK_MM = 6.0
 """A sketch is not placed on shorter strokes: they are letters and hatching."""
@@ -81,6 +82,8 @@ class SketchReading:
 
 def drawings(assignment: Assignment, variants: list[Variant], scales: Scales | None) -> list[Drawing]:
     """Return the right drawings of the given variants, each with its own parameters of shape (1,)."""
+    if assignment.forces is not None:
+        return [exact_plan(assignment, [variant], scales).drawing for variant in variants]
     result = []
     for variant in variants:
         mechanism = assignment.mechanism([variant])

@@ -173,6 +173,11 @@ class Vector:
         return self.scale != "kv" and self.link is not None and not self.part
 
     @property
+    def arrow(self) -> tuple[str, str]:
+        """The nodes at which it begins and its arrow points."""
+        return (self.head, self.tail) if self.reversed else (self.tail, self.head)
+
+    @property
     def turn_rad(self) -> float:
         """The angle from its order of drawing to its own sense: half a turn if it is reversed."""
         return math.pi if self.reversed else 0.0

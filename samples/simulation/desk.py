@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from samples.simulation import figures, habits, page, symbols, truth, wording
+from samples.simulation import figures, forces, habits, page, symbols, truth, wording
 from samples.simulation.hand import DrawingTask, DrawnFigure, DrawnSheet
 from samples.simulation.lettering import any_handwriting
 from samples.simulation.scanner import Background
-from samples.simulation.settings import MECHANISM, VELOCITY, Box, PageStyle, Settings
+from samples.simulation.settings import FORCES, MECHANISM, VELOCITY, Box, PageStyle, Settings
 from samples.simulation.sketch import SheetSketch
 from samples.simulation.strokes import Rng
 
@@ -174,6 +174,9 @@ class Desk:
             nodes = figures.at_origin(figure, origins[figure.name])
             if figure.name == MECHANISM:
                 figures.draw_mechanism(sketch, self.task, nodes, self.settings.student)
+            elif figure.name.startswith(FORCES):
+                student = self.settings.student
+                missing[figure.name] = forces.draw_force_plan(sketch, self.task, figure.name, nodes, student)
             else:
                 student = self.settings.student
                 missing[figure.name] = figures.draw_plan(sketch, self.task, figure.name, nodes, student)

@@ -12,13 +12,19 @@ from dataclasses import dataclass, field
 from reference.construction.elements import (
     Along,
     AnyLine,
+    Balance,
     Component,
     Coriolis,
+    Couple,
     Direction,
     FixedLine,
+    Force,
+    Inertia,
     Length,
     Normal,
+    Parallel,
     Parameters,
+    Same,
     Scaled,
     Side,
     VariantSide,
@@ -142,6 +148,9 @@ class _Paper:
         if isinstance(along, Along):
             link = self.nodes[along.head] - self.nodes[along.tail]
             return self.tools.carried(link * self._side(along.side), along.quarters)
+        if isinstance(along, Parallel):
+            vector = self.nodes[along.head] - self.nodes[along.tail]
+            return self.tools.carried(vector, along.quarters) if vector else 1.0 + 0j
         return self.tools.protracted(self.known[along.angle]) * self._turned() * 1j**along.quarters
 
     def _line(self, line: AnyLine) -> tuple[complex, complex]:
@@ -212,6 +221,41 @@ class _Paper:
                 return self.tools.length(shadow.real)
             case Coriolis():
                 return self._coriolis(length)
+            case Same(sense=sense, tail=tail, head=head):
+                return self._measured(tail, head) * known.get(sense, 1.0)
+            case Inertia(mass=mass, tail=tail, head=head):
+                return known[mass] * self._measured(tail, head) * known["ka"] / known["kF"]
+            case Balance():
+                return self._balancing(length)
+
+    def _balancing(self, balance: Balance) -> float:
+        """A force by its arm: moments of forces, arms by the ruler on the sketch, and couples."""
+        given, per_mm2 = balance.moments, self.known["kL"] * self.known["kF"]
+        about = self.nodes[given.about]
+        moments = [self._moment(force, about) for force in given.forces]
+        moments += [self._couple(couple) / per_mm2 for couple in given.couples]
+        lever = self._arm(self.nodes[balance.point] - about, self._direction(balance.along))
+        return -sum(moments) / lever
+
+    def _moment(self, force: Force, about: complex) -> float:
+        """The moment of a force, mm of the sketch times mm of the force."""
+        arm, along = self.nodes[force.point] - about, self._direction(force.along)
+        size, lever = self._computed(force.size), self._arm(arm, along)
+        whole = self.tools.length(abs(arm)) if force.whole_arm else abs(lever)
+        return size * math.copysign(whole, lever)
+
+    def _arm(self, arm: complex, along: complex) -> float:
+        """The measured distance of a line of action, positive where the force turns counter-clockwise."""
+        return self.tools.length((arm.conjugate() * along).imag)
+
+    def _couple(self, couple: Couple) -> float:
+        """A couple, N m: a datum, or -I epsilon with epsilon by the measured tangential acceleration."""
+        if not couple.inertia:
+            return self.known[couple.name]
+        (tail, head), (first, second) = couple.vector, couple.link
+        arm, pull = self.nodes[second] - self.nodes[first], self.nodes[head] - self.nodes[tail]
+        across = self._arm(arm / abs(arm), pull) * self.known["ka"]
+        return -self.known[couple.inertia] * across / (self._measured(first, second) * self.known["kL"])
 
     def _coriolis(self, length: Coriolis) -> float:
         """2 omega v_r: its magnitude by the ruler, its sign by the senses of rotation and sliding."""

@@ -30,11 +30,12 @@ from samples.simulation.strokes import Dash, arc
 
 def links_of(task: DrawingTask) -> Iterator[tuple[str, str, str]]:
     """Strokes of the sketch: name, tail and head joint."""
+    only_marked = centres(task)
     driver = task.mechanism.driver
     if isinstance(driver, Crank):
         yield f"{driver.pivot}{driver.pin}", driver.pivot, driver.pin
     for group in task.mechanism.groups:
-        for tail, head in _bars(task, group):
+        for tail, head in _bars(task, group) if group.node not in only_marked else ():
             yield f"{tail}{head}", tail, head
 
 
@@ -74,6 +75,11 @@ def coincident(task: DrawingTask) -> set[str]:
     slotted = {g.node for g in task.mechanism.groups if isinstance(g, SlottedLink)}
     slotted |= {g.node for g in task.mechanism.groups if isinstance(g, Yoke) and moving_guides(g)}
     return slotted | {guide.coincident for g in task.mechanism.groups for guide in moving_guides(g)}
+
+
+def centres(task: DrawingTask) -> set[str]:
+    """Centres of mass that are no joints: they are marked only."""
+    return {body.centre for body in task.mechanism.bodies if body.centre == f"S{body.link}"}
 
 
 def blocks_of(task: DrawingTask, group: Group) -> Iterator[tuple[str, str, str]]:
@@ -118,7 +124,8 @@ def draw_mechanism(sketch: SheetSketch, task: DrawingTask, nodes: Nodes, student
     for name, tail, head in links_of(task):
         _link(sketch, name, nodes[tail], nodes[head])
     for group in task.mechanism.groups:
-        if isinstance(group, Plate) and group.line_ratio is None and sketch.style.plate_hatched:
+        is_plate = isinstance(group, Plate) and group.node not in centres(task)
+        if isinstance(group, Plate) and is_plate and group.line_ratio is None and sketch.style.plate_hatched:
             p, q = group.base
             corners = (nodes[p], nodes[q], nodes[group.node])
             symbols.inside_hatching(sketch, corners, sketch.rng.uniform(2.5, 5.0))
@@ -129,6 +136,8 @@ def draw_mechanism(sketch: SheetSketch, task: DrawingTask, nodes: Nodes, student
     for joint in named:
         if task.mechanism.is_ground(joint):
             symbols.support(sketch, nodes[joint], turn)
+        elif joint in centres(task):
+            symbols.dot(sketch, nodes[joint], sketch.rng.uniform(0.4, 0.6))
         else:
             symbols.circle(sketch, nodes[joint], symbols.JOINT_RADIUS_MM, sketch.pen("line"))
     _crank_extras(sketch, task, nodes)
@@ -213,7 +222,7 @@ def _vectors_at_pin(sketch: SheetSketch, task: DrawingTask, nodes: Nodes) -> Non
             symbols.arrowhead(sketch, sketch.pen("line", plan=True), p, q, sketch.style.arrow_mm)
             sketch.lines[MECHANISM, name] = (p, q)
             height = 0.85 * sketch.page.letter_mm
-            sketch.letter(q, _vector_text(sketch, name), height, names=name, distance_mm=1.5)
+            sketch.letter(q, vector_text(sketch, name), height, names=name, distance_mm=1.5)
 
 
 POLE_MM, NEAR_POLE_MM = 1.2, 150.0
@@ -281,7 +290,7 @@ def draw_plan(
 ) -> dict[str, str]:
     """Draw a plan: construction lines, vectors, letters. Return the vectors not drawn, with reasons."""
     missing = {name: "mistake" for name in task.missing if name in _names(task, figure)}
-    _construction_lines(sketch, task, figure, nodes)
+    draw_construction_lines(sketch, task, figure, nodes)
     _unnamed_sides(sketch, task, figure, nodes)
     for vector in task.wrong.construction.polygon_of(figure):
         reason = _left_out(sketch, task, vector, nodes, student)
@@ -339,12 +348,12 @@ def _vector(
         slip = complex(*sketch.rng.normal(0.0, 1.2, 2))
         sketch.line(sketch.pen("ghost"), p, q + slip)
     if abs(q - p) > 9.0 and sketch.chance(sketch.page.vector_labels):
-        text = _vector_text(sketch, vector.name)
+        text = vector_text(sketch, vector.name)
         middle = p + (q - p) * sketch.rng.uniform(0.35, 0.65)
         sketch.letter(middle, text, 0.75 * sketch.page.letter_mm, names=vector.name, distance_mm=0.9)
 
 
-def _construction_lines(sketch: SheetSketch, task: DrawingTask, figure: str, nodes: Nodes) -> None:
+def draw_construction_lines(sketch: SheetSketch, task: DrawingTask, figure: str, nodes: Nodes) -> None:
     """Draw thin lines that run past the points they gave."""
     for step in task.wrong.construction.figures[figure]:
         if not isinstance(step, TwoLines):
@@ -427,7 +436,8 @@ def pole_text(task: DrawingTask, figure: str) -> str:
     return task.assignment.file.names.get(pole, pole)
 
 
-def _vector_text(sketch: SheetSketch, name: str) -> str:
+def vector_text(sketch: SheetSketch, name: str) -> str:
+    """The name of a vector as written beside it."""
     kind, about, *part = name.split("_")
     bar = "\u0304" if sketch.page.bar_over_vectors else ""
     return f"{kind}{bar}_{{{about}}}" + (f"^{part[0]}" if part else "")

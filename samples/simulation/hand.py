@@ -3,8 +3,9 @@
 Later steps start from what is on the paper, so that errors and mistakes are followed through.
 """
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +13,10 @@ from reference.authored.assignment import Assignment, Scales, Variant
 from reference.construction.derive import construction_of
 from reference.construction.graph import evaluate, parameters_of
 from reference.mechanism import Mechanism
+from reference.plan import exact_plan
+from reference.quantities import scale_of
 from samples.simulation.drawing import drawn_nodes
+from samples.simulation.force_orders import in_other_orders
 from samples.simulation.mistakes import (
     CODES,
     Intent,
@@ -22,7 +26,7 @@ from samples.simulation.mistakes import (
     scalars,
     with_mistake,
 )
-from samples.simulation.settings import ACCELERATION, MECHANISM, PLANS, VELOCITY, HandStyle, Student
+from samples.simulation.settings import ACCELERATION, FORCES, MECHANISM, PLANS, VELOCITY, HandStyle, Student
 from samples.simulation.strokes import Rng
 
 Nodes = Mapping[str, complex]
@@ -51,7 +55,7 @@ class DrawingTask:
     @property
     def used(self) -> dict[str, float]:
         """The scales used in the drawing."""
-        return {name: float(self.wrong.parameters[name]) for name in ("kL", "kv", "ka")}
+        return {name: float(self.wrong.parameters[name]) for name in drawn_at(self.wrong)}
 
     @property
     def missing(self) -> frozenset[str]:
@@ -95,6 +99,9 @@ def task_of(assignment: Assignment, variant: Variant, student: Student, rng: Rng
     Raises ValueError for a code that this drawing does not admit.
     """
     right = _right_drawing(assignment, variant, student)
+    if student.force_order != "usual":
+        in_order = in_other_orders(right.construction, student.force_order, rng)
+        right = Intent(in_order, right.parameters)
     occasion = Occasion(assignment, variant, right)
     wrong, made = right, []
     for code in student.mistakes:
@@ -105,10 +112,15 @@ def task_of(assignment: Assignment, variant: Variant, student: Student, rng: Rng
         wrong = with_mistake(wrong, made[-1])
     # Who computes a wrong speed of the crank declares the scales that follow from it.
     declaring = wrong if "rpm_not_converted" in student.mistakes else right
-    declared = {name: float(declaring.parameters[name]) for name in ("kL", "kv", "ka")}
+    declared = {name: float(declaring.parameters[name]) for name in drawn_at(right)}
     return DrawingTask(
         assignment, variant, assignment.mechanism([variant]), right, wrong, tuple(made), declared
     )
+
+
+def drawn_at(intent: Intent) -> list[str]:
+    """The scales of a drawing's figures, each once, in their order."""
+    return list(dict.fromkeys(scale_of(figure) for figure in intent.construction.figures))
 
 
 def _right_drawing(assignment: Assignment, variant: Variant, student: Student) -> Intent:
@@ -116,6 +128,8 @@ def _right_drawing(assignment: Assignment, variant: Variant, student: Student) -
     if student.shrunk != 1.0:
         scales = assignment.scales([variant], kL=scales.kL / student.shrunk)
     scales = Scales(scales.kL, scales.kv * student.kv_ratio, scales.ka * student.ka_ratio)
+    if assignment.forces is not None:
+        return _right_forces(assignment, variant, student, scales)
     by_similarity = student.similarity
     if by_similarity is None:
         by_similarity = assignment.file.plate_images == "similarity"
@@ -123,6 +137,20 @@ def _right_drawing(assignment: Assignment, variant: Variant, student: Student) -
     construction = construction_of(mechanism, plate_by_similarity=by_similarity)
     parameters = scalars(parameters_of(mechanism, scales.kL, scales.kv, scales.ka))
     return Intent(construction, {**parameters, "turn": np.asarray(np.radians(student.turn_deg))})
+
+
+ROUND_SCALES = (1.0, 1.25, 2.0, 2.5, 4.0, 5.0, 8.0)
+
+
+def _right_forces(assignment: Assignment, variant: Variant, student: Student, scales: Scales) -> Intent:
+    """The drawing with force plans, at a round scale: the largest force is about as long as wished."""
+    plan = exact_plan(assignment, [variant], replace(scales, kF=np.ones(1)))
+    forces = [name for name, vector in plan.construction.vectors.items() if vector.scale == "kF"]
+    wished = max(abs(complex(plan.vectors_si[name][0])) for name in forces) / student.largest_force_mm
+    decade = 10.0 ** math.floor(math.log10(wished))
+    scale = decade * min(ROUND_SCALES, key=lambda one: abs(one - wished / decade))
+    known = scalars({**plan.drawing.parameters, "kF": np.asarray([scale])})
+    return Intent(plan.construction, {**known, "turn": np.asarray(np.radians(student.turn_deg))})
 
 
 def possible_mistakes(
@@ -153,6 +181,16 @@ def draw(task: DrawingTask, hand: HandStyle, student: Student, rng: Rng) -> tupl
         )
 
     first = drawn_nodes(construction, parameters, hand, rng)
+    forces = [name for name in construction.figures if name.startswith(FORCES)]
+    if forces and VELOCITY not in construction.figures:
+        return (DrawnSheet("forces", figures((MECHANISM, *forces), first)),)
+    if forces:
+        plans = {step.node: first[step.node] for name in PLANS for step in construction.figures[name]}
+        again = drawn_nodes(construction, parameters, hand, rng, plans)
+        return (
+            DrawnSheet("all", figures((MECHANISM, *PLANS), first)),
+            DrawnSheet("forces", figures((MECHANISM, *forces), again)),
+        )
     if student.sheets == 1:
         return (DrawnSheet("all", figures((MECHANISM, *PLANS), first)),)
     velocities = {step.node: first[step.node] for step in construction.figures[VELOCITY]}

@@ -7,7 +7,7 @@ code of the published formats, so that a report can be compared with it.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
@@ -17,11 +17,14 @@ from reference.authored.assignment import Assignment, Variant
 from reference.construction.elements import (
     Along,
     AnyLine,
+    Balance,
     Coriolis,
     Direction,
+    Inertia,
     Line,
     Normal,
     Parameters,
+    Same,
     Scaled,
 )
 from reference.construction.graph import Construction, evaluate, parameters_of
@@ -89,15 +92,27 @@ class Occasion:
     def steps(self, *figures: str) -> Iterator[Step]:
         """The steps of some figures."""
         for figure in figures:
-            yield from self.construction.figures[figure]
+            yield from self.construction.figures.get(figure, ())
 
 
 def possible(code: str, occasion: Occasion) -> list[StudentMistake]:
     """Every mistake of a kind that the drawing admits, and with which it stays on the paper."""
-    found = list(_PLACES[code](occasion))
+    found = list({**_PLACES, **_OF_FORCES}[code](occasion))
     if code in {"other_variant", "vector_missing", "labels_swapped", "rpm_not_converted"}:
         return found
+    if code in _OF_FORCES:
+        found = [one for one in found if _is_seen(with_mistake(occasion.right, one), occasion.right)]
     return [one for one in found if fits_paper(with_mistake(occasion.right, one), occasion.right)]
+
+
+SEEN_MM = 2.0
+"""A mistake in forces that moves no node by more is none: a couple that is zero, an arm across the link."""
+
+
+def _is_seen(drawing: Intent, right: Intent) -> bool:
+    nodes = evaluate(drawing.construction, drawing.parameters)
+    proper = evaluate(right.construction, right.parameters)
+    return any(abs(complex(nodes[name]) - complex(proper[name])) > SEEN_MM for name in proper)
 
 
 def fits_paper(drawing: Intent, right: Intent) -> bool:
@@ -263,6 +278,87 @@ def _data_of_another(occasion: Occasion) -> Iterator[StudentMistake]:
             )
 
 
+# In force plans
+
+
+def _forces_laid_off(occasion: Occasion) -> Iterator[tuple[str, str]]:
+    """The forces whose size is a datum or taken over, with the datum that a mistake changes."""
+    known: set[str] = set()
+    for vector in occasion.construction.vectors.values():
+        step = occasion.construction.step(vector.head)
+        if vector.scale != "kF" or not isinstance(step, Given) or step.node in known:
+            continue
+        known.add(step.node)
+        match step.length:
+            case Scaled(quantity=datum) | Inertia(mass=datum) | Same(sense=datum):
+                yield vector.name, datum
+
+
+def _couples_on_links(occasion: Occasion) -> Iterator[str]:
+    for step in occasion.construction.steps:
+        if isinstance(step, Given) and isinstance(step.length, Balance):
+            yield from (one.inertia or one.name for one in step.length.moments.couples)
+
+
+def _changed_data(
+    code: str, occasion: Occasion, at: str, factor: float, names: Collection[str]
+) -> StudentMistake:
+    known = occasion.right.parameters
+    changed = {name: np.asarray(factor * known.get(name, 1.0)) for name in names}
+    return StudentMistake(code, at, factor=factor, parameters=changed)
+
+
+def _along_the_acceleration(occasion: Occasion) -> Iterator[StudentMistake]:
+    """All inertia forces along the acceleration, as people have it who do not know d'Alembert, or one."""
+    data = {name: datum for name, datum in _forces_laid_off(occasion) if name.startswith("F_i")}
+    yield _changed_data("inertia_reversed", occasion, "F_i", -1.0, {*data.values()})
+    for name, datum in data.items():
+        yield _changed_data("inertia_reversed", occasion, name, -1.0, {datum})
+
+
+def _force_forgotten(occasion: Occasion) -> Iterator[StudentMistake]:
+    for name, datum in _forces_laid_off(occasion):
+        if not name.startswith("R_"):
+            yield _changed_data("force_missing", occasion, name, 0.0, {datum})
+
+
+def _force_the_wrong_way(occasion: Occasion) -> Iterator[StudentMistake]:
+    """A load or a reaction taken over from another group, in the sense that it had there."""
+    for name, datum in _forces_laid_off(occasion):
+        if not name.startswith(("F_i", "G_")):
+            yield _changed_data("force_reversed", occasion, name, -1.0, {datum})
+
+
+def _couple_forgotten(occasion: Occasion) -> Iterator[StudentMistake]:
+    for name in dict.fromkeys(_couples_on_links(occasion)):
+        yield _changed_data("couple_missing", occasion, name, 0.0, {name})
+
+
+def _couple_the_wrong_way(occasion: Occasion) -> Iterator[StudentMistake]:
+    for name in dict.fromkeys(_couples_on_links(occasion)):
+        yield _changed_data("couple_reversed", occasion, name, -1.0, {name})
+
+
+def _arm_to_the_point(occasion: Occasion) -> Iterator[StudentMistake]:
+    """The distance of a force's point for its arm."""
+    for step in occasion.construction.steps:
+        if isinstance(step, Given) and isinstance(step.length, Balance):
+            moments = step.length.moments
+            for slot, force in enumerate(moments.forces):
+                if force.point != moments.about:
+                    yield StudentMistake("wrong_arm", step.node, slot)
+
+
+_OF_FORCES: Mapping[str, Callable[[Occasion], Iterator[StudentMistake]]] = {
+    "inertia_reversed": _along_the_acceleration,
+    "force_missing": _force_forgotten,
+    "force_reversed": _force_the_wrong_way,
+    "couple_missing": _couple_forgotten,
+    "couple_reversed": _couple_the_wrong_way,
+    "wrong_arm": _arm_to_the_point,
+}
+CODES_OF_FORCES = tuple(_OF_FORCES)
+"""The codes of mistakes in force plans."""
 _PLACES: Mapping[str, Callable[[Occasion], Iterator[StudentMistake]]] = {
     "parallel_for_perpendicular": _along_for_across,
     "wrong_link": _across_another_link,
@@ -312,6 +408,8 @@ def with_mistake(intent: Intent, mistake: StudentMistake) -> Intent:
             return Intent(construction, {**known, mistake.at: np.asarray(known[mistake.at] * mistake.factor)})
         case "rpm_not_converted":
             return Intent(construction, _at_another_speed(construction, known, mistake.factor))
+        case code if code in _OF_FORCES and mistake.parameters:
+            return Intent(construction, {**known, **mistake.parameters})
         case "figure_rotated":
             return Intent(_turned(construction, mistake.at, mistake.quarters), known)
         case _:
@@ -343,6 +441,10 @@ def _done_wrongly(construction: Construction, mistake: StudentMistake) -> Step:
             return replace(step, length=replace(length, tail=construction.poles[VELOCITY]))
         case "arithmetic", Given():
             return replace(step, factor=mistake.factor * step.factor)
+        case "wrong_arm", Given(length=Balance(moments=moments) as length):
+            forces = list(moments.forces)
+            forces[mistake.slot] = replace(forces[mistake.slot], whole_arm=True)
+            return replace(step, length=replace(length, moments=replace(moments, forces=tuple(forces))))
         case "image_mirrored", _ if mistake.at in construction.images:
             image = construction.images[mistake.at]
             return Similar(image.node, image.base, image.model, mirrored=not image.mirrored)

@@ -12,7 +12,8 @@ Habit = Literal[
 """An extra that a person leaves on a sheet beside the drawing (`samples.simulation.habits`)."""
 MECHANISM, VELOCITY, ACCELERATION = "mechanism", "velocity_plan", "acceleration_plan"
 PLANS = (VELOCITY, ACCELERATION)
-"""The figures of a drawing, by the names of the published formats."""
+FORCES = "force_plan_"
+"""The figures of a drawing, by the names of the published formats; `FORCES` starts those of polygons."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +65,11 @@ class Student:
     abandoned : a figure begun and crossed out; with `abandoned_whole` drawn to its end before
     helpers : thin lines of no meaning: directions carried over from the sketch, rulers set wrongly
     habits : other extras on a plain sheet; ``overlapping`` figures lie on each other
+    force_order : in which forces are laid off (`samples.simulation.forces.HABITS`)
+    whole_reactions : how the sums of two parts of a reaction are drawn
+    force_names : share of forces with their names beside them
+    arrows_in_middle : arrowheads of forces in the middle, not at the end
+    largest_force_mm : about how long the largest force is drawn, where the student chooses kF
     """
 
     crank_mm: float | None = None
@@ -82,6 +88,11 @@ class Student:
     abandoned_whole: bool = False
     helpers: int = 0
     habits: tuple[Habit, ...] = ()
+    force_order: str = "usual"
+    whole_reactions: Literal["none", "dashed", "full"] = "dashed"
+    force_names: float = 0.9
+    arrows_in_middle: bool = False
+    largest_force_mm: float = 100.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -176,6 +176,10 @@ def _with_crank(assignment: Assignment, variant: Variant, settings: Settings, sh
     """The settings with a share of the crank's proposed length, to fit the paper."""
     if share == 1.0:
         return settings
+    if assignment.forces is not None:
+        student = settings.student
+        force_mm, crank_mm = share * student.largest_force_mm, student.crank_mm and share * student.crank_mm
+        return replace(settings, student=replace(student, largest_force_mm=force_mm, crank_mm=crank_mm))
     driver = assignment.mechanism([variant]).driver
     if not isinstance(driver, Crank):
         return replace(settings, student=replace(settings.student, shrunk=share))

@@ -96,15 +96,17 @@ def _figure(
     if figure.name == MECHANISM:
         extras = {name: line for name, line in lines.items() if name[1] == "_"}
         return {**truth, "links": {n: line for n, line in lines.items() if n not in extras}, "extras": extras}
-    vectors = {}
-    for vector in task.right.construction.vectors_of(figure.name):
+    vectors, ends = {}, {}
+    for vector in task.wrong.construction.vectors_of(figure.name):
+        ends[vector.name] = [vector.tail, vector.head]
         if vector.name in missing or (vector.is_sum and vector.name not in lines):
             continue
-        drawn = nodes[vector.head] - nodes[vector.tail]
-        meant = figure.intended[vector.head] - figure.intended[vector.tail]
+        tail, head = (vector.head, vector.tail) if vector.reversed else (vector.tail, vector.head)
+        drawn = nodes[head] - nodes[tail]
+        meant = figure.intended[head] - figure.intended[tail]
         vectors[vector.name] = {
-            "tail": vector.tail,
-            "head": vector.head,
+            "tail": tail,
+            "head": head,
             "length_mm": round(abs(drawn), 4),
             "direction_deg": direction(drawn),
             "line_mm": lines.get(vector.name),
@@ -112,7 +114,8 @@ def _figure(
         }
     sides = {name: line for name, line in lines.items() if name.startswith("side ")}
     thin = [[xy(p), xy(q)] for p, q in sketch.construction.get(figure.name, [])]
-    return {**truth, "vectors": vectors, "missing": dict(missing), "sides": sides, "construction": thin}
+    told = {"vectors": vectors, "missing": dict(missing), "ends": ends, "sides": sides, "construction": thin}
+    return {**truth, **told}
 
 
 def scan_truth(view: PaperView, frame: Frame | None, settings: Settings) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from reference.mechanism import Crank
 from samples.simulation.hand import DrawingTask
-from samples.simulation.settings import ACCELERATION, MECHANISM, VELOCITY, PageStyle
+from samples.simulation.settings import ACCELERATION, FORCES, MECHANISM, VELOCITY, PageStyle
 from samples.simulation.strokes import Rng
 
 CAPTIONS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
@@ -14,16 +14,19 @@ CAPTIONS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         MECHANISM: ("Schema cinematică", "Schema mecanismului", "Mecanismul"),
         VELOCITY: ("Planul vitezelor", "Poligonul vitezelor", "Viteze"),
         ACCELERATION: ("Planul accelerațiilor", "Poligonul accelerațiilor", "Accelerații"),
+        FORCES: ("Planul forțelor", "Poligonul forțelor", "Forțe"),
     },
     "ru": {
         MECHANISM: ("Схема механизма", "План положения", "Механизм"),
         VELOCITY: ("План скоростей", "Скорости"),
         ACCELERATION: ("План ускорений", "Ускорения"),
+        FORCES: ("План сил", "Силы"),
     },
     "en": {
         MECHANISM: ("Mechanism", "Space diagram", "Position diagram"),
         VELOCITY: ("Velocity plan", "Velocity diagram"),
         ACCELERATION: ("Acceleration plan", "Acceleration diagram"),
+        FORCES: ("Force plan", "Force polygon", "Forces"),
     },
 }
 WORDS: Mapping[str, Mapping[str, str]] = {
@@ -31,14 +34,15 @@ WORDS: Mapping[str, Mapping[str, str]] = {
     "ru": {"name": "Студент", "group": "Группа", "sheet": "Лист", "number": "Вариант", "date": "Дата"},
     "en": {"name": "Name", "group": "Group", "sheet": "Sheet", "number": "No.", "date": "Date"},
 }
-UNITS: Mapping[str, tuple[str, str, str]] = {
-    "ro": ("m/mm", "(m/s)/mm", "(m/s^2)/mm"),
-    "ru": ("м/мм", "(м/с)/мм", "(м/с^2)/мм"),
-    "en": ("m/mm", "(m/s)/mm", "(m/s^2)/mm"),
+SCALES = ("kL", "kv", "ka", "kF")
+UNITS: Mapping[str, tuple[str, ...]] = {
+    "ro": ("m/mm", "(m/s)/mm", "(m/s^2)/mm", "N/mm"),
+    "ru": ("м/мм", "(м/с)/мм", "(м/с^2)/мм", "Н/мм"),
+    "en": ("m/mm", "(m/s)/mm", "(m/s^2)/mm", "N/mm"),
 }
-SCALE_UNITS: Mapping[str, str] = dict(zip(("kL", "kv", "ka"), UNITS["en"], strict=True))
+SCALE_UNITS: Mapping[str, str] = dict(zip(SCALES, UNITS["en"], strict=True))
 """As they are entered in rosters and tables of measurements."""
-_SCALE_OF = {MECHANISM: "kL", VELOCITY: "kv", ACCELERATION: "ka"}
+_SCALE_OF = {MECHANISM: "kL", VELOCITY: "kv", ACCELERATION: "ka", FORCES: "kF"}
 
 
 def number(value: float, page: PageStyle, digits: int = 4) -> str:
@@ -59,7 +63,7 @@ def scale_text(name: str, value: float, task: DrawingTask, page: PageStyle, rng:
     ratio = 1.0 / (value * 1000.0)
     if name == "kL" and rng.random() < 0.3 and abs(1 / ratio - round(1 / ratio)) < 1e-6:
         return f"{symbol} = 1:{round(1 / ratio)}"
-    unit = UNITS[page.language][("kL", "kv", "ka").index(name)]
+    unit = UNITS[page.language][SCALES.index(name)]
     if rng.random() < 0.3:
         unit = unit.replace(")/", "·").replace("(", "")
     return f"{symbol} = {number(value, page)} {unit}"
@@ -67,10 +71,11 @@ def scale_text(name: str, value: float, task: DrawingTask, page: PageStyle, rng:
 
 def caption(figure: str, task: DrawingTask, page: PageStyle, rng: Rng, written: dict[str, str]) -> list[str]:
     """The lines written above a figure; adds the scales in them to `written`."""
-    choices = CAPTIONS[page.language][figure]
+    sort = FORCES if figure.startswith(FORCES) else figure
+    choices = CAPTIONS[page.language][sort]
     lines = [choices[rng.integers(len(choices))]] if page.captions else []
     if page.scales_written in {"captions", "both"}:
-        name = _SCALE_OF[figure]
+        name = _SCALE_OF[sort]
         text = scale_text(name, task.declared[name], task, page, rng)
         written[name] = plain(text)
         lines.append(text)
@@ -85,10 +90,10 @@ def title_rows(task: DrawingTask, page: PageStyle, rng: Rng, written: dict[str, 
     name = title.in_language(page.language)
     rows = [[name], [f"{words['number']} {who}"]]
     if page.scales_written in {"title", "both"}:
-        scales = {n: scale_text(n, task.declared[n], task, page, rng) for n in ("kL", "kv", "ka")}
+        scales = {n: scale_text(n, task.declared[n], task, page, rng) for n in task.declared}
         written.update({n: plain(text) for n, text in scales.items()})
         rows.append(list(scales.values())[:2])
-        rows.append([scales["ka"]])
+        rows.append(list(scales.values())[2:] or [""])
     else:
         rows.append([f"{words['group']} {rng.choice(['ME-213', 'TM-31', 'M2-04', '402'])}"])
     if rng.random() < 0.5:

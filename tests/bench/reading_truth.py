@@ -23,6 +23,7 @@ import numpy as np
 from grader.records import ACCELERATION_PLAN, VELOCITY_PLAN, Figure, FloatArray, ReadVector, Sheet
 from reference.construction.graph import Construction
 from reference.geometry import ComplexArray
+from reference.quantities import group_of
 
 _PAPER_WIDTH_MM = 420.0
 _FAR_MM = (60 - 60j, 360 - 60j, 60 - 240j)
@@ -188,7 +189,9 @@ def figures_of(truth: Mapping[str, Any], construction: Construction) -> dict[str
     acceleration plan's nodes have no primes); `construction` names the ends of vectors not drawn.
     """
     return {
-        name: _figure(name, drawn, construction) for name, drawn in truth["figures"].items() if name in PLANS
+        name: _figure(name, drawn, construction)
+        for name, drawn in truth["figures"].items()
+        if name in PLANS or group_of(name)
     }
 
 
@@ -200,10 +203,13 @@ def _figure(name: str, drawn: Mapping[str, Any], construction: Construction) -> 
     strokes = [_segment(line) for line in lines]
     vectors = {}
     for vector in construction.vectors_of(name):
-        ends = None
-        if vector.tail in nodes and vector.head in nodes:
-            ends = nodes[vector.tail], nodes[vector.head]
-        told = drawn["vectors"].get(vector.name)
+        ends, told = None, drawn["vectors"].get(vector.name)
+        # The sides of a force polygon may be drawn in another order.
+        drawn_ends = drawn.get("ends", {}).get(vector.name, ("", "")) if group_of(name) else None
+        tail, head = drawn_ends or (vector.tail, vector.head)
+        tail, head = (head, tail) if vector.reversed and group_of(name) else (tail, head)
+        if tail in nodes and head in nodes:
+            ends = nodes[tail], nodes[head]
         if told is None:
             missing = drawn.get("missing", {}).get(vector.name, "not part of this drawing")
             stands = ends is not None and _stands_in(ends, strokes)
