@@ -165,8 +165,10 @@ def loaded(case, folder, *, own):
     cylinder = getattr(mechanism.driver, "cylinder", None)
     plans = [node for node, links in named_links(mechanism).items() if links and cylinder not in links]
     plans.append(mechanism.driver.pin)
-    figures = ["mechanism", *(["acceleration_plan"] if own else []), *(f"force_plan_{one}" for one in plans)]
+    figures = ["mechanism", *(f"force_plan_{one}" for one in plans)]
     text = text.replace('"mechanism", "velocity_plan", "acceleration_plan"', str(figures)[1:-1])
+    if own:
+        text += '\n[[page]]\nkind = "acceleration"\nfigures = ["mechanism", "acceleration_plan"]\n'
     text = text.replace("[scales]", "gravity = 9.81\n[scales]")
     loaded_links = {
         link: points for link, points in points_of(mechanism).items() if cylinder is None or link == "1"

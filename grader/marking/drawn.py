@@ -158,7 +158,9 @@ def _lengths_observed(task: Task, evidence: Evidence, parameters: Parameters) ->
         drawn = evidence.vector(name)
         if drawn is None or drawn.confidence < task.rubric.least_confidence:
             continue
-        if vector.head in nodes and (vector.tail in nodes or drawn.direction_rad is None):
+        # A plan's node that was read is known; the order of forces, and so where one starts, may not be.
+        starts_anywhere = vector.scale == "kF" and vector.tail not in nodes
+        if vector.head in nodes and (not starts_anywhere or drawn.direction_rad is None):
             continue
         value, read_mm = drawn.as_complex, math.hypot(LEAST_ERROR_MM, drawn.se_mm, task.rubric.hand.ruler_mm)
         if value is not None:
