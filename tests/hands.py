@@ -32,7 +32,7 @@ def task_for(name: str, n: int | None = None, position: int | None = None) -> Ta
 
 def rule_scales(task: Task) -> dict[str, float]:
     """The assignment's own scales."""
-    return {name: float(task.parameters[name]) for name in ("kL", "kv", "ka")}
+    return dict(task.rule_scales)
 
 
 def measured(
@@ -68,7 +68,7 @@ def drawn_nodes(
 ) -> dict[str, complex]:
     """All nodes as a perfect hand draws and names them; images of plates' points by lines or similarity."""
     used = scales or rule_scales(task)
-    parameters = {**task.parameters, **{name: np.asarray(used[name]) for name in ("kL", "kv", "ka")}}
+    parameters = {**task.parameters, **{name: np.asarray(one) for name, one in used.items()}}
     drawing = Drawing(task.by_similarity if by_similarity else task.construction, parameters)
     for mistake in mistakes:
         drawing = commit(mistake, drawing)
@@ -110,26 +110,30 @@ def sheet(
     turn_deg: float = 0.0,
     se_mm: float = 0.02,
     confidence: float = 0.99,
-    figures: tuple[str, ...] = ("mechanism", "velocity_plan", "acceleration_plan"),
+    figures: tuple[str, ...] | None = None,
 ) -> Reading:
     """A sheet as read: every node exactly where it was drawn, the whole turned on the paper.
 
-    Arguments: `moved` shifts single nodes, millimetres, after everything is drawn.
+    Arguments: `moved` shifts single nodes, millimetres, after everything is drawn; `figures` are on it, all
+    of them by default.
     """
     nodes = drawn_nodes(task, scales, mistakes)
     shift = {name: nodes[name] + (moved or {}).get(name, 0j) for name in nodes}
     turn = cmath.rect(1.0, math.radians(turn_deg))
     places = {"mechanism": 100 - 90j, "velocity_plan": 300 - 90j, "acceleration_plan": 200 - 220j}
-    found = {}
-    for figure in (figure for figure in figures if figure in task.construction.figures):
+    found, drawn_ones = {}, task.construction.figures
+    for figure in (figure for figure in figures or drawn_ones if figure in drawn_ones):
         names = [step.node for step in task.construction.figures[figure]]
         read = {
-            name: ReadNode(places[figure] + shift[name] * turn, np.eye(2) * se_mm**2, confidence)
+            name: ReadNode(
+                places.get(figure, 300 - 150j) + shift[name] * turn, np.eye(2) * se_mm**2, confidence
+            )
             for name in names
         }
         vectors = {}
         for vector in task.construction.vectors_of(figure):
-            drawn = (shift[vector.head] - shift[vector.tail]) * turn
+            # As the arrow points.
+            drawn = (shift[vector.head] - shift[vector.tail]) * (-turn if vector.reversed else turn)
             length = abs(drawn)
             known = length > ZERO_MM
             degrees = math.degrees(cmath.phase(drawn)) % 360.0 if known else None

@@ -108,31 +108,34 @@ class Polygon:
     vectors: dict[str, Vector] = field(default_factory=dict)
 
     @property
-    def last(self) -> str:
-        """The node made last."""
-        return self.steps[-1].node
+    def next(self) -> str:
+        """The name of the node that is made next."""
+        return f"{self.joint}.{len(self.steps)}"
 
     def start(self) -> str:
         """Add the first node, the plan's pole."""
-        self.steps.append(Pole(f"{self.joint}.0"))
-        return self.last
+        pole = self.next
+        self.steps.append(Pole(pole))
+        return pole
 
-    def lay(self, name: str, start: str, force: Force, *, back: bool = False) -> str:
+    def lay(
+        self, start: str, force: Force, *, back: bool = False, part: Part = "", link: Ends | None = None
+    ) -> str:
         """Lay off a force from a node, or `back` so that it ends there; return the new node."""
-        node = f"{self.joint}.{len(self.steps)}"
+        node = self.next
         along = replace(force.along, quarters=force.along.quarters + 2) if back else force.along
         self.steps.append(Given(node, start, force.size, along))
-        return self.add(name, start, node, back=back)
+        return self.add(force.name, start, node, back=back, part=part, link=link)
 
     def lay_all(self, start: str, forces: Iterable[Force], *, back: bool = False) -> str:
         """Lay off forces one after another; return the last node."""
         for force in forces:
-            start = self.lay(force.name, start, force, back=back)
+            start = self.lay(start, force, back=back)
         return start
 
     def close(self, first: Line, second: Line) -> str:
         """Close the polygon by two lines; return their intersection."""
-        node = f"{self.joint}.{len(self.steps)}"
+        node = self.next
         self.steps.append(TwoLines(node, first, second))
         return node
 
@@ -269,10 +272,8 @@ class ForcePlans:
         if not here.forces and not here.couples:
             return start
         across = Along(pin, inner, 1)
-        size = Balance(pin, across, here.about(inner))
-        polygon.steps.append(Given(f"{polygon.joint}.{len(polygon.steps)}", start, size, across))
-        name = self.reaction(self.carriers[pin], link)
-        return polygon.add(name, start, polygon.last, part="t", link=ends)
+        name, size = self.reaction(self.carriers[pin], link), Balance(pin, across, here.about(inner))
+        return polygon.lay(start, Force(name, size, across, pin), part="t", link=ends)
 
     def _closed_at(
         self, polygon: Polygon, link: str, ends: Ends, nodes: tuple[str, str, str], *, back: bool
@@ -348,7 +349,7 @@ class ForcePlans:
         here, couples = self.on(link), (*self.on(link).couples, *self.on(block).couples)
         start = polygon.start()
         size = Balance(group.node, across, Moments(pivot, tuple(here.forces), couples))
-        second = polygon.lay(self.reaction(block, link), start, Force("", size, across, pin))
+        second = polygon.lay(start, Force(self.reaction(block, link), size, across, pin))
         end = polygon.lay_all(second, here.forces)
         polygon.add(self.reaction(self.carriers[pivot], link), start, end, back=True)
         self._hand_over(polygon, link, pivot)
@@ -417,7 +418,7 @@ class ForcePlans:
             else:
                 along = slot_axis(self.cylinder)
                 balance = Balance(driver.pin, along, here.about(driver.pivot))
-                end = polygon.lay("F_b", end, Force("F_b", balance, along, driver.pin))
+                end = polygon.lay(end, Force("F_b", balance, along, driver.pin))
             if end != start:
                 polygon.add(name, start, end, back=True)
             return

@@ -5,7 +5,6 @@
 """
 
 import argparse
-import re
 import tempfile
 import time
 from collections import Counter
@@ -24,39 +23,12 @@ from reference.plan import construction_for
 from samples.simulation import CAREFUL, TYPICAL, SimulatedSheet, any_settings, simulate
 from samples.simulation.forces import any_drawer_of_forces
 from samples.simulation.wording import declared_texts
+from tests.bench.force_students import BODIES, with_masses
 from tests.bench.reading_truth import Judged, each_vector, figures_of
 
-RUBRICS = Path(__file__).resolve().parents[2] / "rubrics"
 MASSES: Mapping[str, tuple[str, Sequence[str]]] = {
     "pump": (
-        """
-[[body]]
-link = "2"
-mass = 3
-inertia = 0.0225
-centre = { base = ["O2", "B"], ratio = 0.5 }
-
-[[body]]
-link = "3"
-mass = 4
-inertia = 0.06
-centre = { base = ["A", "B"], at = [17.9, 4.84] }
-
-[[body]]
-link = "4"
-mass = 1.2
-inertia = 0.004
-centre = { base = ["C", "D"], ratio = 0.5 }
-
-[[body]]
-link = "slider_D"
-mass = 2.5
-
-[[load]]
-link = "slider_D"
-force = "2000 + 50*n"
-motion = "against"
-""",
+        BODIES["pump"],
         ("D", "B", "A"),
     ),
     "press": (
@@ -143,17 +115,10 @@ WEIGHED = {"press", "engine"}
 def task_with_forces(name: str) -> Assignment:
     """A built-in assignment with masses, a load and one page with force plans, its accelerations given."""
     masses, joints = MASSES[name]
-    text = (RUBRICS / f"{name}.assignment.toml").read_text(encoding="utf-8")
-    text = re.sub(r"(?:^#.*\n)*^\[\[page\]\]\n(?:^[^\[\n].*\n)*", "", text, flags=re.MULTILINE)
-    weighs = "gravity = 9.81\n" if name in WEIGHED else ""
-    text = re.sub(r"^id = ", f"{weighs}id = ", text, count=1, flags=re.MULTILINE)
-    text = re.sub(r"^\[scales\]\n", '[scales]\nkF = "force / 50"\n', text, count=1, flags=re.MULTILINE)
-    figures = ["mechanism", *(f"force_plan_{joint}" for joint in joints)]
-    drawn = ", ".join(f'"{figure}"' for figure in figures)
-    page = f'\n[[page]]\nkind = "forces"\nfigures = [{drawn}]\n'
+    text = with_masses(name, masses, joints, '"force / 50"', weighs=name in WEIGHED)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"{name}-forces.assignment.toml"
-        path.write_text(text + masses + page, encoding="utf-8")
+        path.write_text(text, encoding="utf-8")
         return load_assignment(str(path))
 
 

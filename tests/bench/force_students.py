@@ -106,21 +106,29 @@ motion = "against"
 """,
 }
 FORCE_SCALES = {"pump": 50, "press": 40, "shaper": 20}
-GRAVITY = {"press": "gravity = 9.81\n", "shaper": "gravity = 9.81\n"}
+WEIGHED = {"press", "shaper"}
+"""Mechanisms in which the links weigh something."""
+
+
+def with_masses(name: str, masses: str, joints: Sequence[str], scale: str, *, weighs: bool) -> str:
+    """Return a built-in assignment's text with bodies, loads and one page of force plans."""
+    text = (RUBRICS / f"{name}.assignment.toml").read_text(encoding="utf-8")
+    text = re.sub(r"(?ms)^\[\[page\]\].*?(?=^\[)", "", text).replace(
+        "[scales]\n", f"[scales]\nkF = {scale}\n"
+    )
+    figures = ", ".join(f'"{figure}"' for figure in ("mechanism", *(f"force_plan_{one}" for one in joints)))
+    gravity = "gravity = 9.81\n" if weighs else ""
+    return f'{gravity}{text}{masses}[[page]]\nkind = "forces"\nfigures = [{figures}]\n'
 
 
 @cache
 def force_task(name: str) -> tuple[Assignment, RubricFile]:
     """Return an assignment with force plans by given accelerations, and a rubric that asks for everything."""
     folder = Path(tempfile.mkdtemp())
-    text = (RUBRICS / f"{name}.assignment.toml").read_text(encoding="utf-8")
+    joints = {"pump": "DBA", "press": "DBA", "shaper": ["E", "A3", "A"]}[name]
+    text = with_masses(name, BODIES[name], joints, str(FORCE_SCALES[name]), weighs=name in WEIGHED)
     text = re.sub(r"(?m)^rubric = .*$", 'rubric = "forces"', text)
-    text = re.sub(r"(?ms)^\[\[page\]\].*?(?=^\[)", "", text)
-    text = text.replace("[scales]\n", f"[scales]\nkF = {FORCE_SCALES[name]}\n") + BODIES[name]
     path = folder / f"{name}.assignment.toml"
-    groups = {"pump": "DBA", "press": "DBA", "shaper": ["E", "A3", "A"]}[name]
-    figures = ", ".join(f'"force_plan_{group}"' for group in groups)
-    text = GRAVITY.get(name, "") + text + f'[[page]]\nkind = "forces"\nfigures = ["mechanism", {figures}]\n'
     path.write_text(text, encoding="utf-8")
     construction = construction_for(load_assignment(path))
     asked = {"kF": "scale"} | dict.fromkeys(construction.vectors, "vector")
