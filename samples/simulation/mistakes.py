@@ -378,7 +378,7 @@ _PLACES: Mapping[str, Callable[[Occasion], Iterator[StudentMistake]]] = {
     "arithmetic": _computing_errors,
 }
 CODES = tuple(_PLACES)
-"""The codes of the published formats."""
+"""The codes of mistakes in velocity and acceleration plans."""
 
 
 def scalars(parameters: Parameters) -> dict[str, np.ndarray]:

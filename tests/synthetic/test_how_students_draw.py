@@ -12,7 +12,14 @@ from samples.simulation import CAREFUL, PERFECT, SLOPPY, TYPICAL, Student
 from samples.simulation.drawing import drawn_nodes
 from samples.simulation.hand import task_of
 from samples.simulation.instruments import Instruments
-from samples.simulation.mistakes import CODES, SPEED_FACTORS, Occasion, possible, with_mistake
+from samples.simulation.mistakes import (
+    CODES,
+    CODES_OF_FORCES,
+    SPEED_FACTORS,
+    Occasion,
+    possible,
+    with_mistake,
+)
 from tests.drawn import MECHANISMS, planned
 
 pytestmark = pytest.mark.slow
@@ -95,7 +102,7 @@ def test_lines_that_cross_sharply_are_marked_badly_along_both():
 def test_the_codes_are_those_of_the_published_formats():
     entered = {"units"}  # not drawn: a slip in the numbers entered
     of_the_data = {"data_misread"}  # another crank angle, drawn in tests/unit/given_data
-    assert set(CODES) == set(operators.CODES) - entered - of_the_data
+    assert {*CODES, *CODES_OF_FORCES} == set(operators.CODES) - entered - of_the_data
 
 
 @pytest.mark.parametrize("code", [code for code in CODES if code not in {"labels_swapped", "vector_missing"}])
