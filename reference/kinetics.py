@@ -41,6 +41,8 @@ from reference.mechanism import (
     named_links,
     short_names,
     sliders_of,
+    slotted_links,
+    turning,
     with_arrays,
 )
 from reference.numbers import Complex, Number, cross, dot, larger, where
@@ -223,25 +225,6 @@ Rail = tuple[str, _Near]
 """The link that has a guide, and the guide's direction."""
 
 
-def turning(mechanism: Mechanism) -> dict[str, tuple[str, str, str]]:
-    """Return for every link that turns the one whose rate it has (a slider: its guide's), and two joints."""
-    driver, named = mechanism.driver, named_links(mechanism)
-    found = {driver.link: (driver.link, driver.pivot, driver.pin)} if isinstance(driver, Crank) else {}
-    for group in mechanism.groups:
-        links, node = named[group.node], group.node
-        match group:
-            case Dyad(pins=pins):
-                found |= {link: (link, pin, node) for link, pin in zip(links, pins, strict=True)}
-            case Slider(link=link, pin=pin):
-                found[link] = (link, pin, node)
-            case SlottedLink(link=link, pivot=pivot):
-                found |= dict.fromkeys(links, (link, pivot, node))
-            case Yoke(guide=MovingGuide(link=link)):
-                found[links[1]] = found[link]
-    guides = sliders_of(mechanism).items()
-    return found | {link: found[guide.link] for link, guide in guides if isinstance(guide, MovingGuide)}
-
-
 class _Statics:
     """The equilibrium of one mechanism: what acts on its links, and the reactions found so far.
 
@@ -264,13 +247,11 @@ class _Statics:
     def solve(self) -> Forces:
         """Return all forces as arrays."""
         given = tuple(self._given())
-        driver, last = self.mechanism.driver, None
+        cylinder = slotted_links(self.mechanism).get(getattr(self.mechanism.driver, "cylinder", ""))
         for group in reversed(self.mechanism.groups):
-            if isinstance(group, SlottedLink) and group.link == getattr(driver, "cylinder", None):
-                last = group
-            else:
+            if group is not cylinder:
                 self._balance(group)
-        balancing = self._drive(last)
+        balancing = self._drive(cylinder)
         hinges: dict[str, Reaction] = {}
         for one in reversed(self.reactions):
             if one.along is None:
@@ -279,7 +260,7 @@ class _Statics:
         guides = {self.names[one.on]: one for one in reversed(self.reactions) if one.along is not None}
         size = self.largest.value
         predicted = self.largest.slack / where(size == 0.0, 1.0, size)
-        power = _rounded(self._power(given, balancing, last))
+        power = _rounded(self._power(given, balancing, cylinder))
         return Forces(given, hinges, guides, balancing, power, _rounded(predicted))
 
     def _given(self) -> Iterator[Given]:

@@ -6,7 +6,7 @@ left of the directed line between the group's pins (for a slider: ahead along it
 right (behind); an array where it differs between variants.
 """
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import NoneType
 from typing import Any
@@ -315,12 +315,7 @@ def rows_of(mechanism: Mechanism, rows: Sequence[int] | np.ndarray) -> Mechanism
 
 def guides_of(group: Group) -> tuple[Guide, ...]:
     """Guides on which a group slides."""
-    match group:
-        case Slider(guide=guide) | Yoke(guide=guide):
-            return (guide,)
-        case CrossSlider(guides=guides):
-            return guides
-    return ()
+    return tuple(member.guide for member in members_of(group) if member.guide is not None)
 
 
 def moving_guides(group: Group) -> tuple[MovingGuide, ...]:
@@ -340,42 +335,81 @@ GROUND, SLIDER = "0", "slider_"
 """The frame's name among the links, and the start of a slider's."""
 
 
-def links_of(group: Group) -> tuple[str, ...]:
-    """Return the links that a group adds, in the order of its outer pins; a slider by its joint.
+@dataclass(frozen=True, slots=True)
+class Member:
+    """A link that a group adds.
 
-    A point of a link adds none.
+    Attributes
+    ----------
+    name : a slider has that of its joint
+    points : the joints that are fixed on it, the one at which it is hinged to earlier links first
+    turns_with : the link whose angular velocity it has: its own name, of a slider the link that carries its
+        guide or its slot; empty where that does not turn
+    guide : on which it slides; None for a block in a slot
     """
+
+    name: str
+    points: tuple[str, ...]
+    turns_with: str
+    guide: Guide | None = None
+
+    @property
+    def slides(self) -> bool:
+        """True if it has no angular velocity of its own; it then carries a single joint."""
+        return self.turns_with != self.name
+
+
+def members_of(group: Group) -> tuple[Member, ...]:
+    """Return the links that a group adds, in the order of its outer pins; a point of a link adds none."""
     match group:
-        case Dyad(links=links):
-            return links
-        case Slider(link=link, node=node):
-            return link, SLIDER + node
-        case SlottedLink(link=link, pin=pin):
-            return link, SLIDER + pin
-        case CrossSlider(node=node):
-            return SLIDER + node, f"{SLIDER}{node}2"
-        case Yoke(link=link, node=node, pin=pin):
-            return link or SLIDER + node, SLIDER + pin
+        case Dyad(node=node, pins=pins, links=links):
+            return tuple(Member(link, (pin, node), link) for pin, link in zip(pins, links, strict=True))
+        case Slider(node=node, pin=pin, link=link, guide=guide):
+            return Member(link, (pin, node), link), _slider(SLIDER + node, node, guide)
+        case SlottedLink(pin=pin, pivot=pivot, link=link, foot=foot):
+            return Member(link, (pivot, *([foot] if foot else [])), link), Member(SLIDER + pin, (pin,), link)
+        case CrossSlider(node=node, guides=(first, second)):
+            return _slider(SLIDER + node, node, first), _slider(f"{SLIDER}{node}2", node, second)
+        case Yoke(node=node, pin=pin, link=link, guide=guide):
+            yoke = _slider(link or SLIDER + node, node, guide)
+            return yoke, Member(SLIDER + pin, (pin,), yoke.turns_with)
     return ()
 
 
+def _slider(name: str, joint: str, guide: Guide) -> Member:
+    return Member(name, (joint,), guide.link if isinstance(guide, MovingGuide) else "", guide)
+
+
 def named_links(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
-    """Return the links that each group adds, by the group's node, in the order of `links_of`.
+    """Return the links that each group adds, by the group's node, in the order of `members_of`.
 
     A further slider at a joint that has one already is numbered: ``slider_A``, then ``slider_A2``.
     """
     taken, named = {mechanism.driver.link}, dict[str, tuple[str, ...]]()
     for group in mechanism.groups:
         names: list[str] = []
-        for link in links_of(group):
-            name, count = link, 1
+        for member in members_of(group):
+            name, count = member.name, 1
             while name in taken:
                 count += 1
-                name = f"{link}{count}"
+                name = f"{member.name}{count}"
             taken.add(name)
             names.append(name)
         named[group.node] = tuple(names)
     return named
+
+
+def members(mechanism: Mechanism) -> Iterator[tuple[str, Member, Group]]:
+    """Yield the links that groups add, each with its name as `named_links` has it, and its group."""
+    named = named_links(mechanism)
+    for group in mechanism.groups:
+        for name, member in zip(named[group.node], members_of(group), strict=True):
+            yield name, member, group
+
+
+def slotted_links(mechanism: Mechanism) -> dict[str, SlottedLink]:
+    """Return the slotted links by their names; among them the cylinder that drives a crank."""
+    return {group.link: group for group in mechanism.groups if isinstance(group, SlottedLink)}
 
 
 def short_name(link: str) -> str:
@@ -434,43 +468,34 @@ def points_of(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
 
     A yoke on a moving guide has no such point; its node, the point under the pin, stands for one.
     """
-    driver, named = mechanism.driver, named_links(mechanism)
-    held = {driver.link: [driver.pivot, driver.pin] if isinstance(driver, Crank) else [driver.pin]}
+    driver = mechanism.driver
+    pivot = (driver.pivot,) if isinstance(driver, Crank) else ()
+    held: dict[str, tuple[str, ...]] = {driver.link: (*pivot, driver.pin)}
+    held |= {name: member.points for name, member, _ in members(mechanism)}
     for group in mechanism.groups:
-        links, node = named[group.node], group.node
-        match group:
-            case Dyad(pins=outer):
-                held |= {link: [pin, node] for link, pin in zip(links, outer, strict=True)}
-            case Slider(pin=pin):
-                held |= {links[0]: [pin, node], links[1]: [node]}
-            case SlottedLink(pin=pin, pivot=pivot, foot=foot):
-                held |= {links[0]: [pivot, *([foot] if foot else [])], links[1]: [pin]}
-            case CrossSlider():
-                held |= {link: [node] for link in links}
-            case Yoke(pin=pin):
-                held |= {links[0]: [node], links[1]: [pin]}
-            case _:
-                held[group.link].append(node)
-    return {link: tuple(joints) for link, joints in held.items()}
+        if isinstance(group, Plate | PointOnLine | SlotPoint):
+            held[group.link] += (group.node,)
+    return held
 
 
 def sliders_of(mechanism: Mechanism) -> dict[str, Guide | None]:
     """Return the links that slide and carry a single joint, with their guides; None for a block in a slot."""
-    driver, named = mechanism.driver, named_links(mechanism)
+    driver = mechanism.driver
     found: dict[str, Guide | None] = {}
     if isinstance(driver, DrivingSlider):
         found[driver.link] = FixedGuide(driver.guide_m, driver.guide_rad)
-    for group in mechanism.groups:
-        links = named[group.node]
-        match group:
-            case CrossSlider(guides=guides):
-                found |= dict(zip(links, guides, strict=True))
-            case Slider(guide=guide):
-                found[links[1]] = guide
-            case Yoke(guide=guide):
-                found |= {links[0]: guide, links[1]: None}
-            case SlottedLink():
-                found[links[1]] = None
+    return found | {name: member.guide for name, member, _ in members(mechanism) if member.slides}
+
+
+def turning(mechanism: Mechanism) -> dict[str, tuple[str, str, str]]:
+    """Return for every link that turns the one whose rate it has (a slider: its guide's), and two joints."""
+    driver = mechanism.driver
+    found = {driver.link: (driver.link, driver.pivot, driver.pin)} if isinstance(driver, Crank) else {}
+    for name, member, group in members(mechanism):
+        if not member.slides:
+            found[name] = (name, member.points[0], group.node)
+        elif member.turns_with:
+            found[name] = found[member.turns_with]
     return found
 
 

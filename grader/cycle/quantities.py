@@ -19,7 +19,7 @@ from reference.geometry import ComplexArray, FloatArray, direction, dot
 from reference.kinematics.continuation import change
 from reference.kinematics.cycle import Cycle
 from reference.kinematics.motion import Motion, move_where_possible
-from reference.mechanism import CrossSlider, Dyad, FixedGuide, Mechanism, Slider, SlottedLink, Yoke
+from reference.mechanism import FixedGuide, Mechanism, members
 from reference.plan import vectors_of
 from reference.quantities import KindName, kind_of, unit_of
 
@@ -269,20 +269,11 @@ def strokes_of(subject: CycleSubject) -> tuple[OutputStroke, ...]:
 
 
 def _outputs(subject: CycleSubject) -> Iterator[_Output]:
-    is_ground = subject.structure.is_ground
-    for group in subject.structure.groups:
-        match group:
-            case Slider(guide=FixedGuide() as guide) | Yoke(guide=FixedGuide() as guide):
-                yield _slider(group.node, guide)
-            case CrossSlider(guides=guides):
-                yield from (_slider(group.node, guide) for guide in guides if isinstance(guide, FixedGuide))
-            case Dyad(node=node, pins=pins, links=links):
-                arms = zip(links, pins, strict=True)
-                yield from (_rocker(link, pin, node) for link, pin in arms if is_ground(pin))
-            case SlottedLink(node=node, pivot=pin, link=link) if is_ground(pin):
-                yield _rocker(link, pin, node)
-            case _:
-                pass
+    for link, member, group in members(subject.structure):
+        if isinstance(member.guide, FixedGuide):
+            yield _slider(group.node, member.guide)
+        elif not member.slides and subject.structure.is_ground(member.points[0]):
+            yield _rocker(link, member.points[0], group.node)
 
 
 def _slider(node: str, guide: FixedGuide) -> _Output:

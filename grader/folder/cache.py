@@ -56,19 +56,14 @@ _IMPORT = re.compile(
 
 
 @cache
-def stage_digest(
-    modules: tuple[str, ...], texts: tuple[str, ...] = ORDER, top: Path = Path(__file__).parents[2]
-) -> str:
-    """A digest of the code and data that modules rest on: all they import, and the files beside it.
+def stage_digest(modules: tuple[str, ...], top: Path = Path(__file__).parents[2]) -> str:
+    """A digest of the code and data that modules rest on: all they import, the files beside it, and `ORDER`.
 
-    Arguments
-    ---------
-    texts : modules that count as well, but not what they import
-    top : the folder of the packages
+    Arguments: `top` is the folder of the packages.
     """
     sources = _closure(modules, top)
     paths = {*sources.values(), *_data_of(sources, top)}
-    paths |= {top.joinpath(*name.split(".")).with_suffix(".py") for name in texts}
+    paths |= {top.joinpath(*name.split(".")).with_suffix(".py") for name in ORDER}
     digest = hashlib.sha256()
     for path in sorted(paths):
         digest.update(path.relative_to(top).as_posix().encode() + b"\0")

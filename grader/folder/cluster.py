@@ -395,10 +395,9 @@ class Cluster:
     """
 
     def __init__(
-        self, address: str, folder: Path, out: Path, limits: Limits, sheets: str | None = None,
-        wait_s: float = WAIT_S,
-    ) -> None:  # fmt: skip
-        self._address, self._wait_s = address, wait_s
+        self, address: str, folder: Path, out: Path, limits: Limits, sheets: str | None = None
+    ) -> None:
+        self._address = address
         self._folders = {"sheets": folder, "out": out}
         self._run = Run(secrets.token_hex(8), sheets or str(folder.absolute()), limits)
         self._versions = program()
@@ -534,7 +533,7 @@ class Cluster:
                 return set(ended.done)
             if self._workers():
                 alive = time.monotonic()
-            elif time.monotonic() - alive > self._wait_s:
+            elif time.monotonic() - alive > WAIT_S:
                 raise self._lost()
 
     def _workers(self) -> int:
@@ -554,4 +553,4 @@ class Cluster:
             raise self._lost() from error
 
     def _lost(self) -> CallError:
-        return failure(CallError, "cluster_lost", address=self._address, limit=self._wait_s)
+        return failure(CallError, "cluster_lost", address=self._address, limit=WAIT_S)

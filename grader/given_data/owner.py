@@ -20,7 +20,7 @@ from grader.comparison.evidence import DrawnVector, Evidence
 from grader.comparison.task import Task
 from grader.given_data.fit import fit_of, nobodys
 from grader.given_data.rows import joined, rows_of
-from grader.given_data.scales import by_scale, declared_scales
+from grader.given_data.scales import by_scale
 from grader.given_data.sets import (
     CRANK,
     ELSEWHERE,
@@ -36,6 +36,7 @@ from grader.given_data.sets import (
 )
 from grader.outcomes import NamedMistake
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN
+from grader.tables.scale_text import Declared, parsed_scales
 from reference.construction.mistakes import Mistake
 from reference.geometry import FloatArray
 from reference.quantities import OF_MOTION, sort_of
@@ -121,7 +122,8 @@ def owner_of(task: Task, evidence: Evidence, declared: Mapping[str, str]) -> Own
     if not drawn:
         return None
     everybody = own_first(drawn_by_variants(task), task)
-    scales = declared_scales(task, declared)
+    parsed = parsed_scales(task.assignment, declared).items()
+    scales = {name: one.per_mm for name, one in parsed if isinstance(one, Declared)}
     for mistakes in (False, True):
         # Single mistakes are tried only if other data than the own are likely.
         sets = sets_of(task, drawn, everybody, mistakes=mistakes)

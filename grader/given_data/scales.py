@@ -8,7 +8,6 @@ import numpy as np
 from grader.comparison.evidence import DrawnVector
 from grader.comparison.task import Task
 from grader.given_data.sets import ExactDrawings
-from grader.tables.scale_text import Declared, parse_scale
 from reference.geometry import FloatArray
 from reference.quantities import OF_MOTION, kind_of
 
@@ -19,17 +18,6 @@ AT_DECLARED, AT_OWN_RULE = 0.4, 0.4
 """Probability that a copied plan follows the scale declared beside it, or that of its original author."""
 SET_OFF_SHARE, SET_OFF_MM = 0.006, 0.4
 """Standard errors of the driving vector's length: from its rounded scale, and from drawing it."""
-
-
-def declared_scales(task: Task, declared: Mapping[str, str]) -> dict[str, float]:
-    """Return the scales that were declared as a number, SI per millimetre."""
-    units: Mapping[str, str] = dict(task.assignment.file.scales.bare_units.items())
-    found = {}
-    for name, text in declared.items():
-        parsed = parse_scale(name, text, bare_unit=units.get(name)) if text.strip() else None
-        if isinstance(parsed, Declared):
-            found[name] = parsed.per_mm
-    return found
 
 
 def _driving(

@@ -13,8 +13,7 @@ from reference.construction.steps import Given
 from reference.drawing.canvas import Piece
 from reference.drawing.forces import LEAST_M, acting_on, links_of_plan, on_lever
 from reference.geometry import dot
-from reference.kinetics import turning
-from reference.mechanism import Crank, short_names
+from reference.mechanism import Crank, short_names, turning
 from reference.quantities import group_of, unit_of
 
 COUNTER_CLOCKWISE, CLOCKWISE = N_("counter-clockwise"), N_("clockwise")

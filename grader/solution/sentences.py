@@ -41,7 +41,7 @@ from reference.construction.steps import (
 )
 from reference.drawing.canvas import pieces_of, scale_pieces
 from reference.drawing.subject import Subject, Wording
-from reference.mechanism import SlottedLink, Yoke, moving_guides
+from reference.mechanism import hinged_at
 from reference.quantities import group_of, unit_of
 
 PERPENDICULAR = N_("perpendicular to %(link)s")
@@ -351,7 +351,8 @@ def sentence(speaker: Speaker, step: Step) -> Markup:
         case Similar():
             return _similar(speaker, step)
         case Coincide(node=node, other=other):
-            return speaker.say(COINCIDE, node=node, other=other, link=escape(_link_under(speaker, node)))
+            link, *_ = hinged_at(speaker.subject.plan.mechanism)[node]
+            return speaker.say(COINCIDE, node=node, other=other, link=escape(link))
         case Local():
             return _local(speaker, step)
         case _:
@@ -542,15 +543,6 @@ def _similar(speaker: Speaker, step: Similar) -> Markup:
         first=(p, step.node), first_length=speaker.distance(p, step.node),
         second=(q, step.node), second_length=speaker.distance(q, step.node),
     )  # fmt: skip
-
-
-def _link_under(speaker: Speaker, node: str) -> str:
-    """Return the link of a point that lies under another only at this moment."""
-    groups = speaker.subject.plan.mechanism.groups
-    links = {group.node: group.link for group in groups if isinstance(group, SlottedLink)}
-    links |= {group.node: group.link for group in groups if isinstance(group, Yoke)}
-    links |= {guide.coincident: guide.link for group in groups for guide in moving_guides(group)}
-    return links[node]
 
 
 def _local(speaker: Speaker, step: Local) -> Markup:

@@ -587,9 +587,6 @@ def _enter(given: Mapping[str, object], table: str, end: str, entries: _Entries)
             entries.number(path, f"{name}{end}", shown, why)
 
 
-KEYS_OF_DOCUMENT = tuple(MeasurementsDocument.model_fields)
-
-
 def _about(data: Mapping[str, object], file: str) -> tuple[str | None, int | None, int | None]:
     """Return the student, n and position. Raises TableError with all faults in what is left of the file."""
     found = [(key, why) for key, value in data.items() if (why := _misfit(key, value)) is not None]
@@ -608,8 +605,8 @@ def _misfit(key: str, value: object) -> Reason | None:
     """Return why a key of a document, or its value, cannot be used; None if it can."""
     if isinstance(value, Reason):
         return value
-    if key not in KEYS_OF_DOCUMENT:
-        return Reason("not_known", near(key, KEYS_OF_DOCUMENT, most=2))
+    if key not in MeasurementsDocument.model_fields:
+        return Reason("not_known", near(key, MeasurementsDocument.model_fields, most=2))
     if key in {"scales", *TABLES}:
         return Reason("no_braces_inside")
     if key == "schema_version":

@@ -18,7 +18,7 @@ from pathlib import Path
 from grader.language import Tongue
 from grader.records import Reason, Value
 from grader.texts.spoken import ENGLISH, fault
-from reference.authored.variant_table import delimiter_of, table_lines
+from reference.authored.variant_table import delimiter_of, number_of, table_lines
 from reference.errors import InputFileError, lines_of, near_names
 
 _STUDENT_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
@@ -28,7 +28,6 @@ RESULT_FILES = frozenset(
     {"results.json", "rubric.json", "assessments.json", "summary.csv", "index.html", "decisions.csv"}
 )
 """Files beside the students' folders of results."""
-_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 _COMMENT = re.compile(r'^[ \t]*"?#[^\n]*', re.MULTILINE)
 MARK = "\ufeff"
 """The byte order mark: without it spreadsheets take letters with accents for others."""
@@ -245,10 +244,9 @@ def whole_number(text: str, delimiter: str) -> int | Reason:
 
 def real_number(text: str, delimiter: str) -> float | Reason:
     """A number, with a decimal comma beside semicolons."""
-    plain = text.replace("\N{MINUS SIGN}", "-")
-    plain = plain.replace(",", ".", 1) if delimiter == ";" else plain
-    if _NUMBER.fullmatch(plain):
-        return float(plain)
+    number = number_of(text, decimal_comma=delimiter == ";")
+    if number is not None:
+        return number
     return Reason(
         "no_decimal_point" if "," in text and delimiter == "," else "no_number", {"text": short(text)}
     )

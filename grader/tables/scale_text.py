@@ -420,6 +420,12 @@ def sure_texts(readings: Sequence[Mapping[str, Written]]) -> dict[str, str]:
     return texts
 
 
+def parsed_scales(assignment: Assignment, texts: Mapping[str, str]) -> dict[str, ParsedScale]:
+    """Return the meaning of declared scales; bare numbers have the units that the assignment says."""
+    units: Mapping[str, str] = dict(assignment.file.scales.bare_units.items())
+    return {name: parse_scale(name, text, bare_unit=units.get(name)) for name, text in texts.items()}
+
+
 def declared_scales(assignment: Assignment, variant: Variant, texts: Mapping[str, str]) -> Scales:
     """The scales that texts declare, where they can be understood; the others by the assignment's rule."""
     return assignment.scales([variant], **understood_scales(assignment, variant, texts))
@@ -428,11 +434,10 @@ def declared_scales(assignment: Assignment, variant: Variant, texts: Mapping[str
 def understood_scales(assignment: Assignment, variant: Variant, texts: Mapping[str, str]) -> dict[str, float]:
     """The scales that texts declare, as far as they can be understood without the assignment's rule."""
     known: dict[str, float] = {}
-    units: Mapping[str, str] = dict(assignment.file.scales.bare_units.items())
     driver = assignment.mechanism([variant]).driver
     omega = {"omega": abs(float(driver.omega[0]))} if isinstance(driver, Crank) else {}
-    for name, text in texts.items():
-        match parse_scale(name, text, bare_unit=units.get(name)):
+    for name, parsed in parsed_scales(assignment, texts).items():
+        match parsed:
             case Declared(per_mm=value):
                 known[name] = value
             case ByRule() as rule if rule.powers.keys() <= {**omega, **known}.keys():

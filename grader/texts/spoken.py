@@ -208,16 +208,14 @@ _UNIT_WRITERS: dict[str, Callable[[Tongue, float], str]] = {
 AT_PAGE, AT_LINE = N_("Page %(page)s: %(text)s"), N_("Line %(line)s: %(text)s")
 
 
-def sentence(
-    reason: Coded, speaker: Tongue, names: Mapping[str, str] = NO_NAMES, *, brief: bool = False
-) -> str:
+def sentence(reason: Coded, speaker: Tongue, *, brief: bool = False) -> str:
     """Return the sentence of a problem (`brief`: the one without numbers); empty if its code has none.
 
     An error's own words (`detail`) are no sentence: `details` shows them beside it.
     """
     advice = ADVICE.get(reason.code, {}).get(str(reason.parameters.get("device")))
     texts = (*filter(None, [advice]), *PROBLEMS.get(reason.code, ()))
-    said = spoken(reason.parameters, speaker, names)
+    said = spoken(reason.parameters, speaker)
     text = filled(texts[-1:] if brief else texts, said, speaker)
     also = PROBLEMS.get(str(reason.parameters.get("also", "")))
     if also and text and not brief:
@@ -228,9 +226,9 @@ def sentence(
     return text
 
 
-def clause(reason: Coded, speaker: Tongue, names: Mapping[str, str] = NO_NAMES) -> str:
+def clause(reason: Coded, speaker: Tongue) -> str:
     """Return why something is not read or understood, as part of a sentence; the code if it has no words."""
-    return filled(clauses(reason.code), spoken(reason.parameters, speaker, names), speaker) or reason.code
+    return filled(clauses(reason.code), spoken(reason.parameters, speaker), speaker) or reason.code
 
 
 def fault(reason: Coded, speaker: Tongue = ENGLISH) -> str:

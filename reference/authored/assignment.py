@@ -37,7 +37,7 @@ from reference.authored.variant_table import (
 from reference.errors import AuthoredFileError, CallError, Faults, Finding, near_names, ranges_of
 from reference.geometry import FloatArray
 from reference.kinematics.motion import BoolArray
-from reference.mechanism import Crank, Driver, Mechanism, links_of
+from reference.mechanism import Crank, Driver, Mechanism, members_of
 from reference.quantities import FIGURE, FORCE_PLAN, FORCE_PLANS, SCALE_UNITS, group_of, scale_of, zone_of
 
 
@@ -611,7 +611,7 @@ def _check_force_plans(assignment: Assignment) -> Iterator[Finding]:
     if assignment.file.scales.kF is None:
         yield Finding("$.scales.kF", "is missing: a page shows a force plan")
     mechanism = assignment.mechanism(assignment.variants()[:1])
-    joints = [group.node for group in reversed(mechanism.groups) if links_of(group)]
+    joints = [group.node for group in reversed(mechanism.groups) if members_of(group)]
     known = ", ".join(f"{FORCE_PLAN}{joint}" for joint in (*joints, mechanism.driver.pin))
     for index, page in enumerate(assignment.file.page):
         others = {zone_of(figure) for figure in page.figures} - {FORCE_PLANS, "mechanism"}

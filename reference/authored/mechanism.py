@@ -300,43 +300,42 @@ class MechanismFile(Authored):
         else:
             links[self.driver.link] = [self.driver.pin]
             slides.append((GROUND, self.driver.link))
-        for group in self.group:
-            for link, *joints in _links_of(group):
-                held = links.setdefault(link, [])
-                held += [joint for joint in joints if joint not in held]
-        for group in self.group:
-            block, guides = f"block {group.node}", [guide for _, guide in _guides(group)]
-            if isinstance(group, SlottedLinkTable):
-                slides.append((block, group.link))
-            if isinstance(group, YokeTable):
-                slides.append((block, yoke := f"yoke {group.node}"))
-                block = yoke
-            for index, guide in enumerate(guides):
-                carriers = [link for link, held in links.items() if {*(guide.joints or ())} <= {*held}]
-                if guide.joints and not carriers:
+        parts = [part for group in self.group for part in _parts_of(group)]
+        for link, joints, _ in parts:
+            held = links.setdefault(link, [])
+            held += [joint for joint in joints if joint not in held]
+        for link, _, rail in parts:
+            if isinstance(rail, str):
+                slides.append((link, rail))
+            elif rail is not None:
+                carriers = [other for other, held in links.items() if {*(rail.joints or ())} <= {*held}]
+                if rail.joints and not carriers:
                     return None
-                slides.append((f"{block}{index or ''}", carriers[0]))
+                slides.append((link, carriers[0]))
         return chain_of(links, slides, self.driver.link) if len(links) <= MOST_LINKS else None
 
 
-def _links_of(group: AnyGroupTable) -> Iterator[tuple[str, ...]]:
-    """Yield the links and blocks of a group, each with joints that it carries."""
+def _parts_of(group: AnyGroupTable) -> Iterator[tuple[str, tuple[str, ...], GuideTable | str | None]]:
+    """Yield the links and blocks of a group, each with joints on it and the guide or link it slides on."""
     block, node = f"block {group.node}", group.node
     match group:
         case DyadTable():
-            yield from ((link, pin, node) for pin, link in zip(group.pins, group.links, strict=True))
+            yield from ((link, (pin, node), None) for pin, link in zip(group.pins, group.links, strict=True))
         case SliderTable():
-            yield from ((group.link, group.pin, node), (block, node))
+            yield from ((group.link, (group.pin, node), None), (block, (node,), group.guide))
         case SlottedLinkTable():
-            yield from ((group.link, group.pivot, *([group.foot] if group.foot else [])), (block, group.pin))
+            foot = [group.foot] if group.foot else []
+            yield from ((group.link, (group.pivot, *foot), None), (block, (group.pin,), group.link))
         case CrossSliderTable():
-            yield from ((block, node), (f"{block}1", node))
+            first, second = group.guides
+            yield from ((block, (node,), first), (f"{block}1", (node,), second))
         case YokeTable():
-            yield from ((block, group.pin), (f"yoke {node}", node))
+            yoke = f"yoke {node}"
+            yield from ((yoke, (node,), group.guide), (block, (group.pin,), yoke))
         case PointTable():
-            yield group.link, node
+            yield group.link, (node,), None
         case _:
-            yield group.link, *group.base, node
+            yield group.link, (*group.base, node), None
 
 
 # Checks of joints and links ------------------------------------------------------------------------

@@ -116,9 +116,9 @@ AheadBehind = Annotated[
 Joint = Annotated[str, Field(min_length=1, max_length=4), AfterValidator(_check_joint)]
 Identifier = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]
 LinkName = Annotated[str, Field(pattern=r"^[A-Za-z0-9]{1,4}$")]
-Point = Annotated[list[FormulaText], Field(min_length=2, max_length=2)]
 TwoJoints = Annotated[list[Joint], Field(min_length=2, max_length=2)]
 TwoFormulas = Annotated[list[FormulaText], Field(min_length=2, max_length=2)]
+Point = TwoFormulas
 
 
 class Text(Authored):
@@ -330,26 +330,12 @@ def _path_part(part: str | int) -> str:
 
 
 def _not_known(name: str, model: type[BaseModel]) -> str:
-    fields = {field for kind in _models_in(model, set()) for field in kind.model_fields}
+    schema = model.model_json_schema()
+    tables = (schema, *schema.get("$defs", {}).values())
+    fields = {field for table in tables for field in table.get("properties", ())}
     if name in fields:
         return "does not belong here: another kind of table has it; leave it out"
     if other := _other_kind(name):
         return other
     near = near_names(name, sorted(fields), most=1)
     return "is not known here; check its spelling" + (f" (did you mean {near[0]}?)" if near else "")
-
-
-def _models_in(model: type[BaseModel], known: set[type[BaseModel]]) -> set[type[BaseModel]]:
-    from typing import get_args  # noqa: PLC0415
-
-    if model in known:
-        return known
-    known.add(model)
-    waiting: list[Any] = [field.annotation for field in model.model_fields.values()]
-    while waiting:
-        kind = waiting.pop()
-        if isinstance(kind, type) and issubclass(kind, BaseModel):
-            _models_in(kind, known)
-        else:
-            waiting.extend(get_args(kind))
-    return known

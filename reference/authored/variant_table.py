@@ -414,18 +414,24 @@ def _side_in(cell: Cell, words: tuple[str, ...]) -> float:
     return float(SIDES[str(cell).lower()])
 
 
+def number_of(text: str, *, decimal_comma: bool) -> float | None:
+    """Return the number that a text is, also with a typeset minus; None for any other text."""
+    plain = text.replace("\N{MINUS SIGN}", "-")
+    plain = plain.replace(",", ".", 1) if decimal_comma else plain
+    return float(plain) if _NUMBER.fullmatch(plain) else None
+
+
 def _number_in(cell: Cell, name: str, *, decimal_comma: bool) -> float:
     if not isinstance(cell, str):
         return float(cell)
     if not cell:
         raise ValueError("is empty")
-    plain = cell.replace("\N{MINUS SIGN}", "-")
-    number = plain.replace(",", ".", 1) if decimal_comma else plain
-    if _NUMBER.fullmatch(number):
-        return float(number)
+    number = number_of(cell, decimal_comma=decimal_comma)
+    if number is not None:
+        return number
     if "," in cell:
         raise ValueError(f"'{cell}' is no number: write a decimal point")
-    parts = re.fullmatch(r"([-+0-9.,]+)\s*(\D.*)", plain)
+    parts = re.fullmatch(r"([-+\N{MINUS SIGN}0-9.,]+)\s*(\D.*)", cell)
     if parts is not None and (unit := _unit_of(parts[2])) in UNITS:
         raise ValueError(f"'{cell}' is no number: the unit stands in the heading, as {name} [{unit}]")
     side = f" (a side is {', '.join(SIDES)})" if "side" in name.lower() else ""

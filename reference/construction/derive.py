@@ -58,6 +58,7 @@ from reference.mechanism import (
     Yoke,
     form_of,
     moving_guides,
+    slotted_links,
 )
 
 VELOCITY_POLE, ACCELERATION_POLE = "o", "o'"
@@ -493,11 +494,7 @@ def _is_used(mechanism: Mechanism, joint: str) -> bool:
 
 def _draw_slot_point(draft: Draft, group: SlotPoint) -> None:
     node = group.node
-    slotted = next(
-        link
-        for link in draft.mechanism.groups
-        if isinstance(link, SlottedLink) and link.node == group.slotted
-    )
+    slotted = slotted_links(draft.mechanism)[group.link]
     x, y = Scaled(f"x {node}", "kL"), Scaled(f"y {node}", "kL")
     draft.sketch.append(Local(node, slotted.pivot, slot_axis(slotted), x, y))
     rigid_images(draft, node, (slotted.pivot, slotted.node))

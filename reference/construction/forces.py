@@ -33,7 +33,6 @@ from reference.mechanism import (
     Crank,
     CrossSlider,
     Driver,
-    DrivingSlider,
     Dyad,
     FixedGuide,
     Group,
@@ -43,9 +42,10 @@ from reference.mechanism import (
     SlottedLink,
     Yoke,
     carriers,
-    guides_of,
     named_links,
     short_names,
+    slotted_links,
+    turning,
 )
 from reference.quantities import FORCE_PLAN
 
@@ -168,15 +168,14 @@ class ForcePlans:
     links: dict[str, tuple[str, ...]] = field(init=False)
     carriers: dict[str, str] = field(init=False)
     names: dict[str, str] = field(init=False)
+    turning: dict[str, tuple[str, str, str]] = field(init=False)
     cylinder: SlottedLink | None = field(init=False)
     """The group of the cylinder that drives the crank, without mass: its thrust, F_b, balances the crank."""
 
     def __post_init__(self) -> None:
         self.links, self.carriers = named_links(self.mechanism), carriers(self.mechanism)
-        self.names = short_names(self.mechanism)
-        slotted = (one for one in self.mechanism.groups if isinstance(one, SlottedLink))
-        cylinder = getattr(self.mechanism.driver, "cylinder", None)
-        self.cylinder = next((one for one in slotted if one.link == cylinder), None)
+        self.names, self.turning = short_names(self.mechanism), turning(self.mechanism)
+        self.cylinder = slotted_links(self.mechanism).get(getattr(self.mechanism.driver, "cylinder", ""))
 
     def reaction(self, by: str, on: str) -> str:
         """Return the name of the reaction of one link on another."""
@@ -222,9 +221,12 @@ class ForcePlans:
 
     def _inertia_couple(self, link: str) -> list[Couple]:
         """Return the couple -I epsilon of a link that turns; of a slider, that of the link of its guide."""
-        name, turning = f"M_i{self.names[link]}", self._turning(link)
-        rate = self.plans.rates.get(f"epsilon_{turning}")
-        if not turning or (rate is None and not self._is_driven(turning)):
+        name = f"M_i{self.names[link]}"
+        if link not in self.turning:
+            return []
+        turns_with, *_ = self.turning[link]
+        rate = self.plans.rates.get(f"epsilon_{turns_with}")
+        if rate is None and not self._is_driven(turns_with):
             return []
         if self.accelerations == "given" or rate is None or rate.drives:
             return [Couple(name)]
@@ -234,13 +236,6 @@ class ForcePlans:
     def _is_driven(self, link: str) -> bool:
         driver = self.mechanism.driver
         return isinstance(driver, Crank) and driver.link == link and driver.accelerated
-
-    def _turning(self, link: str) -> str:
-        """Return the link with which a link turns: itself, or the one that carries its guide."""
-        for group in self.mechanism.groups:
-            if link in self.links[group.node]:
-                return _turning_with(group, self.links[group.node].index(link))
-        return "" if isinstance(self.mechanism.driver, DrivingSlider) else link
 
     # Groups --------------------------------------------------------------------------------------
 
@@ -426,21 +421,6 @@ class ForcePlans:
         closed = polygon.close(Line(end, guide), Line(start, replace(guide, quarters=1)))
         polygon.add("F_b", end, closed)
         polygon.add(name, start, closed, back=True)
-
-
-def _turning_with(group: Group, index: int) -> str:
-    """Return the link with which a group's link turns: itself, or that of a moving guide; empty if none."""
-    guides = guides_of(group)
-    match group:
-        case Dyad(links=links):
-            return links[index]
-        case SlottedLink(link=link):
-            return link
-        case Slider(link=link) if index == 0:
-            return link
-        case CrossSlider():
-            guides = (guides[index],)
-    return "" if isinstance(guides[0], FixedGuide) else guides[0].link
 
 
 def _as_given(name: str, point: str) -> Force:

@@ -26,10 +26,9 @@ from reference.construction.elements import (
     data_in,
     is_force,
 )
-from reference.construction.graph import Construction, Vector
+from reference.construction.graph import Construction, Vector, coincident
 from reference.construction.steps import (
     ArcAndLine,
-    Coincide,
     Given,
     Local,
     Similar,
@@ -339,8 +338,7 @@ def _mistakes_of_given(step: Given, construction: Construction) -> Iterator[Mist
 
 def _mistakes_of_lines(step: TwoLines, construction: Construction, figure: str) -> Iterator[Mistake]:
     pole = construction.poles[figure]
-    joints = construction.figures["mechanism"]
-    under = {joint.node: joint.other for joint in joints if isinstance(joint, Coincide)}
+    under = coincident(construction)
     for slot, line in enumerate((step.first, step.second)):
         if isinstance(line.along, Fixed) and line.along.quarters % 2:
             # A reaction along a fixed guide, not across it.

@@ -229,11 +229,8 @@ def shifted(shape: Shape, by: Point) -> Shape:
 
 def bounds(shapes: Iterable[Shape]) -> Bounds:
     """Return the box that shapes fill; raises ValueError for none."""
-    boxes = [_bounds_of(shape) for shape in shapes]
-    lows, highs = [box[:2] for box in boxes], [box[2:] for box in boxes]
-    left, top = (min(low[axis] for low in lows) for axis in (0, 1))
-    right, bottom = (max(high[axis] for high in highs) for axis in (0, 1))
-    return (left, top, right, bottom)
+    lefts, tops, rights, bottoms = zip(*map(_bounds_of, shapes), strict=True)
+    return (min(lefts), min(tops), max(rights), max(bottoms))
 
 
 def _bounds_of(shape: Shape) -> Bounds:

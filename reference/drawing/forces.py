@@ -17,8 +17,7 @@ from reference.drawing.sketch import LETTER_MM, PLATE_FILL, SMALL_LETTER_MM, cap
 from reference.drawing.subject import PLAN_COLOURS, DrawnFigure, Part, Subject
 from reference.drawing.symbols import HAIR_MM, LINK_MM, THIN_MM, Bar, bars, blocks, point
 from reference.drawing.symbols import unit as unit_vector
-from reference.kinetics import turning
-from reference.mechanism import Plate, named_links, short_names
+from reference.mechanism import Plate, named_links, short_names, turning
 from reference.quantities import group_of
 
 SCHEME_MM, APART_MM = 55.0, 10.0
@@ -194,7 +193,8 @@ def _links(subject: Subject, links: Sequence[str], group: str, nodes: dict[str, 
             yield symbols.block(block.at, block.along)
     for bar in own:
         yield Stroke(point(bar.ends[0]), point(bar.ends[1]), LINK_MM)
-    yield from (symbols.joint(nodes[joint]) for joint in {joint for bar in own for joint in bar.joints})
+    joints = dict.fromkeys(joint for bar in own for joint in bar.joints)
+    yield from (symbols.joint(nodes[joint]) for joint in joints)
 
 
 def _picture(

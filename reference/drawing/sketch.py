@@ -11,10 +11,19 @@ from reference.drawing import symbols
 from reference.drawing.canvas import CONSTRUCTION, INK, Area, Curve, Label, Shape, Stroke, Text, pieces_of
 from reference.drawing.labels import Style, Wanted, lengths_inside, letters, names_of_vectors, segments_of
 from reference.drawing.subject import PLAN_COLOURS, DrawnFigure, Part, Subject
-from reference.drawing.symbols import HAIR_MM, LINK_MM, THIN_MM, Bar, bars, blocks, hinged_on, point, unit
+from reference.drawing.symbols import HAIR_MM, LINK_MM, THIN_MM, Bar, bars, blocks, point, unit
 from reference.drawing.triangles import altitudes
 from reference.geometry import FloatArray
-from reference.mechanism import Crank, DrivingSlider, Mechanism, Plate, PointOnLine, SlotPoint, SlottedLink
+from reference.mechanism import (
+    Crank,
+    DrivingSlider,
+    Mechanism,
+    Plate,
+    PointOnLine,
+    SlotPoint,
+    members,
+    slotted_links,
+)
 from reference.quantities import group_of, sort_of
 
 LETTER_MM, SMALL_LETTER_MM = 4.2, 3.2
@@ -168,8 +177,8 @@ def _free_points(mechanism: Mechanism) -> set[str]:
     """Return points of a link at which nothing is hinged."""
     kinds = PointOnLine | Plate | SlotPoint
     points = {group.node for group in mechanism.groups if isinstance(group, kinds)}
-    points.update(group.foot for group in mechanism.groups if isinstance(group, SlottedLink) and group.foot)
-    return points - {joint for group in mechanism.groups for joint in hinged_on(group)}
+    points.update(link.foot for link in slotted_links(mechanism).values() if link.foot)
+    return points - {member.points[0] for _, member, _ in members(mechanism)}
 
 
 def _welds(

@@ -27,6 +27,7 @@ from reference.mechanism import (
     SlottedLink,
     Yoke,
     moving_guides,
+    slotted_links,
 )
 
 LINK_MM, MEDIUM_MM, THIN_MM, HAIR_MM = 0.6, 0.35, 0.18, 0.13
@@ -214,8 +215,8 @@ def _bars_of(subject: Subject, group: Group, nodes: dict[str, complex]) -> Itera
             yield Bar(node, link, (start, node), (nodes[start], end))
             if group.foot:
                 yield _between(node, link, pivot, group.foot, nodes)
-        case SlotPoint(node=node, slotted=slotted, link=link):
-            yield _between(node, link, slotted_link(subject, slotted).pivot, node, nodes)
+        case SlotPoint(node=node, link=link):
+            yield _between(node, link, slotted_links(subject.plan.mechanism)[link].pivot, node, nodes)
         case Yoke(node=node, pin=pin):
             foot, along = slot_of_yoke(subject, group, nodes)
             way = nodes[pin] - foot
@@ -231,12 +232,6 @@ def _carriers(group: Group, nodes: dict[str, complex]) -> Iterator[Bar]:
         near, far = (h, g) if abs(at - h) < abs(at - g) else (g, h)
         if abs(at - far) > abs(far - near):
             yield Bar(guide.coincident, guide.link, guide.base, (near, at + BEYOND_MM * unit(at - near)))
-
-
-def slotted_link(subject: Subject, node: str) -> SlottedLink:
-    """Return the slotted link of a node."""
-    groups = subject.plan.mechanism.groups
-    return next(group for group in groups if isinstance(group, SlottedLink) and group.node == node)
 
 
 def slot_direction(group: SlottedLink, nodes: dict[str, complex]) -> complex:
@@ -289,14 +284,3 @@ def _along(subject: Subject, guide: Guide, nodes: dict[str, complex]) -> complex
     if isinstance(guide, FixedGuide):
         return complex(np.exp(1j * subject.number(np.asarray(guide.angle_rad))))
     return unit(nodes[guide.base[1]] - nodes[guide.base[0]])
-
-
-def hinged_on(group: Group) -> tuple[str, ...]:
-    """Return the joints at which a group's own links are hinged."""
-    match group:
-        case Dyad(pins=pins):
-            return pins
-        case Slider(pin=pin) | SlottedLink(pin=pin) | Yoke(pin=pin):
-            return (pin,)
-        case _:
-            return ()

@@ -18,7 +18,7 @@ from reference.drawing import symbols
 from reference.drawing.canvas import CONSTRUCTION, Curve, Piece, Stroke, pieces_of
 from reference.drawing.labels import Wanted
 from reference.drawing.subject import PLAN_COLOURS, Part, Subject
-from reference.drawing.symbols import HAIR_MM, MEDIUM_MM, point
+from reference.drawing.symbols import HAIR_MM, MEDIUM_MM, point, unit
 from reference.errors import CallError
 from reference.geometry import ComplexArray
 from reference.plan import Plan
@@ -84,10 +84,8 @@ def altitude_nodes(plan: Plan) -> Mapping[str, ComplexArray]:
     """
     check_scales(plan)
     nodes = evaluate(with_triangles(plan.construction), plan.drawing.parameters)
-    made = (triangle for triangle in triangles(plan.construction))
-    return {
-        node: nodes[node] for triangle in made for node in (triangle.end, triangle.beyond, triangle.turned)
-    }
+    made = (step.node for triangle in triangles(plan.construction) for step in triangle.steps)
+    return {node: nodes[node] for node in made}
 
 
 def check_scales(plan: Plan) -> None:
@@ -127,10 +125,7 @@ def altitudes(subject: Subject, nodes: dict[str, complex]) -> Altitudes:
     """
     if not subject.altitude:
         return Altitudes()
-    made = {
-        node: complex(np.broadcast_to(at, (len(subject.plan.variants),))[subject.index])
-        for node, at in altitude_nodes(subject.plan).items()
-    }
+    made = {node: subject.vector(at) for node, at in altitude_nodes(subject.plan).items()}
     known = {**nodes, **made}
     shown = [one for one in triangles(subject.plan.construction) if not subject.is_zero(one.vector.name)]
     joints = [triangle.joint for triangle in shown]
@@ -167,7 +162,7 @@ def _vectors(triangle: Triangle, nodes: dict[str, complex]) -> Iterator[Part]:
 
 
 def _right_angle(at: complex, p: complex, q: complex) -> Curve:
-    one, other = ((end - at) / abs(end - at) * RIGHT_ANGLE_MM for end in (p, q))
+    one, other = (RIGHT_ANGLE_MM * unit(end - at) for end in (p, q))
     return Curve(tuple(point(at + corner) for corner in (one, one + other, other)), HAIR_MM, CONSTRUCTION)
 
 

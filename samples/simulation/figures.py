@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from reference.construction.elements import FixedLine, Line, View
-from reference.construction.graph import ON_SKETCH, Vector, evaluate
+from reference.construction.graph import ON_SKETCH, Vector, coincident, evaluate
 from reference.construction.steps import ArcAndLine, Divide, Given, OnGuide, Similar, Step, TwoArcs, TwoLines
 from reference.mechanism import (
     Crank,
@@ -20,6 +20,7 @@ from reference.mechanism import (
     SlottedLink,
     Yoke,
     moving_guides,
+    slotted_links,
 )
 from samples.simulation import symbols
 from samples.simulation.hand import DrawingTask, DrawnFigure, Nodes
@@ -45,8 +46,8 @@ def _bars(task: DrawingTask, group: Group) -> Iterator[tuple[str, str]]:
             yield foot or pivot, _end_of_slot(task, group)
             if foot is not None:
                 yield pivot, foot
-        case SlotPoint(node=node, slotted=slotted):
-            link = _slotted_link(task, slotted)
+        case SlotPoint(node=node, link=name):
+            link = slotted_links(task.mechanism)[name]
             if node != _end_of_slot(task, link):
                 yield link.pivot, node
         case PointOnLine(node=node, base=(p, q), ratio=ratio):
@@ -58,23 +59,12 @@ def _bars(task: DrawingTask, group: Group) -> Iterator[tuple[str, str]]:
             yield pin, node
 
 
-def _slotted_link(task: DrawingTask, node: str) -> SlottedLink:
-    return next(g for g in task.mechanism.groups if isinstance(g, SlottedLink) and g.node == node)
-
-
 def _end_of_slot(task: DrawingTask, link: SlottedLink) -> str:
     """The point in which a slotted link's bar ends: beyond the block where the link goes on in line."""
     points = (g for g in task.mechanism.groups if isinstance(g, SlotPoint) and g.slotted == link.node)
     in_line = [one for one in points if np.all(one.local_m.imag == np.mean(link.offset_m))]
     ahead = [one for one in in_line if float(np.mean(one.local_m.real)) * float(np.mean(link.side)) > 0.0]
     return max(ahead, key=lambda one: float(np.mean(abs(one.local_m))), default=link).node
-
-
-def coincident(task: DrawingTask) -> set[str]:
-    """Joints that coincide with another and have no symbol or letter of their own."""
-    slotted = {g.node for g in task.mechanism.groups if isinstance(g, SlottedLink)}
-    slotted |= {g.node for g in task.mechanism.groups if isinstance(g, Yoke) and moving_guides(g)}
-    return slotted | {guide.coincident for g in task.mechanism.groups for guide in moving_guides(g)}
 
 
 def centres(task: DrawingTask) -> set[str]:
@@ -130,7 +120,9 @@ def draw_mechanism(sketch: SheetSketch, task: DrawingTask, nodes: Nodes, student
             corners = (nodes[p], nodes[q], nodes[group.node])
             symbols.inside_hatching(sketch, corners, sketch.rng.uniform(2.5, 5.0))
     _sliders(sketch, task, nodes, turn)
-    named = [joint for joint in task.mechanism.joints if joint not in coincident(task)]
+    # A joint that coincides with another has no symbol or letter of its own.
+    under = coincident(task.right.construction)
+    named = [joint for joint in task.mechanism.joints if joint not in under]
     if not sketch.with_supports:
         named = [joint for joint in named if not task.mechanism.is_ground(joint)]
     for joint in named:

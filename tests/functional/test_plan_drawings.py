@@ -5,6 +5,8 @@ import xml.etree.ElementTree as ET
 import pypdfium2
 import pytest
 
+from tests.functional.conftest import run
+
 A3_POINTS = (420.0 / 25.4 * 72.0, 297.0 / 25.4 * 72.0)
 A4_POINTS = (210.0 / 25.4 * 72.0, 297.0 / 25.4 * 72.0)
 POINT = 0.01
@@ -28,6 +30,13 @@ def test_drawing_steps_and_table_speak_the_language_asked_for(planmark, tmp_path
     assert "Marcați polul" in steps
     assert "planmark:" not in ran.stderr
     assert ran.stdout.count("Drawn in") == 2
+
+
+def test_a_drawing_is_the_same_in_every_run(tmp_path):
+    for seed in ("1", "2"):
+        call = ("plan", "press-forces", "--position", 2, "--svg", f"{seed}.svg")
+        assert run(tmp_path, *call, PYTHONHASHSEED=seed).returncode == 0
+    assert (tmp_path / "1.svg").read_bytes() == (tmp_path / "2.svg").read_bytes()
 
 
 def test_steps_are_printed_on_a4(planmark, tmp_path):

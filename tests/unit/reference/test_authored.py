@@ -231,6 +231,7 @@ CRANK_MM, LAST = "crank_mm = 60", "to = 30"
         ([('"30 + 2*n"', '"30 + 2*m"')], "$.variant.values.phi_deg", "unknown name m"),
         (PHI, "$.crank.angle_deg", "unknown name phi_deg"),
         ([("from = 1, to = 30", "from = 30, to = 1")], "$.variant.n", "the range is empty"),
+        ([("from = 1, to = 30", "form = 1, to = 30")], "$.variant.n.from", r"form: .*did you mean from\?"),
         *(
             ([(LAST, f"to = {last}")], "$.variant", "variants, more than 10000")
             for last in ("10_001", "9223372036854775807", "1" + "0" * 30)

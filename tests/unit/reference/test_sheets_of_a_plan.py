@@ -9,7 +9,7 @@ import pytest
 
 from reference.authored.assignment import load_assignment
 from reference.drawing import symbols
-from reference.drawing.canvas import Area, Curve, Label, Stroke, set_pieces, shifted
+from reference.drawing.canvas import Area, Curve, Label, Ring, Stroke, set_pieces, shifted
 from reference.drawing.labels import Wanted, place_labels, segments_of
 from reference.drawing.sheets import (
     CELL_MM,
@@ -24,6 +24,7 @@ from reference.drawing.sketch import support_direction
 from reference.drawing.subject import Subject, Wording
 from reference.drawing.symbols import bars
 from reference.drawing.tables import column, table_rows
+from reference.mechanism import SlottedLink
 from reference.plan import exact_plan
 from tests.drawn import CASES, planned
 
@@ -230,6 +231,19 @@ def test_the_ground_of_a_pivot_lies_where_no_link_goes():
     assert support_direction(at, [(at, at - 5j)]) == 1j
     away = support_direction(at, [(at, at - 5j), (at, at + 5j), (at, at + 5.0)])
     assert away == -1.0
+
+
+def test_a_point_about_which_a_slotted_link_turns_is_drawn_as_a_hinge(folder):
+    assignment, plan = planned("slotted link with an offset, crank slowing down clockwise", folder)
+    turning = SlottedLink("A3", "A", "C", "5", np.zeros(1), None, 1)
+    hinged = replace(plan, mechanism=replace(plan.mechanism, groups=(*plan.mechanism.groups, turning)))
+    radii = [
+        part.shape.radius
+        for one in (plan, hinged)
+        for part in figures_of(Subject(assignment, one))["mechanism"].parts
+        if part.node == "C" and isinstance(part.shape, Ring)
+    ]
+    assert radii == [symbols.POINT_RADIUS_MM, symbols.JOINT_RADIUS_MM]
 
 
 @pytest.mark.parametrize("case", CASES)
