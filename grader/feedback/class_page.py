@@ -5,14 +5,11 @@ import shlex
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
 from urllib.parse import quote
 
-from markupsafe import Markup
-
 from grader.documents import (
-    AlikeDocument,
     Cause,
     CriterionDocument,
     MovedDocument,
@@ -23,7 +20,6 @@ from grader.documents import (
     TrustDocument,
 )
 from grader.feedback.class_statistics import (
-    BINS,
     commonest,
     follow_through,
     hardest,
@@ -38,12 +34,11 @@ from grader.feedback.class_statistics import (
     wrong_scales,
 )
 from grader.feedback.mistakes import MISTAKES
-from grader.feedback.numbers import points_text, score_text
+from grader.feedback.numbers import points_text
 from grader.feedback.words import STATES, VERDICTS, environment, problem_sentence, unmatched_sentence
 from grader.files import result_folders, write_whole
 from grader.language import N_, NO_NAMES, Tongue, tongue
 from grader.marking.trust import CONFIDENCE
-from grader.overlay.scene import MARKS
 
 # The page -----------------------------------------------------------------------------------------
 
@@ -58,7 +53,6 @@ SIGNS: Mapping[Sign, str] = {
     "same_picture": N_("the ink lies in the same places"),
     "other_number": N_("drawn with the other's number"),
 }
-CHANCE = N_("By chance a class like this shows %(chance)s such pairs.")
 CAUSES: Mapping[Cause, str] = {
     "assignment": N_("the assignment was changed"),
     "rubric": N_("the rubric was changed"),
@@ -102,21 +96,6 @@ SOURCES: Mapping[str, str] = {
 KINDS: Mapping[str, str] = {"settled": N_("settled, then checked"), "proposed": N_("proposed, then decided")}
 
 
-def write_index(
-    results: ResultsDocument,
-    out_dir: Path,
-    lang: str,
-    *,
-    title: str = "",
-    student_names: Mapping[str, str] = NO_NAMES,
-    addresses: Sequence[str] = (),
-) -> None:
-    """Write `index.html`, the class at a glance, into a folder; arguments as of `index_page`."""
-    known: dict[str, Any] = {"title": title, "student_names": student_names, "addresses": addresses}
-    page = index_page(results, lang, out=str(out_dir), **known)
-    write_whole(out_dir / "index.html", page)
-
-
 def index_page(
     results: ResultsDocument,
     lang: str,
@@ -126,7 +105,7 @@ def index_page(
     out: str = "OUT",
     addresses: Sequence[str] = (),
 ) -> str:
-    """Return the class's page.
+    """Return the page of the class at a glance.
 
     Arguments
     ---------
@@ -153,7 +132,7 @@ def index_page(
         has_n=any("n" in report.variant for report in results.reports),
         unmatched=[unmatched_sentence(page, speaker) for page in results.unmatched],
         states=states(results),
-        chart=distribution_svg(results, speaker),
+        bins=list(zip(histogram(shares(results)), histogram(open_shares(results)), strict=True)),
         spread=spread(results),
         has_open=bool(open_shares(results)),
         hardest=hardest(results),
@@ -168,10 +147,15 @@ def index_page(
             (link(report), [_scale(results, criterion, speaker) for criterion in lost], refused)
             for report, lost, refused in wrong_scales(results)
         ],
-        alike=[_similar_row(pair, links, speaker) for pair in results.alike],
-        moved=[_change_row(results, change, link(change), speaker) for change in results.moved],
-        causes=_causes(results.moved),
-        score_text=lambda report: score_text(report, speaker),
+        alike=[
+            ([links.get(key, Link(key[0])) for key in zip(pair.students, pair.positions, strict=True)], pair)
+            for pair in results.alike
+        ],
+        signs=SIGNS,
+        moved=[(link(change), change) for change in results.moved],
+        causes=CAUSES,
+        times=Counter(cause for change in results.moved for cause in change.why).most_common(),
+        standing=partial(_standing, speaker=speaker),
         title_of=lambda criterion: title_of(results, criterion),
         shown=SHOWN,
         few=FEW,
@@ -315,7 +299,6 @@ def _row(report: ReportDocument, names: Mapping[str, str], link: Link, speaker: 
         "report": report,
         "name": names.get(report.student_id, ""),
         "link": link.page,
-        "score": score_text(report, speaker),
         "waiting": sum(criterion.verdict == "review" for criterion in report.criteria),
         "problems": Counter(problem_sentence(problem, speaker, brief=True) for problem in report.problems),
         "best": report.score if report.score is not None else (report.score_range or (-1.0, -1.0))[0],
@@ -329,43 +312,7 @@ def _scale(results: ResultsDocument, criterion: CriterionDocument, speaker: Tong
     return f"{title_of(results, criterion)}: {' ≠ '.join(values)}"
 
 
-# Similar sheets, and changes since the last run -----------------------------------------------------------
-
-
-def _similar_row(pair: AlikeDocument, links: Links, speaker: Tongue) -> dict[str, object]:
-    chance, share = "", None
-    if pair.measure is not None:
-        small = pair.measure < 1e-6
-        number = f"< {speaker.number(1e-6, 6)}" if small else speaker.significant(pair.measure, 1)
-        chance = speaker.gettext(CHANCE) % {"chance": number}
-    if pair.share is not None:
-        share = f"{speaker.number(100.0 * pair.share, 0)}\N{NO-BREAK SPACE}%"
-    return {
-        "students": [links.get(key, Link(key[0])) for key in zip(pair.students, pair.positions, strict=True)],
-        "why": [speaker.gettext(SIGNS[sign]) for sign in pair.why],
-        "share": share,
-        "compared": pair.compared,
-        "chance": chance,
-    }
-
-
-def _change_row(
-    results: ResultsDocument, change: MovedDocument, link: Link, speaker: Tongue
-) -> dict[str, object]:
-    return {
-        "student": link,
-        "before": _standing(change.before, speaker),
-        "after": _standing(change.after, speaker),
-        "why": [speaker.gettext(CAUSES[cause]) for cause in change.why],
-        "criteria": [
-            (
-                title_of(results, criterion),
-                _verdict(criterion.before, criterion.points_before, speaker),
-                _verdict(criterion.after, criterion.points_after, speaker),
-            )
-            for criterion in change.criteria
-        ],
-    }
+# Changes since the last run ----------------------------------------------------------------------
 
 
 def change_lines(results: ResultsDocument, speaker: Tongue) -> Iterator[str]:
@@ -383,56 +330,3 @@ def _standing(standing: StandingDocument | None, speaker: Tongue) -> str:
     if standing.status == "needs_review" and standing.score_range is not None:
         return "–".join(points_text(value, speaker) for value in dict.fromkeys(standing.score_range))
     return speaker.gettext(STATES[standing.status])
-
-
-def _verdict(verdict: str | None, points: float | None, speaker: Tongue) -> str:
-    if verdict is None:
-        return "–"
-    told = f"{MARKS[verdict]} {speaker.gettext(VERDICTS[verdict])}"
-    return told if points is None else f"{told} ({points_text(points, speaker)})"
-
-
-def _causes(changes: Sequence[MovedDocument]) -> list[tuple[str, int]]:
-    """Count the causes of changed marks."""
-    times = Counter(cause for change in changes for cause in change.why)
-    return [(CAUSES[cause], count) for cause, count in times.most_common()]
-
-
-# The distribution of scores ----------------------------------------------------------------------
-
-_STEP, _WIDE, _HIGH, _FOOT = 34, 28, 80.0, 100.0
-
-
-def distribution_svg(results: ResultsDocument, speaker: Tongue) -> Markup:
-    """Draw the distribution of scores; empty if there are none.
-
-    Final scores are full bars; open ones are dashed on top, at the middle of their range.
-    """
-    final, waiting = histogram(shares(results)), histogram(open_shares(results))
-    tallest = max(a + b for a, b in zip(final, waiting, strict=True))
-    if not tallest:
-        return Markup("")
-    parts = [_bar(index, final[index], waiting[index], tallest) for index in range(BINS)]
-    parts.append(Markup('<text class="axis" x="343" y="115">100</text>'))
-    summary = speaker.gettext("Scores in per cent of the maximum: how many students in each tenth.")
-    return Markup(
-        '<svg class="chart" viewBox="0 0 352 122" role="img" aria-label="{}">{}'
-        '<line class="foot" x1="2" y1="100.5" x2="350" y2="100.5"/></svg>'
-    ).format(summary, Markup("").join(parts))
-
-
-def _bar(index: int, final: int, waiting: int, tallest: int) -> Markup:
-    x, label = 6 + index * _STEP, f"{10 * index}–{10 * (index + 1)}"
-    parts = []
-    foot = _FOOT
-    for count, kind in ((final, "final"), (waiting, "waits")):
-        if count:
-            height = _HIGH * count / tallest
-            foot -= height
-            place = Markup('x="{}" y="{:.1f}" width="{}" height="{:.1f}"').format(x, foot, _WIDE, height)
-            told = f"{label} %: {count}"
-            parts.append(Markup('<rect class="{}" {}><title>{}</title></rect>').format(kind, place, told))
-    if final + waiting:
-        parts.append(Markup('<text x="{}" y="{:.1f}">{}</text>').format(x + 14, foot - 5, final + waiting))
-    parts.append(Markup('<text class="axis" x="{}" y="115">{}</text>').format(x - 3, 10 * index))
-    return Markup("").join(parts)

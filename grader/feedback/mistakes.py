@@ -5,7 +5,7 @@ guide: a Coriolis component, and the line along the guide.
 """
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from grader.documents import MistakeDocument, RivalDocument
@@ -411,10 +411,14 @@ def words_of(code: str, at: str = "", line: str = "") -> Words:
     return _BY_LINE.get(line, {}).get(code, usual)
 
 
+def line_in(details: Mapping[str, object]) -> str:
+    """Return the kind of line or slip among a mistake's details, as `words_of` takes it; empty if none."""
+    return str(details.get("line", details.get("slip", "")))
+
+
 def mistake_title(cause: MistakeDocument | RivalDocument) -> str:
     """Return the title of a report's mistake, a key of the catalogues."""
-    line = cause.parameters.get("line", cause.parameters.get("slip", ""))
-    return words_of(cause.code, cause.at, str(line)).title
+    return words_of(cause.code, cause.at, line_in(cause.parameters)).title
 
 
 QUESTIONS: dict[str, str] = {

@@ -10,7 +10,15 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from grader.documents import CriterionDocument, Parameters, Quantity
-from grader.feedback.mistakes import GIVING_AWAY, MISTAKES, NORMAL_END, precise, question_of, words_of
+from grader.feedback.mistakes import (
+    GIVING_AWAY,
+    MISTAKES,
+    NORMAL_END,
+    line_in,
+    precise,
+    question_of,
+    words_of,
+)
 from grader.language import N_, NO_NAMES, Tongue, tongue
 from grader.options import Level
 from grader.outcomes import CHARGED, CREDITED, NamedMistake, Outcome
@@ -67,7 +75,7 @@ def criterion_feedback(
     parts = list(dict.fromkeys(told))[:MOST_REASONS]
     if outcome.mistake and outcome.verdict in CHARGED and outcome.mistake in MISTAKES:
         cause = outcome.cause
-        words = words_of(cause.code, cause.at, line_of(cause)) if cause else MISTAKES[outcome.mistake]
+        words = words_of(cause.code, cause.at, line_in(cause.detail)) if cause else MISTAKES[outcome.mistake]
         title = speaker.gettext(words.title)
         parts.append(speaker.gettext("Likely cause: %(cause)s.") % {"cause": title})
     return " ".join(part for part in parts if part)
@@ -199,10 +207,11 @@ def mistake_sentence(
     mistake: NamedMistake, speaker: Tongue, level: Level, names: Mapping[str, str] = NO_NAMES
 ) -> str:
     """Return what was done and what to redo, regardless of rivals."""
-    words = words_of(mistake.code, mistake.at, line_of(mistake))
+    line = line_in(mistake.detail)
+    words = words_of(mistake.code, mistake.at, line)
     where = {"at": place(mistake.at, speaker, names)}
     known = {**where, **_known(mistake, speaker, level, names)}
-    what = precise(mistake.code, mistake.at, line_of(mistake), known) or words.what
+    what = precise(mistake.code, mistake.at, line, known) or words.what
     return f"{speaker.gettext(what) % known} {speaker.gettext(words.redo) % where}"
 
 
@@ -228,8 +237,3 @@ _IMAGE, ACCELERATED = re.compile("[a-z][0-9]?'?"), "'"
 """Names of images of joints in the plans, and the mark of those in the acceleration plan."""
 _CENTRE = re.compile("[IJ][0-9A-Za-z]+")
 """Names of links' centres on the sketch, where a mirrored triangle is not one of the plan."""
-
-
-def line_of(mistake: NamedMistake) -> str:
-    """Return the kind of line or slip, as `words_of` takes it; empty if the code suffices."""
-    return str(mistake.detail.get("line", mistake.detail.get("slip", "")))

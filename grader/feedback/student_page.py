@@ -20,20 +20,17 @@ from grader.documents import (
 from grader.feedback import words
 from grader.feedback.mistakes import MISTAKES, mistake_title
 from grader.feedback.numbers import (
-    added_text,
     quantity_cells,
     scale_text,
-    score_line,
-    score_text,
     tolerance_cells,
 )
-from grader.feedback.words import ProblemText, environment, problem_sentence
+from grader.feedback.words import environment
 from grader.files import write_whole
 from grader.language import N_, Tongue, symbols, tongue
 from grader.options import Level
 from grader.outcomes import CHARGED
 from grader.overlay.closeup import PageView, detail, page_views, scan_element, svg
-from grader.overlay.scene import Picture
+from grader.overlay.scene import Arrow, Picture
 from grader.texts.spoken import PLACES, place
 from reference.construction.graph import ON_SKETCH
 
@@ -46,13 +43,6 @@ AS_MEASURED = N_("drawn from the entered measurements")
 SHEET = N_("the sheet")
 DETAIL = N_("a closer look")
 OR = N_("or")
-WHY_WIDENED = N_(
-    "Widened: here the small errors of careful drawing add up to more than the rubric's tolerance, as they"
-    " do where lines meet at a small angle."
-)
-UNITS = N_(
-    "Lengths are millimetres on paper; directions count counter-clockwise from the horizontal to the right."
-)
 MOST_TITLES = 2
 """Mistakes named in one heading, the likeliest ones; the text below it names them all."""
 PRINTED = "feedback.pdf"
@@ -124,16 +114,6 @@ class Group:
     verdict: str
     rows: tuple[CriterionDocument, ...]
 
-    @property
-    def points(self) -> float:
-        """Points that its rows gave."""
-        return sum(row.points or 0.0 for row in self.rows)
-
-    @property
-    def max_points(self) -> float:
-        """Points that its rows can give."""
-        return sum(row.max_points for row in self.rows)
-
 
 @dataclass(frozen=True, slots=True)
 class StudentPage:
@@ -161,20 +141,10 @@ class StudentPage:
         return [f"{self.speaker.gettext(word)} {value}" for word, value in known if value is not None]
 
     @property
-    def score(self) -> str:
-        """The score, or its range."""
-        return score_text(self.report, self.speaker)
-
-    @property
     def tally(self) -> list[tuple[str, int]]:
         """Count the criteria by verdict; verdicts that do not occur are left out."""
         verdicts = [criterion.verdict for criterion in self.report.criteria]
         return [(verdict, verdicts.count(verdict)) for verdict in words.VERDICTS if verdict in verdicts]
-
-    @property
-    def problems(self) -> list[ProblemText]:
-        """The problems of files and sheets as sentences."""
-        return [problem_sentence(problem, self.speaker) for problem in self.report.problems]
 
     def shown(self, name: str) -> str:
         """Return a vector, computed value, link or scale as students know it."""
@@ -187,16 +157,6 @@ class StudentPage:
         title, *verdicts = GROUPS[name]
         rows = (row for row in self.report.criteria if row.verdict in verdicts and not _is_left_out(row))
         return Group(self.speaker.gettext(title), verdicts[0], tuple(rows))
-
-    @property
-    def score_line(self) -> str:
-        """Explain how the points of the rows add up to the score."""
-        return score_line(self.report, self.speaker)
-
-    @property
-    def added(self) -> str:
-        """The points that a person added or subtracted."""
-        return added_text(self.report, self.speaker)
 
     @property
     def remarks_of_people(self) -> list[tuple[str, str]]:
@@ -228,10 +188,6 @@ class StudentPage:
         is_said = criterion.reasons in (["right"], ["decided"]) and criterion.mistake is None
         return "" if is_said else criterion.feedback
 
-    def measured(self, criterion: CriterionDocument) -> list[str]:
-        """Return the submitted values as lines of a cell."""
-        return quantity_cells(criterion.measured, self.speaker)
-
     def expected(self, criterion: CriterionDocument) -> list[str]:
         """Return the right values as lines of a cell; a vector below its tolerance has no direction."""
         if not self.shows_expected:
@@ -255,21 +211,6 @@ class StudentPage:
         if cells and "follows" in criterion.reasons:
             cells.append(self.speaker.gettext(FROM_OWN))
         return cells
-
-    @property
-    def widening(self) -> str:
-        """Explain why tolerances are wider than the rubric's; empty if none is."""
-        is_wider = any(criterion.tolerance.widened for criterion in self.report.criteria)
-        return self.speaker.gettext(WHY_WIDENED) if self.shows_expected and is_wider else ""
-
-    @property
-    def footer(self) -> str:
-        """Explain how lengths and directions are measured."""
-        return self.speaker.gettext(UNITS)
-
-    def declared(self, name: ScaleName) -> str:
-        """Return a scale as declared."""
-        return scale_text(self.report.scales[name].declared, name, self.speaker)
 
     def remarks(self, scale: ScaleDocument) -> list[str]:
         """Say how and where a scale was written, and why it was refused."""
@@ -296,20 +237,15 @@ class StudentPage:
         return [view for view in views if view not in whole], whole
 
     @property
+    def arrows(self) -> list[Arrow]:
+        """The vectors and links on the drawing."""
+        return [arrow for picture in self.pictures for arrow in picture.scene.arrows]
+
+    @property
     def marked(self) -> list[str]:
         """The verdicts that occur on the drawing."""
-        shown = {arrow.verdict for picture in self.pictures for arrow in picture.scene.arrows}
+        shown = {arrow.verdict for arrow in self.arrows}
         return [verdict for verdict in words.VERDICTS if verdict in shown]
-
-    @property
-    def has_doubts(self) -> bool:
-        """True if any doubtful vector is drawn."""
-        return any(arrow.doubtful for picture in self.pictures for arrow in picture.scene.arrows)
-
-    @property
-    def has_ghosts(self) -> bool:
-        """True if any expected vector is drawn."""
-        return any(picture.scene.ghosts for picture in self.pictures)
 
     def draw(self, view: PageView) -> Markup:
         """Return a view as an element of the page."""
@@ -430,21 +366,8 @@ def _is_left_out(criterion: CriterionDocument) -> bool:
 # Files --------------------------------------------------------------------------------------------
 
 
-def write_feedback(
-    report: ReportDocument,
-    pictures: Sequence[Picture],
-    out_dir: Path,
-    lang: str,
-    level: Level = "full",
-    about: About | None = None,
-) -> None:
-    """Write `feedback.html` and `overlay.png`, `overlay_2.png`, ... into a folder.
-
-    Arguments
-    ---------
-    report : its criteria's and mistakes' `feedback` is shown as it stands (see `criterion_feedback`)
-    pictures : of its pages, in order; for entered measurements, the plans as measured
-    level : `full` shows the expected values; `hint` and `symbol` do not
+def write_feedback(page: str, pictures: Sequence[Picture], out_dir: Path) -> None:
+    """Write a page as `feedback.html`, its pictures as `overlay.png`, `overlay_2.png`, ..., into a folder.
 
     Raises OutputError if a file cannot be written.
     """
@@ -452,7 +375,7 @@ def write_feedback(
     files = ["overlay.png" if k == 1 else f"overlay_{k}.png" for k in range(1, len(scanned) + 1)]
     for file, picture in zip(files, scanned, strict=True):
         write_whole(out_dir / file, picture.png)
-    write_whole(out_dir / "feedback.html", feedback_page(report, pictures, lang, level, about))
+    write_whole(out_dir / "feedback.html", page)
     for old in (*out_dir.glob("overlay*.png"), out_dir / PRINTED):
         # Remove files of an earlier run: of pages no longer handed in, or at another level.
         if old.name not in files:
@@ -466,7 +389,14 @@ def feedback_page(
     level: Level = "full",
     about: About | None = None,
 ) -> str:
-    """Return the page of one submission; arguments as of `write_feedback`."""
+    """Return the page of one submission.
+
+    Arguments
+    ---------
+    report : its criteria's and mistakes' `feedback` is shown as it stands (see `criterion_feedback`)
+    pictures : of its pages, in order; for entered measurements, the plans as measured
+    level : `full` shows the expected values; `hint` and `symbol` do not
+    """
     page = StudentPage(report, tuple(pictures), tongue(lang), level, about or About())
     template = environment(page.speaker.lang).get_template("feedback.html")
     return template.render(

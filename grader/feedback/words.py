@@ -1,12 +1,20 @@
 """Verdicts, states, names and problems as written for people."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from grader.documents import ProblemDocument, UnmatchedDocument
-from grader.feedback.numbers import points_text
+from grader.feedback.numbers import (
+    added_text,
+    points_text,
+    quantity_cells,
+    scale_text,
+    score_line,
+    score_text,
+)
 from grader.feedback.sentences import BETWEEN_RIVALS, RIVALS
 from grader.language import N_, ROOT_LANGUAGE, Tongue, symbols, tongue
 from grader.overlay.scene import COLOURS, MARKS
@@ -50,6 +58,10 @@ STATE_TONES = {
 }  # fmt: skip
 STATE_MARKS = {"graded": "✓", "needs_review": "?", "unreadable": "✗", "missing": "–"}
 
+UNITS = N_(
+    "Lengths are millimetres on paper; directions count counter-clockwise from the horizontal to the right."
+)
+
 # Templates ----------------------------------------------------------------------------------------
 
 
@@ -80,11 +92,15 @@ def environment(lang: str) -> Environment:
     )
     made.filters["symbols"] = symbols
     made.filters["first_up"] = lambda text: text[:1].upper() + text[1:]
-    made.filters["points"] = lambda value: points_text(value, speaker)
+    said: dict[str, Callable[..., object]] = {
+        "points": points_text, "score": score_text, "score_line": score_line, "added": added_text,
+        "scale": scale_text, "quantity": quantity_cells, "problem": problem_sentence,
+    }  # fmt: skip
+    made.filters |= {name: partial(say, speaker=speaker) for name, say in said.items()}
     made.globals.update(
         speaker=speaker, verdicts=VERDICTS, states_words=STATES, state_marks=STATE_MARKS,
         tones=STATE_TONES, colours=COLOURS, dark_colours=DARK_COLOURS, marks=MARKS,
-        rivals=speaker.gettext(RIVALS), either=speaker.gettext(BETWEEN_RIVALS),
+        rivals=speaker.gettext(RIVALS), either=speaker.gettext(BETWEEN_RIVALS), units=speaker.gettext(UNITS),
     )  # fmt: skip
     return made
 

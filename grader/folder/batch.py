@@ -18,8 +18,8 @@ from grader.documents import (
     TrustDocument,
     UnmatchedDocument,
 )
-from grader.feedback.class_page import write_index
-from grader.feedback.student_page import About, write_feedback
+from grader.feedback.class_page import index_page
+from grader.feedback.student_page import About, feedback_page, write_feedback
 from grader.files import remove_parts, result_folders, write_parts, write_whole
 from grader.folder.archives import is_archive
 from grader.folder.cache import (
@@ -552,7 +552,8 @@ def _write_report(batch: Batch, job: Job, report: ReportDocument, pictures: Sequ
     submission, where = job.submission, batch.out / job.folder
     title = batch.assignment.file.title.in_language(submission.lang)
     about = About(title, submission.name, batch.assignment.file.names)
-    write_feedback(report, pictures, where, submission.lang, batch.level, about)
+    page = feedback_page(report, pictures, submission.lang, batch.level, about)
+    write_feedback(page, pictures, where)
     write_whole(where / "report.json", report.model_dump_json(indent=2))
 
 
@@ -561,7 +562,10 @@ def _write_results(batch: Batch, results: ResultsDocument, students: Sequence[St
     write_documents(batch.out, results)
     names = {submission.student_id: submission.name for submission in students}
     title = batch.assignment.file.title.in_language(batch.lang)
-    write_index(results, batch.out, batch.lang, title=title, student_names=names, addresses=batch.addresses)
+    page = index_page(
+        results, batch.lang, title=title, student_names=names, out=str(batch.out), addresses=batch.addresses
+    )
+    write_whole(batch.out / "index.html", page)
     write_parts(batch.out / "results.json", _results_text(batch.out, results))
     note_standings(batch.out / "results.json", results)
 

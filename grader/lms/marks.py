@@ -203,6 +203,11 @@ def _mark(criterion: CriterionDocument, report: ReportDocument, speaker: Tongue)
     )  # fmt: skip
 
 
+def ready_marks(grades: Sequence[Grade], options: Options) -> list[tuple[Grade, list[Mark]]]:
+    """The marks of graded students, one for each criterion of the class."""
+    return [(grade, together(marks_of(grade), options.combine)) for grade in ready(grades)]
+
+
 def together(marks: Sequence[Mark], combine: str | None) -> list[Mark]:
     """One mark for each criterion, of all positions: their sum, or their mean."""
     by_criterion: dict[str, list[Mark]] = {}
@@ -289,7 +294,7 @@ def platform_marks(
 
     Raises InputFileError where the platform's criteria are not the rubric's.
     """
-    marked = [(grade, together(marks_of(grade), options.combine)) for grade in ready(grades)]
+    marked = ready_marks(grades, options)
     criteria = numbered(class_criteria(grades, options), path)
     numbers = {each.criterion: each.id for each in criteria}
     return criteria, [(grade, {numbers[mark.criterion]: mark for mark in marks}) for grade, marks in marked]

@@ -14,7 +14,7 @@ from reportlab.platypus import Flowable, PageBreak, Paragraph, SimpleDocTemplate
 
 from grader.language import N_, Tongue, symbols, tongue
 from grader.printed.answer_sheet import given_data, variants_of
-from grader.printed.pdf import BOLD, REGULAR, embed_fonts, number, put_shapes, with_marks
+from grader.printed.pdf import BOLD, REGULAR, Drawing, embed_fonts, number, with_marks
 from grader.rubric import SECTIONS, RubricFile, accelerations_of, scales_asked
 from grader.tables.roster import RosterRow
 from reference.authored.assignment import Assignment, Variant
@@ -165,22 +165,6 @@ def _whose(row: RosterRow, variant: Variant, speaker: Tongue) -> str:
 # The scheme ---------------------------------------------------------------------------------------
 
 
-class _Picture(Flowable):  # type: ignore[misc]  # reportlab has no types
-    """A figure centred in its room."""
-
-    def __init__(self, subject: Subject) -> None:
-        super().__init__()
-        self.shapes = scheme(subject).shapes
-        left, top, right, bottom = bounds(self.shapes)
-        room = tuple(side * mm for side in SCHEME_MM)
-        self.unit = min(mm, room[0] / (right - left), room[1] / (bottom - top))
-        self.width, self.height = room[0], (bottom - top) * self.unit
-        self.origin = ((room[0] - (left + right) * self.unit) / 2.0, bottom * self.unit)
-
-    def draw(self) -> None:
-        put_shapes(self.canv, self.shapes, self.origin, self.unit)
-
-
 def _scheme(assignment: Assignment, variant: Variant) -> tuple[Flowable, str]:
     """Return the mechanism in a position that is not the student's own, if the assignment has another.
 
@@ -196,10 +180,18 @@ def _scheme(assignment: Assignment, variant: Variant) -> tuple[Flowable, str]:
         if _sides(assignment, other) != _sides(assignment, variant):
             continue
         try:
-            return _Picture(_fitted(assignment, other)), OWN_SCHEME if other == variant else SCHEME
+            return _drawn(_fitted(assignment, other)), OWN_SCHEME if other == variant else SCHEME
         except MechanismError as refused:
             error = refused
     raise error or ValueError("a variant has its own sides")
+
+
+def _drawn(subject: Subject) -> Drawing:
+    """Return the scheme as large as its room allows, but not larger than on paper."""
+    shapes, (wide, high) = scheme(subject).shapes, (side * mm for side in SCHEME_MM)
+    box = bounds(shapes)
+    unit = min(mm, wide / (box[2] - box[0]), high / (box[3] - box[1]))
+    return Drawing(shapes, box, unit, room=wide)
 
 
 def _sides(assignment: Assignment, variant: Variant) -> list[float]:

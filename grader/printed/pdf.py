@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from itertools import groupby
 
 import cv2
 import numpy as np
@@ -17,6 +18,7 @@ from reportlab.pdfbase import pdfmetrics
 from reportlab.pdfbase.ttfonts import TTFont
 from reportlab.pdfgen.canvas import Canvas
 from reportlab.pdfgen.pathobject import PDFPathObject
+from reportlab.platypus import Flowable
 
 from grader.printed.layout import (
     FRAME_MM,
@@ -28,7 +30,19 @@ from grader.printed.layout import (
     Template,
 )
 from grader.records import Box
-from reference.drawing.canvas import SLANT, Area, Curve, Label, Piece, Point, Ring, Shape, Stroke, set_pieces
+from reference.drawing.canvas import (
+    SLANT,
+    Area,
+    Bounds,
+    Curve,
+    Label,
+    Piece,
+    Point,
+    Ring,
+    Shape,
+    Stroke,
+    set_pieces,
+)
 
 # Markers ------------------------------------------------------------------------------------------
 
@@ -149,6 +163,25 @@ def put_shapes(canvas: Canvas, shapes: Iterable[Shape], origin: tuple[float, flo
     for shape in shapes:
         _put(canvas, shape)
     canvas.restoreState()
+
+
+class Drawing(Flowable):  # type: ignore[misc]  # reportlab has no types
+    """Shapes within a box (mm) as a part of a printed page; a millimetre is `unit` points long.
+
+    Arguments: `room` is the width of its place, in points, in which it is centred; its own by default.
+    """
+
+    def __init__(self, shapes: Sequence[Shape], box: Bounds, unit: float, room: float | None = None) -> None:
+        super().__init__()
+        left, top, right, bottom = box
+        self.shapes, self.unit = shapes, unit
+        self.width = (right - left) * unit if room is None else room
+        self.height = (bottom - top) * unit
+        self.origin = ((self.width - (left + right) * unit) / 2.0, bottom * unit)
+
+    def draw(self) -> None:
+        """Draw the shapes; the page calls it."""
+        put_shapes(self.canv, self.shapes, self.origin, self.unit)
 
 
 @cache
@@ -331,14 +364,12 @@ class PdfDrawing:
 def runs(rows: Iterable[Iterable[bool]]) -> Iterable[tuple[int, int, int]]:
     """Yield stretches of True in a grid: row, first column, number of columns."""
     for number, row in enumerate(rows):
-        cells = [*row, False]
-        first = None
-        for column, filled in enumerate(cells):
-            if filled and first is None:
-                first = column
-            elif not filled and first is not None:
-                yield number, first, column - first
-                first = None
+        first = 0
+        for filled, cells in groupby(row):
+            count = len(list(cells))
+            if filled:
+                yield number, first, count
+            first += count
 
 
 def _up(y_mm: float) -> float:

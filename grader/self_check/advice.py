@@ -13,8 +13,8 @@ from grader.feedback.mistakes import (
     DRIVING_ACROSS,
     DRIVING_ALONG,
     OF_FORCE,
+    line_in,
 )
-from grader.feedback.sentences import line_of
 from grader.language import N_, Tongue
 from grader.options import Level
 from grader.outcomes import Judgement, NamedMistake
@@ -282,7 +282,7 @@ def law_of(mistake: NamedMistake) -> str:
     usual = LAWS.get(mistake.code, "")
     if mistake.at.startswith(CORIOLIS_END):
         return _CORIOLIS.get(mistake.code, usual)
-    line = line_of(mistake)
+    line = line_in(mistake.detail)
     known = {**_DRIVING, ALONG_GUIDE: _GUIDE, RIGHT_TRIANGLE: _BY_TRIANGLE}
     others = {**known, OF_FORCE: _OF_FORCES, ACROSS_GUIDE: _OF_FORCES}.get(line, {})
     return others.get(mistake.code, usual)

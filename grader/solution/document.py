@@ -181,9 +181,9 @@ def variant_numbers(variant: Variant) -> dict[str, int]:
     return {} if variant.n is None else {"n": variant.n}
 
 
-def plan_document(assignment: Assignment, plan: Plan, index: int = 0) -> PlanDocument:
-    """Return the plan of the variant at an index of a plan's arrays."""
-    return _document(assignment, plan, _columns(plan), index)
+def plan_document(assignment: Assignment, plan: Plan) -> PlanDocument:
+    """Return the plan of one variant, the first."""
+    return plan_documents(assignment, plan)[0]
 
 
 def plan_documents(assignment: Assignment, plan: Plan) -> list[PlanDocument]:

@@ -9,7 +9,7 @@ import numpy as np
 from grader.language import N_
 from grader.solution.forces import balance_of, force_formula, moment_formula
 from grader.solution.formulas import TICK, Formula, Fraction, Grid, Name
-from grader.solution.sentences import NEXT_TO_NOTHING, Speaker, guided
+from grader.solution.sentences import Speaker, guided
 from reference.authored.assignment import SCALE_NAMES
 from reference.authored.formula import Formula as AuthoredFormula
 from reference.authored.formula import Value
@@ -27,7 +27,6 @@ from reference.construction.elements import (
 )
 from reference.construction.equations import Equation, Proportion, Term
 from reference.drawing.canvas import Piece, pieces_of
-from reference.geometry import cross
 from reference.mechanism import Crank
 from reference.quantities import OF_MOTION, kind_of, unit_of
 
@@ -109,8 +108,7 @@ def _direction(speaker: Speaker, term: Term) -> Formula:
 def _turned(speaker: Speaker, similar: Proportion, end: str) -> Formula:
     """Describe the direction of a link's vector by that of another: in line, or at the link's angle."""
     (p, q), (other, pin, joint) = similar.base, similar.model
-    base, arm = (np.asarray(speaker.place(one) - speaker.place(pin)) for one in (other, joint))
-    if abs(cross(base, arm)) <= NEXT_TO_NOTHING * abs(base) ** 2:
+    if speaker.is_flat(pin, other, joint):
         return ("∥ ", speaker.symbol(q, p))
     return ("∠ ", speaker.symbol(q, p, end), " = ∠ ", speaker.symbol(*similar.model))
 

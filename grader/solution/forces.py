@@ -185,12 +185,12 @@ def results(speaker: Speaker, figure: str) -> Iterator[Formula]:
         formula = moment_formula(speaker, total) if total.lever is None else None
         if formula is not None:
             yield from moment_lines(speaker, total)
-            yield _moment(speaker, total.unknown, " = ", formula[0], " = ", formula[1])
+            value = speaker.subject.number(speaker.subject.plan.rates[total.unknown])
+            yield turning_as(speaker, total.unknown, value, " = ", formula[0], " = ", formula[1])
 
 
-def _moment(speaker: Speaker, name: str, *between: Formula) -> Formula:
-    """Write a moment with its value and its sense."""
-    value = speaker.subject.number(speaker.subject.plan.rates[name])
+def turning_as(speaker: Speaker, name: str, value: float, *between: Formula) -> Formula:
+    """Write a moment or a rate with its value and its sense."""
     told = (speaker.symbol(name), *between, " = ", speaker.real(abs(value), unit_of(name)))
     return (*told, f", {speaker.tongue.gettext(sense(value))}") if value else told
 

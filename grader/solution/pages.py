@@ -10,7 +10,6 @@ from markupsafe import Markup, escape
 from reportlab.lib.pagesizes import A4
 from reportlab.lib.styles import ParagraphStyle
 from reportlab.lib.units import mm
-from reportlab.pdfgen.canvas import Canvas
 from reportlab.platypus import (
     CondPageBreak,
     Flowable,
@@ -22,7 +21,7 @@ from reportlab.platypus import (
 )
 
 from grader.language import N_, Tongue
-from grader.printed.pdf import REGULAR, embed_fonts, put_shapes, with_marks
+from grader.printed.pdf import REGULAR, Drawing, PdfDrawing, embed_fonts, put_shapes, with_marks
 from grader.solution.formulas import (
     Formula,
     Grid,
@@ -50,19 +49,13 @@ from reference.drawing.subject import DrawnFigure, Subject
 # Shapes on a PDF page -----------------------------------------------------------------------------
 
 
-def pdf(sheets: Sequence[Sequence[Shape]], title: str, page_mm: tuple[float, float] = A3_MM) -> bytes:
-    """Return the sheets as the pages of a PDF document; `page_mm` is their width and height."""
-    embed_fonts()
-    buffer = io.BytesIO()
-    canvas = Canvas(buffer, pagesize=(page_mm[0] * mm, page_mm[1] * mm), invariant=1)
-    canvas.setTitle(title)
-    # Viewers must not shrink the page when it is printed.
-    canvas.setViewerPreference("PrintScaling", "None")
+def pdf(sheets: Sequence[Sequence[Shape]], title: str) -> bytes:
+    """Return the sheets as the A3 pages of a PDF document."""
+    drawing = PdfDrawing.begin(title)
     for shapes in sheets:
-        put_shapes(canvas, shapes, (0.0, page_mm[1] * mm), mm)
-        canvas.showPage()
-    canvas.save()
-    return buffer.getvalue()
+        put_shapes(drawing.canvas, shapes, (0.0, A3_MM[1] * mm), mm)
+        drawing.next_page()
+    return drawing.finish()
 
 
 # Steps with their pictures ------------------------------------------------------------------------
@@ -219,30 +212,12 @@ def text_page(subject: Subject, tongue: Tongue) -> str:
 # As PDF -------------------------------------------------------------------------------------------
 
 
-class _Drawn(Flowable):  # type: ignore[misc]  # reportlab has no types
-    """A picture on the printed page, true to size unless it is larger than its place."""
-
-    def __init__(
-        self,
-        picture: Cutout,
-        share: float = 1.0,
-        tallest_mm: float = TALLEST_MM,
-        widest_mm: float = COLUMN_MM,
-    ) -> None:
-        super().__init__()
-        width, height = picture.size
-        self.picture = picture
-        self.unit = mm * min(share, widest_mm / width, tallest_mm / height)
-        self.width, self.height = width * self.unit, height * self.unit
-
-    def wrap(self, _width: float, _height: float) -> tuple[float, float]:
-        return self.width, self.height
-
-    def draw(self) -> None:
-        left, top = self.picture.box[:2]
-        put_shapes(
-            self.canv, self.picture.shapes, (-left * self.unit, self.height + top * self.unit), self.unit
-        )
+def _drawn(
+    picture: Cutout, share: float = 1.0, tallest_mm: float = TALLEST_MM, widest_mm: float = COLUMN_MM
+) -> Drawing:
+    """Return a picture on the printed page, true to size unless it is larger than its place."""
+    width, height = picture.size
+    return Drawing(picture.shapes, picture.box, mm * min(share, widest_mm / width, tallest_mm / height))
 
 
 def pdf_pages(subject: Subject, tongue: Tongue) -> bytes:
@@ -279,7 +254,7 @@ def _printed_chapter(chapter: Chapter) -> Iterator[Flowable]:
     if section.table is not None:
         yield from (Spacer(1, 2 * mm), _grid(section.table))
     if chapter.picture is not None:
-        yield from (Spacer(1, 2 * mm), _Drawn(chapter.picture))
+        yield from (Spacer(1, 2 * mm), _drawn(chapter.picture))
     for step in chapter.steps:
         yield Spacer(1, 4 * mm)
         yield KeepTogether([*_printed_step(step)])
@@ -295,17 +270,17 @@ def _printed_step(step: Illustrated) -> Iterator[Flowable]:
     words: list[Flowable] = [*map(_formula, explanation.before)]
     words += [_paragraph(head, 9.5), *map(_formula, explanation.after)]
     if step.model is not None:
-        words += [Spacer(1, 2 * mm), _Drawn(step.model, MODEL_SHARE, MODEL_TALLEST_MM)]
+        words += [Spacer(1, 2 * mm), _drawn(step.model, MODEL_SHARE, MODEL_TALLEST_MM)]
     widths = ((COLUMN_MM + GAP_MM) * mm, COLUMN_MM * mm)
     style = [("VALIGN", (0, 0), (-1, -1), "TOP"), ("LEFTPADDING", (0, 0), (-1, -1), 0)]
-    picture = _Drawn(step.picture) if step.picture is not None else ""
+    picture = _drawn(step.picture) if step.picture is not None else ""
     yield Table([[words, picture]], colWidths=widths, style=style)
 
 
 def _grid(grid: Grid) -> Flowable:
     """Return an equation or a table, as wide as the page at most."""
     shapes = grid_shapes(grid, EQUATION_MM)
-    return _Drawn(Cutout(shapes, bounds(shapes)), widest_mm=2 * COLUMN_MM + GAP_MM)
+    return _drawn(Cutout(shapes, bounds(shapes)), widest_mm=2 * COLUMN_MM + GAP_MM)
 
 
 def _formula(formula: Formula) -> Flowable:
@@ -313,7 +288,7 @@ def _formula(formula: Formula) -> Flowable:
     found = typeset(formula, FORMULA_MM)
     gap = 0.3 * FORMULA_MM
     box = (-INDENT_MM, -found.rise - gap, max(found.width, 1.0), found.fall + gap)
-    return _Drawn(Cutout(found.shapes, box))
+    return _drawn(Cutout(found.shapes, box))
 
 
 def _paragraph(text: str, size: float) -> Paragraph:

@@ -178,6 +178,11 @@ class Speaker:
         """Return the drawn distance of two nodes, mm."""
         return abs(self.place(q) - self.place(p))
 
+    def is_flat(self, p: str, q: str, third: str) -> bool:
+        """Return whether three nodes lie in line."""
+        base, arm = (np.asarray(self.place(corner) - self.place(p)) for corner in (q, third))
+        return bool(abs(geometry.cross(base, arm)) <= NEXT_TO_NOTHING * abs(base) ** 2)
+
     def is_nothing(self, node: str, mm: float) -> bool:
         """Return whether a length is zero compared with the size of the figure that a node is in."""
         figure = self.subject.plan.construction.figure_of(node)
@@ -535,8 +540,7 @@ def _similar(speaker: Speaker, step: Similar) -> Markup:
     (p, q), (model_p, model_q, third) = step.base, step.model
     if speaker.is_nothing(p, speaker.distance(p, q)):
         return speaker.say(SIMILAR_TO_NOTHING, p=p, q=q, node=step.node)
-    base, arm = (speaker.place(corner) - speaker.place(model_p) for corner in (model_q, third))
-    is_flat = abs(geometry.cross(np.asarray(base), np.asarray(arm))) <= NEXT_TO_NOTHING * abs(base) ** 2
+    is_flat = speaker.is_flat(*step.model)
     return speaker.say(
         SIMILAR_FLAT if is_flat else SIMILAR, node=step.node, base=step.base, third=third,
         model=(model_p, model_q) if is_flat else step.model,

@@ -15,8 +15,8 @@ from grader.solution.forces import (
     lever_table,
     moment_lines,
     results,
-    sense,
     table_of,
+    turning_as,
 )
 from grader.solution.formulas import Formula, Fraction, Grid, Name, grid_text, plain
 from grader.solution.sentences import TITLES, Speaker, speaker_of
@@ -215,10 +215,5 @@ def _turning(speaker: Speaker, rate: AngularRate) -> Formula:
     zero = speaker.subject.is_zero(rate.vector)
     turn = 0.0 if zero else speaker.subject.number(plan.rates[name])
     numbers = Fraction(speaker.bare(abs(turn) * arm), speaker.bare(arm))
-    told = (
-        speaker.symbol(name), " = ", Fraction(speaker.symbol(rate.vector), speaker.symbol(*rate.link)),
-        " = ", numbers, " = ", speaker.real(abs(turn), unit_of(name)),
-    )  # fmt: skip
-    if turn == 0.0:
-        return told
-    return (*told, f", {speaker.tongue.gettext(sense(turn))}")
+    names = Fraction(speaker.symbol(rate.vector), speaker.symbol(*rate.link))
+    return turning_as(speaker, name, turn, " = ", names, " = ", numbers)

@@ -9,7 +9,6 @@ import asyncio
 import contextlib
 import hashlib
 import hmac
-import json
 import re
 import secrets
 import time
@@ -28,7 +27,8 @@ from limits.storage import MemoryStorage
 from limits.strategies import MovingWindowRateLimiter
 from sqlalchemy import select
 from sqlalchemy.orm import Session
-from starlette.datastructures import Headers
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from zxcvbn import zxcvbn
 
@@ -321,7 +321,7 @@ class Rim:
             return
         host = Headers(scope=scope).get("host", "")
         if host != self.settings.host and _name_of(host) not in self.hosts:
-            await _refuse(scope, send, RefusedError(421, "refused", "other_host"))
+            await _refusal(scope, RefusedError(421, "refused", "other_host"))(scope, receive, send)
             return
         most, sender = self._most(scope["path"]), address_of(scope)
         taken, until = 0, 0.0
@@ -353,9 +353,9 @@ class Rim:
             if refused is not None:  # whatever the application answers to that
                 return
             if message["type"] == "http.response.start":
-                known = {name for name, _ in message["headers"]}
-                ours = [(name.lower().encode(), value.encode()) for name, value in self._headers().items()]
-                message["headers"] = [*message["headers"], *(one for one in ours if one[0] not in known)]
+                headers = MutableHeaders(scope=message)
+                for name, value in self._headers().items():
+                    headers.setdefault(name, value)
             await send(message)
 
         try:
@@ -366,7 +366,7 @@ class Rim:
             if 0.0 < until < inf:
                 self._ended(sender)
         if refused is not None:
-            await _refuse(scope, send, refused)
+            await _refusal(scope, refused)(scope, receive, send)
 
     def _ended(self, sender: str) -> float:
         """Forget a body that was being sent; return a time that never comes."""
@@ -421,9 +421,6 @@ async def _in_time(receive: Receive, until: float) -> tuple[Message, RefusedErro
         return {}, RefusedError(408, "refused", "too_slow_body")
 
 
-async def _refuse(scope: Scope, send: Send, error: RefusedError) -> None:
+def _refusal(scope: Scope, error: RefusedError) -> JSONResponse:
     told = told_of(error, tongue(language_of(Request({"query_string": b"", **scope}))))
-    head = [(b"content-type", b"application/json"), (b"connection", b"close")]
-    await send({"type": "http.response.start", "status": error.status, "headers": head})
-    body = json.dumps({"code": error.code, "message": told}).encode()
-    await send({"type": "http.response.body", "body": body})
+    return JSONResponse({"code": error.code, "message": told}, error.status, {"connection": "close"})

@@ -74,7 +74,6 @@ def page(call: Call, name: str, status: int = 200, /, **known: Any) -> Response:
         .render(
             token=guard.form_token(call.visitor),
             account=call.visitor.account,
-            path=call.request.url.path,
             has_mail=bool(call.service.settings.mail),
             **known,
         )

@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from grader.feedback.student_page import About, write_feedback
+from grader.feedback.student_page import About, feedback_page, write_feedback
 from grader.overlay.backdrop import backdrop
 from grader.pipeline import mark, read_pages
 from grader.reading import expected
@@ -102,7 +102,7 @@ def _marking_ms(work: SceneWork, pages: Sequence[ScannedPage], out: Path) -> dic
     pictures = painted("full")
     clock.append(time.perf_counter())
     about = About(work.assignment.file.title.in_language("en"), "s01", work.assignment.file.names)
-    write_feedback(report, pictures, out, "en", "full", about)
+    write_feedback(feedback_page(report, pictures, "en", about=about), pictures, out)
     clock.append(time.perf_counter())
     judging, judging_and_picture, page_ms = (1000.0 / len(pages) * np.diff(clock)).tolist()
     return {"judging": judging, "picture": max(judging_and_picture - judging, 0.0), "page": page_ms}

@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from itertools import chain
 from typing import Any
 
-from grader.lms.api.requests import Plan, place_of, ready_marks, rubric_at
-from grader.lms.grades import Delivery, Grade, Options, ready
+from grader.lms.api.requests import Plan, place_of, rubric_at
+from grader.lms.grades import Delivery, Grade, Options
 from grader.lms.marks import (
     CLOSE,
     Criterion,
@@ -18,6 +18,7 @@ from grader.lms.marks import (
     class_criteria,
     plain_comment,
     platform_marks,
+    ready_marks,
 )
 from grader.lms.table import csv_text, number
 from grader.records import Reason
@@ -124,7 +125,7 @@ def canvas_api(grades: Sequence[Grade], options: Options) -> Delivery:
         made = {"rubric": rubric_body, "rubric_association": place}
         plan.add(f"POST /api/v1/courses/{course}/rubrics", made, "rubric", unless=rubric_at(path, criteria))
         marked = [
-            (grade, {mark.criterion: mark for mark in ready_marks(grade, options)}) for grade in ready(grades)
+            (grade, {mark.criterion: mark for mark in marks}) for grade, marks in ready_marks(grades, options)
         ]
         notes = [Reason("points_become", {"platform": "Canvas", "most_points": grades[0].max_score})]
     else:

@@ -6,9 +6,9 @@ from typing import Any
 from urllib.parse import quote
 from xml.etree import ElementTree as ET
 
-from grader.lms.api.requests import Plan, place_of, ready_marks, students_submissions
-from grader.lms.grades import Delivery, Grade, Options, ready
-from grader.lms.marks import CLOSE, class_criteria, json_text, plain_comment
+from grader.lms.api.requests import Plan, place_of, students_submissions
+from grader.lms.grades import Delivery, Grade, Options
+from grader.lms.marks import CLOSE, class_criteria, json_text, plain_comment, ready_marks
 from grader.lms.table import number
 from grader.records import Reason
 
@@ -22,7 +22,7 @@ def openedx(grades: Sequence[Grade], options: Options) -> Delivery:
     Open response assessments take whole points: all are times one number.
     """
     criteria = class_criteria(grades, options)
-    marked = {grade.student_id: ready_marks(grade, options) for grade in ready(grades)}
+    marked = {grade.student_id: marks for grade, marks in ready_marks(grades, options)}
     given = {each.id: {0.0, each.max_points} for each in criteria}
     for mark in (mark for marks in marked.values() for mark in marks):
         given[mark.criterion].add(mark.points)

@@ -6,7 +6,7 @@ from typing import Any
 from urllib.parse import quote
 
 from grader.lms.grades import Delivery, Grade, Options, Person, ready
-from grader.lms.marks import Criterion, Mark, check_unique, json_text, marks_of, read_answer, together
+from grader.lms.marks import Criterion, check_unique, json_text, read_answer
 from grader.lms.table import Evidence, match_class
 from grader.records import Reason
 from grader.texts.spoken import failure
@@ -136,8 +136,3 @@ def _evidence(student: str, person: Person) -> Evidence:
         ("username", person.username or student),
         ("userId", student),
     )
-
-
-def ready_marks(grade: Grade, options: Options) -> list[Mark]:
-    """The marks of a grade, named as the class's criteria."""
-    return together(marks_of(grade), options.combine)

@@ -33,10 +33,10 @@ def rows_of(text: str, delimiter: str = ",") -> list[dict[str, str]]:
 @pytest.mark.parametrize("name", built_in())
 def test_each_row_of_the_table_is_the_plan_of_its_variant(name):
     assignment, plan = whole(name)
-    rows = rows_of(class_csv(plan))
+    rows, documents = rows_of(class_csv(plan)), plan_documents(assignment, plan)
     assert len(rows) == len(assignment.variants())
     for index in (0, len(rows) // 2, len(rows) - 1):
-        row, document = rows[index], plan_document(assignment, plan, index)
+        row, document = rows[index], documents[index]
         assert {key: int(row[key]) for key in document.variant} == document.variant
         assert float(row["kv"]) == pytest.approx(document.scales["kv"], rel=WRITTEN_DIGITS)
         for vector, exact in document.vectors.items():

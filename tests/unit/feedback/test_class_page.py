@@ -12,20 +12,19 @@ from grader.documents import (
     StaleDecisionDocument,
     StandingDocument,
 )
-from grader.feedback.class_page import index_page, write_demo_page, write_index
+from grader.feedback.class_page import index_page, write_demo_page
 from grader.files import result_folders
 from grader.language import LANGUAGES
 from tests.unit.feedback.parsed import Page
 from tests.unit.feedback.works import HOSTILE, criterion, report, results
 
 
-def test_the_index_links_every_report_where_it_is(tmp_path):
+def test_the_index_links_every_report_where_it_is():
     reports = [
         report(), report(student_id="s08", position=1), report(student_id="s08", position=2),
         report(student_id="s08", position=None),
     ]  # fmt: skip
-    write_index(results(*reports), tmp_path, "en")
-    text = (tmp_path / "index.html").read_text(encoding="utf-8")
+    text = index_page(results(*reports), "en")
     for folder in ("s07", "s08/1", "s08/2", "s08/unknown"):
         assert f'href="{folder}/feedback.html"' in text
     assert result_folders(reports) == ["s07", "s08/1", "s08/2", "s08/unknown"]
@@ -156,11 +155,10 @@ def test_several_positions_of_a_student_are_told_apart_everywhere():
     assert text.index("s1, 1 9 1–10") < text.index("s1, 2 8 2–10")
 
 
-def test_the_page_says_what_to_do_next_with_the_folder_as_a_command_names_it(tmp_path):
+def test_the_page_says_what_to_do_next_with_the_folder_as_a_command_names_it():
     waits = report(status="needs_review", score=None, score_range=(5.0, 7.5))
-    write_index(results(waits, report(student_id="s08")), tmp_path / "my marks", "en")
-    text = Page((tmp_path / "my marks" / "index.html").read_text(encoding="utf-8")).text
-    assert f"planmark review '{tmp_path / 'my marks'}'" in text
+    text = Page(index_page(results(waits, report(student_id="s08")), "en", out="my marks")).text
+    assert "planmark review 'my marks'" in text
     assert "planmark export" in text
 
 

@@ -3,7 +3,7 @@
 import re
 
 from grader.documents import DecidedDocument, MistakeDocument, Quantity, ScaleDocument
-from grader.feedback.class_page import distribution_svg
+from grader.feedback.class_page import index_page
 from grader.feedback.class_statistics import (
     commonest,
     follow_through,
@@ -16,7 +16,6 @@ from grader.feedback.class_statistics import (
     waiting,
     wrong_scales,
 )
-from grader.language import tongue
 from tests.unit.feedback.works import criterion, report, results
 
 
@@ -68,18 +67,18 @@ def test_a_slip_of_known_cause_is_counted_apart():
 
 
 def test_there_is_no_chart_without_scores():
-    assert distribution_svg(results(), tongue("en")) == ""
+    assert 'class="chart"' not in index_page(results(), "en")
 
 
 def test_what_waits_is_in_the_chart_at_the_middle_of_its_range():
     waiting = report(score=None, status="needs_review", score_range=(2.0, 6.0))
     assert open_shares(results(waiting, report(), report(status="missing", score=None))) == [0.4]
-    assert 'class="waits"' in distribution_svg(results(waiting), tongue("en"))
+    assert 'class="waits"' in index_page(results(waiting), "en")
 
 
 def test_a_bar_is_as_high_as_its_count_beside_the_tallest():
     made = results(*[report(score=9.5)] * 4, report(score=1.5))
-    heights = re.findall(r'class="final" [^>]*height="([\d.]+)"', distribution_svg(made, tongue("en")))
+    heights = re.findall(r'class="final" [^>]*height="([\d.]+)"', index_page(made, "en"))
     assert heights == ["20.0", "80.0"]
 
 

@@ -118,7 +118,7 @@ def test_the_scheme_is_not_in_the_position_that_the_student_has_to_draw():
     own = assignment.variant(None, 3)
     picture, title = handout._scheme(assignment, own)
     assert title == handout.SCHEME
-    assert picture.shapes != handout._Picture(handout._fitted(assignment, own)).shapes
+    assert picture.shapes != handout._drawn(handout._fitted(assignment, own)).shapes
 
 
 def test_many_vectors_take_several_pages(monkeypatch):
