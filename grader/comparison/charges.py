@@ -73,12 +73,11 @@ def choose(
             if mark.is_better(chosen.mark) or mark.best > chosen.mark.best:
                 better = the_better(mark, chosen.mark, *charges.why(one))
                 if following.is_trivial(segment, one.vector):
-                    by_hand = better.best == FULL and any(
-                        why.code == "hand_may_miss" for why in better.reasons
-                    )
+                    by_hand = mark.best == FULL and any(why.code == "hand_may_miss" for why in mark.reasons)
                     chosen = replace(chosen, is_trivial=chosen.is_trivial or better.is_full or by_hand)
                 else:
-                    chosen = Choice(better, one, is_followed=True)
+                    is_trivial = chosen.is_trivial and not better.is_full
+                    chosen = Choice(better, one, is_followed=True, is_trivial=is_trivial)
         if chosen.mark.is_full:
             return chosen
     if not chosen.is_trivial and not chosen.mark.is_certain and segment.name in following.explanation.blamed:
@@ -192,7 +191,7 @@ class Charges:
         mark shows it.
         """
         causes = self.causes(one)
-        unpaid = causes - self.charged - self.either
+        unpaid = causes - self.charged - self.either - self.inherited
         if not unpaid and not causes & self.doubtful & self.settled.keys():
             return mark, frozenset()
         if not unpaid or causes & (self.doubtful - self.either):

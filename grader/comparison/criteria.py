@@ -538,7 +538,9 @@ def _own_turnings(charges: Charges, name: str, value: float, per_mm: float) -> I
     """Yield the angular quantity or moment that the student's own drawing gives; none without any."""
     task, following = charges.task, charges.following
     if name in task.construction.moments:
-        yield following.moment(name, per_mm)
+        yield (by_nodes := following.moment(name, per_mm))
+        if charges.is_wrong(by_nodes):
+            yield following.moment_of_own(name, per_mm)
         wrong = frozenset(charges.charged | charges.doubtful)
         scales = replace(following.right(following.followed), name="scales", wrong=following.wrong_scales)
         own = following.own_forces(name, wrong)

@@ -8,7 +8,7 @@ drawing follows.
 
 import cmath
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import cast
 
@@ -20,7 +20,20 @@ from grader.comparison.scales import Scale
 from grader.comparison.task import Made, Task, TaskSegment
 from grader.comparison.verdicts import NO_SPREAD, Expectation
 from grader.records import MECHANISM
-from reference.construction.elements import Coriolis, Fixed, Normal, Same, Scaled, View, data_in, is_force
+from reference.construction.elements import (
+    Balance,
+    Coriolis,
+    Fixed,
+    Force,
+    Moments,
+    Normal,
+    Parallel,
+    Same,
+    Scaled,
+    View,
+    data_in,
+    is_force,
+)
 from reference.construction.graph import AngularRate, Vector
 from reference.construction.mistakes import Drawing, Mistake, commit, laid_off, line_of
 from reference.construction.steps import Divide, Given, Similar, TwoLines
@@ -131,6 +144,7 @@ class FollowThrough:
         if segment.head in self.task.construction.images:
             # Of a wrong base, lines and similarity give different images of a plate's point.
             yield self.from_nodes(segment, self.followed, by_similarity=True)
+        yield from self.joined(segment, wrong)
         yield from self.from_vectors(segment, self.used)
         basis = self.instead
         if basis is not None and not basis.blames(segment.name, segment.head):
@@ -248,17 +262,48 @@ class FollowThrough:
 
     def moment(self, name: str, per_mm: float, basis: PlanBasis | None = None) -> Expectation:
         """The moment that the student's own nodes give, as millimetres of so many N m."""
-        construction, traced = self.task.construction, self.traced(self.used, basis)
-        known_as, moment = basis or self.right(self.used), construction.moments[name]
-        nodes = {node: traced.nodes[node] for node in moment.needs}
+        moment, construction = self.task.construction.moments[name], self.task.construction
+        relies_on = frozenset[str]().union(*map(construction.upstream, moment.needs))
+        one = self._evaluated(lambda view: moment.at(view) / per_mm, moment.needs, relies_on, basis)
+        return one if basis is None else replace(one, causes=basis.wrong)
+
+    def moment_of_own(self, name: str, per_mm: float) -> Expectation:
+        """The moment of the forces as the student laid them off in the last plan."""
+        moment, heads = self._as_laid_off(self.task.construction.moments[name])
+        return self._evaluated(lambda view: moment.at(view) / per_mm, moment.needs, heads)
+
+    def _as_laid_off(self, moments: Moments) -> tuple[Moments, frozenset[str]]:
+        """The moments of forces that are taken over, as they are laid off in this plan; and their ends."""
+        vectors, forces, heads = self.task.construction.vectors, list[Force](), set[str]()
+        for one in moments.forces:
+            own = vectors.get(one.name)
+            if isinstance(one.size, Same) and own and self.evidence.vector(one.name):
+                size = replace(one.size, tail=own.tail, head=own.head)
+                along = Parallel(own.tail, own.head)
+                one = replace(one, size=size, along=along)  # noqa: PLW2901 - the same force
+                heads.add(own.head)
+            forces.append(one)
+        return replace(moments, forces=tuple(forces)), frozenset(heads)
+
+    def _evaluated(
+        self,
+        at: Callable[[View], FloatArray | ComplexArray],
+        needs: Iterable[str],
+        relies_on: frozenset[str],
+        basis: PlanBasis | None = None,
+    ) -> Expectation:
+        """An expectation by a formula, millimetres, from the student's own nodes among those it needs."""
+        traced, parameters = self.traced(self.used, basis), (basis or self.right(self.used)).parameters
+        nodes = {node: traced.nodes[node] for node in needs}
         placed = {node: np.asarray(one.at) for node, one in nodes.items()}
         shifted = {node: np.asarray(one.at + one.shifts) for node, one in nodes.items()}
-        found, moved = (moment.at(View(at, known_as.parameters)) / per_mm for at in (placed, shifted))
-        shifts = np.asarray(moved - found, dtype=np.complex128)
+        found, moved = (at(View(where, parameters)) for where in (placed, shifted))
+        shifts, relies_on = (
+            np.asarray(moved - found, dtype=np.complex128),
+            relies_on & known(self.own(self.used)),
+        )
         uncertainty, se = self.spreads(shifts, traced.drafting_count, complex(found))
-        relies_on = frozenset[str]().union(*map(construction.upstream, nodes)) & known(self.own(self.used))
-        causes = frozenset[str]() if basis is None else basis.wrong
-        return Expectation(complex(found), "nodes", "", relies_on, uncertainty, se, causes=causes)
+        return Expectation(complex(found), "nodes", "", relies_on, uncertainty, se)
 
     def spreads(
         self, shifts: ComplexArray, drafting_count: int, along: complex
@@ -447,6 +492,13 @@ class FollowThrough:
         """A vector that depends on one or two others alone, whose lengths are enough."""
         task = self.task
         match task.construction.step(segment.head):
+            case Given(length=Balance(moments=moments) as length, along=line) as step:
+                moments, heads = self._as_laid_off(moments)
+                length = replace(length, moments=moments)
+                if heads and step.start == segment.tail:
+                    yield self._evaluated(
+                        lambda view: length.at(view) * line.at(view), (*length.needs, *line.needs), heads
+                    )
             case Given(length=Normal(tail=tail, head=head)):
                 yield from self.normal(segment, self.named(tail, head), scales)
             case Given(length=Coriolis() as length):
@@ -466,6 +518,38 @@ class FollowThrough:
                     phase = cmath.phase(task.real[source]) if along is None else along
                     found = cmath.rect(own.length_mm, phase) * (segment.real / task.real[source])
                     yield Expectation(found, "vector", source, frozenset({other}))
+
+    def joined(self, segment: TaskSegment, wrong: frozenset[str]) -> Iterator[Expectation]:
+        """The sum of measured vectors from tail to head of one that joins nodes that they have made.
+
+        Arguments: at `wrong` nodes a vector may have been left out.
+        """
+        construction, hand = self.task.construction, self.task.rubric.hand
+        if self.evidence.has_sheets or line_of(construction.vectors[segment.name], construction):
+            return
+        own = [
+            (one, drawn.as_complex if drawn else 0j if one.head in wrong else None)
+            for one in construction.vectors.values()
+            for drawn in (self.evidence.vector(one.name),)
+            if one.name != segment.name
+        ]
+        # Those that were left out come last.
+        own.sort(key=lambda pair: pair[1] == 0j)
+        ways: dict[str, tuple[tuple[str, complex], ...]] = {segment.tail: ()}
+        for node in (queue := [segment.tail]):
+            for one, vector in own:
+                end = one.head if node == one.tail else one.tail
+                if vector is not None and node in {one.tail, one.head} and end not in ways:
+                    ways[end] = (*ways[node], (one.head, vector if node == one.tail else -vector))
+                    queue.append(end)
+        if way := ways.get(segment.head):
+            parts, heads = np.array([vector for _, vector in way]), {head for head, _ in way}
+            upstream = frozenset[str]().union(*map(construction.upstream, heads))
+            relies_on = (upstream & known(self.own(self.used))) | heads
+            along = hand.ruler_mm * np.exp(1j * np.angle(parts))
+            shifts = np.concatenate((along, 1j * parts * math.radians(hand.protractor_deg)))
+            found = complex(parts.sum())
+            yield Expectation(found, "nodes", "", relies_on, *self.spreads(shifts, len(shifts), found))
 
     def normal(
         self, segment: TaskSegment, source: str | None, scales: Mapping[str, float]

@@ -37,9 +37,11 @@ from grader.given_data.sets import (
 from grader.outcomes import NamedMistake
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN
 from grader.tables.scale_text import Declared, parsed_scales
+from reference.construction.elements import Scaled
 from reference.construction.mistakes import Mistake
+from reference.construction.steps import Given
 from reference.geometry import FloatArray
-from reference.quantities import OF_MOTION, sort_of
+from reference.quantities import OF_MOTION, group_of, sort_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,15 +167,20 @@ def _turned_by(task: Task, drawn: DrawnParts, name: str) -> float:
 
 
 def _drawn(task: Task, evidence: Evidence) -> dict[str, dict[str, DrawnVector]]:
-    """Return the drawn vectors by part, as read, else as measured; all force plans are one part."""
+    """Return the drawn vectors by part, as read, else as measured; all force plans are one part.
+
+    Of forces only those laid off from the data count: a mistake of any kind follows through to all others.
+    """
     parts: dict[str, str] = {}
     for figure in (MECHANISM, *task.construction.poles):
         parts.setdefault(sort_of(figure), figure)
     found: dict[str, dict[str, DrawnVector]] = {part: {} for part in parts.values()}
     for name, segment in task.segments.items():
         one = evidence.vector(name)
-        if one is not None and one.length_mm > 0.0:
-            found[parts[sort_of(task.construction.figure_of(segment.head))]][name] = one
+        figure, step = task.construction.figure_of(segment.head), task.construction.step(segment.head)
+        follows = group_of(figure) and not (isinstance(step, Given) and isinstance(step.length, Scaled))
+        if one is not None and one.length_mm > 0.0 and not follows:
+            found[parts[sort_of(figure)]][name] = one
     return found
 
 

@@ -35,6 +35,7 @@ from reference.replay.explanations import (
     NOT_THERE,
     RARER,
     RARITY,
+    SLIPS,
     SOMETHING_ELSE,
     Observations,
     cost_of_any,
@@ -103,6 +104,8 @@ def explained(case: Case) -> tuple[Replay, ...]:
         explanations = _searched_further(case, roots, explanations)
     elif _may_be_assembled_otherwise(explanations, case):
         explanations = _by_cost(explanations, _replayed(case, roots, [explanations[0].care]))
+    # Made twice, a mistake undoes itself: such an explanation only fits by chance.
+    explanations = [one for one in explanations if len({*map(key_of, one.made)}) == len(one.made)]
     explanations = with_nothing(explanations, case.drawing.construction, case.observations)
     has_directions = any(one.has_direction for one in case.observations.entries)
     doubt = BEYOND_DOUBT if has_directions else BEYOND_DOUBT_BY_LENGTHS
@@ -370,8 +373,13 @@ def _own_forces(case: Case) -> Iterator[Root]:
         if not LEAST_FACTOR < abs(share) < MOST_FACTOR or abs(share - 1.0) < LEAST_WRONG:
             continue
         (datum,) = data_in(step.length)
-        changed = {datum: np.asarray(abs(share) * known.get(datum, 1.0))}
-        slip = Mistake(SLIP, step.node, factor=abs(share), parameters=changed)
+        near = min((abs(abs(share) - by), by) for by in SLIPS)[1]
+        is_known = abs(abs(value) - near * abs(right)) <= FIT_SHARE * abs(value) + 3.0 * math.sqrt(
+            one.spread[0]
+        )
+        factor = near if is_known else abs(share)
+        changed = {datum: np.asarray(factor * known.get(datum, 1.0))}
+        slip = Mistake(SLIP, step.node, factor=factor, parameters=changed)
         yield Root((slip,), changed, cost=rarity_of(slip))
         if isinstance(step.along, Fixed):
             own = {**changed, step.along.angle: np.asarray(np.angle(value))}

@@ -19,7 +19,9 @@ from grader.comparison.scales import Scale
 from grader.comparison.task import Task
 from grader.outcomes import UsedScale
 from grader.records import Reading, ReadVector
+from reference.construction.elements import Scaled
 from reference.construction.mistakes import RPM_FACTOR, Mistake
+from reference.construction.steps import Given
 from reference.geometry import FloatArray
 from reference.quantities import OF_MOTION, KindName, kind_of
 from reference.replay.explanations import AREA_MM
@@ -113,6 +115,7 @@ class _Entries:
     exact_rad, drawn_rad : directions; nan where none was entered, or where the vector is too short for one
     sigma_mm, sigma_rad : standard errors, half of a tolerance
     plan : index of the plan
+    given : 1 where the vector is laid off from the data alone, 0 where it follows from others
     """
 
     exact_mm: FloatArray
@@ -122,6 +125,7 @@ class _Entries:
     sigma_mm: FloatArray
     sigma_rad: FloatArray
     plan: FloatArray
+    given: FloatArray
 
     @classmethod
     def of(cls, task: Task, drawn: Mapping[str, DrawnVector], scales: Mapping[str, UsedScale]) -> "_Entries":
@@ -139,6 +143,10 @@ class _Entries:
             is_directed = one.direction_rad is not None and length >= max(table.least_mm, 1.0)
             turned = one.direction_rad + turn if is_directed and one.direction_rad is not None else math.nan
             across = math.atan(table.across_mm / max(length, table.across_mm))
+            step = task.construction.step(segment.head)
+            is_given = (
+                isinstance(step, Given) and isinstance(step.length, Scaled) and step.start == segment.tail
+            )
             rows.append(
                 (
                     length,
@@ -148,9 +156,10 @@ class _Entries:
                     table.length_at(length) / 2.0,
                     max(math.radians(table.direction_deg), across) / 2.0,
                     float(plans.index(task.construction.figure_of(segment.head))),
+                    float(is_given),
                 )
             )
-        return cls(*np.array(rows or np.zeros((0, 7)), np.float64).reshape(-1, 7).T)
+        return cls(*np.array(rows or np.zeros((0, 8)), np.float64).reshape(-1, 8).T)
 
     def only(self, which: BoolArray) -> "_Entries":
         """Some of the entries."""
@@ -168,8 +177,10 @@ class _Entries:
     ) -> tuple[int, float] | None:
         """The likeliest way in which all was entered, and its probability; None for the first, the right one.
 
-        It must be likelier in each plan, as one plan alone has another mistake, and most must not fit as they
-        stand. Arguments: of each way residuals and price; standard errors, and the range of any entry.
+        It must be likelier in each plan, as one plan alone has another mistake, and explain most of what is
+        given and differs by it, as a mistake follows through; most must not fit as they stand.
+
+        Arguments: of each way residuals and price; standard errors, and the range of any entry.
         """
         plans = [self.plan == index for index in range(max(2, int(self.plan.max(initial=0.0)) + 1))]
         if min(map(np.sum, plans)) < LEAST_ENTRIES:
@@ -177,6 +188,9 @@ class _Entries:
         costs = [_cost(one, sigmas, anywhere) + price for one, price in zip(residuals, prices, strict=True)]
         best, probability = _chosen(costs, 2.0 * math.log(anywhere) * len(self.plan))
         if best == 0 or probability < SURE or _share(residuals[0], sigmas) > MOST_FIT:
+            return None
+        shown = (self.given > 0.0) & (np.abs(residuals[best] - residuals[0]) > FITS * sigmas)
+        if shown.any() and _share(residuals[best][shown], sigmas[shown]) <= MOST_FIT:
             return None
         for plan in plans:
             found, right = (_cost(residuals[way][plan], sigmas[plan], anywhere) for way in (best, 0))

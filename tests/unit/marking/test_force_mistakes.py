@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
 from grader.feedback.mistakes import MISTAKES
 from grader.feedback.redo_steps import with_mistakes_explained
@@ -12,10 +13,13 @@ from grader.marking.mark import judge
 from grader.marking.report import report_of
 from grader.outcomes import CHARGED, CREDITED
 from grader.overlay.measured import measured_picture
+from grader.rubric import load_both
+from grader.tables.measurements import measurements_in, names_of
+from reference.authored.assignment import Variant
 from reference.construction.mistakes import OF_FORCES, affected, made_at, mistakes_of_forces
 from reference.plan import exact_plan
 from tests.bench.force_students import HANDS, ForceMistake, StudentForces, force_task
-from tests.bench.judging_forces import measure_forces
+from tests.bench.judging_forces import Tally, count, measure_forces, sheets
 
 MADE = {
     ForceMistake("reversed", "F_i3"): ("inertia_reversed", "F_i3", {"F_i3"}),
@@ -126,3 +130,110 @@ def test_the_bench_judges_right_sheets_right():
     assert tally.clear > 100
     assert not tally.wrong
     assert not tally.false
+
+
+@pytest.mark.parametrize(
+    ("name", "seed", "kinds", "made"),
+    [
+        pytest.param("press", 98101, "others", ("entry", "G_3"), id="a moment after a wrong entry"),
+        pytest.param("pump", 98052, "known", ("missing", "F_i"), id="a reaction that closes a triangle"),
+        pytest.param("pump", 98101, "known", ("reversed", "F_i"), id="what follows is too short to judge"),
+    ],
+)
+def test_what_was_drawn_rightly_after_a_mistake_is_not_charged(name, seed, kinds, made):
+    task, rubric = force_task(name)
+    every = dict(sheets(name, "typical", seed, kinds)).items()
+    (found,) = (
+        (text, one) for text, one in every if one.mistake and (one.mistake.kind, one.mistake.at) == made
+    )
+    tally = Tally()
+    count(tally, *found, judge(task_of(task, rubric, found[1].variant), found[1].submission))
+    assert tally.clear > 10
+    assert tally.wrong == []
+
+
+def test_a_wrong_entry_of_a_reaction_between_right_ones_is_charged():
+    student, judgement = pump(ForceMistake("entry", "R_34", factor=1.4, turn_deg=40.0))
+    assert {one.name for one in judgement.outcomes if one.verdict in CHARGED} == student.wrong == {"R_34"}
+
+
+MECHANISM = """schema_version = 1
+id = "crank"
+length_unit = "mm"
+title = { en = "Offset crank" }
+ground = { O1 = [0, 0] }
+[crank]
+link = "1"
+pivot = "O1"
+pin = "A"
+length = 70
+angle_deg = "15 + 11*n"
+rpm = 420
+[[group]]
+type = "RRP"
+node = "B"
+pin = "A"
+link = "2"
+length = 260
+guide = { through = [0, -40], angle_deg = 0 }
+side = "ahead"
+"""
+ASSIGNMENT = """schema_version = 1
+id = "crank"
+mechanism = "crank"
+rubric = "crank"
+gravity = 9.81
+title = { en = "Forces" }
+task = { en = "Draw." }
+variant = { n = { from = 1, to = 30 } }
+scales = { kL = 0.004, kv = 0.05, ka = 2.0, kF = 20 }
+[[body]]
+link = "2"
+mass = 4
+inertia = 0.03
+centre = { base = ["A", "B"], ratio = 0.4 }
+[[body]]
+link = "slider_B"
+mass = 5
+[[load]]
+link = "slider_B"
+force = "900 + 20*n"
+motion = "against"
+[[page]]
+kind = "forces"
+figures = ["mechanism", "force_plan_B", "force_plan_A"]
+"""
+ENTERED = {
+    "mass of the rod 0.4 kg": (
+        26,
+        {"R_12_t": (3.7, 93.5), "F_i2": (2.1, 316.1), "G_2": (0.4, 285.4), "F_B": (70.8, 180.0)}
+        | {"F_iB": (17.4, 0.9), "G_B": (2.3, 268.9), "R_0B": (3.5, 270.7), "R_12_n": (52.4, 4.8)}
+        | {"R_12": (52.4, 8.2), "R_B2": (53.7, 186.7), "R_21": (52.6, 188.4), "R_01": (52.4, 8.7)},
+    ),
+    "F_i2 turned by 25 degrees": (
+        30,
+        {"R_12_t": (4.5, 265.9), "F_i2": (29.1, 16.4), "G_2": (2.0, 272.1), "F_B": (75.1, 179.9)}
+        | {"F_iB": (41.9, 359.7), "G_B": (2.5, 270.5), "R_0B": (1.8, 94.7), "R_12_n": (5.3, 357.1)}
+        | {"R_12": (6.8, 316.0), "R_B2": (33.4, 182.1), "R_21": (6.9, 136.0), "R_01": (6.8, 316.4)},
+    ),
+}
+
+
+@pytest.mark.parametrize("made", ENTERED)
+def test_an_unknown_mistake_in_one_force_is_neither_another_variant_nor_another_unit(made, tmp_path):
+    n, drawn = ENTERED[made]
+    rows = "".join(
+        f'[[criterion]]\nid = "{one}"\ntitle = {{ en = "x" }}\npoints = 1\nvector = "{one}"\n'
+        for one in drawn
+    )
+    head = 'schema_version = 1\nid = "crank"\ntitle = { en = "Forces" }\n'
+    files = {"mechanism": MECHANISM, "assignment": ASSIGNMENT, "rubric": head + rows}
+    for kind, text in files.items():
+        (tmp_path / f"crank.{kind}.toml").write_text(text, encoding="utf-8")
+    assignment, rubric = load_both(tmp_path / "crank.assignment.toml")
+    cells = {name: str(one[0]) for name, one in drawn.items()} | {"kF": "20 N/mm"}
+    cells |= {f"{name}_deg": str(one[1]) for name, one in drawn.items()}
+    entered = measurements_in(cells, names_of(assignment), "", "en")
+    handed_in = Submission(measured=entered.reading, declared=entered.scales)
+    found = judge(task_of(assignment, rubric, Variant(n)), handed_in)
+    assert not {"other_variant", "data_misread", "units"} & {one.code for one in found.mistakes}
