@@ -141,6 +141,11 @@ class FigureDocument(Document):
 
     nodes: dict[str, NodeDocument]
     vectors: dict[str, VectorDocument]
+    drawn: dict[str, list[tuple[float, float]]] = {}
+    """Both ends of each vector on the sheet, mm, of a force polygon in another order than the usual.
+
+    The nodes are where the vectors put them in the usual order.
+    """
 
 
 class UnreadDocument(Document):

@@ -18,7 +18,7 @@ from grader.authoring.round_scales import asked_vectors
 from grader.language import LANGUAGES, N_, tongue
 from grader.rubric import RubricFile, load_rubric
 from grader.texts.spoken import failure
-from reference.authored.assignment import SUFFIXES, Assignment, load_assignment
+from reference.authored.assignment import SUFFIXES, USUAL_SCALES, Assignment, load_assignment
 from reference.authored.formula import Formula
 from reference.authored.mechanism import (
     CrankTable,
@@ -54,6 +54,7 @@ TASK = N_(
 )
 SCALES = {
     "kL": N_("Scale of lengths"), "kv": N_("Scale of velocities"), "ka": N_("Scale of accelerations"),
+    "kF": N_("Scale of forces"),
 }  # fmt: skip
 LINK = N_("Link %(name)s on the sketch")
 RATES = {
@@ -74,8 +75,15 @@ RELATIVE = {
     "a_r": N_("Acceleration of %(point)s relative to %(other)s along the guide"),
 }
 """Titles of vectors, by their letter and part."""
-_POINTS = {"scale": 1.0, "link": 0.5, "vector": 2.0, "angular": 0.5}
-_OPTIONAL = {"scale", "link", "angular"}
+FORCES = {
+    "F_i": N_("Inertia force of link %(name)s"), "G_": N_("Weight of link %(name)s"),
+    "F_": N_("Load %(name)s"), "R_": N_("Reaction of link %(other)s on link %(name)s"),
+    "R_t": N_("Part, across the link, of the reaction of link %(other)s on link %(name)s"),
+    "M_": N_("Balancing moment"),
+}  # fmt: skip
+"""Titles of forces, by the start of their names; the frame is link 0."""
+_POINTS = {"scale": 1.0, "link": 0.5, "vector": 2.0, "angular": 0.5, "moment": 3.0}
+_OPTIONAL = {"scale", "link", "angular", "moment"}
 """Items that a student may leave out without losing points."""
 KEYS_OF_A_CRITERION = """\
 # One for each thing judged: exactly one of vector, value, angular, moment, sense, scale, link and point. Of
@@ -128,7 +136,9 @@ def texts_for(mechanism: Path, name: str, start: Texts, table: Path | None) -> d
         if not found.scales:
             faults = lines_of([one for one in found.findings if one.severity == "fault"])
             raise failure(CallError, "no_variant", file=mechanism, findings=faults)
-        scales = {scale: float(f"{np.max(getattr(found.scales[1].scales, scale)):.6g}") for scale in SCALES}
+        scales = {
+            scale: float(f"{np.max(getattr(found.scales[1].scales, scale)):.6g}") for scale in USUAL_SCALES
+        }
         paths["assignment"].write_text(
             _assignment(file, name, start["assignment"], scales, table), encoding="utf-8"
         )
@@ -296,25 +306,11 @@ def _rubric(
     file: MechanismFile, name: str, start: str, assignment: Assignment, unasked: Collection[str] = ()
 ) -> str:
     """Return the start's rubric with a criterion for each scale, link, vector and angular quantity."""
-    construction = construction_for(assignment)
     blocks = [block for block in start.split("\n\n") if "[[criterion]]" not in block]
     titles = _titles(file.title, TITLE)
     blocks = [_with(block, titles) if _heading(block) == "title" else block.rstrip("\n") for block in blocks]
     blocks[0] = re.sub(r'(?m)^id = "[^"]*"', f"id = {_text(name)}", blocks[0])
-    criteria = [
-        *(("scale", name, phrase, {}) for name, phrase in SCALES.items()),
-        *(("link", name, LINK, {"name": name}) for name in construction.links),
-        *(
-            ("vector", name, *titled(name, construction))
-            for name, vector in construction.vectors.items()
-            if not vector.is_sum
-        ),
-        *(
-            ("angular", name, RATES[name.partition("_")[0]], {"name": name.partition("_")[2]})
-            for name, rate in construction.rates.items()
-            if not rate.drives or (file.crank is not None and file.crank.rpm is not None)
-        ),
-    ]
+    criteria = [*_criteria(assignment)]
     asked = [KEYS_OF_A_CRITERION, *(_criterion(*one) for one in criteria if one[1] not in unasked)]
     left_out = [_criterion(*one) for one in criteria if one[1] in unasked]
     if left_out:
@@ -324,6 +320,42 @@ def _rubric(
         )
         asked += [re.sub("(?m)^", "# ", one) for one in left_out]
     return "\n\n".join([*blocks, *asked]) + "\n"
+
+
+def with_forces(rubric: str, assignment: Assignment) -> str:
+    """Return a rubric's text with criteria for all that an assignment's pages show, in place of its own."""
+    blocks = [block.rstrip("\n") for block in rubric.split("\n\n") if "[[criterion]]" not in block]
+    asked = [KEYS_OF_A_CRITERION, *(_criterion(*one) for one in _criteria(assignment))]
+    return "\n\n".join([*blocks, *asked]) + "\n"
+
+
+def _criteria(assignment: Assignment) -> Iterator[tuple[str, str, str, Mapping[str, str]]]:
+    """Yield kind, name, phrase and its names of a criterion for each item on the pages that can be asked for.
+
+    Of forces the given ones, whole reactions and parts that are computed.
+    """
+    construction, shown = construction_for(assignment), assignment.figures
+    crank = assignment.mechanism_file.crank
+    yield from (("scale", name, SCALES[name], {}) for name in assignment.scale_names)
+    yield from (("link", name, LINK, {"name": name}) for name in construction.links)
+    drawn = {name for name, one in construction.vectors.items() if construction.figure_of(one.head) in shown}
+    for name, vector in construction.vectors.items():
+        of_forces = vector.scale == "kF"
+        if name in drawn and (vector.part != "n" if of_forces else not vector.is_sum):
+            yield "vector", name, *(_force_titled(name) if of_forces else titled(name, construction))
+    for name, rate in construction.rates.items():
+        if rate.vector in drawn and (not rate.drives or (crank and crank.rpm is not None)):
+            yield "angular", name, RATES[name.partition("_")[0]], {"name": name.partition("_")[2]}
+    for name in construction.moments:
+        yield "moment", name, FORCES["M_"], {}
+
+
+def _force_titled(name: str) -> tuple[str, dict[str, str]]:
+    """Return the phrase for a force, and the links that it names: ``R_13`` is of 1 on 3, ``R_2a-3`` of 2a."""
+    letter, body, *part = name.split("_")
+    kind = "F_i" if name.startswith("F_i") else f"{letter}_{''.join(part)}"
+    by, on = body.split("-") if "-" in body else (body[:1], body[1:])
+    return FORCES[kind], {"name": on if letter == "R" else body.removeprefix("i"), "other": by}
 
 
 def _criterion(kind: str, name: str, phrase: str, known: Mapping[str, str]) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from grader.authoring.from_mechanism import texts_for
+from grader.authoring.from_mechanism import texts_for, with_forces
 from grader.files import create_whole
 from grader.rubric import load_rubric
 from grader.texts.spoken import failure
@@ -48,7 +48,8 @@ def new_assignment(
     Arguments
     ---------
     file : NAME, or a path that ends in NAME.toml or NAME.assignment.toml
-    like : an assignment (a built-in name or a path) whose mechanism, data and rubric are copied
+    like : an assignment (a built-in name or a path) whose mechanism, data and rubric are copied;
+        where its pages show force plans and its rubric asks for none, it gets criteria for what they show
     mechanism : one of `starts`, or the path of a mechanism's file, for which scales and rubric are made; the
         four-bar if neither is given
     table : the data of the variants, a CSV, for a mechanism's file
@@ -116,13 +117,15 @@ def _path_and_name(file: Path) -> tuple[Path, str]:
 
 def _renamed_texts(source: Assignment, name: str) -> dict[str, str]:
     """Return the source's three files under another name, without the remarks at their top."""
-    load_rubric(source.file.rubric, beside=source.path)
+    asked = load_rubric(source.file.rubric, beside=source.path)
     text = source.path.read_text(encoding="utf-8")
     if isinstance(source.file.mechanism, str):
         mechanism = locate("mechanism", source.file.mechanism, source.path).read_text(encoding="utf-8")
     else:
         text, mechanism = _split(text)
     rubric = locate("rubric", source.file.rubric, source.path).read_text(encoding="utf-8")
+    if source.forces and not any(one.section == "force_plans" for one in asked.criterion):
+        rubric = with_forces(rubric, source)
     return {
         "assignment": _renamed(text, {"id": name, "mechanism": name, "rubric": name}),
         "mechanism": _renamed(mechanism, {"id": name}),

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from grader.comparison.task import Task
 from grader.documents import Quantity
 from grader.outcomes import CREDITED, Judgement, Outcome
+from grader.reading.orders import ends_on_sheet
 from grader.records import Figure, ReadNode, ScannedPage, on_sheet
 from grader.tables.decisions import Decision
 
@@ -85,10 +86,11 @@ def _places(
     is_read = outcome.measured.length_mm is not None
     is_off = bool(codes & OFF_AS_READ) and "follows" not in codes
     if is_read and is_off != (verdict in CREDITED):
-        for node in (vector.tail, vector.head):
-            if node in figure.nodes:
-                yield (name, node), on_sheet(figure.nodes[node].at)
-    elif verdict == "full" and (is_off or not is_read):
+        ends = figure.drawn.get(vector.name, ())
+        for node, at in ends_on_sheet(task.construction, name, figure).items():
+            if at in ends if figure.drawn else node in vector.arrow:
+                yield (name, node), on_sheet(at)
+    elif verdict == "full" and (is_off or not is_read) and not figure.drawn:
         end = end_in_doubt(figure, vector.tail, vector.head, task.rubric.least_confidence)
         along = along_of(outcome.expected)
         if end is not None and along is not None:

@@ -14,8 +14,9 @@ from grader.outcomes import NamedMistake
 from grader.records import MECHANISM
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.elements import Along, Line
-from reference.construction.graph import Construction
+from reference.construction.graph import Construction, Vector
 from reference.construction.mistakes import (
+    OF_FORCES,
     RPM_FACTOR,
     SLIP,
     Drawing,
@@ -72,13 +73,21 @@ SUSPICIOUS, GROSS = 2.0, 3.0
 slight to be named. (Below the first the mistake shows elsewhere.)"""
 
 
+OF_MOMENTS = OF_FORCES | {"wrong_arm"}
+"""Mistakes in moments, or in what acts on a link."""
+
+
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """The criteria that lost points, or may lose some, by vector, link and scale; and the crank's gear."""
+    """The criteria that lost points, or may lose some, by vector, link and scale; and the crank's gear.
+
+    `right`: the vectors that are right by the exact plan.
+    """
 
     vectors: Mapping[str, str]
     scales: Mapping[str, str]
     gear_ratio: float | None = None
+    right: frozenset[str] = frozenset()
 
 
 def named(
@@ -99,6 +108,7 @@ def named(
         together = share + sum(shares.instead(key, key_of(one)) for one in rivals)
         is_sure = share >= LEAST_CONFIDENCE or (together >= SURE_TOGETHER and rivals)
         is_shown = explains[mistake] and (mistake.code != SLIP or mistake.other or slips <= MOST_SLIPS)
+        is_shown = is_shown and not _is_refuted(mistake, construction, lost.right)
         if is_shown and is_sure and not _is_slight(mistake, best):
             others = tuple(record(one, (), known * shares.instead(key, key_of(one))) for one in rivals)
             mistakes.append(record(mistake, tuple(explains[mistake]), known * share, others))
@@ -132,6 +142,17 @@ def _is_slight(mistake: Mistake, explanation: Replay) -> bool:
     if mistake.code in OF_THE_WHOLE:
         return False
     return SUSPICIOUS < explanation.right.get(mistake.at, 0.0) < GROSS
+
+
+def _is_refuted(mistake: Mistake, construction: Construction, right: frozenset[str]) -> bool:
+    """Return whether the forces are right that a mistake in moments or in what acts on a link makes wrong."""
+    laid = {one.head for name in right if _is_laid_off(one := construction.vectors[name], construction)}
+    return mistake.code in OF_MOMENTS and made_at(mistake, construction) <= laid
+
+
+def _is_laid_off(vector: Vector, construction: Construction) -> bool:
+    step = construction.step(vector.head)
+    return isinstance(step, Given) and step.start == vector.tail
 
 
 class _Shares:
@@ -205,7 +226,16 @@ def _losses_explained(
         scale, tail, head = _ends_of(name, construction)
         if head in explanation.unexplained:
             continue
-        touching = [one for one in made if _touches(one, scale, {tail, head}, reach[one])]
+        ends = {tail, head}
+        touching = [one for one in made if _touches(one, scale, ends, reach[one])]
+        if name in construction.vectors and _is_laid_off(construction.vectors[name], construction):
+            # Wherever a force begins, its size and direction follow from other nodes.
+            of = {*construction.step(head).needs} - {tail}
+            touching = [
+                one
+                for one in touching
+                if one.code not in OF_MOMENTS or head in made_at(one, construction) or of & reach[one]
+            ]
         own = [one for one in touching if one.at == head]
         for mistake in (own or touching)[-1:]:
             explains[mistake].append(criterion)

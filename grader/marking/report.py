@@ -6,7 +6,7 @@ from dataclasses import fields
 from grader.comparison.task import Task
 from grader.documents import ReadingDocument, ReasonDocument, ReportDocument, Status
 from grader.outcomes import Judgement, NamedMistake, Outcome, UsedScale
-from grader.records import Figure, Reason, ScannedPage, Sheet
+from grader.records import Figure, Reason, ScannedPage, Sheet, on_sheet
 from grader.rubric import RubricFile
 from grader.texts.reasons import reason_sentence
 from grader.texts.spoken import ENGLISH, as_json, clause, problem_documents, unread_document
@@ -50,7 +50,8 @@ def _figure(figure: Figure) -> dict[str, object]:
         }
         for name, node in figure.nodes.items()
     }
-    return {"nodes": nodes, "vectors": figure.vectors}
+    drawn = {name: [on_sheet(end) for end in ends] for name, ends in figure.drawn.items()}
+    return {"nodes": nodes, "vectors": figure.vectors, "drawn": drawn}
 
 
 def report_of(  # noqa: PLR0913 - what a report holds beside the judgement

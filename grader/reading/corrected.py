@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from grader.reading.expected import Edge, Expected
 from grader.reading.lines import Lines, lines_of
 from grader.reading.matching import StrokeAssignment
 from grader.reading.nodes import LINK_ENDS, PLAN_ENDS, fit_nodes
+from grader.reading.orders import ends_on_sheet, ring_of
 from grader.reading.read import LEAST_VECTOR_MM, NEAR_MM, vector_of
 from grader.records import MECHANISM, Figure, FloatArray, Ink, Reading, ReadNode, ReadVector, ScannedPage
 from reference.construction.graph import Construction
@@ -171,27 +173,51 @@ def _with_nodes(
     construction: Construction,
 ) -> Reading:
     before = reading.figures.get(figure, Figure({}, {}))
-    nodes = {**before.nodes, **moved}
+    at = ends_on_sheet(construction, figure, before)
+    there = {name: replace(node, at=at[name]) for name, node in before.nodes.items() if name in at}
+    nodes, drawn = {**there, **moved}, dict(before.drawn)
+    corner = {place: name for name, place in at.items()}
     vectors, scale_se = dict(before.vectors), 0.0 if page.sheet is None else page.sheet.scale_se
     for vector in construction.vectors_of(figure) if figure != MECHANISM else ():
-        ends = {vector.tail, vector.head}
-        if not ends & moved.keys() or not ends <= nodes.keys():
+        arrow = [corner[end] for end in drawn.get(vector.name, ())] if drawn else vector.arrow
+        if moved.keys().isdisjoint(arrow) or not nodes.keys() >= {*arrow}:
             continue
-        tail, head = (nodes[node] for node in vector.arrow)
+        tail, head = (nodes[node] for node in arrow)
+        if drawn:
+            drawn[vector.name] = tail.at, head.at
         known = vectors.get(vector.name)
         if known is None and not _is_drawn(page.ink, tail.at, head.at):
             continue
-        stays = all(abs(nodes[end].at - before.nodes[end].at) < NEAR_MM for end in ends & before.nodes.keys())
+        stays = all(abs(nodes[end].at - at[end]) < NEAR_MM for end in arrow if end in at)
         least = known.confidence if known is not None and stays else 0.0
         vectors[vector.name] = _between(tail, head, scale_se, least)
+    if drawn:
+        nodes = _in_usual_order(Figure(before.nodes, vectors, drawn), figure, construction)
     order = [step.node for step in construction.figures[figure]]
-    figures = {
-        **reading.figures,
-        figure: Figure({name: nodes[name] for name in order if name in nodes}, vectors),
-    }
+    kept = {name: nodes[name] for name in order if name in nodes}
+    figures = {**reading.figures, figure: Figure(kept, vectors, drawn)}
     found = {*moved, *vectors}
     unread = tuple(gap for gap in reading.unread if gap.name not in found)
     return replace(reading, figures=figures, unread=unread)
+
+
+def _in_usual_order(read: Figure, figure: str, construction: Construction) -> dict[str, ReadNode]:
+    """Return the nodes of a force polygon of another order, where its sides put them in the usual one.
+
+    They are as sure as the surest vector that starts or ends there.
+    """
+    nodes, sure = dict(read.nodes), dict.fromkeys(read.nodes, 0.0)
+    ring = ring_of(construction, figure)
+    for vector in construction.vectors_of(figure):
+        for node in vector.arrow if vector.name in read.vectors else ():
+            sure[node] = max(sure.get(node, 0.0), read.vectors[vector.name].confidence)
+    if ring is None or len(nodes) < len(ring.vectors):
+        return nodes
+    for side, (start, node) in zip(ring.vectors, pairwise(nodes), strict=False):
+        ends = dict(zip(side.arrow, read.drawn[side.name], strict=True))
+        at = nodes[start].at + ends[node] - ends[start]
+        nodes[node] = replace(nodes[node], at=at, confidence=sure[node])
+    return nodes
 
 
 def _between(tail: ReadNode, head: ReadNode, scale_se: float, least: float) -> ReadVector:

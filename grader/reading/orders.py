@@ -21,7 +21,7 @@ from grader.reading.expected import (
     support,
 )
 from grader.reading.lines import Lines
-from grader.records import FloatArray
+from grader.records import Figure, FloatArray
 from reference.construction.elements import Line
 from reference.construction.graph import Construction, Vector
 from reference.construction.steps import Given, Step, TwoLines
@@ -75,6 +75,22 @@ def ring_of(construction: Construction, figure: str) -> Ring | None:
     if any(pair not in between for pair in ends):
         return None
     return Ring(tuple(between[pair] for pair in ends), len(corners) - len(chain))
+
+
+def ends_on_sheet(construction: Construction, name: str, figure: Figure) -> dict[str, complex]:
+    """Return the place on the sheet of each node, complex mm.
+
+    In a force polygon of another order it is the end of the force that ends there in the usual order.
+    """
+    ring = ring_of(construction, name) if figure.drawn else None
+    if ring is None:
+        return {node: read.at for node, read in figure.nodes.items()}
+    corners = [step.node for step in construction.figures[name]]
+    return {
+        node: figure.drawn[side.name][side.arrow.index(node)]
+        for side, node in zip(ring.vectors, (*corners[1:], corners[0]), strict=True)
+        if side.name in figure.drawn
+    }
 
 
 def to_usual(order: Order) -> FloatArray:

@@ -243,7 +243,7 @@ def _on_the_sketch(session: Session, student: Student) -> Facts:
     for sheet, document in enumerate(student.report.reading.sheets):
         figure = document.figures.get("mechanism")
         if figure is not None:
-            nodes = node_facts(student, standing, MECHANISM, figure)
+            nodes = node_facts(student, standing, MECHANISM, session.nodes_of(student, MECHANISM, figure))
             return {**sheet_facts(session, student, sheet), "nodes": nodes}
     return {}
 

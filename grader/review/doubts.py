@@ -15,7 +15,7 @@ import numpy as np
 
 from grader.comparison.task import Task
 from grader.comparison.verdicts import EVEN
-from grader.documents import CriterionDocument, ReadingDocument, ReportDocument
+from grader.documents import CriterionDocument, FigureDocument, ReadingDocument, ReportDocument
 from grader.marking.answers import OFF_AS_READ, along_of
 from grader.outcomes import CREDITED
 from grader.records import MECHANISM, Figure, Reading, ReadNode, ReadVector, ScannedPage, on_sheet
@@ -237,7 +237,9 @@ def _nodes(asked: _Asked) -> Iterator[Doubt]:
             left = {name: one for name, one in left.items() if one not in [unread, *about]}
             continue
         make = _joint if figure == MECHANISM else _places
-        choices = _credit(about) or make(asked, about, step.node, figure) if about else ()
+        # A node of a polygon in another order is at no single place of the sheet: each vector is asked for.
+        places = () if asked.figures[figure].drawn or not about else make(asked, about, step.node, figure)
+        choices = (_credit(about) if about else ()) or places
         if choices:
             kind: Kind = "verdict" if choices[0].at is None else "node"
             yield Doubt(f"node:{figure}:{step.node}", kind, tuple(one.id for one in about), choices)
@@ -387,18 +389,24 @@ def _start(asked: _Asked, vector: Vector, node: str, least: float) -> tuple[comp
 
 def reading_of(document: ReadingDocument) -> Reading:
     """Return the record of a document, with covariances that are equal in all directions."""
-    figures: dict[str, Figure] = {}
-    for kind, figure in document.figures.items():
-        nodes = {
-            name: ReadNode(complex(node.x_mm, -node.y_mm), np.eye(2) * node.se_mm**2, node.confidence)
-            for name, node in figure.nodes.items()
-        }
-        vectors = {
-            name: ReadVector(one.length_mm, one.se_mm, one.direction_deg, one.se_deg, one.confidence)
-            for name, one in figure.vectors.items()
-        }
-        figures[kind] = Figure(nodes, vectors)
-    return Reading(figures)
+    return Reading({kind: figure_of(figure) for kind, figure in document.figures.items()})
+
+
+def figure_of(document: FigureDocument) -> Figure:
+    """Return the record of a figure's document."""
+    nodes = {
+        name: ReadNode(complex(node.x_mm, -node.y_mm), np.eye(2) * node.se_mm**2, node.confidence)
+        for name, node in document.nodes.items()
+    }
+    vectors = {
+        name: ReadVector(one.length_mm, one.se_mm, one.direction_deg, one.se_deg, one.confidence)
+        for name, one in document.vectors.items()
+    }
+    drawn = {
+        name: (complex(x, -y), complex(to_x, -to_y))
+        for name, ((x, y), (to_x, to_y)) in document.drawn.items()
+    }
+    return Figure(nodes, vectors, drawn)
 
 
 def figures_read(report: ReportDocument, pages: Sequence[ScannedPage]) -> dict[str, Figure]:
@@ -409,5 +417,5 @@ def figures_read(report: ReportDocument, pages: Sequence[ScannedPage]) -> dict[s
             first = page.reading.figures.get(name)
             others = {} if first is None else {key: one.others for key, one in first.vectors.items()}
             vectors = {key: replace(one, others=others.get(key, ())) for key, one in figure.vectors.items()}
-            found.setdefault(name, Figure(figure.nodes, vectors))
+            found.setdefault(name, replace(figure, vectors=vectors))
     return found

@@ -1,12 +1,12 @@
 """Data for the review page: a student's criteria as rows, and one question with all that it shows."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 from urllib.parse import urlencode
 
 from markupsafe import Markup
 
-from grader.documents import CriterionDocument, FigureDocument, Quantity
+from grader.documents import CriterionDocument, Quantity
 from grader.feedback.numbers import points_text, quantity_cells, score_text, tolerance_cells
 from grader.feedback.sentences import feedback_again
 from grader.feedback.words import VERDICTS, problem_sentence, unmatched_sentence
@@ -16,7 +16,7 @@ from grader.overlay.scene import MARKS, ink_of
 from grader.printed.layout import PAGE_MM, values_of
 from grader.records import MECHANISM, Box, Reason, ScannedPage
 from grader.review.doubts import SURE, known_probability
-from grader.review.session import OPEN, Session, Standing, Student, mark_of, page_criterion
+from grader.review.session import OPEN, Corner, Session, Standing, Student, mark_of, page_criterion
 from grader.rubric import RubricFile
 from grader.tables.decisions import Decision
 from grader.texts.spoken import clause
@@ -339,7 +339,7 @@ def look_of(session: Session, student: Student, criterion: CriterionDocument) ->
                 node
                 for kind, one in read.items()
                 if kind == figure or (figure == "" and kind != MECHANISM)
-                for node in node_facts(student, standing, kind, one)
+                for node in node_facts(student, standing, kind, session.nodes_of(student, kind, one))
             ],
         }
         if cells or seen or figure in read:
@@ -365,14 +365,14 @@ def sheet_facts(session: Session, student: Student, sheet: int) -> Facts:
     return {"sheet": sheet, "scan": scan, "ink": ink}
 
 
-def node_facts(student: Student, standing: Standing, kind: str, figure: FigureDocument) -> list[Facts]:
+def node_facts(student: Student, standing: Standing, kind: str, nodes: Iterable[Corner]) -> list[Facts]:
     """Return the nodes of a figure that a person may move."""
     return [
         {
-            "figure": kind, "name": name, "x": node.x_mm, "y": node.y_mm,
+            "figure": kind, "name": name, "label": label, "x": x, "y": y,
             "seen": mark_of(standing.of(student, f"node:{kind}:{name}")),
         }
-        for name, node in figure.nodes.items()
+        for name, label, (x, y) in nodes
     ]  # fmt: skip
 
 

@@ -17,6 +17,7 @@ from pydantic.dataclasses import dataclass as posted
 from grader.comparison.task import task_of
 from grader.documents import (
     CriterionDocument,
+    FigureDocument,
     ProblemDocument,
     ReportDocument,
     ResultsDocument,
@@ -31,8 +32,9 @@ from grader.marking.trust import opened_in, trust_of
 from grader.overlay.scene import Arrow, Ghost, Scene, expected_vector, ghost_of, scene_of
 from grader.pipeline import mark
 from grader.reading.corrected import snapped
+from grader.reading.orders import ends_on_sheet
 from grader.records import MECHANISM, PageRef, ScannedPage, on_sheet
-from grader.review.doubts import Doubt, doubts_of, figures_read, in_order, reading_of
+from grader.review.doubts import Doubt, doubts_of, figure_of, figures_read, in_order, reading_of
 from grader.review.scans import Scans
 from grader.scan.page import NO_DRAWINGS
 from grader.tables.decisions import ClashError, Decision, DecisionFile, Key
@@ -41,8 +43,11 @@ from grader.tables.reader import TableError, at
 from grader.texts.spoken import RefusedError
 from reference.construction.graph import Construction
 from reference.errors import PlanmarkError
+from reference.quantities import group_of
 
 OPEN = "review"
+Corner = tuple[str, str, tuple[float, float]]
+"""A node that a person may move: its name, what people call it, its place on the sheet."""
 MOST_COMMENTS = 200
 """Kept comments that are offered, those of all criteria together."""
 
@@ -699,12 +704,24 @@ class Session:
         if construction is None or read is None or expected is None:
             return None
         vector = construction.vectors.get(criterion.drawn)
-        tail = construction.all_on_sketch[criterion.drawn][0] if vector is None else vector.tail
-        node = read.nodes.get(tail)
-        if node is None:
+        tail = construction.all_on_sketch[criterion.drawn][0] if vector is None else vector.arrow[0]
+        places = {name: node.at for name, node in read.nodes.items()} if not read.drawn else {}
+        start = places.get(tail, read.drawn.get(criterion.drawn, (None,))[0])
+        if start is None:
             return None
-        at = on_sheet(node.at)
+        at = on_sheet(start)
         return ghost_of(Arrow(criterion.drawn, figure, at, at, criterion.verdict, doubtful=False), expected)
+
+    def nodes_of(self, student: Student, kind: str, document: FigureDocument) -> Iterator[Corner]:
+        """Yield the nodes of a figure that a person may move; a force polygon's are called by its forces."""
+        construction, figure = self._construction(student), figure_of(document)
+        if construction is None:
+            return
+        ends = {one.name: figure.drawn.get(one.name) or one.arrow for one in construction.vectors_of(kind)}
+        for node, corner in ends_on_sheet(construction, kind, figure).items():
+            place = corner if figure.drawn else node
+            there = [name for name in figure.vectors if group_of(kind) and place in ends.get(name, ())]
+            yield node, ", ".join(there) or node, on_sheet(corner)
 
     def _construction(self, student: Student) -> Construction | None:
         variant = student.job.submission.variant

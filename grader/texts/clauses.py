@@ -59,7 +59,7 @@ PLACING: dict[str, str] = {
         "an A3 drawing scanned in two halves on A4 cannot be put together: scan it on an A3 scanner or"
         " photograph it whole"
     ),
-    "not_by_drawing": N_("nor does the drawing show the scale, by declared kL, kv and ka"),
+    "not_by_drawing": N_("nor does the drawing show the scale, by the declared ones"),
 }
 """Reasons why a page could not be placed or is no such drawing, and what to do."""
 

@@ -157,15 +157,15 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
             "By %(by)s, lengths are %(shorter)s shorter than by frame, paper and resolution"
             " (±%(se)s); the page's scale was corrected."
         ),
-        N_("The page's scale was corrected by lengths that are known: links, v_A and a_A."),
+        N_("The page's scale was corrected by lengths that are known: links and given vectors."),
     ),
     "scale_doubtful": (
         N_("By %(by)s, the page has another scale than its registration says: lengths may be off by %(se)s."),
         N_("Lengths that are known contradict the page's scale: lengths may be off."),
     ),
     "scale_unknown": (
-        N_("Only the drawing can tell the page's scale, with kL, kv and ka declared: %(why)s."),
-        N_("Only the drawing can tell the page's scale, with kL, kv and ka declared."),
+        N_("Only the drawing can tell the page's scale, with its own scales declared: %(why)s."),
+        N_("Only the drawing can tell the page's scale, with its own scales declared."),
     ),
     "upright_unsure": (N_("No title block shows which way up the sheet is."),),
     "sheet_refused": (

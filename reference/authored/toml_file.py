@@ -238,7 +238,7 @@ def findings_of(error: ValidationError, model: type[BaseModel]) -> Iterator[Find
         path = "$" + "".join(map(_path_part, above)) + (f".{last}" if is_field else _path_part(last))
         message, given = fault["msg"].removeprefix("Value error, "), fault["input"]
         if fault["type"] == "extra_forbidden":
-            message = _not_known(str(last), model)
+            message = _not_known(str(last), model, given)
         elif fault["type"] == "missing":
             message = "is missing" + _WHY_NEEDED.get(str(fault["loc"][-1]), "")
         elif fault["type"].startswith("union_tag"):
@@ -329,7 +329,7 @@ def _path_part(part: str | int) -> str:
     return "" if not part or part in _UNION_TAGS or part.startswith("function-") else f".{part}"
 
 
-def _not_known(name: str, model: type[BaseModel]) -> str:
+def _not_known(name: str, model: type[BaseModel], given: object) -> str:
     schema = model.model_json_schema()
     tables = (schema, *schema.get("$defs", {}).values())
     fields = {field for table in tables for field in table.get("properties", ())}
@@ -337,5 +337,8 @@ def _not_known(name: str, model: type[BaseModel]) -> str:
         return "does not belong here: another kind of table has it; leave it out"
     if other := _other_kind(name):
         return other
-    near = near_names(name, sorted(fields), most=1)
-    return "is not known here; check its spelling" + (f" (did you mean {near[0]}?)" if near else "")
+    single = re.sub("ies$", "y", name).removesuffix("s")
+    near = [single] if single in fields else near_names(name, sorted(fields), most=1)
+    is_tables = isinstance(given, list) and given and isinstance(given[0], dict)
+    meant = f" (did you mean {f'[[{near[0]}]]' if is_tables else near[0]}?)" if near else ""
+    return f"is not known here; check its spelling{meant}"

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from reference.quantities import FORCE_PLANS, zone_of
 from samples.simulation import figures, forces, habits, page, symbols, truth, wording
 from samples.simulation.hand import DrawingTask, DrawnFigure, DrawnSheet
 from samples.simulation.lettering import any_handwriting
@@ -59,9 +60,14 @@ class Desk:
         if self.printed is None:
             return self._layout(sheet) is not None
         zones = self.printed[sheet.kind].zones
+        plans = tuple(figure for figure in sheet.figures if zone_of(figure.name) == FORCE_PLANS)
+        if len(plans) > 1:
+            rng = np.random.default_rng([self.seed, 4])
+            if page.place_figures(plans, zones[FORCE_PLANS], [], rng) is None:
+                return False
         for figure in sheet.figures:
             low, high = figures.extent(figure.nodes)
-            _, _, wide, tall = zones[figure.name]
+            _, _, wide, tall = zones[zone_of(figure.name)]
             if (high - low).real > wide - _ZONE_GAP_MM or (high - low).imag > tall - _ZONE_GAP_MM:
                 return False
         return True

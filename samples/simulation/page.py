@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from reference.quantities import FORCE_PLANS, zone_of
 from samples.simulation import wording
 from samples.simulation.figures import extent
 from samples.simulation.hand import DrawingTask, DrawnFigure
@@ -188,10 +189,13 @@ def overlap(one: Box, other: Box) -> bool:
 def place_in_zones(
     figures: tuple[DrawnFigure, ...], zones: Mapping[str, Box], rng: Rng
 ) -> dict[str, complex]:
-    """Origins of the figures near the middles of a printed sheet's zones."""
+    """Origins of the figures near the middles of a printed sheet's zones; force plans share theirs."""
     origins = {}
-    for figure in figures:
-        x, y, w, h = zones[figure.name]
+    plans = tuple(figure for figure in figures if zone_of(figure.name) == FORCE_PLANS)
+    if len(plans) > 1:
+        origins = place_figures(plans, zones[FORCE_PLANS], [], rng) or {}
+    for figure in (one for one in figures if one.name not in origins):
+        x, y, w, h = zones[zone_of(figure.name)]
         low, high = extent(figure.nodes)
         slack = max(0.0, w - (high - low).real - 16.0), max(0.0, h - (high - low).imag - 16.0)
         middle = complex(x + w / 2, -y - h / 2) + complex(

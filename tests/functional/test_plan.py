@@ -12,7 +12,6 @@ from typer.testing import CliRunner
 from grader.cli.app import app
 from grader.cli.exporting import MODELS, schema
 from reference.authored.assignment import library
-from tests.functional.conftest import run
 
 
 def test_the_table_of_the_press_shows_the_five_printed_segments(planmark):
@@ -89,12 +88,6 @@ def test_the_plan_is_drawn_into_a_file(planmark, tmp_path):
     assert ran.returncode == 0
     assert ET.parse(tmp_path / "new" / "plan.svg").getroot().tag.endswith("svg")
     assert [path.name for path in (tmp_path / "new").iterdir()] == ["plan.svg"]
-
-
-def test_a_plan_is_drawn_alike_in_every_run(tmp_path):
-    for seed in ("1", "2"):
-        run(tmp_path, "plan", "pump-forces", "--n", 7, "--svg", f"{seed}.svg", PYTHONHASHSEED=seed)
-    assert (tmp_path / "1.svg").read_bytes() == (tmp_path / "2.svg").read_bytes()
 
 
 def test_all_faults_of_an_authored_file_are_told_at_once(planmark, tmp_path):

@@ -92,9 +92,9 @@ class Viewer {
 
   addNode(node) {
     const title = svgElement("title");
-    const circle = svgElement("circle", { class: "node", tabindex: 0, role: "button", "aria-label": `${texts.node} ${node.name}`, cx: node.x, cy: node.y });
+    const circle = svgElement("circle", { class: "node", tabindex: 0, role: "button", "aria-label": `${texts.node} ${node.label}`, cx: node.x, cy: node.y });
     circle.dataset.node = `${node.figure}:${node.name}`;
-    title.textContent = node.name;
+    title.textContent = node.label;
     circle.append(title);
     circle.addEventListener("keydown", (event) => this.nudge(event, circle));
     this.nodes.append(circle);

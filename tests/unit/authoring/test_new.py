@@ -257,3 +257,20 @@ def test_a_file_whose_names_cannot_be_replaced_is_refused(tmp_path):
     with pytest.raises(CallError, match="each on a line of its own"):
         new_assignment(tmp_path / "mine", like=str(tmp_path / "old.assignment.toml"))
     assert [path.name for path in tmp_path.iterdir()] == ["old.assignment.toml"]
+
+
+def test_a_rubric_that_asks_for_no_force_gets_what_the_force_plans_show(tmp_path):
+    first = new_assignment(tmp_path / "first", like="pump-forces")
+    text = first.rubric.read_text(encoding="utf-8")
+    head, *criteria = text.split("[[criterion]]")
+    of_motion = [one for one in criteria if 'scale = "kL"' in one]
+    first.rubric.write_text("[[criterion]]".join([head, *of_motion]), encoding="utf-8")
+    second = new_assignment(tmp_path / "second", like=str(first.assignment))
+    asked = {one.name: one for one in load_rubric(second.rubric).criterion}
+    built_in = {one.name for one in load_rubric("pump-forces").criterion}
+    assert built_in <= asked.keys()
+    assert {"R_13_n", "v_A", "omega_3", "kv"}.isdisjoint(asked)
+    assert asked["R_13_t"].title.in_language("ro").endswith("reacțiunii elementului 1 asupra elementului 3")
+    assert not [one for one in asked.values() if one.title.ru == one.title.en]
+    findings = lint(load_assignment(second.assignment), load_rubric(second.rubric)).findings
+    assert not [one for one in findings if one.severity == "fault"]

@@ -1,5 +1,7 @@
 """Entered force sheets: one mistake costs one criterion, what follows is credited, and it is named."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -10,13 +12,14 @@ from grader.feedback.redo_steps import with_mistakes_explained
 from grader.feedback.sentences import mistake_feedback
 from grader.language import LANGUAGES
 from grader.marking.mark import judge
+from grader.marking.naming import Lost, named
 from grader.marking.report import report_of
 from grader.outcomes import CHARGED, CREDITED
 from grader.overlay.measured import measured_picture
 from grader.rubric import load_both
 from grader.tables.measurements import measurements_in, names_of
 from reference.authored.assignment import Variant
-from reference.construction.mistakes import OF_FORCES, affected, made_at, mistakes_of_forces
+from reference.construction.mistakes import OF_FORCES, Mistake, affected, made_at, mistakes_of_forces
 from reference.plan import exact_plan
 from tests.bench.force_students import HANDS, ForceMistake, StudentForces, force_task
 from tests.bench.judging_forces import Tally, count, measure_forces, sheets
@@ -52,6 +55,21 @@ def test_a_mistake_costs_where_it_was_made_and_is_named(mistake):
     _, judgement = pump(mistake)
     assert {one.name for one in judgement.outcomes if one.verdict in CHARGED} == charged
     assert [(one.code, one.at) for one in judgement.mistakes] == ([(code, at)] if code else [])
+
+
+def test_a_wrong_arm_explains_neither_given_forces_nor_what_stands_beside_a_right_part():
+    assignment, _ = force_task("pump")
+    construction = exact_plan(assignment, [assignment.variants()[4]]).construction
+    made = Mistake("wrong_arm", construction.vectors["R_13_t"].head)
+    replay = SimpleNamespace(cost=0.0, made=(made,), unexplained=(), not_explained=frozenset(), right={})
+
+    def explained(lost, right=()):
+        found = named([replay], construction, Lost(lost, {}, right=frozenset(right)), has_directions=True)
+        return [one.explains for one in found]
+
+    assert explained({"F_i3": "F_i3", "R_02": "R_02"}) == [("R_02",)]
+    assert explained({"F_i3": "F_i3"}) == []
+    assert explained({"R_02": "R_02"}, right=["R_13_t"]) == []
 
 
 def test_every_order_of_the_given_forces_is_right():

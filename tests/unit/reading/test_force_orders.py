@@ -6,7 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from grader.reading.orders import reordered, ring_of, to_usual
+from grader.reading.corrected import corrected
+from grader.reading.orders import ends_on_sheet, reordered, ring_of, to_usual
+from grader.reading.read import vector_of
+from grader.records import Figure, PageRef, Reading, ReadNode, ScannedPage
 from reference.construction.graph import evaluate
 from reference.plan import exact_plan
 from tests.bench.force_sheets import MASSES, judged, read, task_with_forces, work
@@ -66,3 +69,31 @@ def test_a_polygon_drawn_in_another_order_is_read(order):
     # Where the sides are laid off otherwise, the overlay needs their places on the sheet.
     figure = pages[0].reading.figures["force_plan_B"]
     assert figure.drawn.keys() >= {"R_13_t", "F_i3", "R_43", "F_i2"}
+
+
+def test_a_corner_is_moved_where_it_lies_on_the_sheet():
+    plan = exact_plan(task_with_forces("pump"), task_with_forces("pump").variants()[1:2])
+    figure, lot = "force_plan_B", np.random.default_rng(4)
+    ring = ring_of(plan.construction, figure)
+    changed = reordered(plan.construction, figure, ring, an_order(ring, lot))
+    names = [step.node for step in changed.figures[figure]]
+    nodes = evaluate(changed, plan.drawing.parameters, wanted=names)
+    at = {node: 200.0 - 150.0j + complex(np.ravel(nodes[node])[0]) for node in names}
+    # One corner was read 3 mm beside its place: two sides are wrong.
+    astray = names[2]
+    read = {**at, astray: at[astray] + 3.0}
+    drawn = {one.name: tuple(read[node] for node in one.arrow) for one in changed.vectors_of(figure)}
+    spans = {name: vector_of(head - tail, np.eye(2) * 0.01, 0.6) for name, (tail, head) in drawn.items()}
+    known = dict.fromkeys(names, ReadNode(200.0 - 150.0j, np.eye(2) * 0.01, 0.6))
+    page = ScannedPage(PageRef("s.png"), reading=Reading({figure: Figure(known, spans, drawn)}))
+    ends = ends_on_sheet(plan.construction, figure, page.reading.figures[figure])
+    moved = next(node for node, place in ends.items() if place == read[astray])
+    places = {(figure, moved): (at[astray].real, -at[astray].imag)}
+    (right,), _ = corrected([page], places, plan.construction)
+    fixed = right.reading.figures[figure]
+    for name, vector in fixed.vectors.items():
+        assert vector.length_mm == pytest.approx(abs(plan.drawn_mm(name))[0], abs=WIDTH_MM / 10), name
+    corners = [fixed.nodes[node].at for node in names]
+    usual = [complex(np.ravel(plan.nodes_mm[figure][node])[0]) for node in names]
+    assert np.allclose(np.subtract(corners, corners[0]), np.subtract(usual, usual[0]), atol=ROUNDING_MM)
+    assert ends_on_sheet(plan.construction, figure, fixed)[moved] == pytest.approx(at[astray])

@@ -160,6 +160,7 @@ side = "ahead"
         (('pins = ["B"]', 'pins = ["E"]'), "$.body[2].pins[0]", "no point that is fixed on link 6"),
         (("mass = 5", 'mass = 5\ncentre = "D"'), "$.body[3].centre", "at its joint E: leave out centre"),
         (("mass = 5", ""), "$.body[3]", "needs mass"),
+        (("[[load]]", "[[loads]]"), "$.loads", "did you mean [[load]]?"),
         (('point = "G"', 'point = "A"'), "$.load[1].point", "it carries C, G"),
         (('point = "G"', ""), "$.load[1].point", "is missing"),
         (("force = 30", "force = 30\ncouple = 2"), "$.load[1]", "needs one of force"),
