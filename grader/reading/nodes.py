@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grader.reading.expected import xy
+from grader.reading.expected import Expected, xy
 from grader.reading.lines import TIP_MM, BoolArray, Lines
 from grader.reading.matching import StrokeAssignment
 from grader.records import FloatArray, IntArray
@@ -156,6 +156,7 @@ def fit_nodes(
     lines: Lines,
     density: EndDensity = PLAN_ENDS,
     centres: Mapping[int, complex] | None = None,
+    prior: Expected | None = None,
 ) -> NodeFit:
     """Fit nodes by weighted least squares over all strokes taken, with large residuals down-weighted.
 
@@ -163,12 +164,15 @@ def fit_nodes(
     replaced by a Gaussian with its moments given everything else (expectation propagation; Minka 2001), so
     that the covariance contains the doubt about ends.
 
-    Arguments: `centres` of circles drawn around nodes, by node.
+    Arguments: `centres` of circles drawn around nodes, by node; `prior`, the figure before strokes were
+    assigned, if it says where nodes lie that no stroke shows; without it the fit is by the strokes alone.
     """
     expected = assignment.expected
     taken = _taken(assignment, lines)
     rows, ends = _line_rows(assignment, taken, centres or {}), _end_rows(taken, expected.at, density)
-    prior = np.eye(2 * len(expected.at)) / LOOSE_MM**2
+    every = np.eye(2 * len(expected.at))
+    before = xy(expected.at if prior is None else prior.at)
+    loose = every / LOOSE_MM**2 if prior is None else np.linalg.inv(prior.cov + TIED_MM**2 * every)
     redraw = USUAL_REDRAW_MM
     sites = _Sites(*np.zeros((2, len(ends.design))))
     state = xy(expected.at)
@@ -176,9 +180,9 @@ def fit_nodes(
         sigma = np.sqrt(rows.sigma**2 + np.where(rows.own, redraw**2, 0.0))
         residual = np.abs(rows.goal - rows.design @ state) / sigma
         weight = np.minimum(1.0, 2.0 / np.maximum(residual, 1e-9)) / sigma**2
-        normal = rows.design.T @ (rows.design * weight[:, None]) + prior
+        normal = rows.design.T @ (rows.design * weight[:, None]) + loose
         normal = normal + ends.design.T @ (ends.design * sites.precision[:, None])
-        right = rows.design.T @ (rows.goal * weight) + prior @ xy(expected.at) + ends.design.T @ sites.pull
+        right = rows.design.T @ (rows.goal * weight) + loose @ before + ends.design.T @ sites.pull
         cov = np.asarray(np.linalg.inv(normal), dtype=np.float64)
         state = cov @ right
         redraw = _redraw((rows.goal - rows.design @ state)[rows.own], len(state))

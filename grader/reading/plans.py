@@ -25,6 +25,7 @@ from grader.reading.expected import (
     tied,
     vectors_of,
 )
+from grader.reading.force_labels import ForceLabels, ends_of
 from grader.reading.lettered_graph import lettered_graphs
 from grader.reading.lettering import fitting_letters, lettering, primes_beside
 from grader.reading.lines import BoolArray, Lines
@@ -124,6 +125,7 @@ class PlanProblem:
     renamed : what students write for a node, by name, if it is not the name
     elsewhere : strokes, by their number, that belong to the sketch
     look : tells where nodes lie by the sheet's ink
+    labels : names beside the vectors of a force polygon
     """
 
     lines: Lines
@@ -133,6 +135,7 @@ class PlanProblem:
     renamed: Mapping[str, str] = field(default_factory=dict)
     elsewhere: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
     look: Look | None = None
+    labels: ForceLabels | None = None
 
     @property
     def free(self) -> Lines:
@@ -166,6 +169,7 @@ class PlanReading:
     rivals : other explanations, best first
     named : probability that its letters say the names, of one whose nodes the construction does not place
     by_ink : the nodes by strokes and ink together, of the one that is chosen
+    seen : the same without the data, which place a force polygon's nodes where nothing marks them
     """
 
     hypothesis: PlanHypothesis
@@ -177,11 +181,13 @@ class PlanReading:
     rivals: tuple["PlanReading", ...] = ()
     named: float = 1.0
     by_ink: NodeFit | None = None
+    seen: NodeFit | None = None
 
     @cached_property
     def fit(self) -> NodeFit:
         """The nodes, by the strokes alone unless they were held against the ink."""
-        return self.by_ink or fit_nodes(self.assignment, self.lines)
+        prior = self.placed if group_of(self.figure) else None
+        return self.by_ink or fit_nodes(self.assignment, self.lines, prior=prior)
 
     @property
     def figure(self) -> str:
@@ -234,7 +240,7 @@ def _regular(problem: PlanProblem, drawing: Drawing) -> list[PlanHypothesis]:
     if ring is None or expected is None:
         return hypotheses
     long = problem.lines.take(problem.lines.length > LEAST_LAID_MM)
-    for order in orders_by_ink(expected, ring, long):
+    for order in orders_by_ink(expected, ring, long, problem.labels):
         if order != ring.usual:
             construction = reordered(drawing.construction, problem.figure, ring, order)
             drawn = Drawing(construction, drawing.parameters)
@@ -263,8 +269,11 @@ def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) 
     best, *rivals = _with_letters(problem, everything)
     rivals = [*rivals[: RIVALS - 1], *_without_each_stroke(best, problem.prior)]
     drawn = [best.placed.edges[index] for index in best.placed.required]
+    seen = best.fit if is_lettered else fit_nodes(best.assignment, best.lines)
     by_ink = problem.look and held_against_ink(best.fit, drawn, problem.look)
-    return replace(best, rivals=tuple(rivals), by_ink=by_ink)
+    if not is_lettered and problem.look:
+        seen = held_against_ink(seen, drawn, problem.look)
+    return replace(best, rivals=tuple(rivals), by_ink=by_ink, seen=seen)
 
 
 # Where a plan may lie -----------------------------------------------------------------------------
@@ -411,13 +420,21 @@ def _with_letters(problem: PlanProblem, plans: Sequence[PlanReading]) -> list[Pl
     for plan in sorted(plans, key=lambda plan: -plan.score):
         if plan.score >= least and plan.strokes not in scored:
             expected = plan.assignment.expected
-            nodes = ((problem.figure, name) for name in expected.names)
-            at = dict(zip(nodes, expected.at.tolist(), strict=True)) if not group_of(problem.figure) else {}
-            writing = lettering(at, problem.letters, poles, problem.renamed)
-            nats = 0.0 if writing is None else writing.log()
+            nats = _letters_nats(problem, expected, poles)
             named = _named_by(nats, plan.hypothesis)
             scored[plan.strokes] = replace(plan, score=plan.score + nats, named=named)
     return sorted(scored.values(), key=lambda plan: -plan.score)
+
+
+def _letters_nats(problem: PlanProblem, expected: Expected, poles: Collection[str]) -> float:
+    """Return the evidence of the letters at a plan's nodes, or of the names beside a polygon's vectors."""
+    if group_of(problem.figure):
+        names = [edge.name for edge in expected.edges]
+        return problem.labels.log(names, *ends_of(expected.edges, expected.at)) if problem.labels else 0.0
+    nodes = ((problem.figure, name) for name in expected.names)
+    at = dict(zip(nodes, expected.at.tolist(), strict=True))
+    writing = lettering(at, problem.letters, poles, problem.renamed)
+    return 0.0 if writing is None else writing.log()
 
 
 # Strokes of a plan --------------------------------------------------------------------------------

@@ -79,6 +79,15 @@ def test_crossing_lines_place_a_node_whatever_their_ends():
     assert abs(fit.at[0]) < PLACE_MM
 
 
+def test_two_vectors_on_one_stroke_meet_where_the_data_have_it():
+    lines = lines_of(ink_of([(0j, 60 + 0j)]))
+    edges = (Edge("v", 0, 1), Edge("w", 1, 2))
+    drawn = replace(explanation([0j, 23 + 0j, 60 + 0j], edges, [0, 0]), shared=np.array([False, True]))
+    given = Expected(("o", "a", "b"), np.array([1j, 20 + 1j, 60 + 1j]), 0.1 * np.eye(6), edges)
+    assert abs(fit_nodes(drawn, lines, prior=given).at[1] - 20) < 3.0 * PLACE_MM
+    assert abs(fit_nodes(drawn, lines).at[1] - 20) > 1.0
+
+
 def test_a_stroke_moves_what_is_believed_of_other_nodes():
     cov = np.eye(4) + np.kron(np.ones((2, 2)), 9.0 * np.eye(2))
     belief = Beliefs(np.array([[0j, 50 + 0j]]), cov[None])
