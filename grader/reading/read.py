@@ -41,7 +41,7 @@ from grader.records import (
 from reference.authored.assignment import Assignment, Scales, Variant
 from reference.construction.mistakes import Drawing
 from reference.geometry import ComplexArray
-from reference.quantities import group_of
+from reference.quantities import group_of, zone_of
 
 LEAST_SKETCH = 15.0
 LEAST_PLAN = 12.0
@@ -262,7 +262,7 @@ def _find_plan(
     """
     laid: list[_LaidPlan] = []
     # A printed sheet has a zone for the plan: it is searched first.
-    for page in sorted(pages, key=lambda page: figure not in page.sheet.zones):
+    for page in sorted(pages, key=lambda page: zone_of(figure) not in page.sheet.zones):
         joints, guide_turn = _sketched(page, pages)
         links = page.sketch.members if page.sketch is not None else np.zeros(0, np.int64)
         given = {**joints, **known}
@@ -274,7 +274,7 @@ def _find_plan(
                 every = {**page.beside, page.position: turned}
                 problem, page.told = told_apart(problem, every, page.position)
             laid.append(_LaidPlan(page, problem, turned, regular_plans(problem, turned)))
-        if figure in page.sheet.zones and any(one.is_explained for one in laid):
+        if zone_of(figure) in page.sheet.zones and any(one.is_explained for one in laid):
             break
     laid.sort(key=lambda one: -one.score)
     # If no sheet shows the right plan, a mistaken one may be on either.
