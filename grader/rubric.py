@@ -299,13 +299,13 @@ class RubricFile(Authored):
     @property
     def points(self) -> Mapping[str, float]:
         """Points by criterion, scaled so that each section has its weight, which they add up to in cents."""
-        found, before = dict[str, float](), dict[Section, float]()
+        found, before, authored = dict[str, float](), dict[Section, float](), self.sections
         for one in self.criterion:
-            weight, whole = self.weight_of(one.section), self.sections[one.section]
-            found[one.id] = one.points
+            section, found[one.id] = one.section, one.points
+            weight = self.weight_of(section)
             if weight is not None:
-                exact, first = one.points * weight / whole, before.get(one.section, 0.0)
-                before[one.section] = last = first + exact
+                exact, first = one.points * weight / authored[section], before.get(section, 0.0)
+                before[section] = last = first + exact
                 end = weight if math.isclose(last, weight) else round(last, 2)
                 found[one.id] = round(end - round(first, 2), 6) or exact
         return found
@@ -320,7 +320,8 @@ class RubricFile(Authored):
         """The points of each section as authored."""
         found: dict[Section, float] = {}
         for criterion in self.criterion:
-            found[criterion.section] = found.get(criterion.section, 0.0) + criterion.points
+            section = criterion.section
+            found[section] = found.get(section, 0.0) + criterion.points
         return found
 
 

@@ -578,7 +578,8 @@ def _check_formulas(assignment: Assignment, source: Path) -> Faults:
         own += check(path, formula.names, partial(read, formula))
     faults = Faults()
     if not (own or of_mechanism):
-        plain = replace(assignment, file=file.model_copy(update=Masses().model_dump()))
+        none = {name: field.default for name, field in Masses.model_fields.items()}
+        plain = replace(assignment, file=file.model_copy(update=none))
         of_mechanism += check("$", frozenset(), partial(plain.mechanism, variants))
         own += [] if of_mechanism else check_masses(file, plain.mechanism_file, plain.mechanism(variants[:1]))
         if file.has_forces and not (own or of_mechanism):

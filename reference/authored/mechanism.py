@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from itertools import permutations
 from typing import Annotated, Literal, Self, cast
 
-from pydantic import AliasChoices, Field, model_validator
+from pydantic import AliasChoices, ConfigDict, Field, model_validator
 
 from reference.authored.chain import GROUND, ONE_DRIVING_LINK, Chain, chain_of, refusal
 from reference.authored.toml_file import (
@@ -250,6 +250,7 @@ GroupTable = Annotated[AnyGroupTable, Field(discriminator="type")]
 class MechanismFile(Authored):
     """A mechanism: lengths in `length_unit`, numbers or formulas of the assignment's values."""
 
+    model_config = ConfigDict(defer_build=False)  # so that AssignmentFile takes the same schema
     schema_version: Literal[1]
     id: Identifier
     title: Text

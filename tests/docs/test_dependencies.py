@@ -60,6 +60,14 @@ def test_what_is_imported_is_declared():
     assert {name for where, name in missing if not where.startswith("grader/cli/")} == set()
 
 
+def test_what_is_declared_is_imported():
+    # Whoever installs planmark downloads nothing that it never uses.
+    modules = [path for package in ("grader", "reference") for path in (ROOT / package).rglob("*.py")]
+    used, provided = set().union(*map(imported, modules)), importlib.metadata.packages_distributions()
+    needed = {plain(name) for module in used for name in provided.get(module, [module])}
+    assert names(PROJECT["dependencies"]) - needed == set()
+
+
 def test_every_dependency_stands_on_the_page_with_its_licence():
     rows = dict(re.findall(r"(?m)^\| (\S+) \| (.+) \|$", make_licences.PAGE.read_text("utf-8")))
     licensed = {plain(name) for name, licence in rows.items() if len(licence) > 2}

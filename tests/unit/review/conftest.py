@@ -6,6 +6,7 @@ from starlette.testclient import TestClient
 
 from grader.files import samples_folder
 from grader.folder.batch import Batch
+from grader.owners import title_block
 from grader.review.server import application
 from grader.review.session import Session
 from grader.rubric import load_rubric
@@ -47,6 +48,24 @@ def scanned(tmp_path_factory):
     out = folder.parent / "out"
     Session(Batch(PUMP, RUBRIC, folder, out), Inline()).bring_up_to_date(silent)
     return folder.parent
+
+
+READ = {}
+"""Writing that was read, by page: each run reads it anew on pages of nobody, in half of a test's time."""
+
+
+@pytest.fixture(autouse=True)
+def writing_read_once(monkeypatch):
+    read = title_block.writing_on
+
+    def known(page, *, closely):
+        ref = page.ref
+        key = (ref.digest, ref.page, ref.turn_deg, ref.corners_px, closely)
+        if key not in READ:
+            READ[key] = read(page, closely=closely)
+        return READ[key]
+
+    monkeypatch.setattr(title_block, "writing_on", known)
 
 
 @pytest.fixture

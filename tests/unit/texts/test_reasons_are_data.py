@@ -57,6 +57,12 @@ def trees() -> list[tuple[str, ast.Module]]:
     ]
 
 
+@cache
+def nodes(tree: ast.AST) -> list[ast.AST]:
+    """Every node of a module, gone through once for all tests."""
+    return list(ast.walk(tree))
+
+
 def _is_prose(node: ast.AST) -> bool:
     if isinstance(node, ast.Call):
         return isinstance(node.func, ast.Name) and node.func.id in {"message", "sentence", "clause"}
@@ -65,7 +71,7 @@ def _is_prose(node: ast.AST) -> bool:
 
 def taken_apart(tree: ast.AST) -> Iterator[int]:
     """The lines on which a sentence is searched, cut or compared."""
-    for node in ast.walk(tree):
+    for node in nodes(tree):
         match node:
             case ast.Call(func=ast.Attribute(value=value, attr=attr)) if attr in APART and _is_prose(value):
                 yield node.lineno
@@ -99,7 +105,7 @@ def test_no_code_takes_a_sentence_apart() -> None:
 def test_no_key_of_the_catalogues_is_made_at_run_time() -> None:
     made = []
     for name, tree in trees():
-        for node in ast.walk(tree):
+        for node in nodes(tree):
             match node:
                 case ast.Call(func=ast.Name(id="N_"), args=[key]) if not isinstance(key, ast.Constant):
                     made.append(f"{name}:{node.lineno}")
@@ -112,7 +118,7 @@ def test_no_key_of_the_catalogues_is_made_at_run_time() -> None:
 def codes_made() -> Iterator[tuple[str, str]]:
     """Every code with which a reason is made, and its place in the source."""
     for name, tree in trees():
-        for node in ast.walk(tree):
+        for node in nodes(tree):
             match node:
                 case ast.Call(func=ast.Name(id=maker), args=[*args]) if maker in MAKERS:
                     for one in ast.walk(ast.Module([ast.Expr(arg) for arg in args[:1]], [])):
@@ -136,7 +142,7 @@ def refusals_made() -> Iterator[tuple[str, str]]:
     """Every code with which a request is refused, and its place in the source."""
     before = {"RefusedError": "", "forbidden": "", "_refused": "", "missing": "no_"}
     for name, tree in trees():
-        for node in ast.walk(tree) if name.startswith(("grader/web/", "grader/review/")) else ():
+        for node in nodes(tree) if name.startswith(("grader/web/", "grader/review/")) else ():
             match node:
                 case ast.Call(func=ast.Name(id=maker), args=[*args]) if maker in before:
                     codes = [one.value for one in args if isinstance(one, ast.Constant)]
@@ -159,10 +165,10 @@ def test_every_refusal_and_failure_is_told_in_every_language(lang: str) -> None:
 
 def test_every_failure_has_its_sentence_and_every_sentence_its_failure() -> None:
     assert FAILURES.keys() & REFUSALS.keys() == set()
-    said = {one.value for _, tree in trees() for one in ast.walk(tree) if isinstance(one, ast.Constant)}
+    said = {one.value for _, tree in trees() for one in nodes(tree) if isinstance(one, ast.Constant)}
     assert FAILURES.keys() | EXPORTS.keys() <= said
     for name, tree in trees():
-        for node in ast.walk(tree):
+        for node in nodes(tree):
             match node:
                 case ast.Call(func=ast.Name(id="failure"), args=[_, *args]):
                     named = [one.value for one in ast.walk(ast.Tuple(args)) if isinstance(one, ast.Constant)]
@@ -180,12 +186,12 @@ def words_of_errors(tree: ast.AST) -> Iterator[int]:
     """The lines on which an error is made whose message is, or holds, a text of the code itself."""
     told = {
         target.id: node.value
-        for node in ast.walk(tree)
+        for node in nodes(tree)
         if isinstance(node, ast.Assign)
         for target in node.targets
         if isinstance(target, ast.Name)
     }
-    for node in ast.walk(tree):
+    for node in nodes(tree):
         match node:
             case ast.Call(func=ast.Name(id=kind), args=[_, text, *_]) if kind in ERRORS:
                 names = [one.id for one in ast.walk(text) if isinstance(one, ast.Name)]
@@ -220,7 +226,7 @@ TOLD = {"notes", "note", "why", "missing", "unplaced", "withheld"}
 
 def words_told(tree: ast.AST) -> Iterator[int]:
     """The lines on which an export is given a note, or a reason, that is a text of the code itself."""
-    for node in ast.walk(tree):
+    for node in nodes(tree):
         match node:
             case ast.keyword(arg=str(name), value=value):
                 parts = [value]
