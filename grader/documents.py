@@ -552,6 +552,8 @@ class ResultsDocument(Document):
     assignment: str
     titles: dict[str, str] = {}
     """The criteria's titles in the language of the class, by id; a report's are in its student's."""
+    lang: str | None = None
+    """The language of the class; null in results of earlier versions."""
     rubric: RubricDocument | None = None
     """Null in results of earlier versions."""
     reports: list[ReportDocument]

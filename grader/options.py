@@ -256,7 +256,7 @@ class ExportOptions:
         "Delete the guide there: Moodle's core_grading_get_gradingform_instances tells the points."
     )
     groups: bool | None = option("Whether students hand in as groups.", "--groups/--no-groups")
-    lang: str = _lang()
+    lang: str | None = _lang("Language of comments: en, ro or ru (default: as graded).", None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -34,9 +34,9 @@ letters_unclear       first, second                                          let
 entry_refused         reason                                                 an entry cannot be used
 doubtful              confidence                                             read without confidence
 near_limit            se, good_to, off, tolerance, what                      the error straddles a limit
-counted_for_you       beyond, good_to, what                                  beyond a limit by less than the
+counted_for_you       beyond, good_to, tolerance, what                       beyond a limit by less than the
                                                                              reading's error: counted
-not_certainly_within  beyond, good_to, what                                  within it by less: not counted
+not_certainly_within  beyond, good_to, tolerance, what                       within it by less: not counted
 at_stake                                                                     too little is left open
 other_variant,        whose                                                  another student's data; the own
 data_misread                                                                 ones misread
@@ -70,6 +70,8 @@ from reference.quantities import kind_of
 CREDITED: frozenset[str] = frozenset({"full", "follow_through"})
 CHARGED: frozenset[str] = frozenset({"none", "partial"})
 """Verdicts with all points, and those that cost some; the others are open, or not judged."""
+EVEN = 0.5
+"""Probability of a mark that is open for a reason without a known probability."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -81,7 +81,7 @@ def export_results(folder: Path, call: ExportCall) -> tuple[bool, Path]:
     if call.ids is not None:
         people = with_ids(people, call.ids)
     delivery = deliver(results, path, replace(options, people=people))
-    _report(delivery, path, options.lang)
+    _report(delivery, path, options.lang or results.lang or "en")
     return not delivery.is_complete, path
 
 

@@ -8,7 +8,6 @@ from grader.comparison.follow_through import FollowThrough
 from grader.comparison.scales import Scale
 from grader.comparison.task import Task, TaskSegment
 from grader.comparison.verdicts import (
-    EVEN,
     FULL,
     NONE,
     OPENING,
@@ -18,7 +17,7 @@ from grader.comparison.verdicts import (
     at_worst,
     the_better,
 )
-from grader.outcomes import CHARGED, CREDITED
+from grader.outcomes import CHARGED, CREDITED, EVEN
 from grader.records import Reason
 from reference.construction.steps import Given
 

@@ -32,7 +32,6 @@ from grader.comparison.own import known, own_rate
 from grader.comparison.scales import Scale, settle
 from grader.comparison.task import Task, TaskSegment
 from grader.comparison.verdicts import (
-    EVEN,
     FULL,
     HALF,
     NONE,
@@ -49,7 +48,7 @@ from grader.comparison.verdicts import (
     with_confidence,
 )
 from grader.documents import Quantity, Tolerance, Verdict
-from grader.outcomes import CHARGED, Outcome, UsedScale
+from grader.outcomes import CHARGED, EVEN, Outcome, UsedScale
 from grader.records import Reason
 from grader.rubric import CriterionTable
 from reference.authored.assignment import SCALE_NAMES

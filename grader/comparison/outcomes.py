@@ -5,9 +5,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from grader.comparison.task import Task
-from grader.comparison.verdicts import EVEN, FULL, NONE, MarkRange, degrees
+from grader.comparison.verdicts import FULL, NONE, MarkRange, degrees
 from grader.documents import Quantity, Tolerance, Verdict
-from grader.outcomes import CREDITED, Outcome
+from grader.outcomes import CREDITED, EVEN, Outcome
 from grader.records import Reason
 from grader.rubric import CriterionTable
 from reference.construction.elements import Line

@@ -8,8 +8,8 @@ from typing import Literal, cast
 
 from grader.comparison.evidence import DrawnVector, Evidence, Submission, gather
 from grader.comparison.task import Task, Yardstick
-from grader.comparison.verdicts import ALL_RIGHT, EVEN, FULL, NONE, Limit, MarkRange, by_rule, mark
-from grader.outcomes import UsedScale
+from grader.comparison.verdicts import ALL_RIGHT, FULL, NONE, Limit, MarkRange, by_rule, mark
+from grader.outcomes import EVEN, UsedScale
 from grader.records import Reading, Reason, Unread, Value, Written
 from grader.rubric import ToleranceTable
 from grader.tables.scale_text import (

@@ -21,7 +21,7 @@ from grader.feedback.mistakes import (
 )
 from grader.language import N_, NO_NAMES, Tongue, tongue
 from grader.options import Level
-from grader.outcomes import CHARGED, CREDITED, NamedMistake, Outcome
+from grader.outcomes import CHARGED, CREDITED, EVEN, NamedMistake, Outcome
 from grader.records import Reason, Value
 from grader.texts.reasons import MISREAD, UNCHECKED, UNDECIDED, UNSURE, reason_sentence
 from grader.texts.spoken import place
@@ -91,6 +91,7 @@ def feedback_again(
         reasons=tuple(Reason(one.code, _as_before(one.parameters)) for one in criterion.why),
         possible=(criterion.verdict, criterion.verdict),
         proposed=1.0 if criterion.proposed in CREDITED else 0.0,
+        probability=criterion.probability or EVEN,
     )  # fmt: skip
     return criterion_feedback(outcome, lang, level, names)
 
@@ -112,6 +113,7 @@ def _worth_telling(outcome: Outcome, level: Level = "full") -> list[Reason]:
     needless = {"right"} if codes - {"right"} else set()
     if outcome.verdict == "review":
         needless |= RESIDUALS if outcome.proposed == 1.0 else IN_FAVOUR
+        needless |= {"counted_for_you"} if outcome.probability == EVEN else set()
         if outcome.proposed == 1.0 and codes & RESIDUALS and not codes & {"follows", "counted_for_you"}:
             return [
                 Reason(MISREAD),

@@ -7,7 +7,6 @@ from typing import Literal
 
 from markupsafe import Markup
 
-from grader.comparison.verdicts import EVEN
 from grader.documents import (
     CriterionDocument,
     MistakeDocument,
@@ -28,7 +27,7 @@ from grader.feedback.words import environment
 from grader.files import write_whole
 from grader.language import N_, Tongue, symbols, tongue
 from grader.options import Level
-from grader.outcomes import CHARGED
+from grader.outcomes import CHARGED, EVEN
 from grader.overlay.closeup import PageView, detail, page_views, scan_element, svg
 from grader.overlay.scene import Arrow, Picture
 from grader.texts.spoken import PLACES, place

@@ -201,6 +201,7 @@ def _graded(
     results = ResultsDocument(
         assignment=batch.assignment.id,
         titles={one.id: one.title.in_language(batch.lang) for one in batch.rubric.criterion},
+        lang=batch.lang,
         rubric=rubric_document(batch.assignment, batch.rubric),
         reports=reports,
         unmatched=[*unmatched, *decisions.problems()],

@@ -9,6 +9,7 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from random import SystemRandom
 from typing import Any, Literal
@@ -25,7 +26,17 @@ from grader.lms.export import write_archive
 from grader.lms.grades import in_a_row
 from grader.marking.trust import said_of
 from grader.overlay.covered import Keep, bare_png, covered, painted, reopened, upright_pixels
-from grader.records import MECHANISM, ZONE_SLACK_MM, Box, FloatArray, Reason, ScannedPage, Sheet
+from grader.records import (
+    MECHANISM,
+    ZONE_SLACK_MM,
+    Box,
+    Figure,
+    FloatArray,
+    Reason,
+    ScannedPage,
+    Sheet,
+    on_sheet,
+)
 from grader.rubric import plans_asked
 from grader.scan.decode.pages import decode
 from grader.scan.handwriting.lines import find_lines
@@ -179,11 +190,17 @@ def keep_of(page: ScannedPage, construction: Construction, row: Row) -> Keep | N
     ends += construction.links.values()
     for name, known in row["figures"].items():
         nodes = {node: np.array(place[:2]) for node, place in known.items()}
-        read = page.reading.figures[name].nodes.values() if name in page.reading.figures else ()
-        if len(nodes) > 1:
-            places = [*nodes.values(), *(np.array([one.at.real, -one.at.imag]) for one in read)]
+        read = page.reading.figures.get(name, Figure({}, {}))
+        strokes = [np.array([nodes[a], nodes[b]]) for a, b in ends if a in nodes and b in nodes]
+        places = [*nodes.values(), *(np.array(on_sheet(one.at)) for one in read.nodes.values())]
+        if name in row["drawn"]:
+            # The nodes of a polygon in another order are at no place of the sheet: its vectors are.
+            strokes = [np.array(one) for one in row["drawn"][name].values()]
+            before = [np.array(on_sheet(end)) for one in read.drawn.values() for end in one]
+            places = [*chain.from_iterable(strokes), *before]
+        if len(places) > 1:
             keep.figures.append(np.array(places))
-            keep.strokes += [np.array([nodes[a], nodes[b]]) for a, b in ends if a in nodes and b in nodes]
+            keep.strokes += strokes
     if not keep.figures:
         return None
     if not page.sheet.zones:
@@ -240,6 +257,7 @@ def _known(batch: Batch, graded: Graded) -> Iterator[Known]:
                     }
                     for figure, one in read.figures.items()
                 },
+                "drawn": {figure: one.drawn for figure, one in read.figures.items() if one.drawn},
             }  # fmt: skip
 
 
@@ -347,11 +365,20 @@ def _uncovered(row: Row, boxes: Sequence[Box]) -> Row:
         ((u, v),) = mapped(mm_to_px, np.array([(x, y)]))
         return not any(left <= u <= left + wide and top <= v <= top + high for left, top, wide, high in boxes)
 
+    drawn = {
+        figure: {name: ends for name, ends in vectors.items() if all(is_left(*end) for end in ends)}
+        for figure, vectors in row["drawn"].items()
+    }
     figures = {
+        # The nodes of a polygon in another order follow from all its vectors.
         figure: {name: node for name, node in nodes.items() if is_left(node[0], node[1])}
+        if figure not in drawn
+        else nodes
+        if drawn[figure] == row["drawn"][figure]
+        else {}
         for figure, nodes in row["figures"].items()
     }
-    return {**row, "figures": figures}
+    return {**row, "figures": figures, "drawn": drawn}
 
 
 def _write_zip(preview: Path, file: Path, rows: Sequence[Row]) -> None:

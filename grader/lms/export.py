@@ -141,7 +141,7 @@ def draft(results: ResultsDocument, options: Options) -> Delivery:
     students = tuple(dict.fromkeys(report.student_id for report in results.reports))
     if kind.of_grades is None:
         return Delivery(kind.of_results(results) if kind.of_results else "", students)
-    options = replace(options, titles=results.titles)
+    options = replace(options, titles=results.titles, lang=options.lang or results.lang)
     grades = grades_of(results, options)
     _check_maxima(grades, options, what)
     delivery = kind.of_grades(grades, options)

@@ -235,7 +235,7 @@ def _grade(student_id: str, chosen: Sequence[tuple[ReportDocument, str]], option
     """The grade of a student's reports, each with its folder."""
     reports, folders = tuple(report for report, _ in chosen), tuple(folder for _, folder in chosen)
     person = options.people.get(student_id, Person())
-    person = replace(person, lang=person.lang or options.lang)
+    person = replace(person, lang=person.lang or options.lang or "en")
     maximum = sum(report.max_score for report in reports)
     score = sum(report.score or 0.0 for report in reports)
     parts = len(reports) if options.combine == "mean" else 1

@@ -14,10 +14,9 @@ from typing import Literal
 import numpy as np
 
 from grader.comparison.task import Task
-from grader.comparison.verdicts import EVEN
 from grader.documents import CriterionDocument, FigureDocument, ReadingDocument, ReportDocument
 from grader.marking.answers import OFF_AS_READ, along_of
-from grader.outcomes import CREDITED
+from grader.outcomes import CREDITED, EVEN
 from grader.records import MECHANISM, Figure, Reading, ReadNode, ReadVector, ScannedPage, on_sheet
 from grader.tables.decision_texts import place_text
 from reference.authored.assignment import SCALE_NAMES
@@ -335,7 +334,7 @@ def _credit(about: Sequence[CriterionDocument]) -> tuple[Choice, ...]:
     """
     for one in about:
         is_off = OFF_AS_READ & set(one.reasons) and "counted_for_you" not in one.reasons
-        if one.proposed not in CREDITED or is_off:
+        if one.proposed not in CREDITED or is_off or one.probability == EVEN:
             return ()
     right = tuple((one.id, one.proposed or "full") for one in about)
     wrong = tuple((one.id, "none") for one in about)

@@ -1,5 +1,7 @@
 """The class's page: everybody linked, everything that waits told, for classes of any size."""
 
+import re
+
 import pytest
 
 from grader.documents import (
@@ -137,6 +139,14 @@ def test_many_changed_criteria_of_a_student_unfold():
         move = MovedDocument(student_id="s001", before=standing, after=standing, criteria=[change] * count)
         text = index_page(results(*in_class(1)).model_copy(update={"moved": [move]}), "en")
         assert (f"<summary>{count} criteria</summary>" in text) == (count == 4)
+
+
+def test_the_many_of_a_table_unfold_in_its_own_columns():
+    waits = [report(student_id=f"w{k:02}", status="needs_review", score=None) for k in range(20)]
+    section = index_page(results(*waits), "en").split('id="waits"')[1].split("</section>")[0]
+    assert section.count("<table") == 1
+    first, rest = section.split('<tbody class="rest">')
+    assert re.search(r"<summary>and (\d+) more</summary>", first)[1] == str(rest.count("<tr>"))
 
 
 def test_students_who_made_a_common_mistake_are_named_and_the_many_unfold():

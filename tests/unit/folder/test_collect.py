@@ -5,6 +5,7 @@ import io
 import json
 import re
 import zipfile
+from itertools import chain
 
 import cv2
 import numpy as np
@@ -13,7 +14,8 @@ from PIL import Image, ImageDraw, ImageFont
 
 from grader.files import samples_folder
 from grader.folder.batch import Batch, graded
-from grader.folder.collect import check_scans, check_target, collect, preview_of, vouched
+from grader.folder.collect import check_scans, check_target, collect, keep_of, preview_of, vouched
+from grader.records import Figure, PageRef, Reading, ReadNode, ScannedPage, Sheet
 from grader.rubric import rubric_of
 from grader.tables.decisions import Decision, DecisionFile
 from grader.tables.reader import TableError
@@ -22,6 +24,7 @@ from reference.errors import CallError
 from reference.plan import construction_for
 from tests.bench.collected import points_of
 from tests.inline import Inline
+from tests.unit.reading.drawn import ink_of
 
 PUMP = load_assignment("pump")
 RUBRIC = rubric_of(PUMP)
@@ -135,6 +138,7 @@ def test_nothing_says_whose_the_pages_are(known, preview):
         keys = set(json.loads(line))
         assert keys == {
             "page", "mm_to_px", "schema_version", "assignment", "n", "position", "scales", "sheet", "figures",
+            "drawn",
         }  # fmt: skip
 
 
@@ -190,6 +194,23 @@ def test_the_truth_says_who_vouches_for_each_point(known, preview):
     x, y, who = row["figures"]["velocity_plan"]["b"]
     node = report.reading.sheets[0].figures["velocity_plan"].nodes["b"]
     assert (x, y, who) == (round(node.x_mm, 3), round(node.y_mm, 3), "moved")
+
+
+def test_a_polygon_in_another_order_stays_where_its_forces_lie():
+    construction, figure = construction_for(load_assignment("pump-forces")), "force_plan_D"
+    # The given forces lie elsewhere than in the usual order, in which the nodes are.
+    drawn = {"F_D": [(200.0, 90.0), (260.0, 90.0)], "F_i4": [(260.0, 90.0), (260.0, 30.0)]}
+    usual = {f"D.{corner}": [200.0 + 20.0 * corner, 90.0, "program"] for corner in range(4)}
+    nodes = {name: ReadNode(complex(x, -y), np.eye(2), 1.0) for name, (x, y, _) in usual.items()}
+    sheet = Sheet(np.eye(3), (420.0, 297.0), "markers", 12.0, 0.0, 0.1, 0.0, (5.0, 5.0, 410.0, 287.0))
+    page = ScannedPage(
+        PageRef("s.png"), sheet=sheet, ink=ink_of([]), reading=Reading({figure: Figure(nodes, {})})
+    )
+    keep = keep_of(page, construction, {"figures": {figure: usual}, "drawn": {figure: drawn}})
+    assert {tuple(end) for ends in keep.strokes for end in ends} == {*chain.from_iterable(drawn.values())}
+    assert {tuple(point) for points in keep.figures for point in points} == {
+        *chain.from_iterable(drawn.values())
+    }
 
 
 @pytest.mark.slow

@@ -258,6 +258,7 @@ def test_of_several_bands_the_level_is_the_nearest_to_the_points_and_without_ban
 def test_the_same_results_make_the_same_bytes_and_the_classes_language_no_other_rubric(folder):
     _, _, _, first = run(folder)
     _, _, _, again = run(folder)
-    _, _, _, elsewhere = run(folder, "other", lang="ru")
+    russian, _, _, elsewhere = run(folder, "other", lang="ru")
     assert again == first
+    assert russian.lang == "ru"
     assert elsewhere["rubric.json"] == first["rubric.json"]

@@ -2,7 +2,7 @@
 
 import pytest
 
-from grader.lms.export import read_results
+from grader.lms.export import draft, read_results
 from grader.lms.grades import Options, grades_of, in_a_row
 from grader.lms.marks import comment
 from grader.records import Reason
@@ -80,6 +80,13 @@ def test_comments_on_several_positions_say_which_is_which():
         "<p><b>Poziție 1</b></p><p>Totul este corect.</p>"
         "<p><b>Poziție 2</b></p><ul><li>✗ <b>Vector v_B</b>: Too long.</li></ul>"
     )
+
+
+@pytest.mark.parametrize(("lang", "said"), [(None, "Totul este corect."), ("en", "Everything is right.")])
+def test_comments_are_in_the_language_of_the_class_unless_another_is_asked_for(lang, said):
+    romanian = results(report("s01", 5.0)).model_copy(update={"lang": "ro"})
+    content = draft(romanian, Options(to="lti", lang=lang)).content
+    assert said in (content if isinstance(content, str) else content.decode())
 
 
 def test_a_long_row_of_names_ends_with_how_many_more():

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from grader.feedback.sentences import feedback_again
 from grader.marking.answers import along_of
 from grader.pipeline import mark
 from grader.records import MECHANISM, Figure, PageRef, Reason, ScannedPage, Unread
@@ -119,3 +120,14 @@ def test_what_nothing_speaks_for_is_not_proposed():
     (waiting,) = (one for one in report.criteria if one.verdict == "review")
     assert (waiting.id, waiting.probability) == ("v_D", 0.5)
     assert [one.probability for one in doubts[0].choices] == [None] * 4
+
+
+@pytest.mark.parametrize(("se_mm", "is_proposed"), [(0.7, True), (2.0, False)])
+def test_a_reading_that_is_right_by_its_own_error_alone_is_not_proposed(se_mm, is_proposed):
+    reading = changed(sheet(PUMP), "v_A", length_mm=62.0, se_mm=se_mm, confidence=0.1)
+    report, doubts = reviewed(PUMP, reading)
+    (waiting,) = (one for one in report.criteria if one.verdict == "review")
+    assert waiting.reasons == ["doubtful", "counted_for_you"]
+    assert [doubt.default is not None for doubt in doubts] == [is_proposed]
+    # What is not proposed is not called accepted either.
+    assert ("accepted" in feedback_again(waiting, "en")) == ("accepted" in waiting.feedback) == is_proposed
