@@ -30,7 +30,8 @@ from grader.review.questions import (
     verdict_badge,
     whole_title,
 )
-from grader.review.session import OPEN, Session, Standing, Student, mark_of
+from grader.review.records import OPEN, Standing, Student, mark_of
+from grader.review.session import Session
 from reference.quantities import scale_of
 
 WHOSE = N_("Whose data were drawn?")

@@ -31,7 +31,8 @@ from grader.marking.trust import (
 )
 from grader.overlay.scene import MARKS
 from grader.review import questions
-from grader.review.session import OPEN, Answer, Points, Said, Session, Student, mark_of
+from grader.review.records import OPEN, Answer, Points, Said, Student, mark_of
+from grader.review.session import Session
 from grader.tables.decision_texts import ANSWERS, AuditAnswer
 from grader.tables.decisions import VERDICTS as MARKED_WITH
 from grader.tables.decisions import Decision

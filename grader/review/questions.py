@@ -16,7 +16,8 @@ from grader.overlay.scene import MARKS, ink_of
 from grader.printed.layout import PAGE_MM, values_of
 from grader.records import MECHANISM, Box, Reason, ScannedPage
 from grader.review.doubts import SURE, known_probability
-from grader.review.session import OPEN, Corner, Session, Standing, Student, mark_of, page_criterion
+from grader.review.records import OPEN, Corner, Standing, Student, mark_of, page_criterion
+from grader.review.session import Session
 from grader.rubric import RubricFile
 from grader.tables.decisions import Decision
 from grader.texts.spoken import clause

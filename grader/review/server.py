@@ -34,20 +34,19 @@ from grader.language import N_, Tongue, tongue
 from grader.lms.export import export, usual_name
 from grader.lms.grades import Options
 from grader.review import asked, audit, questions
-from grader.review.scans import page_of
-from grader.review.session import (
+from grader.review.records import (
     Answer,
     ChangedError,
     Drawn,
     Kept,
-    Run,
     Said,
-    Session,
     Standing,
     Student,
     Whole,
     page_criterion,
 )
+from grader.review.scans import page_of
+from grader.review.session import Run, Session
 from grader.tables.decision_texts import PageDecision, place_text
 from grader.tables.decisions import Decision
 from grader.tables.reader import TableError

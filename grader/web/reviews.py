@@ -15,8 +15,9 @@ from starlette.types import Receive, Scope, Send
 
 from grader.feedback.words import VERDICTS
 from grader.language import tongue
+from grader.review.records import Request
 from grader.review.server import application
-from grader.review.session import Request, Session
+from grader.review.session import Session
 from grader.tables.decisions import DecisionFile
 from grader.texts.spoken import RefusedError
 from grader.web.places import batch_of

@@ -18,7 +18,8 @@ import numpy as np
 
 from grader.folder.batch import Batch, grade
 from grader.printed.answer_sheet import make_sheets
-from grader.review.session import Answer, Session, mark_of
+from grader.review.records import Answer, mark_of
+from grader.review.session import Session
 from grader.rubric import load_rubric
 from grader.tables.decision_texts import place_text
 from grader.tables.roster import RosterRow

@@ -15,7 +15,8 @@ import pytest
 
 from grader.folder.batch import Batch
 from grader.printed.answer_sheet import make_sheets
-from grader.review.session import Answer, Session
+from grader.review.records import Answer
+from grader.review.session import Session
 from grader.rubric import load_rubric
 from grader.tables.decision_texts import place_text
 from grader.tables.roster import RosterRow

@@ -10,8 +10,8 @@ from PIL import Image
 
 from grader.folder.decisions import basis_of
 from grader.records import ACCELERATION_PLAN
+from grader.review.records import mark_of
 from grader.review.server import application
-from grader.review.session import mark_of
 from grader.tables.decisions import Decision, DecisionFile
 from tests.examples import slow
 from tests.unit.marking.test_answers import unsure
