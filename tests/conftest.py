@@ -38,11 +38,17 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark laws as slow where they are tried with all their examples: `-m slow` runs these, too."""
-    laws = Path(__file__).parent / "laws"
+    """Mark laws as slow where they are tried with all their examples: `-m slow` runs these, too.
+
+    The coverage of laws is measured with a part of their examples; the simulation is no part of the program.
+    """
+    laws, simulation = (Path(__file__).parent / folder for folder in ("laws", "synthetic"))
     for item in items:
-        if FULL and (item.path.is_relative_to(laws) or hasattr(getattr(item, "obj", None), "hypothesis")):
+        is_law = item.path.is_relative_to(laws)
+        if FULL and (is_law or hasattr(getattr(item, "obj", None), "hypothesis")):
             item.add_marker(pytest.mark.slow)
+        if (FULL and is_law) or item.path.is_relative_to(simulation):
+            item.add_marker(pytest.mark.no_cover)
 
 
 @pytest.fixture(scope="session")

@@ -28,12 +28,10 @@ def call(folder, out):
     ]  # fmt: skip
 
 
-@pytest.fixture
-def handed_in(tmp_path):
-    """Two students' scans and two students' values."""
-    folder = tmp_path / "in"
+def filled(folder, *scanned):
+    """The folder with these students' scans and two students' values."""
     folder.mkdir()
-    for path in (*SAMPLES.glob("s01_*"), *SAMPLES.glob("s02_*")):
+    for path in (path for student in scanned for path in SAMPLES.glob(f"{student}_*")):
         shutil.copy(path, folder / path.name)
     entered = (SAMPLES / "s08.json").read_text(encoding="utf-8")
     for student in ("s08", "g08"):
@@ -58,6 +56,26 @@ def results_of(out):
     results["moved"] = []
     assert not list(out.rglob("*.part"))
     return results
+
+
+@pytest.fixture(scope="module")
+def handed_in(tmp_path_factory):
+    """Two students' scans and two students' values, which no test changes."""
+    return filled(tmp_path_factory.mktemp("class") / "in", "s01", "s02")
+
+
+@pytest.fixture(scope="module")
+def undisturbed(handed_in):
+    """The results of what is handed in."""
+    return graded(handed_in, handed_in.with_name("out"))
+
+
+@pytest.fixture(scope="module")
+def entered(tmp_path_factory):
+    """Values alone, and the folder with their results."""
+    folder = filled(tmp_path_factory.mktemp("entered") / "in")
+    graded(folder, folder.with_name("out"))
+    return folder, folder.with_name("out")
 
 
 RUN = """
@@ -95,8 +113,7 @@ def paused(folder, out, what):
         yield process
 
 
-def test_a_run_killed_on_the_way_is_finished_by_the_next(handed_in, tmp_path):
-    undisturbed = graded(handed_in, tmp_path / "undisturbed")
+def test_a_run_killed_on_the_way_is_finished_by_the_next(handed_in, undisturbed, tmp_path):
     out = tmp_path / "out"
     with paused(handed_in, out, "marking") as process:
         process.send_signal(signal.SIGKILL)
@@ -105,8 +122,7 @@ def test_a_run_killed_on_the_way_is_finished_by_the_next(handed_in, tmp_path):
     assert graded(handed_in, out) == undisturbed
 
 
-def test_a_killed_worker_costs_nothing(handed_in, tmp_path):
-    undisturbed = graded(handed_in, tmp_path / "undisturbed")
+def test_a_killed_worker_costs_nothing(handed_in, undisturbed, tmp_path):
     out = tmp_path / "out"
     with paused(handed_in, out, "opening") as process:
         workers = [
@@ -121,16 +137,13 @@ def test_a_killed_worker_costs_nothing(handed_in, tmp_path):
 
 
 @pytest.mark.parametrize("lacking", ["s08/feedback.html", "results.json"])
-def test_without_room_the_run_ends_with_a_message_and_the_next_one_completes_it(handed_in, tmp_path, lacking):
+def test_without_room_the_run_ends_with_a_message_and_the_next_one_completes_it(entered, tmp_path, lacking):
     """A limit for each file stands for a full disk: first a report has no room, then the results alone."""
     resource = pytest.importorskip("resource")
-    for path in handed_in.glob("*.jpg"):
-        path.unlink()
-    undisturbed = graded(handed_in, tmp_path / "undisturbed")
-    out = tmp_path / "out"
-    room = (tmp_path / "undisturbed" / lacking).stat().st_size - 1000
+    (folder, undisturbed), out = entered, tmp_path / "out"
+    room = (undisturbed / lacking).stat().st_size - 1000
     ended = subprocess.run(  # noqa: S603 - our own program
-        call(handed_in, out), capture_output=True, text=True, timeout=PATIENCE_S, check=False,
+        call(folder, out), capture_output=True, text=True, timeout=PATIENCE_S, check=False,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (room, room)),
     )  # fmt: skip
     assert ended.returncode == 5
@@ -138,12 +151,11 @@ def test_without_room_the_run_ends_with_a_message_and_the_next_one_completes_it(
     assert "Traceback" not in ended.stderr
     assert not (out / "results.json").exists()
     assert not list(out.rglob("*.part"))
-    assert graded(handed_in, out) == undisturbed
+    assert graded(folder, out) == results_of(undisturbed)
 
 
-def test_a_scan_replaced_on_the_way_is_told_or_read_whole_and_the_next_run_has_the_new_one(
-    handed_in, tmp_path
-):
+def test_a_scan_replaced_on_the_way_is_told_or_read_whole_and_the_next_run_has_the_new_one(tmp_path):
+    handed_in = filled(tmp_path / "in", "s01", "s02")
     out, other = tmp_path / "out", tmp_path / "other.jpg"
     shutil.copy(SAMPLES / "s02_1.jpg", other)
     with other.open("ab") as file:

@@ -25,8 +25,8 @@ from tests.waiting import PATIENCE_S
 
 LIMITS = Limits(memory_mb=400)
 ROOT = Path(__file__).parents[3]
-KILLED = 0.05
-"""Share of the results after which a process is killed."""
+KILLED, CALLS = 0.05, 80
+"""Share of the results after which a process is killed, and of how many: each new process takes seconds."""
 
 
 def codes(jobs, work, limits=LIMITS):
@@ -91,13 +91,13 @@ def test_processes_killed_at_any_moment_lose_no_call():
     """Also between two calls, and while one is handed over; some results come between two kills."""
     dice, results = random.Random(7), {}
     with Workers(2, LIMITS, calls.__name__) as workers:
-        for index, result in workers.run(calls.sleeps, [(0.02,)] * 200):
+        for index, result in workers.run(calls.sleeps, [(0.02,)] * CALLS):
             results[index] = result
             children = [child for child in active_children() if child.name == WORKERS_NAME]
             if children and dice.random() < KILLED:
                 time.sleep(dice.uniform(0.0, 0.03))
                 dice.choice(children).kill()
-    assert sorted(results) == list(range(200))
+    assert sorted(results) == list(range(CALLS))
     assert set(results.values()) == {0.02}
 
 
