@@ -64,7 +64,7 @@ EXAMPLES: Mapping[str, str] = {
     "second_length": "@40.0 mm", "segment": "ab", "settled": "310", "slide": "v_BD", "start": "o'",
     "sum": "30", "tail": "A", "terms": "9 × 2 + 10 × 1", "text": "1:5?", "third": "C", "through": "a",
     "tolerance": "@1.0 mm", "used": "@0.036 (m/s)/mm", "vector": "a_BA_n",
-    "why": "“%(said)s” has no unit, and a unit is never guessed", "wrong": "0.4",
+    "why": "“%(said)s” has no unit, and a unit is never guessed: write it after the number", "wrong": "0.4",
     "written": "@45.0 mm", "x": "@60.0 mm", "x_direction": "@0°", "y": "@20.0 mm", "y_direction": "@90°",
     "cause": "normal component reversed", "done": "12", "minutes": "4", "open": "38", "total": "30",
     "verdict": "right", "who": "A. B.", "beyond": "@0.2 mm", "good_to": "@0.3 mm", "whose": "7",

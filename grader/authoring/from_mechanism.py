@@ -255,7 +255,7 @@ def _given(file: MechanismFile) -> Iterator[tuple[str, str, str]]:
                 yield from _point(f"guide {node}", guide.through, file.length_unit)
                 yield f"φ(guide {node})", guide.angle_deg.text, "°"
         if getattr(table, "at", None) is not None:
-            yield from _point(node, table.at, file.length_unit)
+            yield from _point(f"{node}, {table.base[0]}→{table.base[1]}", table.at, file.length_unit)
         if getattr(table, "ratio", None) is not None:
             yield f"{table.base[0]}{node} : {table.base[0]}{table.base[1]}", table.ratio.text, ""
         if getattr(table, "gear_ratio", None) is not None:

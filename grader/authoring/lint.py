@@ -188,7 +188,7 @@ def _least(figures: Mapping[str, FloatArray], count: int, **pages: int) -> list[
 _REASONS = (
     ("transmission", LEAST_TRANSMISSION, "the sine of the transmission angle at {at} is {value:.2g}"),
     ("crossing_deg", LEAST_CROSSING_DEG, "the construction lines of {at} meet at {value:.1f} degrees"),
-    ("room", 1.0, "the {at} would fit its zone at only {value:.2f} of its size"),
+    ("room", 1.0, "the {at} would fit the zone at only {value:.2f} times the size"),
     ("shortest_mm", np.inf, "{at} is the shortest vector asked for, {value:.2g} mm"),
     (
         "crossing_deg",

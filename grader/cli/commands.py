@@ -91,7 +91,7 @@ def new(
     first = load_assignment(written.assignment).variants()[0]
     chosen = [f"--{name}={value}" for name, value in asdict(first).items() if value is not None]
     for path in (written.assignment, written.mechanism, written.rubric):
-        note(f"written: {path}")
+        note(f"{'kept' if mechanism == str(path) else 'written'}: {path}")
     note(f"see it: {shown_command('planmark', 'plan', written.assignment, *chosen, '--svg', 'plan.svg')}")
     tell_next("lint", written.assignment, before="change them, then ")
 

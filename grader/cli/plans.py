@@ -132,18 +132,21 @@ def _table_of_forces(forces: ForcesDocument) -> "Table":
     def direction(degrees: float | None) -> str:
         return "-" if degrees is None else f"{degrees:.2f}"
 
+    def told(value: float) -> str:
+        return f"{value:.0f}" if abs(value) >= 1e4 else f"{value:.4g}"
+
     table = new_table("force", "at", "N", "direction deg", "N m", left=("at",))
     for link, one in forces.inertia.items():
-        row = (f"{one.force_N:.4g}", direction(one.direction_deg), f"{one.moment_Nm:.4g}")
+        row = (told(one.force_N), direction(one.direction_deg), told(one.moment_Nm))
         table.add_row(f"inertia of {link}", one.at, *row)
     for name, joint in (*forces.joints.items(), *forces.guides.items()):
-        moment = f"{joint.moment_Nm:.4g}" if isinstance(joint, GuideDocument) else ""
-        row = (f"{joint.value_N:.4g}", direction(joint.direction_deg), moment)
+        moment = told(joint.moment_Nm) if isinstance(joint, GuideDocument) else ""
+        row = (told(joint.value_N), direction(joint.direction_deg), moment)
         table.add_row(f"{joint.by} on {joint.on}", name, *row)
     last = forces.balancing
     if isinstance(last, ForceDocument):
-        row = (f"{last.value_N:.4g}", direction(last.direction_deg), "")
+        row = (told(last.value_N), direction(last.direction_deg), "")
     else:
-        row = ("", "", f"{last.moment_Nm:.4g}")
+        row = ("", "", told(last.moment_Nm))
     table.add_row(f"balancing on {last.on}", "", *row)
     return table

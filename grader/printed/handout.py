@@ -51,7 +51,10 @@ SIGNS = N_(
 BODIES = {True: N_("Masses, and accelerations of the centres of mass"), False: N_("Masses")}
 LOADS, LINK, CENTRE = N_("Loads"), N_("Link"), N_("Centre of mass")
 LOAD = (N_("Load"), LINK, N_("Point"), VALUE, DIRECTION)
-ON_THE_LINE = N_("%(point)s on %(link)s, %(along)s from %(tail)s")
+ON_THE_LINE = {
+    False: N_("%(point)s on %(link)s, %(along)s from %(tail)s"),
+    True: N_("%(point)s on %(link)s extended beyond %(tail)s, %(along)s from %(tail)s"),
+}
 BESIDE = {
     True: N_("%(point)s: %(along)s from %(tail)s along %(link)s, %(across)s to the left"),
     False: N_("%(point)s: %(along)s from %(tail)s along %(link)s, %(across)s to the right"),
@@ -323,14 +326,17 @@ def _centre(assignment: Assignment, plan: Plan, body: Body, speaker: Tongue) -> 
     place = (at[body.centre][0] - start) * abs(end - start) / (end - start) * LENGTH_UNITS[unit]
 
     def length(value: float) -> str:
-        told = number(float(f"{abs(value):.5g}"), speaker.decimal_mark)
+        told = number(float(f"{round(value, 9) + 0.0:.5g}"), speaker.decimal_mark)
         return f"{told}\N{NO-BREAK SPACE}{speaker.unit(unit)}"
 
     line = Markup("").join(_letters(pieces_of(joint)) for joint in centre.base)
-    known: dict[str, str] = {"along": length(place.real), "across": length(place.imag)}
+    least = 1e-6 * abs(end - start) * LENGTH_UNITS[unit]
+    is_on_it = abs(place.imag) < least
+    known: dict[str, str] = {"along": length(abs(place.real) if is_on_it else place.real)}
     known |= {"point": point, "link": line, "tail": _letters(pieces_of(centre.base[0]))}
-    is_on_it = abs(place.imag) < 1e-6 * abs(end - start) * LENGTH_UNITS[unit]
-    return Markup(speaker.gettext(ON_THE_LINE if is_on_it else BESIDE[place.imag > 0.0])) % known  # noqa: S704
+    known["across"] = length(abs(place.imag))
+    sentence = ON_THE_LINE[place.real < -least] if is_on_it else BESIDE[place.imag > 0.0]
+    return Markup(speaker.gettext(sentence)) % known  # noqa: S704 - our own sentence
 
 
 # Tables to fill in --------------------------------------------------------------------------------

@@ -84,7 +84,7 @@ SCALES: dict[str, str] = {
     "no_omega": N_("a slider drives this mechanism, so that there is no omega of a crank"),
     "not_positive": N_("“%(said)s” is no positive number"),
     "undrawable": N_("“%(said)s” is no scale that anything could be drawn at"),
-    "no_unit": N_("“%(said)s” has no unit, and a unit is never guessed"),
+    "no_unit": N_("“%(said)s” has no unit, and a unit is never guessed: write it after the number"),
     "no_length": N_("“%(said)s” is not a length per length on paper"),
     "no_velocity": N_("“%(said)s” is not a velocity per length on paper"),
     "no_acceleration": N_("“%(said)s” is not an acceleration per length on paper"),

@@ -32,7 +32,10 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
             "The file is named %(suffix)s, but is not a %(kind)s file: scan or export it as JPEG, PNG,"
             " TIFF, HEIC or PDF."
         ),
-        N_("The file is of a type that is not read: use JPEG, PNG, TIFF, HEIC or PDF."),
+        N_(
+            "The file is of a type that is not read: use JPEG, PNG, TIFF, HEIC or PDF, for measurements"
+            " CSV or JSON."
+        ),
     ),
     "heic_unreadable": (
         N_(

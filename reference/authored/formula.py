@@ -131,10 +131,10 @@ def _advice(text: str) -> str:
     """Return advice on a text that is often written in place of a formula; empty for any other."""
     if re.fullmatch(r"\d+([.,]\d+)?\s*:\s*\d+([.,]\d+)?", text):
         return ": a scale is a number of metres on a millimetre, 1:2.5 is 0.0025"
-    if re.fullmatch(r"[+-]?\d+,\d+", text):
-        return ": write a decimal point"
     if text.count("(") != text.count(")"):
         return ": a bracket is opened and not closed, or closed and not opened"
+    if re.search(r"\d,\d", text) and "(" not in text:
+        return ": write a decimal point"
     if re.fullmatch(r"[+-]?\d+(\.\d*)?\s*[^\d\s(+*/-][^(+*]*", text):
         return ": write the number alone; the key and length_unit say its unit"
     return ""
@@ -162,9 +162,8 @@ def _check(node: ast.expr, names: set[str], text: str, depth: int) -> None:
             for argument in arguments:
                 _check(argument, names, text, depth + 1)
         case _:
-            raise FormulaError(
-                f"'{text}': only numbers, names, + - * / % ** and {', '.join(FUNCTIONS)} may be used"
-            )
+            known = f": only numbers, names, + - * / % ** and {', '.join(FUNCTIONS)} may be used"
+            raise FormulaError(f"'{text}'{_advice(text) or known}")
 
 
 def _check_function(function: str, count: int, text: str) -> None:

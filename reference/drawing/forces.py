@@ -17,6 +17,7 @@ from reference.drawing.sketch import LETTER_MM, PLATE_FILL, SMALL_LETTER_MM, cap
 from reference.drawing.subject import PLAN_COLOURS, DrawnFigure, Part, Subject
 from reference.drawing.symbols import HAIR_MM, LINK_MM, THIN_MM, Bar, bars, blocks, point
 from reference.drawing.symbols import unit as unit_vector
+from reference.drawing.tables import four_digits
 from reference.mechanism import Plate, named_links, short_names, turning
 from reference.quantities import group_of
 
@@ -228,7 +229,7 @@ def _picture(
         shapes += [Stroke(point(arm.start), point(arm.foot), HAIR_MM, CONSTRUCTION, LINE_DASH)]
         for start, end in ((arm.joint, arm.foot), (arm.foot, arm.joint)):
             shapes += symbols.arrow(start, end, HAIR_MM, CONSTRUCTION, ARM_HEAD_MM)
-        length = f"{subject.wording.number(f'{arm.mm:.4g}')} {subject.wording.unit('mm')}"
+        length = f"{subject.wording.number(four_digits(arm.mm))} {subject.wording.unit('mm')}"
         text, middle = (*subject.letter(arm.name), Piece(f" = {length}")), point((arm.joint + arm.foot) / 2.0)
         wanted.append(Wanted("", middle, text, ARM_LETTER_MM, CONSTRUCTION, 0.4, italic=False))
     marked = {nodes[one.at] for one in acting if point(nodes[one.at]) not in hinges}
@@ -279,7 +280,8 @@ def on_lever(subject: Subject) -> list[OnLever]:
         image = -1j * subject.vector(plan.motion.velocity[one.point]) / kv
         force, couple = subject.vector(one.force), subject.number(one.couple)
         if force:
-            arm = float((np.conj(image) * unit_vector(force)).imag)
+            # Rounded: a force through the pole has no arm, not one of 1e-15 mm.
+            arm = round(float((np.conj(image) * unit_vector(force)).imag), 10)
             found.append(
                 OnLever(Acting(one.name, one.link, one.point, force), image, arm, abs(force) * arm * kv)
             )

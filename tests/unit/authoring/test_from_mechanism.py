@@ -45,6 +45,15 @@ def test_an_assignment_of_a_mechanism_and_a_table_has_no_fault_and_no_warning(tm
     assert told.items() <= given.items()
 
 
+def test_coordinates_of_a_point_of_a_link_are_given_with_the_line_along_which_they_count(tmp_path):
+    point = '\n[[group]]\ntype = "point"\nnode = "K"\nbase = ["A", "B"]\nlink = "2"\nat = [-40, 12]\n'
+    mechanism, table = written(tmp_path, SIX_BAR + point)
+    new = new_assignment(tmp_path / "six", mechanism=str(mechanism), table=table)
+    assignment = load_assignment(new.assignment)
+    given = {datum.label: value for datum, value in assignment.given(assignment.variants()[0])}
+    assert (given["x(K, A→B)"], given["y(K, A→B)"]) == (-40.0, 12.0)
+
+
 @pytest.mark.parametrize("near_dead_point", [1, 3])
 def test_vectors_too_short_in_most_variants_are_criteria_behind_comment_signs(tmp_path, near_dead_point):
     """Two variants, and some near the dead point, 33.85 degrees."""

@@ -92,6 +92,15 @@ def test_a_sheet_of_forces_tells_masses_loads_and_the_given_accelerations():
         assert told in words, (told, words)
 
 
+def test_a_centre_of_mass_behind_its_base_is_not_told_as_one_on_the_link(tmp_path):
+    text = (library() / "pump-forces.assignment.toml").read_text(encoding="utf-8")
+    path = tmp_path / "mine.assignment.toml"
+    path.write_text(text.replace("ratio = 0.5", "ratio = -0.5").replace("17.9,", "-17.9,"), encoding="utf-8")
+    words = re.sub(r"\s+", " ", *pages_of(load_assignment(path), RosterRow("", n=7)))
+    assert "S2 on O2B extended beyond O2, 15 cm from O2" in words
+    assert "S3: −17.9 cm from A along AB, 4.84 cm to the left" in words
+
+
 def test_students_with_an_acceleration_plan_of_their_own_are_not_told_its_results(tmp_path):
     assignment = load_assignment(with_own_accelerations(tmp_path))
     words = re.sub(r"\s+", " ", " ".join(pages_of(assignment, RosterRow("", n=7))))

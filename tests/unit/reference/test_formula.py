@@ -127,6 +127,11 @@ def test_a_wrong_count_of_numbers_is_told():
         parse("min(3)")
 
 
+def test_a_decimal_comma_is_answered_by_a_point():
+    with pytest.raises(FormulaError, match=r"'9,81\*n': write a decimal point"):
+        parse("9,81*n")
+
+
 def test_an_unknown_name_is_told_with_the_near_ones():
     with pytest.raises(FormulaError, match="unknown name phi_dge; did you mean phi_deg"):
         parse("phi_dge")({"phi_deg": 1.0})

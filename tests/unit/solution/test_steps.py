@@ -15,13 +15,14 @@ from grader.solution.formulas import grid_text, mathml, typeset, unicode_name
 from grader.solution.pages import chapters, html_page, pdf, pdf_pages
 from grader.solution.sentences import sentence, speaker_of, wording_of
 from grader.solution.steps import explain
-from reference.authored.assignment import load_assignment
+from reference.authored.assignment import library, load_assignment
 from reference.construction.equations import equations
 from reference.construction.steps import Given, Pole
 from reference.drawing.canvas import Label, Ring, pieces_of, set_pieces
 from reference.drawing.forces import scheme_of
 from reference.drawing.sheets import BEFORE, NOW, reference_drawing
 from reference.drawing.subject import Subject
+from reference.drawing.tables import table_rows
 from reference.plan import exact_plan
 from tests.drawn import CASES, WITH_FORCES, loaded, planned
 
@@ -411,6 +412,22 @@ def test_the_lever_gives_the_same_balance_as_the_force_plans(case, folder):
     balancing = plan.forces.balancing
     assert found == pytest.approx(abs(balancing.moment[0]) + abs(balancing.force[0]), rel=1e-4)
     assert len(lever.table.rows) > len(plan.mechanism.bodies)
+
+
+def test_large_forces_and_forces_through_the_pole_are_told_in_plain_numbers(folder):
+    file = folder / "heavy.assignment.toml"
+    crank = '[[body]]\nlink = "1"\nmass = 9000\ncentre = { base = ["O1", "A"], ratio = -0.5 }\n\n[[load]]\n'
+    text = (library() / "pump-forces.assignment.toml").read_text(encoding="utf-8")
+    file.write_text(text.replace("[[load]]\n", crank, 1), encoding="utf-8")
+    assignment = load_assignment(file)
+    subject = Subject(assignment, exact_plan(assignment, [assignment.variant(7, None)]), 0)
+    lever = next(one for one in explain(subject, tongue("en")) if one.figure == "lever")
+    (row,) = [row for row in lever.table.rows if in_unicode(row[0]) == "F_i1"]
+    assert in_unicode(row[2]) == "0.00"
+    assert in_unicode(row[4]).split("\N{NO-BREAK SPACE}")[0] == "0"
+    values = [one.value.partition(" ")[0] for one in list(table_rows(subject, ["force_plan_A"]))[1:]]
+    assert max(map(float, values)) > 10_000.0
+    assert not [value for value in values if "e" in value]
 
 
 def test_moments_are_told_with_arms_as_they_are_dimensioned(folder):
