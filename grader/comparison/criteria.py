@@ -116,11 +116,16 @@ def _refused_below(charges: Charges, name: str) -> tuple[str, ...] | None:
     if turned is not None and turned.drives:
         return None
     segment = task.segments.get((vector_of_value(name) or name) if turned is None else turned.vector)
-    if segment is None or not evidence.refused:
+    moment = task.construction.moments.get(name.removesuffix("_sense"))
+    if moment is not None:
+        needs, own = moment.needs, ["kF"]
+    elif segment is not None:
+        needs, own = task.construction.step(segment.head).needs, [segment.scale, segment.name]
+    else:
         return None
-    needs = {need for need in task.construction.step(segment.head).needs if need not in evidence.nodes}
-    vectors = [vector.name for vector in task.segments.values() if vector.head in needs]
-    below = [name for name in (segment.scale, segment.name, *vectors) if name in evidence.refused]
+    ends = {need for need in needs if need not in evidence.nodes}
+    vectors = [vector.name for vector in task.segments.values() if vector.head in ends]
+    below = [name for name in (*own, *vectors) if name in evidence.refused]
     return evidence.refused[below[0]] if below else None
 
 
@@ -539,13 +544,15 @@ def _own_turnings(charges: Charges, name: str, value: float, per_mm: float) -> I
     if name in task.construction.moments:
         yield (by_nodes := following.moment(name, per_mm))
         if charges.is_wrong(by_nodes):
-            yield following.moment_of_own(name, per_mm)
+            yield following.moment(name, per_mm, as_laid_off=True)
         wrong = frozenset(charges.charged | charges.doubtful)
         scales = replace(following.right(following.followed), name="scales", wrong=following.wrong_scales)
         own = following.own_forces(name, wrong)
         for basis in (scales if scales.wrong else None, own, following.instead):
             if basis is not None:
                 yield following.moment(name, per_mm, basis)
+        for heads, other in following.entered_otherwise(name, wrong):
+            yield replace(other.moment(name, per_mm), causes=heads)
         return
     rate = task.construction.rates[name]
     turned, source = _own_rate(charges, rate, value), task.segments[rate.vector]

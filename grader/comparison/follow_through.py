@@ -10,11 +10,13 @@ import cmath
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import combinations
 from typing import cast
 
 import numpy as np
 
-from grader.comparison.evidence import Evidence
+from grader.comparison.evidence import DrawnVector, Evidence
 from grader.comparison.own import Nodes, PlanBasis, known, other_mechanism, own_nodes
 from grader.comparison.scales import Scale
 from grader.comparison.task import Made, Task, TaskSegment
@@ -146,6 +148,7 @@ class FollowThrough:
             yield self.from_nodes(segment, self.followed, by_similarity=True)
         yield from self.joined(segment, wrong)
         yield from self.from_vectors(segment, self.used)
+        yield from self.taken_over(segment, wrong)
         basis = self.instead
         if basis is not None and not basis.blames(segment.name, segment.head):
             one = self.from_nodes(segment, self.followed, basis)
@@ -157,6 +160,8 @@ class FollowThrough:
             yield replace(self.from_nodes(segment, self.followed), causes=others)
             for one in self.from_vectors(segment, self.followed):
                 yield replace(one, causes=others)
+        for heads, other in self.entered_otherwise(segment.head, wrong):
+            yield replace(other.from_nodes(segment, self.followed), causes=others | heads)
 
     @property
     def wrong_scales(self) -> frozenset[str]:
@@ -233,18 +238,49 @@ class FollowThrough:
 
         Arguments: `wrong` are nodes that are wrong, among them where such forces end.
         """
-        construction, changed, heads = self.task.construction, dict[str, FloatArray](), set[str]()
-        data = construction.data_of(at)
-        for step in construction.steps:
-            if not isinstance(step, Given) or step.node == at or step.node not in wrong:
-                continue
-            if is_force(step.length) and not data.isdisjoint(data_in(step.length)):
-                changed |= self._own_force(construction.vectors[laid_off(step, construction)], step)
-                heads.add(step.node)
-        if not heads:
+        construction, changed = self.task.construction, dict[str, FloatArray]()
+        forces = self._wrong_forces(at, wrong)
+        for vector, step in forces.items():
+            changed |= self._own_force(construction.vectors[vector], step)
+        if not forces:
             return None
+        heads = frozenset(step.node for step in forces.values())
         right, name = self.right(self.followed), f"forces {' '.join(sorted(heads))}"
-        return PlanBasis(name, construction, {**right.parameters, **changed}, frozenset(heads))
+        return PlanBasis(name, construction, {**right.parameters, **changed}, heads)
+
+    def _wrong_forces(self, at: str, wrong: frozenset[str]) -> dict[str, Given]:
+        """The steps of wrong forces from which a node or moment is made, by vector."""
+        construction = self.task.construction
+        data = construction.data_of(at)
+        return {
+            laid_off(step, construction): step
+            for step in construction.steps
+            if isinstance(step, Given) and step.node != at and step.node in wrong
+            if is_force(step.length) and not data.isdisjoint(data_in(step.length))
+        }
+
+    def entered_otherwise(
+        self, at: str, wrong: frozenset[str]
+    ) -> Iterator[tuple[frozenset[str], "FollowThrough"]]:
+        """Yield what follows if wrong forces are wrong in their entry alone, with the nodes where they end.
+
+        One was drawn as it is due; one or two point the other way.
+        """
+        measured, segments = self.evidence.measured, self.task.segments
+        forces = {} if self.evidence.has_sheets else self._wrong_forces(at, wrong)
+        drawn = {name: one for name in forces if (one := measured.get(name)) and one.as_complex}
+        turned, due = dict[str, DrawnVector](), dict[str, DrawnVector]()
+        for name, one in drawn.items():
+            right = segments[name].drawn(self.followed)
+            turned[name] = replace(one, direction_rad=(one.direction_rad or 0.0) + math.pi)
+            due[name] = replace(one, length_mm=abs(right), direction_rad=cmath.phase(right))
+        ways = [{name: each[name]} for name in drawn for each in (turned, due)]
+        ways += [{one: turned[one], other: turned[other]} for one, other in combinations(drawn, 2)]
+        for entries in ways:
+            evidence = replace(self.evidence, measured={**measured, **entries})
+            make = partial(replace, self, evidence=evidence, cache={})
+            other = self._cached(("entered", *entries.items()), make)
+            yield frozenset(forces[name].node for name in entries), other
 
     def _own_force(self, vector: Vector, step: Given) -> dict[str, FloatArray]:
         """The data by which a force is what the student has drawn; zero for one that was not."""
@@ -260,17 +296,19 @@ class FollowThrough:
         share = (drawn * made.conjugate()).real / max(abs(made) ** 2, 1e-9)
         return {datum: np.asarray(share * known.get(datum, 1.0))}
 
-    def moment(self, name: str, per_mm: float, basis: PlanBasis | None = None) -> Expectation:
-        """The moment that the student's own nodes give, as millimetres of so many N m."""
+    def moment(
+        self, name: str, per_mm: float, basis: PlanBasis | None = None, *, as_laid_off: bool = False
+    ) -> Expectation:
+        """The moment that the student's own nodes give, as millimetres of so many N m.
+
+        Arguments: with `as_laid_off` it is of the forces as the student laid them off in the last plan.
+        """
         moment, construction = self.task.construction.moments[name], self.task.construction
         relies_on = frozenset[str]().union(*map(construction.upstream, moment.needs))
+        if as_laid_off:
+            moment, relies_on = self._as_laid_off(moment)
         one = self._evaluated(lambda view: moment.at(view) / per_mm, moment.needs, relies_on, basis)
         return one if basis is None else replace(one, causes=basis.wrong)
-
-    def moment_of_own(self, name: str, per_mm: float) -> Expectation:
-        """The moment of the forces as the student laid them off in the last plan."""
-        moment, heads = self._as_laid_off(self.task.construction.moments[name])
-        return self._evaluated(lambda view: moment.at(view) / per_mm, moment.needs, heads)
 
     def _as_laid_off(self, moments: Moments) -> tuple[Moments, frozenset[str]]:
         """The moments of forces that are taken over, as they are laid off in this plan; and their ends."""
@@ -298,10 +336,8 @@ class FollowThrough:
         placed = {node: np.asarray(one.at) for node, one in nodes.items()}
         shifted = {node: np.asarray(one.at + one.shifts) for node, one in nodes.items()}
         found, moved = (at(View(where, parameters)) for where in (placed, shifted))
-        shifts, relies_on = (
-            np.asarray(moved - found, dtype=np.complex128),
-            relies_on & known(self.own(self.used)),
-        )
+        shifts = np.asarray(moved - found, dtype=np.complex128)
+        relies_on &= known(self.own(self.used))
         uncertainty, se = self.spreads(shifts, traced.drafting_count, complex(found))
         return Expectation(complex(found), "nodes", "", relies_on, uncertainty, se)
 
@@ -481,12 +517,13 @@ class FollowThrough:
         """The propagated drafting error of a vector since the start of the drawing."""
         scales = (scale for name, scale in self.used.items() if name != "kL")
         key = ("reach", segment.name, abs(along), cmath.phase(along), *scales, self.evidence.has_sheets)
-        return self.task.cached(key, lambda: self._uncertainty_of(segment, along))
 
-    def _uncertainty_of(self, segment: TaskSegment, along: complex) -> EndSpread:
-        shifts = self.task.traced(self.used).shifts(segment.tail, segment.head)
-        turned = shifts * np.exp(1j * (cmath.phase(along) - cmath.phase(segment.real)))
-        return self.by_hand(spread(turned, along), along)
+        def found() -> EndSpread:
+            shifts = self.task.traced(self.used).shifts(segment.tail, segment.head)
+            turned = shifts * np.exp(1j * (cmath.phase(along) - cmath.phase(segment.real)))
+            return self.by_hand(spread(turned, along), along)
+
+        return self.task.cached(key, found)
 
     def from_vectors(self, segment: TaskSegment, scales: Mapping[str, float]) -> Iterator[Expectation]:
         """A vector that depends on one or two others alone, whose lengths are enough."""
@@ -503,12 +540,6 @@ class FollowThrough:
                 yield from self.normal(segment, self.named(tail, head), scales)
             case Given(length=Coriolis() as length):
                 yield from self.coriolis(segment, length, scales)
-            case Given(length=Same(tail=tail, head=head), along=turned):
-                source = self.named(tail, head)
-                one = None if source is None else self.evidence.vector(source)
-                if source is not None and one is not None and one.as_complex is not None:
-                    found = one.as_complex * 1j**turned.quarters
-                    yield Expectation(found, "vector", source, frozenset({head}))
             case Divide(base=base) | Similar(base=base) if segment.tail in base:
                 pole, other = base if segment.tail == base[0] else base[::-1]
                 source = self.named(pole, other)
@@ -518,6 +549,28 @@ class FollowThrough:
                     phase = cmath.phase(task.real[source]) if along is None else along
                     found = cmath.rect(own.length_mm, phase) * (segment.real / task.real[source])
                     yield Expectation(found, "vector", source, frozenset({other}))
+
+    def taken_over(self, segment: TaskSegment, wrong: frozenset[str]) -> Iterator[Expectation]:
+        """A vector taken over, also from a plan at another scale: the one followed, or of wrong forces."""
+        task, step = self.task, self.task.construction.step(segment.head)
+        if not isinstance(step, Given) or not isinstance(same := step.length, Same):
+            return
+        source, head, forces = (
+            self.named(same.tail, same.head),
+            same.head,
+            self._wrong_forces(same.head, wrong),
+        )
+        own, shares = self.evidence.vector(source or ""), list[tuple[float, frozenset[str]]]()
+        for one in task.construction.vectors_of(task.construction.figure_of(head)):
+            drawn, due_mm = self.evidence.vector(one.name), abs(task.segments[one.name].drawn(self.used))
+            if one.name in forces and drawn and drawn.length_mm and due_mm:
+                shares.append((due_mm / drawn.length_mm, frozenset({one.head})))
+        other = self.followed[segment.scale] / self.used[segment.scale]
+        shares += [(share, self.wrong_scales) for share in (other, 1.0 / other) if other != 1.0]
+        if own is not None and own.as_complex is not None:
+            for share, causes in ((1.0, frozenset[str]()), *shares):
+                found = own.as_complex * 1j**step.along.quarters * share
+                yield Expectation(found, "vector", source or "", frozenset({head}), causes=causes)
 
     def joined(self, segment: TaskSegment, wrong: frozenset[str]) -> Iterator[Expectation]:
         """The sum of measured vectors from tail to head of one that joins nodes that they have made.
@@ -555,13 +608,10 @@ class FollowThrough:
         self, segment: TaskSegment, source: str | None, scales: Mapping[str, float]
     ) -> Iterator[Expectation]:
         """v^2 / l from the own velocity; omega^2 l from the own computed angular velocity."""
-        task = self.task
-        if source is None or not task.real[source]:
+        task, right = self.task, segment.drawn(scales)
+        if source is None:
             return
-        right = segment.drawn(scales)
-        own = self.evidence.vector(source)
-        if own is not None:
-            share = own.length_mm * scales[task.segments[source].scale] / abs(task.real[source])
+        if (share := self.own_share(source, scales)) is not None:
             head = task.construction.vectors[source].head
             yield Expectation(right * share**2, "vector", source, frozenset({head}))
         rate = next((one for one in task.construction.rates.values() if one.vector == source), None)

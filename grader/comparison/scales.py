@@ -150,16 +150,27 @@ def _contradiction(task: Task, evidence: Evidence, name: str, used: float) -> fl
     if _is_confirmed(task, evidence, name, used, shown):
         return None
     other = shown[0] / shown[1]
-    return other if _fitting(task, evidence, name, other) > _fitting(task, evidence, name, used) else None
+    # Where vectors by the data differ, those that follow from them say nothing more.
+    by_data, each = (
+        [_fitting(task, evidence, name, scale, data=data) for scale in (other, used)]
+        for data in (True, False)
+    )
+    return other if (by_data[0], each[0]) > (by_data[1], each[1]) else None
 
 
-def _fitting(task: Task, evidence: Evidence, name: str, scale: float, least: float = 0.0) -> int:
-    """Count the drawn vectors of such a confidence, without the crank's, with the right length at a scale."""
-    vectors = [v for v in task.construction.vectors.values() if v.scale == name]
-    known = [(v.name, evidence.vector(v.name)) for v in vectors if v.name != task.driving_vector(name)]
+def _fitting(
+    task: Task, evidence: Evidence, name: str, scale: float, least: float = 0.0, *, data: bool = False
+) -> int:
+    """Count the drawn vectors of such a confidence, without the crank's, with the right length at a scale.
+
+    Arguments: with `data` only those that are laid off from the data.
+    """
+    known = task.parameters if data else task.real
+    vectors = [v for v in task.construction.vectors.values() if v.scale == name and v.name in known]
+    drawn_as = [(v.name, evidence.vector(v.name)) for v in vectors if v.name != task.driving_vector(name)]
     return sum(
         _fits(drawn, abs(task.real[vector]) / scale, task.rubric.tolerance_of(vector))
-        for vector, drawn in known
+        for vector, drawn in drawn_as
         if drawn is not None and drawn.confidence >= least
     )
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from grader.rubric import RubricFile, ToleranceTable, plans_asked
 from reference.authored.assignment import Assignment, Variant
-from reference.construction.elements import Parameters
+from reference.construction.elements import Inertia, Parameters
 from reference.construction.graph import Construction, evaluate
 from reference.construction.uncertainty import Skill, TracedDrawing, trace
 from reference.mechanism import Crank, Dyad, Mechanism, Slider
@@ -99,8 +99,8 @@ class Task:
     def driving_vector(self, name: str) -> str:
         """The vector by the data of the kind of a vector or scale: it shows the scale and the turn.
 
-        It is the driving link's; of forces, which have none, the largest given one of the vector's plan, of
-        those that are asked for if there are any.
+        It is the driving link's; of forces, which have none, the largest given one of the vector's plan: of
+        those that do not follow from accelerations as drawn, and that are asked for, if there are any.
         """
         kind, vectors, figure = kind_of(name), self.construction.vectors, self.construction.figure_of
         if kind.omegas is not None:
@@ -108,6 +108,8 @@ class Task:
         given = [one for one in vectors.values() if one.scale == kind.scale and one.name in self.parameters]
         if name in vectors:
             given = [one for one in given if figure(one.head) == figure(vectors[name].head)]
+        lengths = {step.node: getattr(step, "length", None) for step in self.construction.steps}
+        given = [one for one in given if not isinstance(lengths[one.head], Inertia)] or given
         asked = [one for one in given if one.name in self.rubric.vectors] or given
         largest = max(asked, key=lambda one: abs(self.real[one.name]), default=None)
         return name if largest is None else largest.name

@@ -76,7 +76,9 @@ def _blamed(mistakes: Iterable[Mistake], construction: Construction) -> frozense
     for mistake in mistakes:
         at = made_at(mistake, construction)
         here = {one.name for one in construction.vectors.values() if one.head in at}
-        found |= (here & _on_wrong_lines([mistake], construction)) or here
+        steps = (step for step in construction.steps if step.node in at and isinstance(step, Given))
+        made = {laid_off(step, construction) for step in steps} | _on_wrong_lines([mistake], construction)
+        found |= (here & made) or here
     return frozenset(found)
 
 

@@ -5,12 +5,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from grader.comparison.criteria import compare
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
 from grader.feedback.mistakes import MISTAKES
 from grader.feedback.redo_steps import with_mistakes_explained
 from grader.feedback.sentences import mistake_feedback
 from grader.language import LANGUAGES
+from grader.marking.drawn import explain
 from grader.marking.mark import judge
 from grader.marking.naming import Lost, named
 from grader.marking.report import report_of
@@ -237,21 +239,81 @@ ENTERED = {
 }
 
 
-@pytest.mark.parametrize("made", ENTERED)
-def test_an_unknown_mistake_in_one_force_is_neither_another_variant_nor_another_unit(made, tmp_path):
-    n, drawn = ENTERED[made]
+CHARGED_ALONE = {
+    "F_B twice as long, and entered the other way": (
+        19,
+        {"R_12_t": (10.0, 92.9), "F_i2": (21.6, 212.6), "G_2": (1.8, 263.6), "F_B": (127.7, 0.4)}
+        | {"F_iB": (20.4, 180.7), "G_B": (2.1, 269.7), "R_0B": (1.9, 85.5), "R_12_n": (167.4, 1.8)}
+        | {"R_12": (167.4, 4.3), "R_B2": (148.2, 180.7), "R_21": (167.3, 184.4), "R_01": (167.0, 4.3)},
+        {"F_B"},
+    ),
+    "inertia along the accelerations, F_B entered the other way": (
+        15,
+        {"R_12_t": (1.0, 247.0), "F_i2": (24.5, 359.5), "G_2": (2.5, 277.0), "F_B": (60.5, 0.0)}
+        | {"F_iB": (24.0, 359.5), "G_B": (2.5, 272.0), "R_0B": (8.0, 89.5), "R_12_n": (11.5, 351.0)}
+        | {"R_12": (11.0, 345.0), "R_B2": (36.0, 171.0), "R_21": (12.0, 164.5), "R_01": (12.0, 344.5)},
+        {"F_i2", "F_iB", "F_B"},
+    ),
+}
+
+
+def crank(folder, n, drawn, moment=None):
+    """What is found on a student's sheet of the offset crank."""
+    asked = {one: f'vector = "{one}"' for one in drawn} | ({"M_b": 'moment = "M_b"'} if moment else {})
     rows = "".join(
-        f'[[criterion]]\nid = "{one}"\ntitle = {{ en = "x" }}\npoints = 1\nvector = "{one}"\n'
-        for one in drawn
+        f'[[criterion]]\nid = "{one}"\ntitle = {{ en = "x" }}\npoints = 1\n{key}\n'
+        for one, key in asked.items()
     )
     head = 'schema_version = 1\nid = "crank"\ntitle = { en = "Forces" }\n'
     files = {"mechanism": MECHANISM, "assignment": ASSIGNMENT, "rubric": head + rows}
     for kind, text in files.items():
-        (tmp_path / f"crank.{kind}.toml").write_text(text, encoding="utf-8")
-    assignment, rubric = load_both(tmp_path / "crank.assignment.toml")
+        (folder / f"crank.{kind}.toml").write_text(text, encoding="utf-8")
+    assignment, rubric = load_both(folder / "crank.assignment.toml")
     cells = {name: str(one[0]) for name, one in drawn.items()} | {"kF": "20 N/mm"}
     cells |= {f"{name}_deg": str(one[1]) for name, one in drawn.items()}
+    cells |= {"M_b_value": moment} if moment else {}
     entered = measurements_in(cells, names_of(assignment), "", "en")
-    handed_in = Submission(measured=entered.reading, declared=entered.scales)
-    found = judge(task_of(assignment, rubric, Variant(n)), handed_in)
+    handed_in = Submission(measured=entered.reading, values=entered.values, declared=entered.scales)
+    return judge(task_of(assignment, rubric, Variant(n)), handed_in)
+
+
+@pytest.mark.parametrize("made", ENTERED)
+def test_an_unknown_mistake_in_one_force_is_neither_another_variant_nor_another_unit(made, tmp_path):
+    found = crank(tmp_path, *ENTERED[made])
     assert not {"other_variant", "data_misread", "units"} & {one.code for one in found.mistakes}
+
+
+@pytest.mark.parametrize("made", CHARGED_ALONE)
+def test_what_follows_from_a_wrong_force_that_was_entered_the_other_way_is_credited(made, tmp_path):
+    n, drawn, charged = CHARGED_ALONE[made]
+    found = crank(tmp_path, n, drawn)
+    assert {one.name for one in found.outcomes if one.verdict in CHARGED} == charged
+
+
+def test_a_moment_waits_while_a_force_from_which_it_follows_cannot_be_used(tmp_path):
+    drawn = {"R_12_t": (8.1, 89.2), "R_0B": (59793.1, 269.8), "R_12_n": (59798.7, 89.5)}
+    (found,) = (one for one in crank(tmp_path, 18, drawn, "-69850").outcomes if one.name == "M_b")
+    assert found.verdict == "review"
+
+
+@pytest.mark.parametrize(("name", "joint", "scale"), [("shaper", "E", "none"), ("pump", "D", "full")])
+def test_a_force_taken_over_from_a_plan_at_another_scale_is_credited(name, joint, scale):
+    assignment, rubric = force_task(name)
+    made, rng = ForceMistake("reversed", f"F_{joint}"), np.random.default_rng(5)
+    student = StudentForces(assignment, assignment.variants()[4], HANDS["careful"], made, rng)
+    task = task_of(assignment, rubric, student.variant)
+    for one in task.construction.vectors_of(f"force_plan_{joint}"):
+        length, turn = student.entered[one.name]
+        student.entered[one.name] = 2.0 * length, turn
+    said = {one.name: one.verdict for one in judge(task, student.submission).outcomes}
+    assert (said["kF"], said["R_43"]) == (scale, "follow_through")
+
+
+def test_of_two_vectors_that_end_where_a_force_was_laid_off_only_that_force_is_blamed():
+    task, rubric = force_task("shaper")
+    made = ForceMistake("reversed", "R_43")
+    student = StudentForces(task, task.variants()[4], HANDS["careful"], made, np.random.default_rng(5))
+    drawn = task_of(task, rubric, student.variant)
+    explanation = compare(drawn, student.submission, explain).explanation
+    assert explanation is not None
+    assert explanation.blamed == {"R_43"}

@@ -125,6 +125,42 @@ def test_a_declared_scale_of_forces_is_held_against_a_given_force(judged):
     assert "scale_off" in found["kF"].codes
 
 
+def test_what_follows_from_a_load_drawn_too_long_does_not_make_the_declared_scale_wrong(judged):
+    right = judged()
+    longer = {name: f"{1.5 * right[name].measured.length_mm:.2f}" for name in ("F_D", "R_0D", "R_02", "R_31")}
+    blank = dict.fromkeys(("R_43", "R_43_deg", "R_13_t", "R_13_t_deg"), "")
+    found = verdicts(judged(**longer, **blank))
+    assert (found["kF"], found["F_D"]) == ("full", "none")
+
+
+def test_inertia_forces_of_wrong_own_accelerations_do_not_make_a_declared_scale_wrong(forces):
+    bodies = "".join(
+        f'[[body]]\nlink = "{link}"\nmass = 2.5\ncentre = {{ base = [{ends}], ratio = 0.5 }}\n'
+        for link, ends in {"2": '"O2", "B"', "4": '"C", "D"'}.items()
+    )
+    page = '[[page]]\nkind = "acceleration"\nfigures = ["mechanism", "acceleration_plan"]\n'
+    names = ("a_A", "a_B", "a_C", "a_D", "a_S2", "a_S3", "a_S4", "F_i2", "F_i3", "F_i4", "F_D")
+    asked = "".join(
+        f'[[criterion]]\nid = "{one}"\ntitle = {{ en = "x" }}\npoints = 1\nvector = "{one}"\n'
+        for one in names
+    )
+    kept = '[[criterion]]\nid = "kF"\ntitle = { en = "x" }\npoints = 1\nscale = "kF"\n'
+    assignment = forces(
+        ("[[page]]", f"{page}[[page]]"), ("[[load]]", f"{bodies}[[load]]"), rubric=HEAD + kept + asked
+    )
+    task = task_of(assignment, rubric_of(assignment), Variant(7))
+    entered = {"kF": "16 N/mm", "ka": f"{task.rule_scales['ka']} (m/s2)/mm"}
+    for name in names:
+        # The driving link turns half as fast.
+        share = 1.0 if name == "F_D" else 0.25
+        length = share * abs(task.real[name]) / (16.0 if name[0] == "F" else task.rule_scales["ka"])
+        entered |= {name: f"{length:.2f}", f"{name}_deg": f"{math.degrees(cmath.phase(task.real[name])):.2f}"}
+    measured = measurements_in(entered, names_of(assignment), "", "en")
+    handed_in = Submission(measured=measured.reading, values=measured.values, declared=measured.scales)
+    said = verdicts({one.name: one for one in compare(task, handed_in).outcomes})
+    assert (said["kF"], said["F_D"], said["F_i3"]) == ("full", "full", "follow_through")
+
+
 def test_the_columns_are_those_of_the_rubric_and_of_the_sheet_s_own_scales(forces):
     assignment = forces()
     columns = columns_of(assignment, rubric_of(assignment))
