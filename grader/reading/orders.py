@@ -20,7 +20,6 @@ from grader.reading.expected import (
     lay,
     support,
 )
-from grader.reading.force_labels import ForceLabels
 from grader.reading.lines import Lines
 from grader.records import Figure, FloatArray
 from reference.construction.elements import Line
@@ -40,8 +39,6 @@ KEPT = 6
 """Orders kept of each set of sides, and of all."""
 WORSE = 0.12
 """Orders supported by this much less of the polygon are left out."""
-NAMED_MM = 1.5
-"""A name beside a side supports it as so much of a stroke, for each nat."""
 Order = tuple[int, ...]
 """Sides by their number in the usual ring; the closing ones stand last."""
 
@@ -140,8 +137,8 @@ def reordered(construction: Construction, figure: str, ring: Ring, order: Order)
 # The order by the ink -----------------------------------------------------------------------------
 
 
-def orders_by_ink(expected: Expected, ring: Ring, lines: Lines, labels: ForceLabels | None) -> list[Order]:
-    """Return likely orders of a polygon's sides, likeliest first, by the strokes along and names beside each.
+def orders_by_ink(expected: Expected, ring: Ring, lines: Lines) -> list[Order]:
+    """Return likely orders of a polygon's sides, likeliest first, by the strokes along each.
 
     Wherever a long side may lie, all sets of the other sides are laid off from its end, each in the best
     orders of its members: the corner that a set ends in does not depend on their order.
@@ -150,8 +147,7 @@ def orders_by_ink(expected: Expected, ring: Ring, lines: Lines, labels: ForceLab
     items = list(_items(spans, ring))
     if not np.isfinite(spans).all() or not 3 <= len(items) <= MOST_ITEMS:
         return []
-    names = [vector.name for vector in ring.vectors]
-    search = _Sets(items, spans, lines, labels, names)
+    search = _Sets(items, spans, lines)
     found: dict[Order, float] = {}
     for order, share in search.best():
         whole = _whole(order, spans, ring)
@@ -209,14 +205,11 @@ class _Sets:
     items : what is laid off at a time, each in one or two ways
     spans : the sides, complex mm
     lines : the strokes
-    labels, names : names beside vectors, and the name of each side
     """
 
     items: Sequence[tuple[Order, ...]]
     spans: ComplexArray
     lines: Lines
-    labels: ForceLabels | None
-    names: Sequence[str]
 
     @property
     def weights(self) -> FloatArray:
@@ -257,8 +250,6 @@ class _Sets:
             end = at + spin * self.spans[side]
             sigma = RESIDUAL_MM + RESIDUAL_PER_MM * np.maximum(np.abs(at - start), np.abs(end - start))
             score += self.weights[side] * support(strokes, at, end, sigma)
-            if self.labels is not None:
-                score += NAMED_MM * self.labels.beside(self.names[side], at, end)
             at = end
         return score
 

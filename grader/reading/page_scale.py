@@ -11,7 +11,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from grader.records import MECHANISM, Figure, FloatArray, Reading, Reason, ScannedPage, Sheet, Value
+from grader.reading.expected import dots_of
+from grader.records import (
+    MECHANISM,
+    Figure,
+    FloatArray,
+    Reading,
+    ReadVector,
+    Reason,
+    ScannedPage,
+    Sheet,
+    Value,
+)
 from reference.construction.graph import evaluate, pair
 from reference.construction.mistakes import Drawing
 
@@ -37,6 +48,8 @@ RIVAL = 0.05
 """If other factors together are this probable, lengths may be off by as much; no factor is half-way."""
 UNKNOWN, SURELY = "scale_unknown", 0.008
 """A problem of registration, and the standard error at which a drawing settles it."""
+ONE_LINE_RAD = math.radians(15.0)
+"""Forces that differ by less are laid off as if in one line: their corner is no mark."""
 ENOUGH = 2
 """Number of lengths of different figures that settle it; one alone may be drawn wrongly."""
 NEGLIGIBLE = 0.001
@@ -243,32 +256,68 @@ def _links(reading: Reading, drawing: Drawing) -> Iterator[tuple[str, _Length]]:
     """Yield the sketch's links of given length, as one: a scale of their own changes them all."""
     nodes = reading.figures[MECHANISM].nodes if MECHANISM in reading.figures else {}
     found: list[_Length] = []
+    dots = dots_of(drawing.construction)
     for name, (tail, head) in drawing.construction.links.items():
+        if not dots.isdisjoint((tail, head)):
+            continue
         real = drawing.parameters.get(pair(tail, head), drawing.parameters.get(pair(head, tail)))
         if real is not None and tail in nodes and head in nodes:
             drawn_mm = abs(nodes[head].at - nodes[tail].at)
             se_mm = math.hypot(nodes[head].se_mm, nodes[tail].se_mm)
             found += _length(name, _scalar(real) / _scalar(drawing.parameters["kL"]), drawn_mm, se_mm)
+    yield from (("kL", one) for one in _together(found))
+
+
+def _together(found: Sequence[_Length]) -> Iterator[_Length]:
+    """Yield lengths at one scale as one, without those that differ from most."""
     if found:
-        middle = float(np.median([one.off for one in found]))
-        alike = [one for one in found if abs(one.off - middle) < 3.0 * one.se] or found
+        off, se = np.array([(one.off, one.se) for one in sorted(found, key=lambda one: one.off)]).T
+        middle = off[np.searchsorted(np.cumsum(1.0 / se), np.sum(0.5 / se))]
+        alike = [one for one in found if abs(one.off - middle) < 3.0 * one.se]
         weights = np.array([one.se**-2.0 for one in alike])
-        off = float(np.average([one.off for one in alike], weights=weights))
-        se = math.hypot(float(weights.sum()) ** -0.5, SAME_LINKS)
-        yield "kL", _Length(" ".join(one.name for one in alike), off, se)
+        mean = float(np.average([one.off for one in alike], weights=weights))
+        se_mean = math.hypot(float(weights.sum()) ** -0.5, SAME_LINKS)
+        yield _Length(" ".join(one.name for one in alike), mean, se_mean)
 
 
 def _givens(reading: Reading, drawing: Drawing, scale_se: float) -> Iterator[tuple[str, _Length]]:
-    """Yield the given vectors at the start of each plan; `scale_se` is the page's, which they share."""
-    for vector in drawing.construction.vectors.values():
-        real = given_length(drawing.parameters, vector.name)
-        for figure in reading.figures.values():
-            drawn = figure.vectors.get(vector.name)
-            if real is not None and drawn is not None and drawn.length_mm is not None:
-                expected_mm = real / _scalar(drawing.parameters[vector.scale])
-                own_mm = math.sqrt(max(drawn.se_mm**2 - (scale_se * drawn.length_mm) ** 2, 0.0))
-                for length in _length(vector.name, expected_mm, drawn.length_mm, own_mm):
-                    yield vector.scale, length
+    """Yield the given vectors of each plan; `scale_se` is the page's, which they share.
+
+    Forces of nearly one direction are one length: nothing marks their common corner. All forces are one.
+    """
+    nodes = evaluate(drawing.construction, drawing.parameters)
+    forces: list[_Length] = []
+    for figure in reading.figures.values():
+        ones = [
+            _Laid(name, vector.scale, complex(np.ravel(nodes[vector.head] - nodes[vector.tail])[0]), drawn)
+            for name, drawn in figure.vectors.items()
+            if (vector := drawing.construction.vectors.get(name)) is not None
+            and drawn.length_mm
+            and given_length(drawing.parameters, name)
+        ]
+        while ones:
+            first = max(ones, key=lambda one: abs(one.span))
+            along = [one for one in ones if abs(cmath.phase(one.span / first.span)) < ONE_LINE_RAD]
+            ones = [one for one in ones if one not in along]
+            drawn_mm = [one.drawn.length_mm or 0.0 for one in along]
+            own = [one.drawn.se_mm**2 - (scale_se * mm) ** 2 for one, mm in zip(along, drawn_mm, strict=True)]
+            names, expected_mm = " ".join(one.name for one in along), sum(abs(one.span) for one in along)
+            for length in _length(names, expected_mm, sum(drawn_mm), math.sqrt(max(0.0, *own))):
+                if first.scale == "kF":
+                    forces.append(length)
+                else:
+                    yield first.scale, length
+    yield from (("kF", one) for one in _together(forces))
+
+
+@dataclass(frozen=True, slots=True)
+class _Laid:
+    """A given vector: its name and scale, the span to lay off, complex mm, and what was drawn."""
+
+    name: str
+    scale: str
+    span: complex
+    drawn: ReadVector
 
 
 def given_length(parameters: Mapping[str, FloatArray], vector: str) -> float | None:

@@ -25,7 +25,6 @@ from grader.reading.expected import (
     tied,
     vectors_of,
 )
-from grader.reading.force_labels import ForceLabels, ends_of
 from grader.reading.lettered_graph import lettered_graphs
 from grader.reading.lettering import fitting_letters, lettering, primes_beside
 from grader.reading.lines import BoolArray, Lines
@@ -125,7 +124,6 @@ class PlanProblem:
     renamed : what students write for a node, by name, if it is not the name
     elsewhere : strokes, by their number, that belong to the sketch
     look : tells where nodes lie by the sheet's ink
-    labels : names beside the vectors of a force polygon
     """
 
     lines: Lines
@@ -135,7 +133,6 @@ class PlanProblem:
     renamed: Mapping[str, str] = field(default_factory=dict)
     elsewhere: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
     look: Look | None = None
-    labels: ForceLabels | None = None
 
     @property
     def free(self) -> Lines:
@@ -240,7 +237,7 @@ def _regular(problem: PlanProblem, drawing: Drawing) -> list[PlanHypothesis]:
     if ring is None or expected is None:
         return hypotheses
     long = problem.lines.take(problem.lines.length > LEAST_LAID_MM)
-    for order in orders_by_ink(expected, ring, long, problem.labels):
+    for order in orders_by_ink(expected, ring, long):
         if order != ring.usual:
             construction = reordered(drawing.construction, problem.figure, ring, order)
             drawn = Drawing(construction, drawing.parameters)
@@ -427,10 +424,9 @@ def _with_letters(problem: PlanProblem, plans: Sequence[PlanReading]) -> list[Pl
 
 
 def _letters_nats(problem: PlanProblem, expected: Expected, poles: Collection[str]) -> float:
-    """Return the evidence of the letters at a plan's nodes, or of the names beside a polygon's vectors."""
+    """Return the evidence of the letters at a plan's nodes; a force polygon's have none."""
     if group_of(problem.figure):
-        names = [edge.name for edge in expected.edges]
-        return problem.labels.log(names, *ends_of(expected.edges, expected.at)) if problem.labels else 0.0
+        return 0.0
     nodes = ((problem.figure, name) for name in expected.names)
     at = dict(zip(nodes, expected.at.tolist(), strict=True))
     writing = lettering(at, problem.letters, poles, problem.renamed)

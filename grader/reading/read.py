@@ -11,7 +11,6 @@ import numpy as np
 from grader.reading.apart import told_apart
 from grader.reading.by_ink import Look
 from grader.reading.expected import Edge
-from grader.reading.force_labels import ForceLabels, ends_of, force_labels
 from grader.reading.lettering import lettered, support
 from grader.reading.lines import Lines, lines_of
 from grader.reading.nodes import NodeFit
@@ -80,8 +79,6 @@ class _PageReading:
     """The chance that the plan read there is the own position's."""
     sketch: SketchReading | None = None
     plans: dict[str, PlanReading] = field(default_factory=dict)
-    labels: ForceLabels | None = None
-    """Names beside the vectors of force plans."""
 
 
 def read_figures(
@@ -237,10 +234,6 @@ def _find_forces(
 ) -> None:
     """Find the force plans, one after another: each takes reactions over from those before it."""
     figures = list(filter(group_of, drawing.construction.figures))
-    names = [vector.name for figure in figures for vector in drawing.construction.vectors_of(figure)]
-    for page in pages if figures else ():
-        page.labels = force_labels(names, page.ink.letters)
-        page.lines = page.labels.without(page.lines)
     for figure in figures:
         for found in [one for page in pages for one in page.plans.values()]:
             _set_apart(pages, found)
@@ -267,7 +260,7 @@ def _find_plan(
         links = page.sketch.members if page.sketch is not None else np.zeros(0, np.int64)
         given = {**joints, **known}
         letters = page.ink.letters
-        problem = PlanProblem(page.lines, figure, given, letters, renamed, links, page.look, page.labels)
+        problem = PlanProblem(page.lines, figure, given, letters, renamed, links, page.look)
         for drawing in at_scales:
             turned = Drawing(drawing.construction, {**drawing.parameters, "turn": np.asarray(guide_turn)})
             if page.beside and page.position is not None:
@@ -365,13 +358,18 @@ def _nodes(plan: PlanReading) -> Nodes:
 def _readings(pages: Sequence[_PageReading], drawing: Drawing, wanted: Collection[str]) -> list[Reading]:
     """Return one Reading per sheet; requested items found nowhere are unread on the last sheet."""
     readings = []
+    is_backwards = False
     for page in pages:
         figures: dict[str, Figure] = {}
         unread: list[Unread] = []
         if page.sketch is not None:
             figures[MECHANISM] = figure_of_sketch(page.sketch)
         for figure, plan in page.plans.items():
-            figures[figure], missing = figure_of_plan(plan, page.sheet.scale_se, page.ink.where, page.labels)
+            figures[figure], missing = figure_of_plan(plan, page.sheet.scale_se, page.ink.where)
+            is_backwards |= bool(group_of(figure)) and points_backwards(plan, page.ink.where)
+            if is_backwards:
+                # Later polygons take forces over in their sense.
+                figures[figure] = no_surer(Reading({figure: figures[figure]}), MOST_OPEN).figures[figure]
             unread.extend(gap for gap in missing if not wanted or gap.name in wanted)
         readings.append(Reading(figures, tuple(unread)))
     named = {gap.name for reading in readings for gap in reading.unread}
@@ -420,9 +418,16 @@ ODDS_AGREES, ODDS_OFF = 12.0, 0.45
 """Factors of the odds that a force is right if it lies as near, and if it lies off: of 261 vectors of
 simulated sheets that lay off 26 were misread, none of the 103 that were surer than 0.95."""
 BEYOND_MM = (0.7, 4.0)
+LEAST_ARROWED_MM = 12.0
+BARB_MM, ASIDE_MM = (1.0, 3.4), 0.45
+"""Forces whose arrowheads are looked for: their least length; where barbs' ink is along and beside them."""
+BACKWARDS = -0.5
+"""A sum of more ink at heads than at tails, below which the arrowheads stand at the tails."""
+MIDDLE = 0.3, 0.7
+"""Arrowheads in the middle of a force have their ink between these shares of its length."""
 MOST_OPEN = 0.8
 """Most confidence in a line of two opposite forces with ink behind its end, of an arrowhead perhaps; and in a
-tiny force or a sum without its own stroke or name: many are left out."""
+tiny force or a sum without its own stroke: many are left out."""
 LEAST_VECTOR_MM = 2.0
 """A shorter vector is read from its nodes, with or without a stroke."""
 
@@ -435,18 +440,15 @@ def figure_of_sketch(sketch: SketchReading) -> Figure:
     return Figure(nodes, {})
 
 
-def figure_of_plan(
-    plan: PlanReading, scale_se: float, where: InkMap, labels: ForceLabels | None = None
-) -> tuple[Figure, list[Unread]]:
+def figure_of_plan(plan: PlanReading, scale_se: float, where: InkMap) -> tuple[Figure, list[Unread]]:
     """Return nodes and vectors of a plan; for those not drawn, the reason.
 
-    Arguments: `scale_se` is the sheet's relative standard error of lengths, `where` its ink, `labels` the
-    names beside its vectors.
+    Arguments: `scale_se` is the sheet's relative standard error of lengths, `where` its ink.
     """
     fit, names = plan.fit, plan.assignment.expected.names
     explanations = _explanations(plan, fit)
     absent = dict(plan.hypothesis.absent)
-    vectors, unread = _vectors(plan, fit, explanations, scale_se, where, _written(plan, labels))
+    vectors, unread = _vectors(plan, fit, explanations, scale_se, where)
     fit, at = _in_usual_order(plan), explanations.at
     at = at if plan.usual is None else at @ plan.usual.T
     nodes = {
@@ -497,25 +499,12 @@ def _node(fit: NodeFit, index: int, confidence: float) -> ReadNode:
     return ReadNode(complex(fit.at[index]), _node_cov(fit, index), confidence)
 
 
-def _written(plan: PlanReading, labels: ForceLabels | None) -> set[str]:
-    """Return the vectors of a force polygon that have their own names beside them.
-
-    A sum needs that of its part along the link, too: without its last sign that name would be the sum's.
-    """
-    if labels is None or not group_of(plan.figure):
-        return set()
-    names = [edge.name for edge in plan.placed.edges]
-    named = labels.named(names, *ends_of(plan.placed.edges, plan.fit.at))
-    return {name for name in named if f"{name}_n" not in names or f"{name}_n" in named}
-
-
 def _vectors(
     plan: PlanReading,
     fit: NodeFit,
     explanations: "_Explanations",
     scale_se: float,
     where: InkMap,
-    written: Collection[str],
 ) -> tuple[dict[str, ReadVector], list[Unread]]:
     expected = plan.assignment.expected
     vectors: dict[str, ReadVector] = {}
@@ -543,8 +532,7 @@ def _vectors(
                 continue
         cov = _difference_cov(fit, edge, span, scale_se)
         spans = explanations.at[:, edge.head] - explanations.at[:, edge.tail]
-        ends = {edge.tail, edge.head}
-        is_double = is_polygon and sum({one.tail, one.head} == ends for one in expected.edges) > 1
+        is_double = is_polygon and _is_double(plan, edge)
         (_, named), *others = explanations.of(spans, EITHER_MM if is_double else NEAR_MM)
         signs = Signs(within(cov), named, off_mm=0.0)
         if row >= 0:
@@ -562,7 +550,7 @@ def _vectors(
             sure = _weighed(sure, span, _predicted(plan, edge), seen)
             is_tiny = min(abs(span), abs(_predicted(plan, edge))) < LEAST_VECTOR_MM
             has_own = row >= 0 and not plan.assignment.shared[index]
-            is_inferred = edge.optional and not (has_own or is_double or edge.name in written)
+            is_inferred = edge.optional and not (has_own or is_double)
             if is_tiny or is_inferred or (is_double and _goes_on(where, complex(fit.at[edge.tail]), span)):
                 sure = min(sure, MOST_OPEN)
         read = vector_of(span, cov, min(sure, most, HIGHEST))
@@ -589,6 +577,43 @@ def _weighed(sure: float, span: complex, predicted: complex, placed: float) -> f
     off, near = abs(span - predicted), AGREES_MM + AGREES_SHARE * abs(predicted)
     odds = ODDS_AGREES if off < near and placed >= LEAST_PLACED else ODDS_OFF
     return sure * odds / (sure * odds + 1.0 - sure)
+
+
+def _is_double(plan: PlanReading, edge: Edge) -> bool:
+    """Return whether another vector, an opposite force, has the same two ends."""
+    edges = plan.assignment.expected.edges
+    return sum({one.tail, one.head} == {edge.tail, edge.head} for one in edges) > 1
+
+
+def points_backwards(plan: PlanReading, where: InkMap) -> bool:
+    """Return whether the arrowheads of a force polygon stand at the tails of its forces.
+
+    Sides in another order and the opposite sense leave the same lines. Two opposite forces in one line have
+    an arrowhead at both ends in either sense.
+    """
+    forward = 0.0
+    for edge in plan.assignment.expected.edges:
+        tail, head = complex(plan.fit.at[edge.tail]), complex(plan.fit.at[edge.head])
+        if edge.optional or _is_double(plan, edge) or not abs(head - tail) > LEAST_ARROWED_MM:
+            continue
+        first, last = (tail + share * (head - tail) for share in MIDDLE)
+        middle = _beside(where, first, last)
+        if min(middle) == 0.0:
+            forward += _barbs(where, head, tail) - _barbs(where, tail, head)
+    return forward < BACKWARDS
+
+
+def _barbs(where: InkMap, end: complex, other: complex) -> float:
+    """Return the share of ink beside a vector near its end, on both sides."""
+    out = (other - end) / abs(other - end)
+    near, far = (end + along * out for along in BARB_MM)
+    return sum(_beside(where, near, far))
+
+
+def _beside(where: InkMap, first: complex, last: complex) -> list[float]:
+    """Return the share of ink along a segment, at its left and at its right."""
+    aside = 1j * ASIDE_MM * (last - first) / abs(last - first)
+    return [where.share_inked(first + one, last + one, 0) for one in (aside, -aside)]
 
 
 def _goes_on(where: InkMap, tail: complex, span: complex) -> bool:

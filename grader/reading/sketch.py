@@ -1,11 +1,22 @@
 """Read the mechanism sketch: the strokes of its links, its joints, and its turn."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from grader.reading.expected import DraftingErrors, Expected, Pose, Search, Slack, expect, links_of, poses
+from grader.reading.expected import (
+    STEP_OF_DERIVATIVE,
+    DraftingErrors,
+    Expected,
+    Pose,
+    Search,
+    Slack,
+    dots_of,
+    expect,
+    links_of,
+    poses,
+)
 from grader.reading.lines import BoolArray, Lines
 from grader.reading.matching import EndPrior, StrokeAssignment, assign_groups
 from grader.reading.nodes import LINK_ENDS, NodeFit, fit_nodes
@@ -13,7 +24,7 @@ from grader.records import MECHANISM, FloatArray, IntArray
 from reference.authored.assignment import Assignment, Scales, Variant
 from reference.construction.derive import construction_of
 from reference.construction.elements import FixedLine
-from reference.construction.graph import Construction, parameters_of
+from reference.construction.graph import Construction, evaluate, parameters_of
 from reference.construction.mistakes import Drawing, commit, single_mistakes
 from reference.construction.steps import ArcAndLine, OnGuide, Step, TwoLines
 from reference.plan import exact_plan
@@ -222,10 +233,28 @@ def _near(lines: Lines, placed: Sequence[Expected]) -> BoolArray:
 def _fitted(sketch: _Assigned, lines: Lines) -> SketchReading:
     """Return the sketch with its joints fitted."""
     fit = fit_nodes(sketch.assignment, sketch.lines, LINK_ENDS, sketch.centres)
+    fit = _with_dots(fit, sketch.drawing, sketch.assignment.expected.names)
     guide_turn = _guide_turn(sketch.drawing, fit, lines)
     stroke = sketch.assignment.stroke
     members = np.unique(sketch.lines.members[stroke[stroke >= 0]])
     return SketchReading(sketch.drawing, sketch.assignment, fit, members, guide_turn, sketch.score)
+
+
+def _with_dots(fit: NodeFit, drawing: Drawing, names: Sequence[str]) -> NodeFit:
+    """Return the fit with the centres of mass, which no stroke shows, placed by the joints."""
+    dots = dots_of(drawing.construction)
+    count = len(names)
+    shifted = fit.at[:, None] + STEP_OF_DERIVATIVE * np.kron(np.eye(count, count), [1.0, 1j])
+    each = dict(zip(names, np.column_stack([fit.at, shifted]), strict=True))
+    joints = {name: at for name, at in each.items() if name not in dots}
+    placed = {**joints, **evaluate(drawing.construction, drawing.parameters, given=joints, wanted=dots)}
+    at = np.stack([np.broadcast_to(placed[name], 2 * count + 1) for name in names])
+    if not np.isfinite(at).all():
+        return fit
+    moves = (at[:, 1:] - at[:, :1]) / STEP_OF_DERIVATIVE
+    slopes = np.stack([moves.real, moves.imag], axis=1).reshape(2 * count, -1)
+    laid_mm = np.repeat([DRAFTING_ERRORS.length_mm * (name in dots) for name in names], 2)
+    return replace(fit, at=at[:, 0], cov=slopes @ fit.cov @ slopes.T + np.diag(laid_mm**2))
 
 
 def _guide_turn(drawing: Drawing, fit: NodeFit, lines: Lines) -> float:

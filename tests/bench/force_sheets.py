@@ -9,6 +9,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -22,6 +23,7 @@ from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.plan import construction_for
 from samples.simulation import CAREFUL, TYPICAL, SimulatedSheet, any_settings, simulate
 from samples.simulation.forces import any_drawer_of_forces
+from samples.simulation.mistakes import CODES_OF_FORCES
 from samples.simulation.wording import declared_texts
 from tests.bench.force_students import BODIES, with_masses
 from tests.bench.reading_truth import Judged, each_vector, figures_of
@@ -155,6 +157,14 @@ def work(name: str, seed: int, mistake: str = "", order: str = "") -> ForceWork:
     return ForceWork(assignment, variant, seed, sheets)
 
 
+def work_with_mistake(name: str, seed: int, order: str = "") -> ForceWork:
+    """One student's work with one mistake in forces: by its seed, the next that the drawing admits."""
+    for code in (*CODES_OF_FORCES[seed % len(CODES_OF_FORCES) :], *CODES_OF_FORCES):
+        with suppress(ValueError):
+            return work(name, seed, code, order)
+    raise ValueError(f"no mistake in forces can be made in {name}, seed {seed}")
+
+
 def read(one: ForceWork, folder: Path) -> list[ScannedPage]:
     """The student's pages as read."""
     paths = [sheet.save(folder / f"{number}") for number, sheet in enumerate(one.sheets)]
@@ -206,6 +216,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--seed", type=int, default=95001)
     parser.add_argument("--names", nargs="*", default=["pump", "press", "shaper"])
     parser.add_argument("--mistake", default="")
+    parser.add_argument("--mistakes", action="store_true", help="one mistake on each sheet, of all in turn")
     parser.add_argument("--order", default="")
     parser.add_argument("-v", action="store_true")
     options = parser.parse_args(arguments)
@@ -213,21 +224,26 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for name in options.names:
         tally = ForceTally()
         for seed in range(options.seed, options.seed + options.count):
-            one = work(name, seed, options.mistake, options.order)
+            one = (
+                work_with_mistake(name, seed, options.order)
+                if options.mistakes
+                else work(name, seed, options.mistake, options.order)
+            )
             started = time.process_time()
             with tempfile.TemporaryDirectory() as folder:
                 pages = read(one, Path(folder))
             spent = time.process_time() - started
-            order = one.sheets[0].settings.student.force_order
+            student = one.sheets[0].settings.student
+            told = f"{student.force_order} {' '.join(student.mistakes)}"
             own = ForceTally()
             for vector in judged(one, pages):
                 for tallied in (tally, every, own):
                     tallied.add(vector)
                 if options.v and not (vector.right and vector.sure) and not vector.short and vector.counts:
                     true = vector.true
-                    told = f"{true.figure} {true.name} {true.length_mm:.1f} {true.missing}"
-                    print("   ", told, f"confidence {vector.confidence:.2f} error {vector.error_mm:.2f}")
-            print(own.line(f"  {seed} {order} {spent:.0f} s"))
+                    what = f"{true.figure} {true.name} {true.length_mm:.1f} {true.missing}"
+                    print("   ", what, f"confidence {vector.confidence:.2f} error {vector.error_mm:.2f}")
+            print(own.line(f"  {seed} {told} {spent:.0f} s"))
         print(tally.line(name))
     print(every.line("all"))
 

@@ -7,16 +7,12 @@ import numpy as np
 import pytest
 
 from grader.reading.corrected import corrected
-from grader.reading.force_labels import force_labels
-from grader.reading.lines import lines_of
 from grader.reading.orders import ends_on_sheet, reordered, ring_of, to_usual
 from grader.reading.read import vector_of
-from grader.records import Figure, Letters, PageRef, Reading, ReadNode, ScannedPage
-from grader.scan.handwriting.model import COLUMN, SIGNS
+from grader.records import Figure, PageRef, Reading, ReadNode, ScannedPage
 from reference.construction.graph import evaluate
 from reference.plan import exact_plan
-from tests.bench.force_sheets import MASSES, judged, read, task_with_forces, work
-from tests.unit.reading.drawn import ink_of
+from tests.bench.force_sheets import MASSES, judged, read, task_with_forces, work, work_with_mistake
 
 ROUNDING_MM = 1e-9
 WIDTH_MM = 0.5
@@ -61,60 +57,6 @@ def test_the_usual_order_changes_nothing():
     assert (to_usual(ring.usual) == np.eye(len(ring.vectors))).all()
 
 
-# Names beside vectors ------------------------------------------------------------------------------
-
-FORCES = ("R_34_t", "R_34_n", "R_34", "R_43_n", "F_i4", "F_D", "G_4")
-
-
-def written(*texts):
-    """Letters as read from texts, each with the left end and the middle of its first sign, mm, y down."""
-    boxes, rows = [], []
-    for text, x, y in texts:
-        for place, sign in enumerate(text):
-            row = np.full(len(SIGNS), 0.3 / len(SIGNS))
-            row[COLUMN[sign]] += 0.7
-            rows.append(row)
-            high, low = (4.2, 0.0) if place == 0 else (2.6, 1.8)
-            boxes.append((x + 2.4 * place, y + low - 2.1, 2.2, high))
-    return Letters(np.array(boxes), np.array(rows), np.ones(len(rows), dtype=bool), COLUMN)
-
-
-@pytest.mark.parametrize(
-    ("text", "name"),
-    [("R34n", "R_34_n"), ("p34t", "R_34_t"), ("p34", "R_34"), ("fD", "F_D"), ("f4", "F_i4"), ("G4", "G_4")],
-)
-def test_a_name_beside_a_vector_is_told_from_the_others(text, name):
-    labels = force_labels(FORCES, written((text, 20.0, 30.0)))
-    assert FORCES[int(labels.fits[0].argmax())] == name
-
-
-def test_signs_that_are_no_name_say_nothing():
-    assert not len(force_labels(FORCES, written(("A", 20.0, 30.0), ("s2", 60.0, 30.0))).box_mm)
-    assert force_labels(FORCES, None).log(["F_D"], np.array([0j]), np.array([9 + 0j])) == 0.0
-
-
-def test_names_support_the_order_in_which_they_stand():
-    labels = force_labels(FORCES, written(("fD", 20.0, 30.0), ("G4", 60.0, 30.0)))
-    tail, head = np.array([0 - 34j, 44 - 34j]), np.array([44 - 34j, 84 - 34j])
-    right, wrong = (labels.log(names, tail, head) for names in (["F_D", "G_4"], ["G_4", "F_D"]))
-    assert right > 2.0 > -2.0 > wrong
-    assert labels.beside("F_D", tail, head)[0] > 0.0 > labels.beside("F_D", tail, head)[1]
-
-
-def test_strokes_of_a_name_are_no_forces_but_one_through_it_is():
-    labels = force_labels(FORCES, written(("fD", 20.0, 30.0)))
-    lines = lines_of(ink_of([(20.5 - 31.5j, 20.5 - 28.5j), (10 - 30j, 40 - 30j)]))
-    assert labels.without(lines).length == pytest.approx([30.0])
-
-
-def test_a_sum_has_its_name_only_where_it_is_told_from_its_part():
-    both = force_labels(FORCES, written(("p34n", 20.0, 30.0), ("p34", 32.0, 30.0)))
-    tail, head = np.zeros(2) - 33j, np.full(2, 60 - 33j)
-    assert both.named(["R_34_n", "R_34"], tail, head) == {"R_34_n", "R_34"}
-    alone = force_labels(FORCES, written(("p34n", 20.0, 30.0)))
-    assert alone.named(["R_34_n", "R_34"], tail, head) == {"R_34_n"}
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("order", ["mixed", "backwards", "parts last"])
 def test_a_polygon_drawn_in_another_order_is_read(order):
@@ -127,6 +69,18 @@ def test_a_polygon_drawn_in_another_order_is_read(order):
     # Where the sides are laid off otherwise, the overlay needs their places on the sheet.
     figure = pages[0].reading.figures["force_plan_B"]
     assert figure.drawn.keys() >= {"R_13_t", "F_i3", "R_43", "F_i2"}
+    # A centre of mass is a dot beside its link: the joints place it, no stroke.
+    joints = pages[0].reading.figures["mechanism"].nodes
+    assert joints["S4"].at == pytest.approx((joints["C"].at + joints["D"].at) / 2.0)
+    assert joints["S4"].se_mm < 1.0
+
+
+@pytest.mark.slow
+def test_a_polygon_whose_arrowheads_point_back_is_not_asserted():
+    one = work_with_mistake("shaper", 96404)
+    with tempfile.TemporaryDirectory() as folder:
+        pages = read(one, Path(folder))
+    assert not any(vector.misread for vector in judged(one, pages))
 
 
 def test_a_corner_is_moved_where_it_lies_on_the_sheet():

@@ -13,6 +13,8 @@ from grader.reading.matching import Beliefs, Constraint, EndPrior, StrokeAssignm
 from grader.reading.nodes import fit_nodes
 from grader.reading.read import Signs, within
 from grader.records import VELOCITY_PLAN
+from reference.plan import exact_plan
+from tests.bench.force_sheets import task_with_forces
 from tests.unit.reading.drawn import ink_of, task
 
 PLACE_MM = 0.15
@@ -177,7 +179,12 @@ def test_expectations_propagate_the_hands_errors():
 
 def test_links_of_a_press_are_its_bars():
     _, _, drawing = task("press")
-    assert {edge.name for edge in links_of(drawing.construction)} == {"O1A", "AB", "O2B", "O2C", "CD"}
+    links = {"O1A", "AB", "O2B", "O2C", "CD"}
+    assert {edge.name for edge in links_of(drawing.construction)} == links
+    weighed = task_with_forces("press")
+    plan = exact_plan(weighed, weighed.variants()[:1])
+    assert plan.construction.step("S3")
+    assert {edge.name for edge in links_of(plan.construction)} == links
 
 
 def test_probability_within_half_a_millimetre_falls_with_the_error():

@@ -138,6 +138,42 @@ def test_a_page_of_unknown_scale_is_refused_unless_its_drawing_tells_it():
         assert [problem.code for problem in refused.problems] == ["sheet_refused"]
 
 
+def sheet_of_forces(longer: float, corner_mm: float) -> ScannedPage:
+    """A page of unknown scale with a right sketch, its forces so many times longer, F_iD's corner moved."""
+    assignment = load_assignment("pump-forces")
+    (right,) = drawings(assignment, [assignment.variant(3)], None)
+    exact = {
+        name: complex(np.ravel(at)[0]) for name, at in evaluate(right.construction, right.parameters).items()
+    }
+    joints = {
+        step.node: ReadNode(exact[step.node], np.eye(2) * 0.01, 0.99)
+        for step in right.construction.figures[MECHANISM]
+    }
+    moved = {"F_iD": corner_mm, "F_D": -corner_mm}
+    vectors = {
+        vector.name: ReadVector(
+            longer * abs(exact[vector.head] - exact[vector.tail]) + moved.get(vector.name, 0.0),
+            1.2,
+            0.0,
+            1.0,
+            0.5,
+        )
+        for vector in right.construction.vectors.values()
+        if vector.scale == "kF"
+    }
+    reading = Reading({MECHANISM: Figure(joints, {}), "force_plan_D": Figure({}, vectors)})
+    unknown = page(0.03, Reason("scale_unknown", {"detail": "no frame was found"}))
+    pages = at_drawn_scales([unknown], [reading], right, ["kL", "kF"])
+    return unknown if pages is None else pages[0]
+
+
+def test_an_unmarked_corner_between_forces_in_one_line_hides_no_scale():
+    after = sheet_of_forces(1.0, 2.5)
+    assert after.sheet is not None
+    assert after.sheet.px_per_mm == pytest.approx(12.0, abs=0.06)
+    assert sheet_of_forces(1.06, 0.0).sheet is None
+
+
 def test_two_figures_turned_by_half_say_that_the_page_lies_upside_down():
     assert is_upside_down(drawn(turn=-1.0), RIGHT)
     assert not is_upside_down(drawn(), RIGHT)
