@@ -337,7 +337,8 @@ def _criteria(assignment: Assignment) -> Iterator[tuple[str, str, str, Mapping[s
     construction, shown = construction_for(assignment), assignment.figures
     crank = assignment.mechanism_file.crank
     yield from (("scale", name, SCALES[name], {}) for name in assignment.scale_names)
-    yield from (("link", name, LINK, {"name": name}) for name in construction.links)
+    links = [name for name, pair in construction.links.items() if construction.dots.isdisjoint(pair)]
+    yield from (("link", name, LINK, {"name": name}) for name in links)
     drawn = {name for name, one in construction.vectors.items() if construction.figure_of(one.head) in shown}
     for name, vector in construction.vectors.items():
         of_forces = vector.scale == "kF"

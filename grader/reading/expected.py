@@ -7,7 +7,7 @@ import numpy as np
 
 from grader.reading.lines import Lines
 from grader.records import MECHANISM, FloatArray, Reason
-from reference.construction.elements import Force, Normal, Same, Scaled
+from reference.construction.elements import Normal, Same, Scaled
 from reference.construction.graph import Construction, bars, coincident, evaluate
 from reference.construction.mistakes import (
     Drawing,
@@ -189,18 +189,8 @@ def xy(values: ComplexArray) -> FloatArray:
 def links_of(construction: Construction) -> tuple[Edge, ...]:
     """Return the links of a mechanism sketch: every bar that its steps draw between two joints."""
     index = {step.node: row for row, step in enumerate(construction.figures[MECHANISM])}
-    drawn = [pair for pair in bars(construction) if dots_of(construction).isdisjoint(pair)]
+    drawn = [pair for pair in bars(construction) if construction.dots.isdisjoint(pair)]
     return tuple(Edge(f"{tail}{head}", index[tail], index[head]) for tail, head in drawn)
-
-
-def dots_of(construction: Construction) -> frozenset[str]:
-    """Return the centres of mass that are no joints: a sketch has dots there, and no bars to them."""
-    return frozenset(
-        force.point
-        for link, acting in construction.acting.items()
-        for force in acting
-        if isinstance(force, Force) and force.point == f"S{link}"
-    )
 
 
 def vectors_of(construction: Construction, figure: str, absent: Iterable[str] = ()) -> tuple[Edge, ...]:

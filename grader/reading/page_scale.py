@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from grader.reading.expected import dots_of
 from grader.records import (
     MECHANISM,
     Figure,
@@ -256,9 +255,8 @@ def _links(reading: Reading, drawing: Drawing) -> Iterator[tuple[str, _Length]]:
     """Yield the sketch's links of given length, as one: a scale of their own changes them all."""
     nodes = reading.figures[MECHANISM].nodes if MECHANISM in reading.figures else {}
     found: list[_Length] = []
-    dots = dots_of(drawing.construction)
     for name, (tail, head) in drawing.construction.links.items():
-        if not dots.isdisjoint((tail, head)):
+        if not drawing.construction.dots.isdisjoint((tail, head)):
             continue
         real = drawing.parameters.get(pair(tail, head), drawing.parameters.get(pair(head, tail)))
         if real is not None and tail in nodes and head in nodes:

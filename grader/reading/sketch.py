@@ -12,7 +12,6 @@ from grader.reading.expected import (
     Pose,
     Search,
     Slack,
-    dots_of,
     expect,
     links_of,
     poses,
@@ -242,8 +241,9 @@ def _fitted(sketch: _Assigned, lines: Lines) -> SketchReading:
 
 def _with_dots(fit: NodeFit, drawing: Drawing, names: Sequence[str]) -> NodeFit:
     """Return the fit with the centres of mass, which no stroke shows, placed by the joints."""
-    dots = dots_of(drawing.construction)
-    count = len(names)
+    dots, count = drawing.construction.dots, len(names)
+    if not dots:
+        return fit
     shifted = fit.at[:, None] + STEP_OF_DERIVATIVE * np.kron(np.eye(count, count), [1.0, 1j])
     each = dict(zip(names, np.column_stack([fit.at, shifted]), strict=True))
     joints = {name: at for name, at in each.items() if name not in dots}

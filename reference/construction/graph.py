@@ -236,6 +236,16 @@ class Construction:
         return tuple(step for steps in self.figures.values() for step in steps)
 
     @cached_property
+    def dots(self) -> frozenset[str]:
+        """The centres of mass that are no joints: a sketch has dots there, and no bars to them."""
+        return frozenset(
+            force.point
+            for link, acting in self.acting.items()
+            for force in acting
+            if isinstance(force, Force) and force.point == f"S{link}"
+        )
+
+    @cached_property
     def _by_node(self) -> dict[str, tuple[str, Step]]:
         """Figure and step of each node."""
         return {step.node: (figure, step) for figure, steps in self.figures.items() for step in steps}
@@ -251,6 +261,11 @@ class Construction:
     def step(self, node: str) -> Step:
         """Return the step that makes a node. Raises KeyError for an unknown node."""
         return self._by_node[node][1]
+
+    def laid_off(self, tail: str, head: str) -> Given | None:
+        """Return the step that lays off a vector from its tail; None if its head is made otherwise."""
+        step = self.step(head)
+        return step if isinstance(step, Given) and step.start == tail else None
 
     def figure_of(self, node: str) -> str:
         """Return the figure that a node belongs to. Raises KeyError for an unknown node."""
