@@ -220,9 +220,10 @@ class FollowThrough:
     ) -> Expectation:
         """The vector constructed from the student's own nodes upstream; the exact one without any."""
         found, own = self.traced(scales, basis, by_similarity=by_similarity), self.own(scales, basis)
-        upstream, step = self.task.construction.upstream, self.task.construction.step(segment.head)
+        construction = self.task.construction
+        upstream, step = construction.upstream, construction.laid_off(segment.tail, segment.head)
         ends: tuple[str, ...] = segment.head, segment.tail
-        if isinstance(step, Given) and step.start == segment.tail:
+        if step is not None:
             # Laid off, wherever it starts.
             ends = (*step.length.needs, *step.along.needs)
         relies_on = (known(own) & frozenset[str]().union(*map(upstream, ends))) - {segment.head}
@@ -555,12 +556,9 @@ class FollowThrough:
         task, step = self.task, self.task.construction.step(segment.head)
         if not isinstance(step, Given) or not isinstance(same := step.length, Same):
             return
-        source, head, forces = (
-            self.named(same.tail, same.head),
-            same.head,
-            self._wrong_forces(same.head, wrong),
-        )
-        own, shares = self.evidence.vector(source or ""), list[tuple[float, frozenset[str]]]()
+        source, head = self.named(same.tail, same.head), same.head
+        forces, shares = self._wrong_forces(head, wrong), list[tuple[float, frozenset[str]]]()
+        own = self.evidence.vector(source or "")
         for one in task.construction.vectors_of(task.construction.figure_of(head)):
             drawn, due_mm = self.evidence.vector(one.name), abs(task.segments[one.name].drawn(self.used))
             if one.name in forces and drawn and drawn.length_mm and due_mm:

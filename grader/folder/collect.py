@@ -370,14 +370,13 @@ def _uncovered(row: Row, boxes: Sequence[Box]) -> Row:
         for figure, vectors in row["drawn"].items()
     }
     figures = {
-        # The nodes of a polygon in another order follow from all its vectors.
         figure: {name: node for name, node in nodes.items() if is_left(node[0], node[1])}
-        if figure not in drawn
-        else nodes
-        if drawn[figure] == row["drawn"][figure]
-        else {}
         for figure, nodes in row["figures"].items()
     }
+    for figure, vectors in drawn.items():
+        # The nodes of a polygon in another order follow from all its vectors.
+        is_whole = vectors == row["drawn"][figure]
+        figures[figure] = row["figures"][figure] if is_whole else {}
     return {**row, "figures": figures, "drawn": drawn}
 
 

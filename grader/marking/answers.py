@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from grader.comparison.task import Task
 from grader.documents import Quantity
 from grader.outcomes import CREDITED, Judgement, Outcome
-from grader.reading.orders import ends_on_sheet
+from grader.reading.orders import corners_of, ends_on_sheet
 from grader.records import Figure, ReadNode, ScannedPage, on_sheet
 from grader.tables.decisions import Decision
 
@@ -86,10 +86,10 @@ def _places(
     is_read = outcome.measured.length_mm is not None
     is_off = bool(codes & OFF_AS_READ) and "follows" not in codes
     if is_read and is_off != (verdict in CREDITED):
-        ends = figure.drawn.get(vector.name, ())
-        for node, at in ends_on_sheet(task.construction, name, figure).items():
-            if at in ends if figure.drawn else node in vector.arrow:
-                yield (name, node), on_sheet(at)
+        at = ends_on_sheet(task.construction, name, figure)
+        for node in corners_of(task.construction, name, figure).get(vector.name, ()):
+            if node in at:
+                yield (name, node), on_sheet(at[node])
     elif verdict == "full" and (is_off or not is_read) and not figure.drawn:
         end = end_in_doubt(figure, vector.tail, vector.head, task.rubric.least_confidence)
         along = along_of(outcome.expected)

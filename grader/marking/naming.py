@@ -14,7 +14,7 @@ from grader.outcomes import NamedMistake
 from grader.records import MECHANISM
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.elements import Along, Line
-from reference.construction.graph import Construction, Vector
+from reference.construction.graph import Construction
 from reference.construction.mistakes import (
     OF_FORCES,
     RPM_FACTOR,
@@ -146,13 +146,9 @@ def _is_slight(mistake: Mistake, explanation: Replay) -> bool:
 
 def _is_refuted(mistake: Mistake, construction: Construction, right: frozenset[str]) -> bool:
     """Return whether the forces are right that a mistake in moments or in what acts on a link makes wrong."""
-    laid = {one.head for name in right if _is_laid_off(one := construction.vectors[name], construction)}
+    vectors = [construction.vectors[name] for name in right]
+    laid = {one.head for one in vectors if construction.laid_off(one.tail, one.head)}
     return mistake.code in OF_MOMENTS and made_at(mistake, construction) <= laid
-
-
-def _is_laid_off(vector: Vector, construction: Construction) -> bool:
-    step = construction.step(vector.head)
-    return isinstance(step, Given) and step.start == vector.tail
 
 
 class _Shares:
@@ -228,9 +224,10 @@ def _losses_explained(
             continue
         ends = {tail, head}
         touching = [one for one in made if _touches(one, scale, ends, reach[one])]
-        if name in construction.vectors and _is_laid_off(construction.vectors[name], construction):
+        step = construction.laid_off(tail, head) if name in construction.vectors else None
+        if step is not None:
             # Wherever a force begins, its size and direction follow from other nodes.
-            of = {*construction.step(head).needs} - {tail}
+            of = {*step.needs} - {tail}
             touching = [
                 one
                 for one in touching

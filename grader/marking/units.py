@@ -21,7 +21,6 @@ from grader.outcomes import UsedScale
 from grader.records import Reading, ReadVector
 from reference.construction.elements import Scaled
 from reference.construction.mistakes import RPM_FACTOR, Mistake
-from reference.construction.steps import Given
 from reference.geometry import FloatArray
 from reference.quantities import OF_MOTION, KindName, kind_of
 from reference.replay.explanations import AREA_MM
@@ -143,10 +142,8 @@ class _Entries:
             is_directed = one.direction_rad is not None and length >= max(table.least_mm, 1.0)
             turned = one.direction_rad + turn if is_directed and one.direction_rad is not None else math.nan
             across = math.atan(table.across_mm / max(length, table.across_mm))
-            step = task.construction.step(segment.head)
-            is_given = (
-                isinstance(step, Given) and isinstance(step.length, Scaled) and step.start == segment.tail
-            )
+            step = task.construction.laid_off(segment.tail, segment.head)
+            is_given = step is not None and isinstance(step.length, Scaled)
             rows.append(
                 (
                     length,

@@ -10,7 +10,7 @@ from grader.reading.expected import Edge, Expected
 from grader.reading.lines import Lines, lines_of
 from grader.reading.matching import StrokeAssignment
 from grader.reading.nodes import LINK_ENDS, PLAN_ENDS, fit_nodes
-from grader.reading.orders import ends_on_sheet, ring_of
+from grader.reading.orders import corners_of, ends_on_sheet, ring_of
 from grader.reading.read import LEAST_VECTOR_MM, NEAR_MM, vector_of
 from grader.records import MECHANISM, Figure, FloatArray, Ink, Reading, ReadNode, ReadVector, ScannedPage
 from reference.construction.graph import Construction
@@ -176,21 +176,20 @@ def _with_nodes(
     at = ends_on_sheet(construction, figure, before)
     there = {name: replace(node, at=at[name]) for name, node in before.nodes.items() if name in at}
     nodes, drawn = {**there, **moved}, dict(before.drawn)
-    corner = {place: name for name, place in at.items()}
+    corners = corners_of(construction, figure, before) if figure != MECHANISM else {}
     vectors, scale_se = dict(before.vectors), 0.0 if page.sheet is None else page.sheet.scale_se
-    for vector in construction.vectors_of(figure) if figure != MECHANISM else ():
-        arrow = [corner[end] for end in drawn.get(vector.name, ())] if drawn else vector.arrow
+    for name, arrow in corners.items():
         if moved.keys().isdisjoint(arrow) or not nodes.keys() >= {*arrow}:
             continue
         tail, head = (nodes[node] for node in arrow)
         if drawn:
-            drawn[vector.name] = tail.at, head.at
-        known = vectors.get(vector.name)
+            drawn[name] = tail.at, head.at
+        known = vectors.get(name)
         if known is None and not _is_drawn(page.ink, tail.at, head.at):
             continue
         stays = all(abs(nodes[end].at - at[end]) < NEAR_MM for end in arrow if end in at)
         least = known.confidence if known is not None and stays else 0.0
-        vectors[vector.name] = _between(tail, head, scale_se, least)
+        vectors[name] = _between(tail, head, scale_se, least)
     if drawn:
         nodes = _in_usual_order(Figure(before.nodes, vectors, drawn), figure, construction)
     order = [step.node for step in construction.figures[figure]]

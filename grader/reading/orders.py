@@ -93,6 +93,21 @@ def ends_on_sheet(construction: Construction, name: str, figure: Figure) -> dict
     }
 
 
+def corners_of(construction: Construction, name: str, figure: Figure) -> dict[str, tuple[str, ...]]:
+    """Return the nodes where each vector begins and ends on the sheet, as `ends_on_sheet` places them.
+
+    A vector of a polygon in another order is left out if no node is at one of its ends.
+    """
+    if not figure.drawn:
+        return {vector.name: vector.arrow for vector in construction.vectors_of(name)}
+    there = {at: node for node, at in ends_on_sheet(construction, name, figure).items()}
+    return {
+        vector: (there[tail], there[head])
+        for vector, (tail, head) in figure.drawn.items()
+        if tail in there and head in there
+    }
+
+
 def to_usual(order: Order) -> FloatArray:
     """Return (n, n) that gives the corners of the usual order from those of an order."""
     count = len(order)
@@ -138,7 +153,7 @@ def reordered(construction: Construction, figure: str, ring: Ring, order: Order)
 
 
 def orders_by_ink(expected: Expected, ring: Ring, lines: Lines) -> list[Order]:
-    """Return likely orders of a polygon's sides, likeliest first, by the strokes along each.
+    """Return likely orders of a polygon's sides, likeliest first, by the strokes along each side.
 
     Wherever a long side may lie, all sets of the other sides are laid off from its end, each in the best
     orders of its members: the corner that a set ends in does not depend on their order.

@@ -166,7 +166,7 @@ class PlanReading:
     rivals : other explanations, best first
     named : probability that its letters say the names, of one whose nodes the construction does not place
     by_ink : the nodes by strokes and ink together, of the one that is chosen
-    seen : the same without the data, which place a force polygon's nodes where nothing marks them
+    seen : of a force polygon the same without the data, which place its nodes where nothing marks them
     """
 
     hypothesis: PlanHypothesis
@@ -266,9 +266,9 @@ def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) 
     best, *rivals = _with_letters(problem, everything)
     rivals = [*rivals[: RIVALS - 1], *_without_each_stroke(best, problem.prior)]
     drawn = [best.placed.edges[index] for index in best.placed.required]
-    seen = best.fit if is_lettered else fit_nodes(best.assignment, best.lines)
     by_ink = problem.look and held_against_ink(best.fit, drawn, problem.look)
-    if not is_lettered and problem.look:
+    seen = None if is_lettered else fit_nodes(best.assignment, best.lines)
+    if seen is not None and problem.look:
         seen = held_against_ink(seen, drawn, problem.look)
     return replace(best, rivals=tuple(rivals), by_ink=by_ink, seen=seen)
 
@@ -417,20 +417,13 @@ def _with_letters(problem: PlanProblem, plans: Sequence[PlanReading]) -> list[Pl
     for plan in sorted(plans, key=lambda plan: -plan.score):
         if plan.score >= least and plan.strokes not in scored:
             expected = plan.assignment.expected
-            nats = _letters_nats(problem, expected, poles)
+            nodes = ((problem.figure, name) for name in expected.names)
+            at = dict(zip(nodes, expected.at.tolist(), strict=True)) if not group_of(problem.figure) else {}
+            writing = lettering(at, problem.letters, poles, problem.renamed)
+            nats = 0.0 if writing is None else writing.log()
             named = _named_by(nats, plan.hypothesis)
             scored[plan.strokes] = replace(plan, score=plan.score + nats, named=named)
     return sorted(scored.values(), key=lambda plan: -plan.score)
-
-
-def _letters_nats(problem: PlanProblem, expected: Expected, poles: Collection[str]) -> float:
-    """Return the evidence of the letters at a plan's nodes; a force polygon's have none."""
-    if group_of(problem.figure):
-        return 0.0
-    nodes = ((problem.figure, name) for name in expected.names)
-    at = dict(zip(nodes, expected.at.tolist(), strict=True))
-    writing = lettering(at, problem.letters, poles, problem.renamed)
-    return 0.0 if writing is None else writing.log()
 
 
 # Strokes of a plan --------------------------------------------------------------------------------

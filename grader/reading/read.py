@@ -233,8 +233,7 @@ def _find_forces(
     pages: Sequence[_PageReading], drawing: Drawing, known: Nodes, renamed: Mapping[str, str]
 ) -> None:
     """Find the force plans, one after another: each takes reactions over from those before it."""
-    figures = list(filter(group_of, drawing.construction.figures))
-    for figure in figures:
+    for figure in filter(group_of, drawing.construction.figures):
         for found in [one for page in pages for one in page.plans.values()]:
             _set_apart(pages, found)
         plan = _find_plan(pages, [drawing], figure, known, renamed)
@@ -259,8 +258,7 @@ def _find_plan(
         joints, guide_turn = _sketched(page, pages)
         links = page.sketch.members if page.sketch is not None else np.zeros(0, np.int64)
         given = {**joints, **known}
-        letters = page.ink.letters
-        problem = PlanProblem(page.lines, figure, given, letters, renamed, links, page.look)
+        problem = PlanProblem(page.lines, figure, given, page.ink.letters, renamed, links, page.look)
         for drawing in at_scales:
             turned = Drawing(drawing.construction, {**drawing.parameters, "turn": np.asarray(guide_turn)})
             if page.beside and page.position is not None:
@@ -500,11 +498,7 @@ def _node(fit: NodeFit, index: int, confidence: float) -> ReadNode:
 
 
 def _vectors(
-    plan: PlanReading,
-    fit: NodeFit,
-    explanations: "_Explanations",
-    scale_se: float,
-    where: InkMap,
+    plan: PlanReading, fit: NodeFit, explanations: "_Explanations", scale_se: float, where: InkMap
 ) -> tuple[dict[str, ReadVector], list[Unread]]:
     expected = plan.assignment.expected
     vectors: dict[str, ReadVector] = {}
@@ -542,11 +536,7 @@ def _vectors(
         most = math.erf(NEAR_MM / max(math.sqrt(2.0) * scale_se * abs(span), 1e-9))
         sure = signs.confidence()
         if is_polygon:
-            seen = (
-                signs.placed
-                if plan.seen is None
-                else within(_difference_cov(plan.seen, edge, span, scale_se))
-            )
+            seen = within(_difference_cov(plan.seen or fit, edge, span, scale_se))
             sure = _weighed(sure, span, _predicted(plan, edge), seen)
             is_tiny = min(abs(span), abs(_predicted(plan, edge))) < LEAST_VECTOR_MM
             has_own = row >= 0 and not plan.assignment.shared[index]

@@ -28,7 +28,7 @@ from grader.marking.trust import opened_in, trust_of
 from grader.overlay.scene import Arrow, Ghost, Scene, expected_vector, ghost_of, scene_of
 from grader.pipeline import mark
 from grader.reading.corrected import snapped
-from grader.reading.orders import ends_on_sheet
+from grader.reading.orders import corners_of, ends_on_sheet
 from grader.records import MECHANISM, PageRef, ScannedPage, on_sheet
 from grader.review.doubts import Doubt, doubts_of, figure_of, figures_read, in_order, reading_of
 from grader.review.records import (
@@ -570,11 +570,10 @@ class Session:
         construction, figure = self._construction(student), figure_of(document)
         if construction is None:
             return
-        ends = {one.name: figure.drawn.get(one.name) or one.arrow for one in construction.vectors_of(kind)}
-        for node, corner in ends_on_sheet(construction, kind, figure).items():
-            place = corner if figure.drawn else node
-            there = [name for name in figure.vectors if group_of(kind) and place in ends.get(name, ())]
-            yield node, ", ".join(there) or node, on_sheet(corner)
+        corners = corners_of(construction, kind, figure) if group_of(kind) else {}
+        for node, place in ends_on_sheet(construction, kind, figure).items():
+            there = [name for name in figure.vectors if node in corners.get(name, ())]
+            yield node, ", ".join(there) or node, on_sheet(place)
 
     def _construction(self, student: Student) -> Construction | None:
         variant = student.job.submission.variant
