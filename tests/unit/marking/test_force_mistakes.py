@@ -258,7 +258,7 @@ CHARGED_ALONE = {
 
 
 def crank(folder, n, drawn, moment=None):
-    """Return the tally of a student's sheet of the offset crank."""
+    """Return the judgement of a student's sheet of the offset crank."""
     asked = {one: f'vector = "{one}"' for one in drawn} | ({"M_b": 'moment = "M_b"'} if moment else {})
     rows = "".join(
         f'[[criterion]]\nid = "{one}"\ntitle = {{ en = "x" }}\npoints = 1\n{key}\n'
