@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from importlib.resources import files
+from pathlib import Path
 
 from markupsafe import Markup, escape
 
@@ -55,10 +55,11 @@ class Tongue:
     def titled(self, titles: Mapping[str, str], figure: str, names: Mapping[str, str] = NO_NAMES) -> str:
         """Return the title of a figure, or what else is told of it: force plans share one with ``{group}``.
 
-        Arguments: `names` are those that students know.
+        Arguments: `names` are those that students know; a figure's is the key of a title of its own.
         """
         group = group_of(figure)
-        return self.gettext(titles[sort_of(figure)]).replace("{group}", names.get(group, group))
+        title = titles.get(names.get(figure, ""), titles[sort_of(figure)])
+        return self.gettext(title).replace("{group}", names.get(group, group))
 
     def ngettext(self, one: str, many: str, count: int) -> str:
         """Return the form that goes with `count`."""
@@ -119,7 +120,7 @@ def tongue(lang: str) -> Tongue:
 def _catalogue(code: str) -> gnu.NullTranslations:
     if code == ROOT_LANGUAGE:
         return gnu.NullTranslations()
-    compiled = files("grader") / "locale" / code / "LC_MESSAGES" / f"{DOMAIN}.mo"
+    compiled = Path(__file__).parent / "locale" / code / "LC_MESSAGES" / f"{DOMAIN}.mo"
     with compiled.open("rb") as stream:
         return gnu.GNUTranslations(stream)
 

@@ -223,7 +223,7 @@ def mark(
         again = judged(submission, assignment, rubric, [page.reading for page in pages], learnt.verdicts)
         judgement = own if isinstance(again, Reason) else again[1]
     judgement = decide(opened_by_audit(judgement, rubric, submission.opened), rubric, submission.decided)
-    names, lang, measured = assignment.file.names, submission.lang, submission.measured or NOTHING_MEASURED
+    names, lang, measured = assignment.names, submission.lang, submission.measured or NOTHING_MEASURED
     report = report_of(
         task, judgement, submission.student_id,
         language=lang,

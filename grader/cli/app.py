@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import MISSING
-from functools import wraps
+from functools import cache, wraps
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_origin, get_type_hints
@@ -157,7 +157,8 @@ _COMPLETED = {"lang": _languages, "to": _platforms}
 _KEYWORD = inspect.Parameter.KEYWORD_ONLY
 
 
-def _parameters(record: type) -> list[inspect.Parameter]:
+@cache
+def _parameters(record: type) -> tuple[inspect.Parameter, ...]:
     """The parameters of a command for the options of a record; what a choice may be, the command checks."""
     types, made = get_type_hints(record), []
     for one, told in offered(record):
@@ -169,7 +170,7 @@ def _parameters(record: type) -> list[inspect.Parameter]:
         kind = str if get_origin(types[one.name]) is Literal else types[one.name]
         default = inspect.Parameter.empty if one.default is MISSING else one.default
         made.append(inspect.Parameter(one.name, _KEYWORD, default=default, annotation=Annotated[kind, offer]))
-    return made
+    return tuple(made)
 
 
 class _Application(typer.Typer):
@@ -205,7 +206,7 @@ class _Application(typer.Typer):
                 finally:
                     terminal.LOG.debug("ended after %.1f s", time.monotonic() - start)
 
-            every = [_parameters(one.annotation) if name in records else [one] for name, one in own.items()]
+            every = [_parameters(one.annotation) if name in records else (one,) for name, one in own.items()]
             parameters = [*chain.from_iterable(every), *common]
             first = inspect.signature(run, follow_wrapped=False).parameters["context"]
             first = first.replace(kind=_KEYWORD, annotation=typer.Context)

@@ -33,9 +33,10 @@ NOTHING = N_("nothing that this assignment asks for was measured")
 WRITTEN = N_("%(file)s: fill in what is below the comments, then check it by --measured %(file)s")
 HOW_TO_FILL_IN = N_(
     "# Drawn lengths in mm; _deg: directions counter-clockwise from the horizontal to the right; _value:"
-    " computed values, counter-clockwise positive or with their sense (2.09 cw); scales with their units."
-    " Points I and J from the driving link's pivot; _sketch: as drawn on the mechanism. Blank cells are not"
-    " checked; lines that begin with # are ignored."
+    " computed values, counter-clockwise positive or with their sense (2.09 cw); scales with their units in"
+    " the cell (0.005 m/mm). Points I and J from the driving link's pivot; _sketch: as drawn on the"
+    " mechanism. Blank cells are not checked; lines that begin with # are ignored. A class's table has"
+    " a column student_id, too."
 )
 
 
@@ -81,7 +82,7 @@ def check_measured(name: str, options: CheckOptions) -> bool:
             raise CallError(error.code, f"{variant}: {known}") from error
         _tell(check.lines, wanted, speaker)
         likely = likely_mistakes(check.judgement, wanted)
-        mistakes = [mistake_feedback(mistake, lang, "full", assignment.file.names) for mistake in likely]
+        mistakes = [mistake_feedback(mistake, lang, "full", assignment.names) for mistake in likely]
         for mistake, sentences in zip(likely, mistakes, strict=True):
             _print(f"{mistake.code}: {sentences}", "  ")
         if page is not None:
@@ -167,7 +168,7 @@ def _write_page(
     report, painted = mark(submission, (), assignment, rubric_of(assignment), options.level)
     problems = [*entered.problems, *entered.reading.problems]
     told = [*problem_documents(problems)]
-    about = About(assignment.file.title.in_language(lang), "", assignment.file.names)
+    about = About(assignment.file.title.in_language(lang), "", assignment.names)
     report = report.model_copy(update={"problems": told})
     write_whole(page, check_page(report, painted(options.level), lines, mistakes, lang, about))
 

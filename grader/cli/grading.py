@@ -307,7 +307,7 @@ def _list(title: str, lines: Sequence[str], page: Path) -> None:
 def _waiting(results: ResultsDocument) -> Iterator[str]:
     """Lines on unmatched files, on what waits (most points at stake first), and on missing students."""
     for page in results.unmatched:
-        yield f"{page.file}{'' if page.page is None else f'#{page.page}'}: {page.message}"
+        yield _placed(f"{page.file}{'' if page.page is None else f'#{page.page}'}", page.message)
     for wait in waiting(results):
         report = wait.report
         count = f"{len(wait.criteria)} {'criterion' if len(wait.criteria) == 1 else 'criteria'}"
@@ -320,8 +320,12 @@ def _waiting(results: ResultsDocument) -> Iterator[str]:
 
 def _first(report: ReportDocument) -> str:
     """The first problem of a report, behind its file; empty if there is none."""
-    told = [": ".join(filter(None, (one.file, one.message))) for one in report.problems[:1]]
-    return "".join(f"; {problem}" for problem in told)
+    return "".join(f"; {_placed(one.file or '', one.message)}" for one in report.problems[:1])
+
+
+def _placed(place: str, message: str) -> str:
+    """The message behind its place; an error's own words begin with it."""
+    return message if not place or message.startswith(f"{place}:") else f"{place}: {message}"
 
 
 def _change_line(change: MovedDocument) -> str:

@@ -128,25 +128,23 @@ def _print_table(assignment: Assignment, plan: Plan) -> None:
 
 def _table_of_forces(forces: ForcesDocument) -> "Table":
     """Return inertia forces, reactions and the balancing moment or force, a row each."""
+    from reference.drawing.tables import four_digits
 
     def direction(degrees: float | None) -> str:
         return "-" if degrees is None else f"{degrees:.2f}"
 
-    def told(value: float) -> str:
-        return f"{value:.0f}" if abs(value) >= 1e4 else f"{value:.4g}"
-
     table = new_table("force", "at", "N", "direction deg", "N m", left=("at",))
     for link, one in forces.inertia.items():
-        row = (told(one.force_N), direction(one.direction_deg), told(one.moment_Nm))
+        row = (four_digits(one.force_N), direction(one.direction_deg), four_digits(one.moment_Nm))
         table.add_row(f"inertia of {link}", one.at, *row)
     for name, joint in (*forces.joints.items(), *forces.guides.items()):
-        moment = told(joint.moment_Nm) if isinstance(joint, GuideDocument) else ""
-        row = (told(joint.value_N), direction(joint.direction_deg), moment)
+        moment = four_digits(joint.moment_Nm) if isinstance(joint, GuideDocument) else ""
+        row = (four_digits(joint.value_N), direction(joint.direction_deg), moment)
         table.add_row(f"{joint.by} on {joint.on}", name, *row)
     last = forces.balancing
     if isinstance(last, ForceDocument):
-        row = (told(last.value_N), direction(last.direction_deg), "")
+        row = (four_digits(last.value_N), direction(last.direction_deg), "")
     else:
-        row = ("", "", told(last.moment_Nm))
+        row = ("", "", four_digits(last.moment_Nm))
     table.add_row(f"balancing on {last.on}", "", *row)
     return table

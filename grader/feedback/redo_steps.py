@@ -132,7 +132,7 @@ def with_mistakes_explained(
     """
     if not judgement.mistakes or level == "symbol":
         return report
-    speaker, names = tongue(lang), assignment.file.names
+    speaker, names = tongue(lang), assignment.names
     subject = _subject(judgement, assignment, variant, speaker)
     told = []
     for document, mistake in zip(report.mistakes, judgement.mistakes, strict=True):

@@ -255,13 +255,15 @@ def _roster(batch: Batch) -> Roster | None:
 
 
 def files_of(batch: Batch) -> list[Path]:
-    """The files handed in, or the archive of them. Raises CallError where there is no such folder."""
-    if is_archive(batch.folder) and batch.folder.is_file():
-        return [batch.folder]
-    if not batch.folder.is_dir():
-        raise failure(CallError, "folder_missing", folder=batch.folder)
+    """The files handed in, or the archive of them. Raises CallError where there is neither."""
+    folder = batch.folder
+    if is_archive(folder) and folder.is_file():
+        return [folder]
+    if not folder.is_dir():
+        cause = "submissions_in_file" if folder.is_file() else "submissions_missing"
+        raise failure(CallError, "folder_missing", cause, folder=folder, near=folder.parent)
     others = (batch.out, batch.decisions_path, *batch.growing, *batch.assignment.own_files)
-    files = submissions(batch.folder, batch.roster, passed_over=others)
+    files = submissions(folder, batch.roster, passed_over=others)
     return (
         sorted(files, key=lambda path: natural_key(batch.called.get(path, path.name)))
         if batch.called
@@ -552,7 +554,7 @@ def _write_report(batch: Batch, job: Job, report: ReportDocument, pictures: Sequ
     """Write the page and the report of a submission."""
     submission, where = job.submission, batch.out / job.folder
     title = batch.assignment.file.title.in_language(submission.lang)
-    about = About(title, submission.name, batch.assignment.file.names)
+    about = About(title, submission.name, batch.assignment.names)
     page = feedback_page(report, pictures, submission.lang, batch.level, about)
     write_feedback(page, pictures, where)
     write_whole(where / "report.json", report.model_dump_json(indent=2))

@@ -1,6 +1,7 @@
 """Likelihoods of parts of a drawing under each set of data, with outliers and propagated errors."""
 
 import math
+import statistics
 
 import numpy as np
 
@@ -57,8 +58,9 @@ def fit_of(rows: Rows, is_own: BoolArray) -> FloatArray:
 
 def _lies_straight(rows: Rows, residuals: FloatArray) -> bool:
     """Return whether no sheet is turned, by the medians of its directions' residuals against the own data."""
-    turned = (residuals[rows.is_angle & (rows.sheet == sheet)] for sheet in set(rows.sheet.tolist()))
-    return all(abs(np.median(one)) <= math.radians(STRAIGHT_DEG) for one in turned if len(one))
+    turned = (residuals[rows.is_angle & (rows.sheet == sheet)].tolist() for sheet in set(rows.sheet.tolist()))
+    # numpy's median loads masked arrays.
+    return all(abs(statistics.median(one)) <= math.radians(STRAIGHT_DEG) for one in turned if one)
 
 
 def nobodys(rows: Rows) -> float:

@@ -273,7 +273,7 @@ def _why(
 def doubt_sentence(session: Session, criterion: CriterionDocument, speaker: Tongue) -> Markup:
     """Return the reason why a criterion waits, in the reviewer's language."""
     batch = session.batch
-    return symbols(feedback_again(criterion, speaker.lang, batch.level, batch.assignment.file.names))
+    return symbols(feedback_again(criterion, speaker.lang, batch.level, batch.assignment.names))
 
 
 def per_cent(probability: float) -> str:
@@ -318,7 +318,7 @@ def _points(criterion: CriterionDocument, speaker: Tongue) -> str:
 
 def look_of(session: Session, student: Student, criterion: CriterionDocument) -> Facts | None:
     """Return the part of a scan that a question is about, with the reading there; None without a scan."""
-    names = session.batch.assignment.file.names
+    names = session.batch.assignment.names
     pages, standing = session.pages_of(student), session.standing()
     first: Facts | None = None
     for sheet, page in enumerate(pages):

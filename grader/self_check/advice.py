@@ -48,7 +48,6 @@ _LINES = N_(
 )
 _LETTERS = N_("Look at the letters of its name: from which point of the plan to which does it run?")
 _ENTRY = N_("Look at this entry again: its number and its unit.")
-_SCALE = N_("Give the scale that you used with its unit, such as 1:5 or 0.005 m/mm.")
 _AS_IN_PLAN = N_("It must be parallel to the vector of the plan, of its sense, and as long.")
 SIZE = {
     "sketch": _AS_IN_PLAN,
@@ -107,18 +106,15 @@ ADVICE: dict[str, Mapping[str, str]] = {
     "data_misread": {"": N_("Look at the crank's angle: from which axis and in which sense it is measured.")},
     "data_unclear": {"": N_("Look at your number, and at the data that belong to it.")},
     "scale_off": {"": N_("Look at how it is made: real value divided by drawn length, each with its unit.")},
-    "scale_refused": {"": _SCALE},
-    "scale_assumed": {"": _SCALE},
+    "scale_assumed": {"": N_("Give the scale that you used, with its unit.")},
 }
 """Advice by code of the reason and kind of the value; `""` for every other kind."""
-_SCALE_ON_SHEET = N_("Write the scale that you used on the sheet, with its unit, such as 1:5 or 0.005 m/mm.")
 ON_SHEET = {
     "unread": N_("Draw it clearly, with its arrow and letters, and photograph the sheet again."),
     "doubtful": N_("Draw it clearly, with its arrow and letters, and photograph the sheet again."),
     "not_drawn": N_("Draw it, with its arrow and letters."),
     "near_limit": N_("Measure it on the sheet."),
-    "scale_refused": _SCALE_ON_SHEET,
-    "scale_assumed": _SCALE_ON_SHEET,
+    "scale_assumed": N_("Write the scale that you used on the sheet, with its unit."),
 }
 """Advice on a drawing, by code, if it differs from that on a file of measurements."""
 
@@ -219,7 +215,7 @@ def checked_lines(
 
     Arguments: `unread` are the vectors of a drawing that could not be read; None for entered measurements.
     """
-    names, driving = assignment.file.names, assignment.mechanism_file.driver.pin
+    names, driving = assignment.names, assignment.mechanism_file.driver.pin
     values = checked_values(judgement, level, unread or ())
     other = next((one for one in judgement.mistakes if one.code == "other_variant"), None)
     of_other = [one for one in values if any(reason.code == "other_variant" for reason in one.reasons[:1])]

@@ -65,7 +65,7 @@ TABLES = {"segments_mm": "", "directions_deg": "_deg", "values": "_value"}
 MAX_BYTES = 1_000_000
 """A class of a thousand with every length, direction and value writes half of it."""
 CLASS_TABLE = TableKind(
-    "measurements", (*KEYS, *USUAL_SCALES, "v_A", "v_A_deg", "v_A_value"), ("student_id",), MAX_BYTES, 20_000,
+    "measurements", KEYS, ("student_id",), MAX_BYTES, 20_000,
     has_comments=True, unreadable="measurements_unreadable", encoding="measurements_encoding",
 )  # fmt: skip
 OWN_TABLE = replace(CLASS_TABLE, required=())
@@ -230,7 +230,9 @@ def read_measurements(
     Raises TableError with every fault of the file as a whole.
     """
     path = Path(path)
-    name, kind = file or shown_text(path.name), OWN_TABLE if is_own else CLASS_TABLE
+    name, first = file or shown_text(path.name), next(iter(names.vectors), "v_A")
+    examples = (*KEYS, *names.scales, *(f"{first}{end}" for end in TABLES.values()))
+    kind = replace(OWN_TABLE if is_own else CLASS_TABLE, columns=examples)
     text = kind.text(path, name)
     if path.suffix.lower() == ".json":
         return (_parse_json(text, name, names),)

@@ -20,6 +20,8 @@ FAILURES: dict[str, str] = {
         " export grades without criteria"
     ),
     "folder_missing": N_("%(folder)s: there is no such folder"),
+    "submissions_missing": N_("%(folder)s: there is no such folder; name the submissions' folder, or a .zip"),
+    "submissions_in_file": N_("%(folder)s: is a file; name the submissions' folder (%(near)s), or a .zip"),
     "nothing_to_grade": N_("%(folder)s: there is nothing to grade in this folder"),
     "nothing_came": N_("%(folder)s: no submission here can be graded"),
     "run_unknown": N_("%(folder)s: nothing was graded here; run planmark grade first, then name its --out"),

@@ -145,7 +145,8 @@ FOLLOWS: dict[str, str] = {
 def reason_sentence(reason: Coded, speaker: Tongue, level: Level, names: Mapping[str, str] = NO_NAMES) -> str:
     """Return the sentence of one reason; a code without a sentence is shown by its name."""
     hint = HINTS.get(reason.code, reason.code)
-    texts = [FULL[reason.code], hint] if level == "full" and reason.code in FULL else [hint]
+    is_full = reason.code in FULL and (level == "full" or reason.code == "scale_refused")  # no answer in it
+    texts = [FULL[reason.code], hint] if is_full else [hint]
     if reason.code == "follows":
         texts = [FOLLOWS.get(str(reason.parameters.get("what")), hint), hint]
     return filled(texts, spoken(reason.parameters, speaker, names), speaker)

@@ -36,6 +36,7 @@ PLACES = {
     "velocity_plan": N_("the velocity plan"),
     "acceleration_plan": N_("the acceleration plan"),
     "force_plan": N_("the force plan of the group of {group}"),
+    "driving_force_plan": N_("the force plan of the driving link"),
     "force_plans": N_("the set of force plans"),
     "F_i": N_("every inertia force"),
     "G_": N_("every weight"),

@@ -19,7 +19,7 @@ from grader.overlay.measured import measured_picture
 from grader.overlay.scene import Picture
 from grader.records import Reason
 from grader.rubric import rubric_of
-from grader.self_check.advice import RESULTS, CheckedLine, advice_on
+from grader.self_check.advice import RESULTS, CheckedLine
 from grader.self_check.values import check_values
 from grader.tables.measurements import NOTHING_MEASURED, columns_of, measurements_in, names_of
 from grader.texts.reasons import reason_sentence
@@ -46,7 +46,7 @@ def variant_of(assignment: Assignment, n: int | None, position: int | None) -> V
 
 def form_of(assignment: Assignment, lang: str) -> dict[str, Any]:
     """Return the fields of a form, each with its name, group, unit and column, and the ranges of numbers."""
-    speaker, names = tongue(lang), assignment.file.names
+    speaker, names = tongue(lang), assignment.names
     fields = []
     for column, unit in columns_of(assignment, rubric_of(assignment)).items():
         name = column.removesuffix("_deg").removesuffix("_value")
@@ -104,8 +104,7 @@ def _faults(
     for name, outcome in outcomes.items():
         for one in outcome.reasons:
             if one.code == "scale_refused":
-                advice = speaker.gettext(advice_on([one], name, ""))
-                yield name, f"{reason_sentence(one, speaker, 'hint')} {advice}"
+                yield name, reason_sentence(one, speaker, "hint")
 
 
 def _with_unit(column: str, text: str) -> str:
@@ -135,7 +134,7 @@ def checked_photo(path: Path, asked: Mapping[str, Any]) -> dict[str, Any]:
 
 def _drawings(pictures: Sequence[Picture], assignment: Assignment, lang: str) -> list[str]:
     """Return the plans as drawn, or a sheet without plans, each an SVG element with its own scan in it."""
-    speaker, names = tongue(lang), assignment.file.names
+    speaker, names = tongue(lang), assignment.names
     drawings = []
     for index, picture in enumerate(pictures):
         views = page_views(picture, index, names)
@@ -146,7 +145,7 @@ def _drawings(pictures: Sequence[Picture], assignment: Assignment, lang: str) ->
         )
         drawings += [scan] if picture.scan else []
         for view in wanted:
-            what = speaker.gettext(PLACES.get(view.kind, SHEET))
+            what = speaker.titled({**PLACES, "sheet": SHEET, "detail": SHEET}, view.kind, names)
             drawings.append(str(svg(view, picture, what + shared)))
     return drawings
 

@@ -9,7 +9,6 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
-from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, cast
 
@@ -263,6 +262,11 @@ class Assignment:
         return "own" if "acceleration_plan" in self.figures else "given"
 
     @property
+    def names(self) -> dict[str, str]:
+        """The names that students see instead of others; the driving link's force plan has a title's key."""
+        return {**self.file.names, f"{FORCE_PLAN}{self.mechanism_file.driver.pin}": "driving_force_plan"}
+
+    @property
     def scale_names(self) -> tuple[str, ...]:
         """The scales of the drawings: kL, kv and ka; with force plans from given accelerations, kL and kF."""
         drawn = {scale_of(figure) for figure in self.figures}
@@ -414,8 +418,8 @@ SUFFIXES = {"assignment": ".assignment.toml", "mechanism": ".mechanism.toml", "r
 
 def library() -> Path:
     """Return the folder of built-in files: inside the installed package, or beside it in a checkout."""
-    installed = Path(str(files("reference"))) / "rubrics"
-    return installed if installed.is_dir() else Path(__file__).resolve().parents[2] / "rubrics"
+    installed = Path(__file__).resolve().parents[1] / "rubrics"
+    return installed if installed.is_dir() else installed.parents[1] / "rubrics"
 
 
 def names_in(folder: Path, kind: str) -> list[str]:

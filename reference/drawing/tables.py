@@ -141,7 +141,7 @@ def table_rows(subject: Subject, figures: Sequence[str]) -> Iterator[TableRow]:
 
 def four_digits(value: float) -> str:
     """Return a value with four significant digits, trailing zeros kept, or all digits before the point."""
-    return f"{value:.0f}" if value >= 1e4 else f"{value:#.4g}".rstrip(".") if value else "0"
+    return f"{value:.0f}" if abs(value) >= 1e4 else f"{value:#.4g}".rstrip(".") if value else "0"
 
 
 def _cell(column_at: int, text: Text, at: tuple[float, float], size: float) -> Label:

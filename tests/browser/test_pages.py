@@ -1,7 +1,19 @@
 """Pages of a class as a phone, a dark room and a printer show them."""
 
+from io import BytesIO
+
+import numpy as np
 import pypdfium2
 import pytest
+from PIL import Image
+
+from grader.language import tongue
+from grader.solution.pages import html_page
+from grader.solution.sentences import wording_of
+from reference.authored.assignment import Variant
+from reference.drawing.subject import Subject
+from reference.plan import exact_plan
+from tests.unit.review.conftest import PUMP
 
 pytestmark = pytest.mark.slow
 
@@ -51,6 +63,23 @@ def test_a_dark_room_has_dark_pages(phone, class_of_30):
         "getComputedStyle(document.body).backgroundColor.match(/\\d+/g).slice(0, 3).map(Number)"
     )
     assert max(red, green, blue) < 60
+
+
+def test_an_equation_has_a_shadow_at_the_edge_behind_which_it_goes_on(phone, tmp_path):
+    plan, speaker = exact_plan(PUMP, [Variant(n=7)]), tongue("en")
+    (tmp_path / "steps.html").write_text(html_page(Subject(PUMP, plan, 0, wording_of(speaker)), speaker))
+    page = phone(tmp_path / "steps.html")
+    equations = page.locator(".equation").element_handles()
+    long = next(one for one in equations if one.evaluate("one => one.scrollWidth - one.clientWidth") > 40)
+
+    def edges():
+        """The lightest points of both edges: a letter is not as high as a shadow."""
+        grey = np.asarray(Image.open(BytesIO(long.screenshot())).convert("L"))
+        return grey[5:-5, 0].max() < 250, grey[5:-5, -1].max() < 250
+
+    assert edges() == (False, True)
+    long.evaluate("one => { one.scrollLeft = one.scrollWidth }")
+    assert edges() == (True, False)
 
 
 def test_what_is_folded_is_printed(phone, class_of_30, tmp_path):

@@ -129,9 +129,11 @@ def test_help_keeps_every_option_in_one_piece(tmp_path, command, width):
 
 def test_quiet_leaves_what_needs_a_person_alone(course):
     (course / "nobody.jpg").touch()
+    (course / "nobodys.csv").write_text("n,v_A\n7,60\n", encoding="utf-8")
     status, out, err = told(course, "grade", "-q", "--jobs", "1")
     assert (status, err) == (1, "")
     assert out.startswith("A person must look at:")
+    assert "\n  nobodys.csv: line 1: column student_id is missing" in out
     assert "next:" not in out
     status, out, err = told(course, "plan", "pump", "--n", "7", "--json", "-q")
     assert status == 0

@@ -217,6 +217,8 @@ def test_a_student_fills_in_the_template_and_needs_no_student_id(planmark, tmp_p
     assert header.startswith("n;kL;kv;ka;v_A;v_A_deg;")
     assert all(line.lstrip('"').startswith("#") for line in comments)
     assert "student_id" not in header
+    assert "(0,005 m/mm)" in comments[-1]
+    assert "student_id" in comments[-1]
     assert planmark("check", "pump", "--n", 7, "--template", file).returncode == 2
     untouched = planmark("check", "pump", "--measured", file)
     assert untouched.returncode == 1
@@ -279,6 +281,7 @@ def test_the_printed_rows_of_the_press_typed_into_its_template_earn_all_their_cr
         ("pump --n 7 --measured bare.csv --level all", "--level all"),
         ("pump --n 7 --measured bare.csv --page mine.pdf", ".html"),
         ("pump --n 7 --measured bare.csv --page mine", ".html"),
+        ("pump-forces --n 7 --measured nowhere.csv", "kL, kF, R_34_t"),
         ("pump --n 7 --template mine.txt", ".csv"),
         ("pump --n 8 --measured both.csv", "n 7"),
     ],
@@ -302,6 +305,15 @@ def test_the_page_of_a_self_check_has_no_points_and_sends_nobody_to_a_person(pla
         assert word not in text
     assert 'class="score' not in text
     assert "Look at" in text
+
+
+def test_the_page_of_a_force_sheet_calls_the_driving_link_no_group(planmark, tmp_path):
+    file, page = tmp_path / "mine.csv", tmp_path / "mine.html"
+    file.write_text("R_31,R_31_deg,R_43,R_43_deg\n50,203,40,199\n", encoding="utf-8")
+    planmark("check", "pump-forces", "--n", 3, "--measured", file, "--page", page)
+    text = page.read_text(encoding="utf-8")
+    assert "force plan of the driving link:" in text
+    assert "force plan of the group of A" not in text
 
 
 def test_a_column_that_is_not_known_costs_no_class(planmark, tmp_path):

@@ -12,7 +12,10 @@ from grader.feedback.sentences import criterion_feedback, mistake_feedback
 from grader.language import LANGUAGES, tongue
 from grader.outcomes import NamedMistake, Outcome
 from grader.records import Reason
+from grader.solution.sentences import wording_of
 from grader.texts.reasons import FULL, HINTS, reason_sentence
+from grader.texts.spoken import place
+from reference.authored.assignment import load_assignment
 from reference.construction.mistakes import CODES, Mistake
 
 TOO_LONG = Reason("too_long", {"measured_mm": 49.5, "expected_mm": 47.2, "off_mm": 2.3, "tolerance_mm": 1.0})
@@ -204,6 +207,14 @@ def test_names_are_those_that_the_students_know():
     told = mistake_feedback(NamedMistake(Mistake("scale_wrong", "kv"), (), 0.9), "ru", names={"kv": "μv"})
     assert "μv" in told
     assert "kv" not in told
+
+
+@pytest.mark.parametrize("lang", LANGUAGES)
+def test_force_plans_are_called_as_in_the_steps(lang):
+    names, titles = load_assignment("pump-forces").names, wording_of(tongue(lang)).titles
+    for figure, key in (("force_plan_A", "driving_force_plan"), ("force_plan_B", "force_plan")):
+        title = titles[key].replace("{group}", "B")
+        assert place(figure, tongue(lang), names).lower().endswith(title.lower())
 
 
 def test_a_students_text_with_a_per_cent_sign_does_no_harm():

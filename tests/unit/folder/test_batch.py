@@ -1,4 +1,5 @@
 import json
+import re
 
 import pytest
 
@@ -104,10 +105,13 @@ def test_results_inside_the_folder_are_no_submissions(class_folder):
 
 
 def test_a_folder_that_is_not_there_or_empty_is_told(tmp_path):
-    with pytest.raises(CallError, match="no such folder"):
-        run(tmp_path / "nowhere", tmp_path / "out")
+    with pytest.raises(CallError, match=r"no such folder; .*\.zip"):
+        run(tmp_path / "nothing.zip", tmp_path / "out")
     with pytest.raises(CallError, match="nothing to grade"):
         run(tmp_path, tmp_path / "out")
+    (tmp_path / "roster.csv").write_text("student_id,name,n\ns01,Ana,4\n")
+    with pytest.raises(CallError, match=f"is a file; .*{re.escape(str(tmp_path))}\\)"):
+        run(tmp_path / "roster.csv", tmp_path / "out")
 
 
 def test_a_roster_with_faults_stops_before_anything_is_written(class_folder, tmp_path):

@@ -68,7 +68,8 @@ def test_a_mistake_that_is_certain_is_told_once_by_its_law(mistake):
 def test_a_scale_without_a_unit_is_told_how_to_write_it():
     line = lines_of(measured(PUMP), kv="0,22")["kv"]
     assert line.result == "open"
-    assert "with its unit" in line.advice
+    assert "“0.22” has no unit" in line.hint
+    assert "0.036 (m/s)/mm" in line.hint
 
 
 def test_every_mistake_but_a_missing_vector_has_a_law():
