@@ -30,7 +30,7 @@ from grader.overlay.backdrop import backdrop
 from grader.overlay.measured import measured_picture
 from grader.overlay.picture import overlay
 from grader.overlay.scene import Picture
-from grader.printed.layout import position_zones, written_cells
+from grader.printed.layout import cells_of, position_zones, values_of
 from grader.reading import page_scale
 from grader.reading.corrected import corrected
 from grader.reading.read import read_figures
@@ -38,7 +38,7 @@ from grader.reading.sketch import drawings
 from grader.records import PageRef, Reading, Reason, ScannedPage, Value, of_error
 from grader.rubric import Asked, RubricFile
 from grader.scan.handwriting import captions
-from grader.scan.handwriting.fields import written_lengths
+from grader.scan.handwriting.fields import written_numbers
 from grader.scan.page import open_page, timed, turned, writing_on
 from grader.scan.strokes.nodes import node_places
 from grader.tables.measurements import NOTHING_MEASURED, Measurements, StudentSubmission
@@ -58,8 +58,9 @@ def scan(ref: PageRef, asked: Asked) -> ScannedPage:
         return page
     reading = page.reading
     if page.sheet is not None and page.sheet.zones and asked.assignment is not None:
-        cells = written_cells(asked.assignment, tuple(page.sheet.zones), asked.entries)
-        reading = replace(reading, lengths=written_lengths(page.image, page.sheet, *cells))
+        here = asked.assignment, tuple(page.sheet.zones), asked.entries
+        written = written_numbers(page.image, page.sheet, cells_of(*here), values_of(*here))
+        reading = replace(reading, lengths=written)
     return replace(page, image=None, reading=reading, backdrop=backdrop(page.image, page.sheet))
 
 

@@ -579,7 +579,7 @@ class Reading:
     problems : what a person should know
     written : contents of the printed boxes, or of captions on plain paper, by scale; empty boxes are left out
     lengths : measured lengths from the printed cells, mm, with their probability, by vector; and computed
-        values, SI, by ``NAME_value``
+        values, SI, by ``NAME_value``, moments with their sign and ``NAME_sense``: 1, -1 or 0
     swapped : exchanged letters; the figures keep the construction's names
     """
 

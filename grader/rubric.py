@@ -272,9 +272,15 @@ class RubricFile(Authored):
         return tuple(criterion.value for criterion in self.criterion if criterion.value)
 
     @property
+    def moments(self) -> tuple[str, ...]:
+        """The moments that are asked for, or whose sense is."""
+        names = (one.moment or one.sense or "" for one in self.criterion)
+        return tuple(dict.fromkeys(name for name in names if kind_of(name).name == "moment"))
+
+    @property
     def entries(self) -> tuple[str, ...]:
         """The numbers that have cells on a printed sheet: lengths of vectors, and ``NAME_value``."""
-        return (*self.vectors, *map(value_name, self.values))
+        return (*self.vectors, *map(value_name, (*self.values, *self.moments)))
 
     @property
     def needs_accelerations(self) -> bool:

@@ -275,6 +275,12 @@ class Mechanism:
         added = (joint for group in self.groups for joint in joints_of(group))
         return (*self.ground_m, self.driver.pin, *added)
 
+    @property
+    def dots(self) -> frozenset[str]:
+        """The centres of mass that are no joints: a sketch has dots there, and no bars to them."""
+        hinged = {member.points[0] for _, member, _ in members(self)}
+        return frozenset(one.centre for one in self.bodies if one.centre == f"S{one.link}") - hinged
+
     def is_ground(self, joint: str) -> bool:
         """Return whether a joint is fixed to the ground."""
         return joint in self.ground_m

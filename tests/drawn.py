@@ -144,8 +144,8 @@ pin = "A"
 pivot = "O2"
 link = "3"
 """
-WITH_FORCES = (*MECHANISMS, "every group", "cylinder")
-"""Mechanisms that `loaded` gives bodies; a cylinder that drives has none."""
+WITH_FORCES = (*MECHANISMS, "every group", "cylinder", "light cylinder")
+"""Mechanisms that `loaded` gives bodies, all but a light cylinder that drives."""
 
 
 @cache
@@ -154,7 +154,7 @@ def loaded(case, folder, *, own):
     head, _, inner = (_HEAD + MECHANISMS.get(case, "")).partition("[mechanism]")
     if case == "every group":
         inner = every_group.MECHANISM.replace("40 + n", "43")
-    inner += CYLINDER if case == "cylinder" else ""
+    inner += CYLINDER if case.endswith("cylinder") else ""
     name = f"f{WITH_FORCES.index(case)}{'own' if own else ''}"
     head = head.format(name=name).replace("[scales]", "[scales]\nkF = 5")
     text = f"{head}[mechanism]{inner.replace('{{', '{').replace('}}', '}').replace('{name}', name)}"
@@ -171,7 +171,9 @@ def loaded(case, folder, *, own):
         text += '\n[[page]]\nkind = "acceleration"\nfigures = ["mechanism", "acceleration_plan"]\n'
     text = text.replace("[scales]", "gravity = 9.81\n[scales]")
     loaded_links = {
-        link: points for link, points in points_of(mechanism).items() if cylinder is None or link == "1"
+        link: points
+        for link, points in points_of(mechanism).items()
+        if case != "light cylinder" or link == "1"
     }
     for link, points in loaded_links.items():
         centre = "" if link.startswith(SLIDER) else f'centre = "{points[-1]}"'

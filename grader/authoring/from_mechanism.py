@@ -324,7 +324,9 @@ def _rubric(
 
 def with_forces(rubric: str, assignment: Assignment) -> str:
     """Return a rubric's text with criteria for all that an assignment's pages show, in place of its own."""
-    blocks = [block.rstrip("\n") for block in rubric.split("\n\n") if "[[criterion]]" not in block]
+    kept = [block.partition("[[criterion]]") for block in rubric.split("\n\n")]
+    # Of a block with a criterion, the keys before it; remarks alone are about criteria.
+    blocks = [head.rstrip("\n") for head, cut, _ in kept if not cut or re.search("(?m)^[^#\n]", head)]
     asked = [KEYS_OF_A_CRITERION, *(_criterion(*one) for one in _criteria(assignment))]
     return "\n\n".join([*blocks, *asked]) + "\n"
 

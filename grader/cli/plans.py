@@ -137,7 +137,9 @@ def _table_of_forces(forces: ForcesDocument) -> "Table":
     for link, one in forces.inertia.items():
         row = (four_digits(one.force_N), direction(one.direction_deg), four_digits(one.moment_Nm))
         table.add_row(f"inertia of {link}", one.at, *row)
-    for name, joint in (*forces.joints.items(), *forces.guides.items()):
+    # A further hinge at a joint has the link in its name, too: B_4.
+    joints = ((name.partition("_")[0], joint) for name, joint in forces.joints.items())
+    for name, joint in (*joints, *forces.guides.items()):
         moment = four_digits(joint.moment_Nm) if isinstance(joint, GuideDocument) else ""
         row = (four_digits(joint.value_N), direction(joint.direction_deg), moment)
         table.add_row(f"{joint.by} on {joint.on}", name, *row)

@@ -138,8 +138,9 @@ def _suggest_scales(name: str, roster: Path) -> None:
         terminal.say(f"  {variant}: {line}", err=True)
     if len(lines) > SHOWN_VARIANTS:
         terminal.say(f"  ... and {counted(len(lines) - SHOWN_VARIANTS, 'more variant')}", err=True)
+    names = ", ".join(assignment.scale_names)
     terminal.say(
-        "  to be written into the scale boxes by the student, or into the roster (kL, kv, ka)", err=True
+        f"  to be written into the scale boxes by the student, or into the roster ({names})", err=True
     )
 
 

@@ -492,7 +492,8 @@ def _is_not_drawn(task: Task, evidence: Evidence, name: str, length_mm: float) -
 def _rate(charges: Charges, criterion: CriterionTable) -> Outcome:
     """An angular quantity, a moment, or its sense, against the exact one, then what the own drawing gives.
 
-    That of the driving link follows from the data alone.
+    That of the driving link follows from the data alone. One read in a sheet's cells that is off goes to a
+    person, as a computed value does.
     """
     task, following, values = charges.task, charges.following, charges.evidence.values
     name, unit = criterion.turning or "", unit_of(criterion.turning or "")
@@ -523,10 +524,16 @@ def _rate(charges: Charges, criterion: CriterionTable) -> Outcome:
         if candidate.is_better(mark):
             right, followed = one.vector.real * per_mm, True
             mark = the_better(candidate, mark, *charges.why(one))
+    read = charges.evidence.sure
+    sure = min(read.get(f"{name}_sense", 1.0), 1.0 if criterion.sense else read.get(name, 1.0))
+    mark = with_confidence(mark, sure, task.rubric.doubt.settle)
     if criterion.sense is not None:
         return outcome_of(criterion, mark, Quantity(), Quantity(), Tolerance(), followed=followed)
+    if name in read and not mark.is_full:
+        mark = open_between(NONE, FULL, mark, Reason("cells_off"), sure=sure)
     measured, expected = Quantity(value=value, unit=unit), Quantity(value=right, unit=unit)
-    return outcome_of(criterion, mark, measured, expected, held.allowed(exact), followed=followed)
+    allowed = held.allowed(exact)
+    return outcome_of(criterion, mark, measured, expected, allowed, confidence=sure, followed=followed)
 
 
 def _uncertainty_of(charges: Charges, name: str, per_mm: float) -> EndSpread:

@@ -86,7 +86,7 @@ class Evidence:
     refused : what was entered by hand for a vector, angular quantity or scale and cannot be used, by name
     remarks : what to say where the length in the sheets' cells is another, by vector
     verdicts : what a person decided of what waited, by name
-    sure : the probability that a value was read rightly in a sheet's cells, by vector; others were entered
+    sure : the probability that a value was read rightly in a sheet's cells, by name; others were entered
     """
 
     drawn: Mapping[str, DrawnVector]
@@ -118,8 +118,10 @@ def gather(task: Task, submission: Submission) -> Evidence:
     measured = _measured(task, submission.measured)
     own = sheets.nodes if submission.readings else _nodes_from(task, measured)
     written = {name: one for reading in submission.readings for name, one in reading.lengths.items()}
-    values = {name: written[value_name(name)] for name in task.rubric.values if value_name(name) in written}
     entered, least = submission.values, task.rubric.least_confidence
+    columns = {value_name(name): name for name in (*task.rubric.values, *task.rubric.moments)}
+    columns |= {(sense := f"{name}_sense"): sense for name in task.rubric.moments if name not in entered}
+    values = {name: written[column] for column, name in columns.items() if column in written}
     drawn, remarks = {}, {}
     for name, one in sheets.drawn.items():
         table = task.rubric.tolerance_of(name)

@@ -12,6 +12,7 @@ from grader.language import N_, SIDES, Tongue, symbols, tongue
 from grader.printed.layout import (
     CALIBRATION,
     CODE_MM,
+    PAGE_MM,
     SCALE_BOXES,
     TENTH_CELLS,
     Layout,
@@ -30,6 +31,7 @@ from grader.printed.layout import (
     page_construction,
     poles_mm,
     position_zones,
+    values_asked,
     values_of,
 )
 from grader.printed.pdf import (
@@ -40,6 +42,7 @@ from grader.printed.pdf import (
     fitted,
     number,
     pieces_width_mm,
+    put_shapes,
     runs,
     unprintable,
     width_mm,
@@ -49,8 +52,9 @@ from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, Ide
 from grader.tables.roster import RosterRow
 from reference.authored.assignment import Assignment, PageKind, PageTable, Variant
 from reference.drawing.canvas import Piece, pieces_of, scale_pieces
+from reference.drawing.symbols import sense
 from reference.errors import AuthoredFileError, CallError, Finding
-from reference.quantities import FORCE_PLANS, scale_of, unit_of, value_name
+from reference.quantities import FORCE_PLANS, scale_of, unit_of
 
 # One page -----------------------------------------------------------------------------------------
 
@@ -82,9 +86,9 @@ _CLEAR_MM: Box = (289.0, 43.0, 118.0, 6.0)
 _MEASURED = N_(
     "Lengths measured on the drawing, in millimetres with one decimal: one digit in each cell, nothing else"
 )
-_MEASURED_AT_MM = (39.0, 265.2)
 _COMPUTED = N_("Values computed from them, in the unit beside the cells; the last cells may stay empty")
-_COMPUTED_AT_MM = (39.0, 268.2)
+_TICKED = N_("Tick the sense of the moment")
+_CELLS_AT_MM = (39.0, 265.2)
 _TICK_MM = 5.0
 """Long enough to be seen, too short to be taken for a stroke."""
 _POLE_MM = (2.0, 4.5)
@@ -129,7 +133,7 @@ class PageForm:
     template : the page's
     fields : boxes to write in, by scale or vector
     poles : the names of the plans' poles, by figure
-    values : places of computed values, by vector
+    values : places of computed values, by vector or moment
     positions : the zone of each position where the page has all of them, else empty
     """
 
@@ -164,6 +168,7 @@ def draw_page(
         _pole(drawing, at, name)
     _fields(drawing, assignment, form.fields, tongue)
     _values(drawing, assignment, form.values, tongue)
+    _about_cells(drawing, form, tongue)
     draw_ruler(drawing, tongue)
     drawing.next_page()
 
@@ -301,16 +306,12 @@ def _fields(drawing: PdfDrawing, assignment: Assignment, fields: dict[str, Box],
             drawing.box(box, 0.25)
         else:
             _comb(drawing, box, tongue)
-    if fields.keys() - SCALE_BOXES.keys():
-        drawing.text(_MEASURED_AT_MM, tongue.gettext(_MEASURED), 6.5, REGULAR, GREY)
 
 
 def _values(
     drawing: PdfDrawing, assignment: Assignment, values: Mapping[str, ValuePlace], tongue: Tongue
 ) -> None:
-    """Draw the cells for computed values, each with its vector and unit."""
-    if values:
-        drawing.text(_COMPUTED_AT_MM, tongue.gettext(_COMPUTED), 6.5, REGULAR, GREY)
+    """Draw the cells for computed values, each with its name and unit, and a moment's two senses to tick."""
     for name, place in values.items():
         x, y, _, h = place.box
         unit = Piece(f", {tongue.unit(unit_of(name))}")
@@ -318,6 +319,18 @@ def _values(
         wide = pieces_width_mm(label, REGULAR, _VALUE_PT)
         drawing.pieces((x - wide - 0.6, y + 0.7 * h), label, _VALUE_PT)
         _comb(drawing, place.box, tongue, place.decimals)
+        for box, sign in zip(place.senses, (1.0, -1.0), strict=False):
+            drawing.box(box, 0.25)
+            at = complex(box[0] - 2.6, -(box[1] + box[3] / 2.0))
+            put_shapes(drawing.canvas, sense(at, sign), (0.0, PAGE_MM[1] * mm), mm)
+
+
+def _about_cells(drawing: PdfDrawing, form: PageForm, tongue: Tongue) -> None:
+    """Say above the foot what is written into the page's cells."""
+    told = [_MEASURED] if form.fields.keys() - SCALE_BOXES.keys() else []
+    told += [_COMPUTED] if form.values else []
+    told += [_TICKED] if any(place.senses for place in form.values.values()) else []
+    drawing.text(_CELLS_AT_MM, ". ".join(map(tongue.gettext, told)), 6.5, REGULAR, GREY)
 
 
 def _comb(drawing: PdfDrawing, box: Box, tongue: Tongue, decimals: int = TENTH_CELLS) -> None:
@@ -377,7 +390,7 @@ def make_sheets(
     rows : their `lang`, if given, overrides `lang`
     roster : the file's name, for messages
     asked : the vectors that have a box for the measured length, all by default; and ``NAME_value`` of those
-        that have a place for the computed value
+        vectors and moments that have a place for the computed value
 
     Raises AuthoredFileError with every row whose n or position the assignment does not have.
     """
@@ -450,7 +463,7 @@ def _forms(
             known: dict[str, Value] = {"form": table.kind, "lengths": len(names)}
             problems.append(Reason("sheet_boxes", known, str(assignment.path)))
         values = values_of(assignment, figures, asked or ())
-        wanted = [name for name in names if value_name(name) in (asked or ())]
+        wanted = [] if table.grid else values_asked(assignment, table, construction, asked or ())
         if len(values) < len(wanted):
             known = {"form": table.kind, "values": tuple(one for one in wanted if one not in values)}
             problems.append(Reason("sheet_values", known, str(assignment.path)))

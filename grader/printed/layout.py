@@ -14,7 +14,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from grader.records import ACCELERATION_PLAN, MECHANISM, VELOCITY_PLAN, Box, FloatArray, Identity
-from reference.authored.assignment import SCALE_NAMES, Assignment, PageKind, PageTable, Scales, Variant
+from reference.authored.assignment import SCALE_NAMES, Assignment, PageKind, PageTable, Variant
+from reference.construction.elements import View
 from reference.construction.graph import Construction, Vector, evaluate
 from reference.drawing.canvas import A3_MM
 from reference.geometry import ComplexArray
@@ -92,6 +93,8 @@ _CELL_GAP_MM, _MARK_GAP_MM = 0.6, 2.2
 _CELL_MOST_MM = 5.2
 _LEAST_VALUE_MM, _VALUE_WIDE_MM, _HEADROOM = 4.0, 25.4, 1.1
 """Cells for computed values: least height, width, and ratio of the largest value to the exact one."""
+_TICK_MM, _TICKS_FROM_MM = 4.5, (6.5, 18.0)
+"""Side of the boxes to tick for the two senses of a moment; their left edges, from the end of its cells."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -276,15 +279,6 @@ def measured_on(construction: Construction, figures: Sequence[str]) -> list[Vect
     ]
 
 
-def written_cells(
-    assignment: Assignment, figures: Sequence[str], asked: Collection[str]
-) -> tuple[dict[str, tuple[Box, ...]], dict[str, int]]:
-    """Return the cells of lengths and values on a page with these figures, and the decimals of values."""
-    values = {value_name(name): one for name, one in values_of(assignment, figures, asked).items()}
-    cells = cells_of(assignment, figures, asked) | {name: one.cells for name, one in values.items()}
-    return cells, {name: one.decimals for name, one in values.items()}
-
-
 def _single(assignment: Assignment, figures: Sequence[str]) -> PageTable | None:
     """Return the page with these figures or zones, if it has them for one position."""
     zones = set(map(zone_of, figures))
@@ -347,18 +341,22 @@ class MarkerPlace(_Document):
 
 
 class ValuePlace(_Document):
-    """The place of a vector's computed value: its box, and its cells from the left, the last for decimals."""
+    """The place of a computed value: its box, and its cells from the left, the last for decimals.
+
+    `senses` are the boxes to tick for the sense of a moment: counter-clockwise, clockwise.
+    """
 
     box: Box
     decimals: int
     cells: tuple[Box, ...]
+    senses: tuple[Box, ...] = ()
 
 
 class PageLayout(_Document):
     """The positions of everything on the pages of one kind. `zones` holds the figures' boxes and `fields`.
 
     `cells` holds, for each box of `fields` in which a measured length is written (millimetres), its cells
-    from the left: three digits, then the tenths; `values` the places of computed values, by vector;
+    from the left: three digits, then the tenths; `values` the places of computed values, by vector or moment;
     `positions` the zone of each position where one sheet has all.
     """
 
@@ -423,7 +421,7 @@ def places_mm(
     (nodes, variants) complex millimetres by figure, y up; a sketch's about its own origin.
     """
     construction = page_construction(assignment, figures)
-    _, nodes = _drawn(assignment, construction, variants)
+    nodes = _drawn(assignment, construction, variants).nodes
     return {
         figure: np.stack(
             [np.broadcast_to(nodes[step.node], (len(variants),)) for step in construction.figures[figure]]
@@ -432,22 +430,33 @@ def places_mm(
     }
 
 
-def _drawn(
-    assignment: Assignment, construction: Construction, variants: list[Variant]
-) -> tuple[Scales, Mapping[str, ComplexArray]]:
-    """Return the assignment's own scales, and all nodes drawn at them."""
-    scales = assignment.scales(variants)
-    return scales, evaluate(construction, parameters_for(assignment, variants, scales))
+def _drawn(assignment: Assignment, construction: Construction, variants: list[Variant]) -> View:
+    """Return the data of variants at the assignment's own scales, and all nodes drawn at them."""
+    known = parameters_for(assignment, variants, assignment.scales(variants))
+    return View(evaluate(construction, known), known)
+
+
+def values_asked(
+    assignment: Assignment, table: PageTable, construction: Construction, asked: Collection[str]
+) -> list[str]:
+    """Return the vectors of a page whose computed value is asked for, and the moments after its force plans.
+
+    A moment follows from all force plans: it stands on the last page that has any.
+    """
+    with_forces = [page for page in assignment.file.page if any(map(group_of, page.figures))]
+    moments = construction.moments if table in with_forces[-1:] else ()
+    names = [vector.name for vector in measured_on(construction, table.figures)]
+    return [name for name in (*names, *moments) if value_name(name) in asked]
 
 
 def values_of(
     assignment: Assignment, figures: Sequence[str], asked: Collection[str]
 ) -> dict[str, ValuePlace]:
-    """Return the places for the requested values on a page with these figures, by vector.
+    """Return the places for the requested values on a page with these figures, by vector or moment.
 
-    A value stands below its vector's length where the lengths fill one row, else in place of a scale that the
-    page does not have; where that is not room for all there are none. Each has as many cells before the mark
-    as the largest one of all variants.
+    A value stands below its vector's length where the lengths fill one row, else, as a moment, in place of a
+    scale that the page does not have; where there is not room for all vectors they have none, nor for a
+    moment behind them. Each has as many cells before the mark as the largest one of all variants.
 
     Arguments: `asked` as `RubricFile.entries`, ``v_B_value`` for the value of v_B.
     """
@@ -456,25 +465,35 @@ def values_of(
         return {}
     construction, variants = page_construction(assignment, table.figures), assignment.variants()
     vectors = {vector.name: vector for vector in measured_on(construction, table.figures)}
-    wanted = [name for name in vectors if value_name(name) in asked]
+    wanted = values_asked(assignment, table, construction, asked)
     boxes = field_boxes(tuple(vectors)) if wanted and len(vectors) <= EASY_FIELDS else {}
     below = max((y + high for _, y, _, high in boxes.values()), default=np.inf) + _FIELD_GAP_MM
     left_mm = _FIELD_TOP_MM + _FIELD_HEIGHT_MM - below
-    if left_mm >= _LEAST_VALUE_MM:
-        places = {name: (boxes[name][0], below, boxes[name][2], left_mm) for name in wanted}
-    else:
-        used = {SCALE_BOXES[scale_of(figure)] for figure in table.figures}
-        free = [box for box in dict.fromkeys(SCALE_BOXES.values()) if box not in used]
-        rows = [(x, y, _VALUE_WIDE_MM, _FIELD_MOST_MM) for x, y, _, _ in free[: len(wanted)]]
-        places = dict(zip(wanted, rows, strict=True)) if len(wanted) == len(rows) else {}
-    found, (scales, nodes) = {}, _drawn(assignment, construction, variants)
+    is_room = left_mm >= _LEAST_VALUE_MM
+    places = {
+        name: (boxes[name][0], below, boxes[name][2], left_mm) for name in wanted if is_room and name in boxes
+    }
+    used = {SCALE_BOXES[scale_of(figure)] for figure in table.figures}
+    free = [box for box in dict.fromkeys(SCALE_BOXES.values()) if box not in used]
+    for kind in (vectors, construction.moments):
+        some = [name for name in wanted if name in kind and name not in places]
+        if len(some) <= len(free):
+            rows = [(x, y, _VALUE_WIDE_MM, _FIELD_MOST_MM) for x, y, _, _ in free[: len(some)]]
+            places, free = places | dict(zip(some, rows, strict=True)), free[len(some) :]
+    found, view = {}, _drawn(assignment, construction, variants)
     for name, (x, y, w, h) in places.items():
-        one = vectors[name]
-        most = float(np.nanmax(np.abs(nodes[one.head] - nodes[one.tail]) * getattr(scales, one.scale)))
+        moment, middle = construction.moments.get(name), y + (h - _TICK_MM) / 2.0
+        ticks = tuple((x + w + right, middle, _TICK_MM, _TICK_MM) for right in _TICKS_FROM_MM)
+        if moment is not None:
+            most = np.nanmax(np.abs(moment.at(view)))
+        else:
+            drawn = view.nodes[vectors[name].head] - view.nodes[vectors[name].tail]
+            most = np.nanmax(np.abs(drawn * view.parameters[vectors[name].scale]))
         decimals = WHOLE_CELLS + TENTH_CELLS - len(str(int(_HEADROOM * most)))
         if decimals >= 0:
             box = (x, round(y, 3), w, round(h, 3))
-            found[name] = ValuePlace(box=box, decimals=decimals, cells=comb_cells(box, decimals))
+            cells = comb_cells(box, decimals)
+            found[name] = ValuePlace(box=box, decimals=decimals, cells=cells, senses=ticks if moment else ())
     return found
 
 

@@ -189,8 +189,7 @@ def xy(values: ComplexArray) -> FloatArray:
 def links_of(construction: Construction) -> tuple[Edge, ...]:
     """Return the links of a mechanism sketch: every bar that its steps draw between two joints."""
     index = {step.node: row for row, step in enumerate(construction.figures[MECHANISM])}
-    drawn = [pair for pair in bars(construction) if construction.dots.isdisjoint(pair)]
-    return tuple(Edge(f"{tail}{head}", index[tail], index[head]) for tail, head in drawn)
+    return tuple(Edge(f"{tail}{head}", index[tail], index[head]) for tail, head in bars(construction))
 
 
 def vectors_of(construction: Construction, figure: str, absent: Iterable[str] = ()) -> tuple[Edge, ...]:

@@ -352,11 +352,12 @@ def look_of(session: Session, student: Student, criterion: CriterionDocument) ->
 def _cells_box(session: Session, page: ScannedPage, criterion: CriterionDocument) -> Box | None:
     """Return the part of a printed sheet around the cells for a computed value; None if it has none."""
     zones, batch = () if page.sheet is None else tuple(page.sheet.zones), session.batch
-    place = values_of(batch.assignment, zones, batch.rubric.entries).get(criterion.value or "")
-    if place is None:
+    name = criterion.value or (criterion.vector or "").removesuffix("_sense")
+    place = values_of(batch.assignment, zones, batch.rubric.entries).get(name)
+    if place is None or not (criterion.value or place.senses):
         return None
-    x, y, wide, high = place.box
-    return box_around([(x, y), (x + wide, y + high)], LOOK_MARGIN_MM, LEAST_LOOK_MM, PAGE_MM)
+    ends = [at for x, y, wide, high in (place.box, *place.senses) for at in ((x, y), (x + wide, y + high))]
+    return box_around(ends, LOOK_MARGIN_MM, LEAST_LOOK_MM, PAGE_MM)
 
 
 def sheet_facts(session: Session, student: Student, sheet: int) -> Facts:

@@ -375,6 +375,10 @@ MEET = N_(
     "From the end of %(last)s draw a line %(first_direction)s for %(first)s, and from the beginning of the "
     "plan a line %(second_direction)s for %(second)s. Where they meet, %(first)s ends and %(second)s begins."
 )
+MEET_HERE = N_(
+    "From the end of %(last)s draw a line %(first_direction)s for %(first)s, and from the end of %(other)s a "
+    "line %(second_direction)s for %(second)s. Both end where they meet."
+)
 CLOSING = N_("%(name)s closes the polygon.")
 INNER = N_("%(name)s runs from the end of %(other)s to the same point.")
 
@@ -392,8 +396,10 @@ def force(speaker: Speaker, step: Given | TwoLines, *, with_numbers: bool = True
         lines = [line for line in (step.first, step.second) if isinstance(line, Line)]
         drawn = {ends[line.through, step.node] for line in lines}
         first, second = (speaker.line_direction(line.along) for line in lines)
+        is_closing = lines[1].through in construction.poles.values()
         told = speaker.say(
-            MEET, last=_ending(lines[0].through, vectors), first_direction=first, second_direction=second,
+            MEET if is_closing else MEET_HERE, other=_ending(lines[1].through, vectors),
+            last=_ending(lines[0].through, vectors), first_direction=first, second_direction=second,
             first=ends[lines[0].through, step.node], second=ends[lines[1].through, step.node],
         )  # fmt: skip
     closing = [

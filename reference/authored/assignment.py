@@ -614,9 +614,13 @@ def _check_force_plans(assignment: Assignment) -> Iterator[Finding]:
     if "kF" not in assignment.scale_names:
         return
     if assignment.file.scales.kF is None:
-        yield Finding("$.scales.kF", "is missing: a page shows a force plan")
+        detail = 'a page shows a force plan. Write it in N/mm: kF = 50, or "force / 60"'
+        yield Finding("$.scales.kF", f"is missing: {detail}")
     mechanism = assignment.mechanism(assignment.variants()[:1])
-    joints = [group.node for group in reversed(mechanism.groups) if members_of(group)]
+    # A cylinder that drives stands in the plan of its crank.
+    driving = getattr(mechanism.driver, "cylinder", None)
+    groups = [group for group in reversed(mechanism.groups) if members_of(group)]
+    joints = [group.node for group in groups if driving is None or getattr(group, "link", "") != driving]
     known = ", ".join(f"{FORCE_PLAN}{joint}" for joint in (*joints, mechanism.driver.pin))
     for index, page in enumerate(assignment.file.page):
         others = {zone_of(figure) for figure in page.figures} - {FORCE_PLANS, "mechanism"}

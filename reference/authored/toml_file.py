@@ -333,6 +333,8 @@ def _not_known(name: str, model: type[BaseModel], given: object) -> str:
     schema = model.model_json_schema()
     tables = (schema, *schema.get("$defs", {}).values())
     fields = {field for table in tables for field in table.get("properties", ())}
+    if name in schema.get("properties", ()) and not isinstance(given, dict | list):
+        return "belongs to the file, not to this table: write it above the first [table]"
     if name in fields:
         return "does not belong here: another kind of table has it; leave it out"
     if other := _other_kind(name):

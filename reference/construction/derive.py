@@ -323,7 +323,8 @@ def _write_down(
     images = {node: step for node, step in draft.images.items() if node in keep}
     links = [draft.vectors[name] for name in _in_order(draft) if name in draft.vectors]
     pairs = tuple(dict.fromkeys(one.link for one in links if one.link and one.part != "r"))
-    whole = Construction(figures, poles, vectors, rates, images, _centres(draft, rates), pairs)
+    centres, dots = _centres(draft, rates), mechanism.dots
+    whole = Construction(figures, poles, vectors, rates, images, centres, pairs, dots)
     return whole if forces is None else with_force_plans(mechanism, whole, forces)
 
 

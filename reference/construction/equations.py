@@ -183,6 +183,9 @@ def _closed(ends: _Ends, figure: str) -> Iterator[Equation]:
             total = [replace(terms[name], is_negative=backwards) for name, backwards in way]
             drawn = {one.head for one in (*total, term) if not one.is_drawn}
             nodes = tuple(step.node for step in construction.figures[figure] if step.node in drawn)
+            if total[0].is_negative:
+                # A sum begins with a term that is not subtracted.
+                total = sorted(total, key=lambda one: one.is_negative)
             yield Equation(None, ((*total, term),), nodes)
             known = [(one, replace(its, is_drawn=True)) for one, its in known]
 

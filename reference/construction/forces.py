@@ -70,7 +70,7 @@ def with_force_plans(mechanism: Mechanism, plans: Construction, accelerations: A
     }
     if accelerations == "given":
         sketch = {"mechanism": plans.figures["mechanism"]}
-        plans = Construction(sketch, {}, {}, {}, pairs=plans.pairs)
+        plans = Construction(sketch, {}, {}, {}, pairs=plans.pairs, dots=plans.dots)
     return replace(
         plans,
         figures={**plans.figures, **figures},
@@ -170,7 +170,7 @@ class ForcePlans:
     names: dict[str, str] = field(init=False)
     turning: dict[str, tuple[str, str, str]] = field(init=False)
     cylinder: SlottedLink | None = field(init=False)
-    """The group of the cylinder that drives the crank, without mass: its thrust, F_b, balances the crank."""
+    """The group of the cylinder that drives the crank: its thrust, F_b, balances the crank."""
 
     def __post_init__(self) -> None:
         self.links, self.carriers = named_links(self.mechanism), carriers(self.mechanism)
@@ -248,7 +248,7 @@ class ForcePlans:
         polygon = self._polygon(group.node)
         match group:
             case Dyad():
-                self._dyad(polygon, group)
+                self._two_links(polygon, group.pins, group.links, group.node)
             case Slider():
                 self._slider(polygon, group)
             case SlottedLink():
@@ -302,8 +302,12 @@ class ForcePlans:
         self.on(carrier).forces.append(Force(name, size, along, joint))
         self.on(carrier).couples.extend(couples)
 
-    def _dyad(self, polygon: Polygon, group: Dyad) -> None:
-        (p, q), (link_p, link_q), inner = group.pins, group.links, group.node
+    def _two_links(self, polygon: Polygon, pins: Ends, links: Ends, inner: str, hinged: str = "") -> str:
+        """Close the polygon of two links hinged together at `inner`; return the node that closes it.
+
+        Arguments: `hinged` is the part of the first link that is hinged there, by default that link.
+        """
+        (p, q), (link_p, link_q) = pins, links
         start = polygon.start()
         second = self._part_across(polygon, start, link_p, (p, inner))
         middle = polygon.lay_all(second, self.on(link_p).forces)
@@ -314,7 +318,8 @@ class ForcePlans:
         self._closed_at(polygon, link_p, (p, inner), (start, second, closed), back=True)
         if middle not in {start, end}:
             # Without forces on either link, the other's reaction passes through it.
-            polygon.add(self.reaction(link_q, link_p), middle, closed, link=(p, inner))
+            polygon.add(self.reaction(link_q, hinged or link_p), middle, closed, link=(p, inner))
+        return closed
 
     def _slider(self, polygon: Polygon, group: Slider) -> None:
         pin, inner, (rod, slider) = group.pin, group.node, self.links[group.node]
@@ -399,8 +404,29 @@ class ForcePlans:
 
     # The driving link ----------------------------------------------------------------------------
 
+    def _cylinder(self, group: SlottedLink, driver: Crank) -> None:
+        """Write down the plan of a cylinder on which forces act, and of its crank: of two links and a joint.
+
+        The thrust is the part along the cylinder of the force between its tube and its rod.
+        """
+        polygon, (tube, rod), axis = self._polygon(driver.pin), self.links[group.node], slot_axis(group)
+        own, of_rod = self.on(tube), self.on(rod)
+        whole = Loaded([*own.forces, *of_rod.forces], [*own.couples, *of_rod.couples])
+        self.loaded |= {tube: whole, rod: Loaded()}
+        pivots = group.pivot, driver.pivot
+        closed = self._two_links(polygon, pivots, (tube, driver.link), driver.pin, hinged=rod)
+        after = polygon.steps[1 + len(own.forces)].node
+        foot = polygon.close(Line(closed, axis), Line(after, replace(axis, quarters=axis.quarters + 1)))
+        polygon.add("F_b", closed, foot)
+        polygon.add(self.reaction(rod, tube), after, foot)
+
     def _driver(self, driver: Driver) -> None:
-        here = self.on(driver.link)
+        here, cylinder = self.on(driver.link), self.cylinder
+        if cylinder is not None and isinstance(driver, Crank):
+            moved = [self.on(link) for link in self.links[cylinder.node]]
+            if any(one.forces or one.couples for one in moved):
+                self._cylinder(cylinder, driver)
+                return
         if not here.forces and not here.couples:
             return
         polygon = self._polygon(driver.pin)
@@ -408,10 +434,10 @@ class ForcePlans:
         end = polygon.lay_all(start, here.forces)
         name = self.reaction(GROUND, driver.link)
         if isinstance(driver, Crank):
-            if self.cylinder is None:
+            if cylinder is None:
                 self.moments["M_b"] = here.about(driver.pivot)
             else:
-                along = slot_axis(self.cylinder)
+                along = slot_axis(cylinder)
                 balance = Balance(driver.pin, along, here.about(driver.pivot))
                 end = polygon.lay(end, Force("F_b", balance, along, driver.pin))
             if end != start:

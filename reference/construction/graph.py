@@ -216,6 +216,7 @@ class Construction:
     centres : on the sketch, by Mehmke's similarity from the finished plans: instantaneous centres (``I3``)
         and acceleration poles (``J3``) of links that turn about no fixed pivot
     pairs : the joints between which links, slots and slides run, from the earlier joint
+    dots : as `reference.mechanism.Mechanism.dots`
     moments : the balancing moment (``M_b``) of what acts on the driving link, N m
     acting : what acts on each link but the reactions of its own group: given, or taken over
     """
@@ -227,6 +228,7 @@ class Construction:
     images: Mapping[str, Similar] = field(default_factory=dict)
     centres: Mapping[str, Similar] = field(default_factory=dict)
     pairs: tuple[tuple[str, str], ...] = ()
+    dots: frozenset[str] = frozenset()
     moments: Mapping[str, Moments] = field(default_factory=dict)
     acting: Mapping[str, tuple[Force | Couple, ...]] = field(default_factory=dict)
 
@@ -234,16 +236,6 @@ class Construction:
     def steps(self) -> tuple[Step, ...]:
         """All steps in order."""
         return tuple(step for steps in self.figures.values() for step in steps)
-
-    @cached_property
-    def dots(self) -> frozenset[str]:
-        """The centres of mass that are no joints: a sketch has dots there, and no bars to them."""
-        return frozenset(
-            force.point
-            for link, acting in self.acting.items()
-            for force in acting
-            if isinstance(force, Force) and force.point == f"S{link}"
-        )
 
     @cached_property
     def _by_node(self) -> dict[str, tuple[str, Step]]:
@@ -398,6 +390,7 @@ def bars(construction: Construction) -> tuple[tuple[str, str], ...]:
     return tuple(
         (start, step.node)
         for step in construction.figures["mechanism"]
+        if step.node not in construction.dots
         for start in _starts(step, construction)
     )
 

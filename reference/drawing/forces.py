@@ -67,9 +67,15 @@ class Acting:
 
 
 def links_of_plan(subject: Subject, figure: str) -> tuple[str, ...]:
-    """Return the links whose forces a force plan shows: of its group, or the driving link."""
-    mechanism = subject.plan.mechanism
-    return named_links(mechanism).get(group_of(figure), (mechanism.driver.link,))
+    """Return the links whose forces a force plan shows: of its group, or the driving link.
+
+    With that link come those of the cylinder that drives it, if forces act on them.
+    """
+    mechanism, named = subject.plan.mechanism, named_links(subject.plan.mechanism)
+    cylinder = getattr(mechanism.driver, "cylinder", None)
+    moved = next((links for links in named.values() if links[:1] == (cylinder,)), ())
+    is_loaded = any(subject.plan.construction.acting.get(link) for link in moved)
+    return named.get(group_of(figure), (*(moved if is_loaded else ()), mechanism.driver.link))
 
 
 def acting_on(subject: Subject, figure: str) -> list[Acting]:
@@ -106,9 +112,12 @@ def _reactions(subject: Subject, figure: str) -> Iterator[Acting]:
     told = [vector for vector in plan.construction.vectors_of(figure) if not vector.is_sum]
     known = [places[name] for vector in told if (name := whole(vector)) in places]
     outer = {joint for joint, _, by, _ in known if by not in links}
+    # Of a cylinder and its crank together no inner force is shown: neither the thrust nor that of its tube.
+    inside = {*links, ""} if len(links) > 2 else set[str]()
     for vector in told:
         joint, on, by, away = places.get(whole(vector), (driver.pin, driver.link, "", 0j))
-        if on in links and (by not in links or joint not in outer) and not subject.is_zero(vector.name):
+        is_shown = on in links and by not in inside and (by not in links or joint not in outer)
+        if is_shown and not subject.is_zero(vector.name):
             force = subject.vector(plan.vectors_si[vector.name])
             yield Acting(vector.name, on, joint, force, is_found=True, aside_m=away)
     if group_of(figure) == driver.pin:
@@ -186,9 +195,11 @@ def _links(subject: Subject, links: Sequence[str], group: str, nodes: dict[str, 
         if isinstance(one, Plate) and one.link in links:
             yield Area(tuple(point(nodes[corner]) for corner in (*one.base, one.node)), PLATE_FILL)
     own = [bar for bar in bars(subject, nodes) if _is_of(bar, links, group)]
-    driver = subject.plan.mechanism.driver.pin
+    mechanism = subject.plan.mechanism
+    moved = {node for node, added in named_links(mechanism).items() if added and {*added} <= {*links}}
+    moved |= {mechanism.driver.pin} if mechanism.driver.link in links else set()
     for block in blocks(subject, nodes):
-        if block.node == group or (block.node == driver and links == (subject.plan.mechanism.driver.link,)):
+        if block.node in moved:
             reach = 2.0 * symbols.BLOCK_MM[0] * block.along
             yield symbols.axis(block.at - reach, block.at + reach)
             yield symbols.block(block.at, block.along)

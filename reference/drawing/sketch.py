@@ -204,26 +204,30 @@ def _link_numbers(subject: Subject, nodes: dict[str, complex]) -> Iterator[Wante
             driver.pin, point(nodes[driver.pin]), driver.link, LINK_NUMBER_MM, INK, symbols.BLOCK_MM[1],
             italic=False,
         )  # fmt: skip
-    plates = {group.link for group in subject.plan.mechanism.groups if isinstance(group, Plate)}
+    groups, dots = subject.plan.mechanism.groups, subject.plan.construction.dots
+    plates = {group.link for group in groups if isinstance(group, Plate) and group.node not in dots}
     stretches: dict[str, list[Bar]] = {}
     for bar in bars(subject, nodes):
         stretches.setdefault(bar.link, []).append(bar)
     for link, parts in stretches.items():
         if link:
-            at = _middle(parts) if link in plates else _beside(parts, nodes)
+            places = _within(parts) if link in plates else _beside(parts)
+            # Farthest from all joints and points, of several such places the first.
+            at = max(places, key=lambda place: min(10.0, *(abs(place - one) for one in nodes.values())))
             yield Wanted(parts[0].node, point(at), link, LINK_NUMBER_MM, INK, 0.2, italic=False)
 
 
-def _middle(parts: Sequence[Bar]) -> complex:
-    corners = {end for bar in parts for end in bar.ends}
-    return sum(corners) / len(corners)
+def _within(parts: Sequence[Bar]) -> list[complex]:
+    """Return places in a plate, its middle first."""
+    corners = list(dict.fromkeys(end for bar in parts for end in bar.ends))
+    middle = sum(corners) / len(corners)
+    return [middle, *((middle + corner) / 2.0 for corner in corners)]
 
 
-def _beside(parts: Sequence[Bar], nodes: dict[str, complex]) -> complex:
-    """Return the position on a link's longest stretch farthest from all joints: its middle if clear."""
+def _beside(parts: Sequence[Bar]) -> list[complex]:
+    """Return places along a link's longest stretch, its middle first."""
     start, end = max((bar.ends for bar in parts), key=lambda ends: abs(ends[1] - ends[0]))
-    places = (start + share * (end - start) for share in NUMBER_SHARES)
-    return max(places, key=lambda at: min(10.0, *(abs(at - place) for place in nodes.values())))
+    return [start + share * (end - start) for share in NUMBER_SHARES]
 
 
 # The arrow at the driving link ----------------------------------------------------------------------

@@ -182,13 +182,13 @@ def unit(z: complex) -> complex:
 
 
 def bars(subject: Subject, nodes: dict[str, complex]) -> list[Bar]:
-    """Return the links as straight stretches."""
-    driver = subject.plan.mechanism.driver
+    """Return the links as straight stretches, without any to centres of mass that are no joints."""
+    driver, dots = subject.plan.mechanism.driver, subject.plan.construction.dots
     found = []
     if isinstance(driver, Crank):
         found.append(_between(driver.pin, driver.link, driver.pivot, driver.pin, nodes))
     for group in subject.plan.mechanism.groups:
-        found += _bars_of(subject, group, nodes)
+        found += _bars_of(subject, group, nodes) if group.node not in dots else ()
         found += _carriers(group, nodes)
     return found
 

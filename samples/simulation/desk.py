@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from reference.construction.elements import View
+from reference.construction.graph import evaluate
 from reference.quantities import FORCE_PLANS, zone_of
 from samples.simulation import figures, forces, habits, page, symbols, truth, wording
 from samples.simulation.hand import DrawingTask, DrawnFigure, DrawnSheet
@@ -29,7 +31,8 @@ class PrintedSheet:
     zones : boxes in sheet millimetres by figure (``mechanism``, ``velocity_plan``, ...)
     fields : boxes to write in, by scale (``kL``) or vector (``v_A``)
     cells : of the boxes that have one for each digit, the last for the tenths
-    values : by vector, the cells of its computed value, and how many of them are for decimals
+    values : by vector or moment, the cells of its computed value, how many of them are for decimals, and the
+        boxes to tick for its sense
     positions : the zone of each position, where the sheet has all of them
     """
 
@@ -37,7 +40,7 @@ class PrintedSheet:
     zones: Mapping[str, Box]
     fields: Mapping[str, Box] = field(default_factory=dict)
     cells: Mapping[str, Sequence[Box]] = field(default_factory=dict)
-    values: Mapping[str, tuple[Sequence[Box], int]] = field(default_factory=dict)
+    values: Mapping[str, tuple[Sequence[Box], int, Sequence[Box]]] = field(default_factory=dict)
     positions: Mapping[int, Box] = field(default_factory=dict)
 
 
@@ -215,21 +218,17 @@ class Desk:
 
     def _compute(self, sketch: SheetSketch, sheet: DrawnSheet, paper: PrintedSheet) -> dict[str, str]:
         """Write the values computed from the lengths at the declared scales; return the texts by column."""
-        texts = {}
+        task, values = self.task.wrong, dict[str, float]()
         for figure in sheet.figures:
-            for vector in self.task.wrong.construction.vectors_of(figure.name):
-                if vector.name not in paper.values or vector.scale not in self.task.declared:
-                    continue
-                cells, decimals = paper.values[vector.name]
-                length = abs(figure.nodes[vector.head] - figure.nodes[vector.tail])
-                # Nobody computes more than three digits from a ruler's millimetres.
-                value = float(f"{round(2.0 * length) / 2.0 * self.task.declared[vector.scale]:.3g}")
-                text = f"{value:.{min(decimals, 2)}f}"
-                whole, _, behind = text.partition(".")
-                places = cells[: len(cells) - decimals + len(behind)]
-                _write_digits(sketch, whole + behind, places, vector.name)
-                texts[f"{vector.name}_value"] = text
-        return texts
+            for vector in task.construction.vectors_of(figure.name):
+                if vector.name in paper.values and vector.scale in self.task.declared:
+                    length = abs(figure.nodes[vector.head] - figure.nodes[vector.tail])
+                    values[vector.name] = round(2.0 * length) / 2.0 * self.task.declared[vector.scale]
+        for name in paper.values.keys() & task.construction.moments.keys():
+            drawn = {node: np.asarray(at) for figure in sheet.figures for node, at in figure.nodes.items()}
+            view = View(evaluate(task.construction, task.parameters, given=drawn), task.parameters)
+            values[name] = float(task.construction.moments[name].at(view))
+        return {f"{name}_value": _write_value(sketch, name, values[name], paper) for name in values}
 
 
 def ruler_text(length_mm: float, style: PageStyle, rng: Rng, *, in_cells: bool = False) -> str:
@@ -238,6 +237,20 @@ def ruler_text(length_mm: float, style: PageStyle, rng: Rng, *, in_cells: bool =
     if in_cells:
         return f"{read:.1f}".replace(".", "," if style.decimal_comma else ".")
     return wording.number(read, style)
+
+
+def _write_value(sketch: SheetSketch, name: str, value: float, paper: PrintedSheet) -> str:
+    """Write a computed value into its cells, tick its sense; return its text."""
+    cells, decimals, senses = paper.values[name]
+    # Nobody computes more than three digits from a ruler's millimetres.
+    text = f"{float(f'{abs(value):.3g}'):.{min(decimals, 2)}f}"
+    whole, _, behind = text.partition(".")
+    _write_digits(sketch, whole + behind, cells[: len(cells) - decimals + len(behind)], name)
+    for x, y, w, h in [senses[int(value < 0.0)]] if senses else []:
+        low = complex(x + 0.4 * w, -y - 0.75 * h)
+        for end in (complex(-0.2 * w, 0.25 * h), complex(0.4 * w, 0.55 * h)):
+            sketch.line(sketch.pen("text"), low, low + end)
+    return f"-{text}" if senses and value < 0.0 else text
 
 
 def _write_digits(sketch: SheetSketch, text: str, cells: Sequence[Box], name: str) -> None:

@@ -31,7 +31,7 @@ from samples.simulation.strokes import Dash, arc
 
 def links_of(task: DrawingTask) -> Iterator[tuple[str, str, str]]:
     """Strokes of the sketch: name, tail and head joint."""
-    only_marked = centres(task)
+    only_marked = task.mechanism.dots
     driver = task.mechanism.driver
     if isinstance(driver, Crank):
         yield f"{driver.pivot}{driver.pin}", driver.pivot, driver.pin
@@ -65,11 +65,6 @@ def _end_of_slot(task: DrawingTask, link: SlottedLink) -> str:
     in_line = [one for one in points if np.all(one.local_m.imag == np.mean(link.offset_m))]
     ahead = [one for one in in_line if float(np.mean(one.local_m.real)) * float(np.mean(link.side)) > 0.0]
     return max(ahead, key=lambda one: float(np.mean(abs(one.local_m))), default=link).node
-
-
-def centres(task: DrawingTask) -> set[str]:
-    """Centres of mass that are no joints: they are marked only."""
-    return {body.centre for body in task.mechanism.bodies if body.centre == f"S{body.link}"}
 
 
 def blocks_of(task: DrawingTask, group: Group) -> Iterator[tuple[str, str, str]]:
@@ -114,7 +109,7 @@ def draw_mechanism(sketch: SheetSketch, task: DrawingTask, nodes: Nodes, student
     for name, tail, head in links_of(task):
         _link(sketch, name, nodes[tail], nodes[head])
     for group in task.mechanism.groups:
-        is_plate = isinstance(group, Plate) and group.node not in centres(task)
+        is_plate = isinstance(group, Plate) and group.node not in task.mechanism.dots
         if isinstance(group, Plate) and is_plate and group.line_ratio is None and sketch.style.plate_hatched:
             p, q = group.base
             corners = (nodes[p], nodes[q], nodes[group.node])
@@ -128,7 +123,7 @@ def draw_mechanism(sketch: SheetSketch, task: DrawingTask, nodes: Nodes, student
     for joint in named:
         if task.mechanism.is_ground(joint):
             symbols.support(sketch, nodes[joint], turn)
-        elif joint in centres(task):
+        elif joint in task.mechanism.dots:
             symbols.dot(sketch, nodes[joint], sketch.rng.uniform(0.4, 0.6))
         else:
             symbols.circle(sketch, nodes[joint], symbols.JOINT_RADIUS_MM, sketch.pen("line"))

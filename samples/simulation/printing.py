@@ -27,7 +27,7 @@ def printed_sheets(pdf: bytes, layout: Layout, first_page: int = 0) -> dict[str,
             zones,
             dict(fields) if isinstance(fields, dict) else {},
             page.cells,
-            {name: (place.cells, place.decimals) for name, place in page.values.items()},
+            {name: (place.cells, place.decimals, place.senses) for name, place in page.values.items()},
             page.positions,
         )
     document.close()

@@ -15,6 +15,8 @@ import pytest
 
 from grader.folder.batch import Batch
 from grader.printed.answer_sheet import make_sheets
+from grader.printed.layout import values_of
+from grader.review.questions import look_of
 from grader.review.records import Answer
 from grader.review.session import Session
 from grader.rubric import load_rubric
@@ -107,7 +109,9 @@ def force_sheets(folder):
         settings = replace(settings, hand=CAREFUL, student=hand, pen=replace(settings.pen, arrow="open"))
         printed = None
         if student_id == "s01":
-            document = make_sheets(assignment, [RosterRow(student_id, "A", variant.n, None)], "ro")
+            asked = load_rubric("pump-forces").entries
+            row = RosterRow(student_id, "A", variant.n, None)
+            document = make_sheets(assignment, [row], "ro", asked=asked)
             printed = printed_sheets(document.pdf, document.layout)
         (sheet,) = simulate(assignment, variant, seed, settings, student_id=student_id, printed=printed)
         sheet.save(folder / student_id)
@@ -129,6 +133,16 @@ def test_force_sheets_are_graded_reviewed_and_exported(planmark, tmp_path):
         Batch(load_assignment("pump-forces"), load_rubric("pump-forces"), folder, out), Inline()
     )
     session.bring_up_to_date(lambda *_: None)
+    first = session.students[0]
+    moment = next(one for one in first.report.criteria if one.id == "M_b")
+    assert moment.measured.value == float(truths["s01"]["fields"]["M_b_value"])
+    assert moment.verdict in {"full", "follow_through"}
+    x, y, wide, high = look_of(session, first, moment)["box"]
+    batch = session.batch
+    place = values_of(batch.assignment, ("mechanism", "force_plans"), batch.rubric.entries)["M_b"]
+    for left, top, w, h in (place.box, *place.senses):
+        assert x < left < left + w < x + wide
+        assert y < top < top + h < y + high
     moved = 0
     for student in session.students:
         figures = truths[student.key]["figures"]

@@ -8,7 +8,7 @@ from itertools import product
 import cv2
 import numpy as np
 
-from grader.printed.layout import SCALE_BOXES, TENTH_CELLS
+from grader.printed.layout import SCALE_BOXES, TENTH_CELLS, ValuePlace
 from grader.records import Box, FloatArray, GreyImage, Page, Sheet, Written
 from grader.scan.handwriting.model import (
     COLUMN,
@@ -22,7 +22,7 @@ from grader.scan.handwriting.model import (
 )
 from grader.scan.pixels import cut_out
 from grader.tables.scale_text import ByRule, Declared, ParsedScale, parse_scale
-from reference.quantities import OF_MOTION, scale_of
+from reference.quantities import OF_MOTION, scale_of, value_name
 
 # What may stand in a scale's box, sign by sign ----------------------------------------------------
 
@@ -395,8 +395,6 @@ _FULL = 0.97
 """Share of a cell that is less inked than the middle of a stroke."""
 _NO_TENTHS = 0.5
 """Confidence in a whole number if the cells of the decimals are empty: a shifted number looks the same."""
-NO_DECIMALS: Mapping[str, int] = {}
-"""All numbers are lengths, which have tenths."""
 
 
 def written_scales(page: Page, sheet: Sheet, units: Mapping[str, str] | None = None) -> dict[str, Written]:
@@ -470,15 +468,18 @@ def writing(page: Page, sheet: Sheet, box: Box, border_mm: float) -> GreyImage:
 # Measured lengths ---------------------------------------------------------------------------------
 
 
-def written_lengths(
-    page: Page, sheet: Sheet, cells: Mapping[str, Sequence[Box]], decimals: Mapping[str, int] = NO_DECIMALS
+def written_numbers(
+    page: Page, sheet: Sheet, cells: Mapping[str, Sequence[Box]], values: Mapping[str, ValuePlace]
 ) -> dict[str, tuple[float, float]]:
     """Return numbers with the probability that they are as written, by name; nothing for empty boxes.
 
-    Arguments: `cells` are the boxes of a name's digits in sheet mm, from the left; the last `decimals` stand
-    behind the decimal mark, of a length (mm) the last one. Anything that is no number (a gap between digits,
-    a sign that is no digit) has the probability 0.
+    Arguments: `cells` are the boxes of a length's digits (sheet mm, the last one for tenths) by vector,
+    `values` the places of computed values, which are returned as ``NAME_value``. Anything that is no number
+    (a gap between digits, a sign that is no digit) has the probability 0. A moment has the sign that is
+    ticked, and ``NAME_sense`` is 1 (counter-clockwise), -1, or 0 where none is.
     """
+    cells = {**cells, **{value_name(name): place.cells for name, place in values.items()}}
+    decimals = {value_name(name): place.decimals for name, place in values.items()}
     pictures: list[GreyImage] = []
     sizes: list[tuple[float, float]] = []
     filled: dict[str, list[int | None]] = {}
@@ -491,11 +492,21 @@ def written_lengths(
                 pictures.append(normalised(sign))
                 sizes.append((sign.shape[1], sign.shape[0]))
     probability = recognise(pictures, np.array(sizes, dtype=np.float64).reshape(-1, 2))
-    return {
+    found = {
         name: _number(places, probability, decimals.get(name, TENTH_CELLS))
         for name, places in filled.items()
         if any(place is not None for place in places)
     }
+    for name, place in values.items():
+        is_ticked = [_sign(writing(page, sheet, box, _CELL_BORDER_MM)) is not None for box in place.senses]
+        if not is_ticked:
+            continue
+        value, told = value_name(name), float(is_ticked[0]) or -float(is_ticked[1])
+        if value in found and told:
+            found[value] = found[value][0] * told, found[value][1]
+        if value in found or told:
+            found[f"{name}_sense"] = told, 0.0 if all(is_ticked) else 1.0
+    return found
 
 
 def _sign(grey: GreyImage) -> GreyImage | None:

@@ -264,7 +264,9 @@ def test_a_rubric_that_asks_for_no_force_gets_what_the_force_plans_show(tmp_path
     text = first.rubric.read_text(encoding="utf-8")
     head, *criteria = text.split("[[criterion]]")
     of_motion = [one for one in criteria if 'scale = "kL"' in one]
-    first.rubric.write_text("[[criterion]]".join([head, *of_motion]), encoding="utf-8")
+    # Its first keys stand right before a criterion.
+    own = "[[criterion]]".join([head.replace("\n\n", "\n"), *of_motion])
+    first.rubric.write_text(own, encoding="utf-8")
     second = new_assignment(tmp_path / "second", like=str(first.assignment))
     asked = {one.name: one for one in load_rubric(second.rubric).criterion}
     built_in = {one.name for one in load_rubric("pump-forces").criterion}

@@ -389,7 +389,7 @@ def test_every_module_that_the_order_of_work_calls_is_in_a_stage():
 
 SCANS_AND_READS = (
     "backdrop", "declared_scales", "decode", "find_ink", "find_letters", "is_blank",
-    "read_figures", "register", "straighten", "sure_texts", "written_lengths", "written_scales",
+    "read_figures", "register", "straighten", "sure_texts", "written_numbers", "written_scales",
 )  # fmt: skip
 
 

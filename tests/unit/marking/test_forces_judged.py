@@ -8,6 +8,7 @@ import pytest
 from grader.comparison.criteria import compare
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
+from grader.records import Reading
 from grader.rubric import rubric_of
 from grader.tables.measurements import columns_of, measurements_in, names_of
 from reference.authored.assignment import Variant, library, load_assignment
@@ -72,8 +73,11 @@ def judged(forces):
     assignment = forces()
     task = task_of(assignment, rubric_of(assignment), Variant(7))
 
-    def mark(longer=1.0, scale="16 N/mm", **cells):
-        """Arguments: `longer`, how much longer R_02 was drawn, from which R_31 and the moment follow."""
+    def mark(longer=1.0, scale="16 N/mm", written=None, **cells):
+        """Mark what was entered, and what was written in a sheet's cells.
+
+        Arguments: `longer`, how much longer R_02 was drawn, from which R_31 and the moment follow.
+        """
         real = {name: task.real[name] for name in ("F_D", "R_0D", "R_02", "R_31", "F_i3", "R_43", "R_13_t")}
         real["R_31"] += (longer - 1.0) * real["R_02"]
         entered = {"kF": scale}
@@ -84,7 +88,8 @@ def judged(forces):
             }
         measured = measurements_in({**entered, **cells}, names_of(assignment), "", "en")
         assert measured.problems == ()
-        handed_in = Submission(measured=measured.reading, values=measured.values, declared=measured.scales)
+        sheets = () if written is None else (Reading({}, lengths=written),)
+        handed_in = Submission(sheets, measured.reading, measured.values, measured.scales)
         return {one.name: one for one in compare(task, handed_in).outcomes}
 
     arm = task.nodes(task.rule_scales)["A"]
@@ -108,6 +113,29 @@ def test_a_moment_of_the_other_sense_is_wrong(judged):
     found = judged(M_b_value=f"{-judged.right:.1f}")
     assert (found["M_b"].verdict, found["M_b_sense"].verdict) == ("none", "none")
     assert "value_reversed" in found["M_b"].codes
+
+
+@pytest.mark.parametrize(
+    ("share", "sense", "sure", "verdict", "of_sense"),
+    [
+        (1.0, 1.0, 1.0, "full", "full"),
+        (1.2, 1.0, 1.0, "review", "full"),
+        (-1.0, -1.0, 1.0, "review", "none"),
+        (1.0, 1.0, 0.0, "review", "review"),
+        (1.0, 0.0, 1.0, "review", "review"),
+    ],
+)
+def test_a_moment_in_a_sheets_cells_is_right_or_goes_to_a_person(
+    judged, share, sense, sure, verdict, of_sense
+):
+    is_left = math.copysign(1.0, judged.right)
+    value = abs(judged.right) if sense == 0.0 else share * judged.right
+    found = judged(written={"M_b_value": (value, 0.99), "M_b_sense": (sense * is_left, sure)})
+    assert (found["M_b"].verdict, found["M_b_sense"].verdict) == (verdict, of_sense)
+    assert found["M_b"].measured.value == value
+    told = f"{abs(judged.right):.1f} {'ccw' if judged.right > 0.0 else 'cw'}"
+    entered = judged(M_b_value=told, written={"M_b_sense": (-is_left, 1.0)})
+    assert (entered["M_b"].verdict, entered["M_b_sense"].verdict) == ("full", "full")
 
 
 def test_a_moment_follows_from_the_student_s_own_reactions(judged):
@@ -181,7 +209,8 @@ def test_the_columns_are_those_of_the_rubric_and_of_the_sheet_s_own_scales(force
             "C names no group.*force_plan_D, force_pl",
         ),
         (('"force_plan_B"', '"forceplan_B"'), "$.page[0].figures[2]", "force_plan_ and the joint of a group"),
-        (('\nkF = "force / 50"', ""), "$.scales.kF", "is missing: a page shows a force plan"),
+        (('\nkF = "force / 50"', ""), "$.scales.kF", "is missing: a page shows a force plan.*kF = 50"),
+        (("[[body]]", "[[body]]\ngravity = 9.81"), "$.body[0].gravity", r"above the first \[table\]"),
         (('kF = "force / 50"', 'kF = "forces"'), "$.scales.kF", "unknown name forces"),
     ],
 )

@@ -10,6 +10,7 @@ from grader.language import tongue
 from grader.printed import answer_sheet
 from grader.printed.answer_sheet import make_calibration, make_sheets
 from grader.printed.layout import (
+    CODE_MM,
     FRAME_MM,
     MARKER_CORNERS,
     PAGE_MM,
@@ -403,6 +404,19 @@ def test_values_asked_for_have_places_that_meet_nothing_else(name, velocities, a
             assert min(min(cell[2:]) for cell in place.cells) >= LEAST_CELL_MM
             others = [one.box for one in page.values.values() if one is not place]
             assert not any(overlap(place.box, other, 0.5) for other in (*taken, *others))
+
+
+@pytest.mark.parametrize("name", ["pump-forces", "press-forces"])
+def test_a_moment_has_cells_and_a_box_for_each_sense_after_the_force_plans(name):
+    *others, page = values_on(name)
+    assert not any(one.values for one in others)
+    place = page.values["M_b"]
+    assert (place.decimals, len(place.senses)) == (0, 2)
+    markers = [(*marker.corners_mm[0], 12.0, 12.0) for marker in page.markers]
+    taken = [*boxes_of(page).values(), *markers, CODE_MM]
+    boxes = [place.box, *place.senses]
+    assert not any(overlap(box, other, 0.5) for box in boxes for other in taken)
+    assert not any(overlap(*pair, 3.0) for pair in itertools.combinations(boxes, 2))
 
 
 def test_values_leave_the_rest_of_a_sheet_as_it_is():

@@ -219,6 +219,7 @@ def test_a_flat_plate_on_a_link_with_a_ground_pivot_divides_its_image():
     ("name", "told"),
     [
         ("pump", "O1-A A-B O2-B A-C B-C C-D"),
+        ("pump-forces", "O1-A A-B O2-B A-C B-C C-D"),
         ("press", "O1-A A-B O2-B O2-C C-D"),
         ("shaper", "O1-A O2-A3 O2-D D-E"),
         ("piston", "B-A O1-A B-C"),

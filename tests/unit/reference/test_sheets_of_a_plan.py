@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reference.authored.assignment import load_assignment
+from reference.authored.assignment import library, load_assignment
 from reference.drawing import symbols
 from reference.drawing.canvas import Area, Curve, Label, Ring, Stroke, set_pieces, shifted
 from reference.drawing.labels import Wanted, place_labels, segments_of
@@ -291,3 +291,21 @@ def test_a_figure_larger_than_its_room_has_no_place_in_it():
     assert _roomiest(room, np.ones((4, 5), bool), None)[1] > 0.0
     for rows, columns in ((20, 31), (21, 30)):
         assert _roomiest(room, np.ones((rows, columns), bool), None)[1] == 0.0
+
+
+@pytest.mark.parametrize("pages", [True, False])
+def test_a_centre_of_mass_is_a_named_dot_to_which_no_bar_leads(tmp_path, pages):
+    text = (library() / "pump-forces.assignment.toml").read_text(encoding="utf-8")
+    if not pages:
+        text = text.replace('"forces"', '"velocity"').replace(
+            '"force_plan_D", "force_plan_B"', '"velocity_plan"'
+        )
+    path = tmp_path / "dots.assignment.toml"
+    path.write_text(text.replace('id = "pump-forces"', 'id = "dots"'), encoding="utf-8")
+    assignment = load_assignment(path)
+    subject = Subject(assignment, exact_plan(assignment, [assignment.variant(7)]))
+    nodes = subject.nodes("mechanism")
+    assert not any("S3" in bar.joints for bar in bars(subject, nodes))
+    shapes = figures_of(subject)["mechanism"].shapes
+    assert {"S2", "S3", "S4"} < set(labels_of(shapes))
+    assert symbols.marked_point(nodes["S3"]) in shapes

@@ -398,6 +398,7 @@ def test_the_forces_of_every_equation_add_up_to_nothing_and_two_properties_are_u
         assert nodes <= known.keys()
         for equation in {known[node] for node in nodes}:
             assert equation.left is None
+            assert not equation.terms[0].is_negative
             forces = [plan.vectors_si[one.vector][0] * (-1) ** one.is_negative for one in equation.terms]
             assert abs(sum(forces)) <= 1e-9 * max(map(abs, forces))
             assert sum(2 - term.known for term in equation.terms) == 2

@@ -1,5 +1,6 @@
 """Scales read in the answer sheet's boxes, written by the simulated hand, which nothing was trained on."""
 
+import cv2
 import numpy as np
 import pytest
 
@@ -7,7 +8,7 @@ from grader.printed.answer_sheet import make_sheets
 from grader.printed.layout import values_of
 from grader.records import Page, Sheet, Written
 from grader.rubric import rubric_of
-from grader.scan.handwriting.fields import moves, read_scale, start, written_lengths, written_scales
+from grader.scan.handwriting.fields import moves, read_scale, start, written_numbers, written_scales
 from grader.scan.handwriting.model import lattice_of
 from grader.scan.register.registration import rectify
 from grader.tables.roster import RosterRow
@@ -140,14 +141,39 @@ def test_computed_values_written_in_a_sheets_cells_are_read_as_they_were_written
     placed = rectify(page)
     assert isinstance(placed, Sheet)
     places = values_of(press, tuple(placed.zones), entries)
-    read = written_lengths(
-        page,
-        placed,
-        {name: place.cells for name, place in places.items()},
-        {name: place.decimals for name, place in places.items()},
-    )
-    written = {name: float(drawn.truth["fields"][f"{name}_value"]) for name in places}
+    read = written_numbers(page, placed, {}, places)
+    written = {f"{name}_value": float(drawn.truth["fields"][f"{name}_value"]) for name in places}
     right = [name for name, (value, _) in read.items() if value == pytest.approx(written[name])]
     assert len(written) == 5
     assert len(right) >= 4
     assert all(read[name][1] < SURE for name in written.keys() - right)
+
+
+@pytest.mark.parametrize(
+    ("ticked", "sense", "sign", "sure"),
+    [((), 0.0, 1.0, True), ((0,), 1.0, 1.0, True), ((1,), -1.0, -1.0, True), ((0, 1), 1.0, 1.0, False)],
+)
+def test_a_moment_in_a_sheets_cells_has_the_sense_that_is_ticked(ticked, sense, sign, sure):
+    pump = load_assignment("pump-forces")
+    entries = rubric_of(pump).entries
+    document = make_sheets(pump, [RosterRow("s1", "Student 1", 7)], "en", asked=entries)
+    grey = printed_sheets(document.pdf, document.layout)["forces"].background.grey.copy()
+    place = document.layout.pages[0].values["M_b"]
+
+    def stroke(box, *ends):
+        x, y, w, h = box
+        points = [(round((x + u * w) * 300 / 25.4), round((y + v * h) * 300 / 25.4)) for u, v in ends]
+        cv2.polylines(grey, [np.array(points)], isClosed=False, color=40, thickness=5)
+
+    for cell in place.cells[1:]:
+        stroke(cell, (0.25, 0.2), (0.75, 0.2), (0.45, 0.85))  # a seven
+    for k in ticked:
+        stroke(place.senses[k], (0.2, 0.5), (0.4, 0.75), (0.8, 0.2))
+    page = Page("s.png", 1, grey, (300.0, 300.0))
+    placed = rectify(page)
+    assert isinstance(placed, Sheet)
+    read = written_numbers(page, placed, {}, values_of(pump, tuple(placed.zones), entries))
+    assert read.keys() == {"M_b_value", "M_b_sense"}
+    assert read["M_b_value"][0] == sign * 777.0
+    assert read["M_b_sense"][0] == sense
+    assert (read["M_b_sense"][1] > SURE) == sure
