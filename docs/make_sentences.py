@@ -101,6 +101,8 @@ EXAMPLES: Mapping[str, str] = {
     "wait": "90\u00a0s",
     "bias": "-0.05", "difference": "0.21", "equal": "17",
     "force": "R_34_t = 12.3\u00a0mm",
+    "carriers": "A: 1, 6; O3: 7", "now": "12", "figures": "the velocity plan", "free": "2", "links": "5",
+    "rank": "III", "sides": "left, right", "texts": "kL, kv", "types": "RRR, RRP", "variant": "n = 3",
     "waiting": "4", "zone": "EET", "wide": "@90 mm", "zone_high": "@120 mm", "zone_wide": "@180 mm",
 }  # fmt: skip
 """Parameters by name: after ``@`` a number with its unit; other texts of the catalogues are translated."""

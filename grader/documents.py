@@ -586,6 +586,7 @@ class LintFindingDocument(Document):
     file: Literal["assignment", "mechanism", "rubric"]
     path: str
     message: str
+    parameters: Parameters = {}
     variants: list[VariantDocument]
 
 
@@ -630,9 +631,11 @@ class LintScales(Document):
 
 
 class LintWorst(VariantDocument):
-    """The variant that is hardest to draw."""
+    """The variant that is hardest to draw, and why, as a sentence and as data."""
 
     why: str
+    code: str
+    parameters: Parameters = {}
 
 
 class LintDocument(Document):

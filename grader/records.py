@@ -13,12 +13,13 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.errors import InputFileError, PlanmarkError
+from reference.errors import InputFileError, Parameter, PlanmarkError
 from reference.quantities import zone_of
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 GreyImage = NDArray[np.uint8]
+Value = Parameter
 Box = tuple[float, float, float, float]
 """x, y, width, height in sheet millimetres."""
 
@@ -28,7 +29,6 @@ ZONE_SLACK_MM = 2.0
 MECHANISM = "mechanism"
 VELOCITY_PLAN = "velocity_plan"
 ACCELERATION_PLAN = "acceleration_plan"
-Value = float | str | tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from grader.records import MECHANISM
 from reference.authored.assignment import Assignment, AssignmentFile, load_assignment, locate
 from reference.authored.toml_file import Authored, Identifier, Text, is_file, load
 from reference.construction.graph import ON_SKETCH, Construction
-from reference.errors import AuthoredFileError, CallError, Faults, Finding, look_alikes
+from reference.errors import AuthoredFileError, CallError, FaultError, Faults, Finding, look_alikes
 from reference.plan import construction_for
 from reference.quantities import KindName, kind_of, value_name
 
@@ -60,12 +60,10 @@ class ToleranceTable(Authored):
         if self.bands is None:
             return self
         if {"partial_factor", "partial_share"} & self.model_fields_set:
-            raise ValueError(
-                "bands stand in place of partial_factor and partial_share: give one or the other"
-            )
+            raise FaultError("bands_beside")
         pairs = zip(self.bands, self.bands[1:], strict=False)
         if not all(one.factor < other.factor and one.share > other.share for one, other in pairs):
-            raise ValueError("bands must have rising factors and falling shares")
+            raise FaultError("bands_order")
         return self
 
     @property
@@ -183,11 +181,11 @@ class CriterionTable(Authored):
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
         if sum(getattr(self, kind) is not None for kind in ASKED) != 1:
-            raise ValueError(f"must have exactly one of {', '.join(ASKED[:-1])} and {ASKED[-1]}")
+            raise FaultError("one_kind", texts=ASKED)
         if self.figure and not self.vector:
-            raise ValueError("has a figure, which only a vector may have")
+            raise FaultError("figure_of_vector")
         if self.point and not self.direction:
-            raise ValueError("must have a direction: a point's distance alone is not judged")
+            raise FaultError("point_direction")
         return self
 
     @property
@@ -394,9 +392,9 @@ def check_accelerations(assignment: Assignment, rubric: RubricFile) -> Iterator[
     """Report accelerations that no page shows, and those for which there is no force plan."""
     told = rubric.accelerations
     if told is not None and accelerations_of(assignment, rubric) is None:
-        yield Finding("$.accelerations", "no page of the assignment shows a force plan: leave it out")
+        yield Finding("$.accelerations", "no_force_plans")
     elif told == "own" and "acceleration_plan" not in assignment.figures:
-        yield Finding("$.accelerations", 'no page shows the acceleration plan: add one, or say "given"')
+        yield Finding("$.accelerations", "no_own_accelerations")
 
 
 def check_rubric(rubric: RubricFile, construction: Construction) -> list[Finding]:
@@ -414,7 +412,8 @@ def check_rubric(rubric: RubricFile, construction: Construction) -> list[Finding
     return [
         Finding(
             f"$.criterion[{index}].{key}",
-            f"{name} is not in this mechanism{look_alikes(name)}: {', '.join(names)}",
+            "not_in_mechanism",
+            {"name": name, "texts": tuple(names), **look_alikes(name)},
         )
         for index, criterion in enumerate(rubric.criterion)
         for key, all_names in known.items()
@@ -463,11 +462,10 @@ def load_rubric(name: str | Path, *, beside: Path | None = None) -> RubricFile:
     """
     path = locate("rubric", str(name), beside)
     if not is_file(path) and not str(name).endswith(".toml"):
-        missing = f"there is no rubric '{name}': {path.name} was looked for"
         if beside is None:
-            raise CallError("unknown_rubric", f"{missing} among the built-in ones")
-        finding = Finding("$.rubric", f"{missing} beside this file and among the built-in ones")
-        raise AuthoredFileError(str(beside), (finding,))
+            raise CallError("unknown_rubric", name=str(name))
+        missing = Finding("$.rubric", "no_file_of_name", {"text": str(name), "file": path.name})
+        raise AuthoredFileError(str(beside), (missing,))
     return _load(path.resolve(), path.stat().st_mtime_ns if is_file(path) else 0)
 
 
@@ -484,14 +482,14 @@ def _twice(rubric: RubricFile) -> Iterator[Finding]:
     ids = [criterion.id for criterion in rubric.criterion]
     for index, name in enumerate(ids):
         if name in ids[:index]:
-            yield Finding(f"$.criterion[{index}].id", f"{name} is there already")
+            yield Finding(f"$.criterion[{index}].id", "there_twice", {"text": name})
 
 
 def _reserved(rubric: RubricFile) -> Iterator[Finding]:
     """Report ids that have another meaning in people's decisions."""
     for index, criterion in enumerate(rubric.criterion):
         if criterion.id in {"total", "comment"}:
-            yield Finding(f"$.criterion[{index}].id", f"{criterion.id} has a meaning in decisions.csv")
+            yield Finding(f"$.criterion[{index}].id", "id_of_decisions", {"name": criterion.id})
 
 
 def _idle_weights(rubric: RubricFile) -> Iterator[Finding]:
@@ -506,4 +504,4 @@ def _idle_weights(rubric: RubricFile) -> Iterator[Finding]:
     }
     for section, kind in kinds.items():
         if getattr(rubric.weights, section) is not None and section not in rubric.sections:
-            yield Finding(f"$.weights.{section}", f"no criterion belongs to it: none has such a {kind}")
+            yield Finding(f"$.weights.{section}", "weight_idle", {"name": kind})

@@ -10,17 +10,24 @@ PlanmarkError            caught once, at the rim
 
 import difflib
 import unicodedata
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
 MOST_FINDINGS = 20
 """Findings shown at once: a hostile file may have a million."""
-_MOST_CHARACTERS = 500
-"""Longest line of a message: a name in the file may be a megabyte long."""
 _LONGEST_NAME = 64
 """Longer names match no known name, and comparing them takes the square of their length."""
+
+
+Parameter = float | str | tuple[str, ...]
+"""A value that a sentence names."""
+
+
+def writable(text: str) -> str:
+    """Return text that can be written: the bytes in a file's name that are no text become escapes."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 class PlanmarkError(Exception):
@@ -36,11 +43,10 @@ class PlanmarkError(Exception):
     exit_status = 2
     faults: tuple[Any, ...] = ()
 
-    def __init__(self, code: str, message: str = "", **parameters: float | str | tuple[str, ...]) -> None:
-        # A file's name may hold bytes that are no text; told as they are, no report could be written.
-        self.message = message.encode("utf-8", "backslashreplace").decode()
+    def __init__(self, code: str, message: str = "", **parameters: Parameter) -> None:
+        self.message, self.code = writable(message), code
+        self.parameters = {k: writable(one) if isinstance(one, str) else one for k, one in parameters.items()}
         super().__init__(self.message or f"{code} {parameters or ''}".strip())
-        self.code, self.parameters = code, parameters
 
     def __reduce__(self) -> tuple[object, ...]:
         # Errors return from worker processes unchanged, whatever arguments their classes take.
@@ -53,30 +59,36 @@ class CallError(PlanmarkError):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One fault of an authored file: its path, such as ``$.criteria[3].points``, and what is right there.
+    """One fault of an authored file, as data: `grader.texts` makes its sentence in the reader's language.
 
     Attributes
     ----------
-    code : where other code must know the fault
+    path : in the file, such as ``$.criteria[3].points``; in a table's file a column, or nothing
+    code, parameters : of its sentence in `grader.texts.authored`, and the values that this names
     line : of a table's file, from 1; 0 where the fault is of no single line
     """
 
     path: str
-    message: str
-    code: str = ""
+    code: str
+    parameters: Mapping[str, Parameter] = field(default_factory=dict)
     line: int = 0
 
-    def __str__(self) -> str:
-        return f"{self.path}: {self.message}"
 
+class FaultError(ValueError):
+    """A fault whose place in the file is not known where it is found; validators raise it, too.
 
-def lines_of(findings: Sequence[object]) -> str:
-    """Format findings as lines of a message: the first twenty, and how many more there are."""
-    lines = [str(finding) for finding in findings[:MOST_FINDINGS]]
-    lines = [line if len(line) <= _MOST_CHARACTERS else f"{line[:_MOST_CHARACTERS]}..." for line in lines]
-    if len(findings) > MOST_FINDINGS:
-        lines.append(f"... and {len(findings) - MOST_FINDINGS} more")
-    return "\n".join(f"  {line}" for line in lines)
+    Attributes
+    ----------
+    code, parameters : as those of a `Finding`
+    """
+
+    def __init__(self, code: str, **parameters: Parameter) -> None:
+        super().__init__(f"{code} {parameters or ''}".strip())
+        self.code, self.parameters = code, parameters
+
+    def at(self, path: str, line: int = 0, /, **more: Parameter) -> Finding:
+        """Return the finding at its place."""
+        return Finding(path, self.code, {**self.parameters, **more}, line)
 
 
 def counted(count: int, noun: str) -> str:
@@ -95,6 +107,12 @@ def near_names(name: str, known: Iterable[str], *, most: int = 2, cutoff: float 
     return [by_lower[near] for near in difflib.get_close_matches(name.lower(), by_lower, most, cutoff)]
 
 
+def nearest(name: str, known: Iterable[str], most: int = 1) -> dict[str, Parameter]:
+    """Return, as a parameter, the known names that a misspelt name may stand for; or nothing."""
+    near = tuple(near_names(name, known, most=most))
+    return {"near": near} if near else {}
+
+
 def runs_of(numbers: Sequence[int]) -> list[list[int]]:
     """Group ascending whole numbers into runs of consecutive ones."""
     runs: list[list[int]] = []
@@ -107,20 +125,16 @@ def runs_of(numbers: Sequence[int]) -> list[list[int]]:
 
 
 def ranges_of(numbers: Sequence[int]) -> str:
-    """Describe ascending whole numbers: ``from 1 to 30``, or with gaps ``= 1..9, 11, 13, 14``."""
+    """Describe ascending whole numbers: ``1..30``, or with gaps ``1..9, 11, 13, 14``."""
     runs = runs_of(numbers)
-    if len(runs) == 1:
-        return f"from {numbers[0]} to {numbers[-1]}"
-    return "= " + ", ".join(
-        f"{run[0]}..{run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in runs
-    )
+    return ", ".join(f"{run[0]}..{run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in runs)
 
 
-def look_alikes(text: str) -> str:
-    """Return a remark on letters that only look Latin, such as the Cyrillic А; empty if there are none."""
-    foreign = [letter for letter in text if letter.isalpha() and not letter.isascii()]
-    names = dict.fromkeys(f"'{one}' is {unicodedata.name(one, 'no letter')}" for one in foreign[:3])
-    return f" ({', '.join(names)}: type it on a Latin keyboard)" if names else ""
+def look_alikes(text: str) -> dict[str, Parameter]:
+    """Return, as a parameter, the first letters that only look Latin, such as the Cyrillic А; or nothing."""
+    foreign = dict.fromkeys(letter for letter in text if letter.isalpha() and not letter.isascii())
+    letters = tuple(f"'{one}' is {unicodedata.name(one, 'no letter')}" for one in [*foreign][:3])
+    return {"letters": letters} if letters else {}
 
 
 class AuthoredFileError(PlanmarkError):
@@ -129,9 +143,11 @@ class AuthoredFileError(PlanmarkError):
     def __init__(
         self, file: str, findings: tuple[Finding, ...], others: Sequence["AuthoredFileError"] = ()
     ) -> None:
-        text = f"{file}: {counted(len(findings), 'fault')}\n{lines_of(findings)}"
-        super().__init__("authored_file", "\n".join([text, *(other.message for other in others)]))
+        super().__init__("authored_file")
         self.file, self.findings, self.others = file, findings, tuple(others)
+
+    def __str__(self) -> str:
+        return "\n".join(f"{one.file}: {one.findings}" for one in (self, *self.others))
 
 
 class Faults:

@@ -1,15 +1,18 @@
 """Findings of lint: severity, place in a file, message, and the variants concerned."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from grader.language import Tongue
+from grader.records import Reason
+from grader.texts.spoken import ENGLISH, clause
 from reference.authored.assignment import Assignment, Variant
-from reference.errors import runs_of
+from reference.errors import Parameter, runs_of
 
 Severity = Literal["fault", "warning", "hint"]
 """fault: some student cannot be set or marked; warning: something a teacher should change or accept;
@@ -23,23 +26,30 @@ NAMED = 6
 
 @dataclass(frozen=True, slots=True)
 class LintFinding:
-    """A finding: its severity, a stable code, its path (such as ``$.criterion[3]``), the message.
+    """A finding: its severity, a stable code, its path (such as ``$.criterion[3]``), what its sentence names.
 
-    `variants` is empty if the finding concerns the files as such; `names_them` is true if the message names
-    the variants itself.
+    `variants` is empty if the finding concerns the files as such; `names_them` is true if the sentence names
+    the variants itself; `why` is the code of the sentence where several share the code.
     """
 
     severity: Severity
     code: str
     file: File
     path: str
-    message: str
+    parameters: Mapping[str, Parameter] = field(default_factory=dict)
     variants: tuple[Variant, ...] = ()
     names_them: bool = False
+    why: str = ""
 
-    def __str__(self) -> str:
-        concerned = f" ({named(self.variants)})" if self.variants and not self.names_them else ""
-        return f"{self.file} {self.path}: {self.message}{concerned}"
+    def message(self, speaker: Tongue = ENGLISH) -> str:
+        """Return the finding's sentence."""
+        return clause(Reason(self.why or self.code, self.parameters), speaker)
+
+    def told(self, speaker: Tongue = ENGLISH) -> str:
+        """Return the finding in one line: its place, its sentence, its variants."""
+        numbered = [variant for variant in self.variants if variant.numbers]
+        concerned = f" ({named(numbered)})" if numbered and not self.names_them else ""
+        return f"{self.file} {self.path}: {self.message(speaker)}{concerned}"
 
 
 def chosen(variants: Sequence[Variant], which: BoolArray) -> tuple[Variant, ...]:
@@ -61,8 +71,13 @@ def named(variants: Iterable[Variant]) -> str:
         )
         for positions, known in numbers_with.items()
     ]
-    more = len(parts) - NAMED
-    return "; ".join(parts[:NAMED]) + (" and more" if more > 0 else "") or "the only variant"
+    return first_of(parts, "; ") or "the only variant"
+
+
+def first_of(texts: Sequence[str], between: str = ", ") -> str:
+    """Join the first six texts, and say how many more there are."""
+    more = len(texts) - NAMED
+    return between.join(texts[:NAMED]) + (f"{between}... (+{more})" if more > 0 else "")
 
 
 def _ranges(numbers: Sequence[int]) -> str:
@@ -74,7 +89,7 @@ def _ranges(numbers: Sequence[int]) -> str:
     if len(texts) <= NAMED + 2:
         return ", ".join(texts)
     counted = sum(len(run) for run in runs[NAMED:])
-    return ", ".join(texts[:NAMED]) + f" and {counted} more"
+    return ", ".join(texts[:NAMED]) + f", ... (+{counted})"
 
 
 # Places in files ----------------------------------------------------------------------------------

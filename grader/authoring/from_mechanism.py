@@ -17,7 +17,7 @@ from grader.authoring.lint import lint, names_in
 from grader.authoring.round_scales import asked_vectors
 from grader.language import LANGUAGES, N_, tongue
 from grader.rubric import RubricFile, load_rubric
-from grader.texts.spoken import failure
+from grader.texts.spoken import failure, lines_of
 from reference.authored.assignment import SUFFIXES, USUAL_SCALES, Assignment, load_assignment
 from reference.authored.formula import Formula
 from reference.authored.mechanism import (
@@ -33,7 +33,7 @@ from reference.authored.mechanism import (
 from reference.authored.toml_file import SideText, Text, load, text_of
 from reference.authored.variant_table import KEYS, MEASURES
 from reference.construction.graph import Construction
-from reference.errors import AuthoredFileError, CallError, lines_of
+from reference.errors import AuthoredFileError, CallError
 from reference.plan import construction_for
 
 Texts = Mapping[str, str]
@@ -41,10 +41,9 @@ Texts = Mapping[str, str]
 RANGES = {"n": "{ from = 1, to = 30 }", "position": "{ from = 0, to = 7 }"}
 """Ranges of students and positions for a mechanism whose formulas use their numbers."""
 _UNITS = {
-    "a length": "{length}", "an angle": "°", "revolutions per minute": "rev/min",
-    "an angular velocity": "rad/s", "an angular acceleration": "rad/s²", "a speed": "{length}/s",
-    "an acceleration": "{length}/s²", "a mass": "kg", "a moment of inertia": "kg m²", "a force": "N",
-    "a moment": "N m",
+    "length": "{length}", "angle": "°", "rpm": "rev/min", "omega": "rad/s", "epsilon": "rad/s²",
+    "speed": "{length}/s", "acceleration": "{length}/s²", "mass": "kg", "inertia": "kg m²", "force": "N",
+    "couple": "N m",
 }  # fmt: skip
 """Units of the keys of a mechanism, by the kind of quantity."""
 
@@ -134,7 +133,7 @@ def texts_for(mechanism: Path, name: str, start: Texts, table: Path | None) -> d
         paths["rubric"].write_text(rubric, encoding="utf-8")
         found = lint(loaded, load_rubric(paths["rubric"]))
         if not found.scales:
-            faults = lines_of([one for one in found.findings if one.severity == "fault"])
+            faults = lines_of([one.told() for one in found.findings if one.severity == "fault"])
             raise failure(CallError, "no_variant", file=mechanism, findings=faults)
         scales = {
             scale: float(f"{np.max(getattr(found.scales[1].scales, scale)):.6g}") for scale in USUAL_SCALES

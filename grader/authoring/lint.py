@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from grader.authoring.findings import NAMED, SEVERITIES, File, LintFinding, mechanism_place
+from grader.authoring.findings import SEVERITIES, File, LintFinding, first_of, mechanism_place
 from grader.authoring.round_scales import (
     WELL_READ_MM,
     AskedVectors,
@@ -43,15 +43,19 @@ from grader.documents import (
     LintLeast,
     LintVariant,
     LintWorst,
+    VariantDocument,
 )
-from grader.language import LANGUAGES
+from grader.language import LANGUAGES, Tongue
+from grader.records import Reason
 from grader.rubric import RubricFile, check_accelerations, check_rubric, plans_asked
+from grader.texts.spoken import ENGLISH, as_json, clause
 from reference.authored.assignment import SCALE_NAMES, TRADITIONS, Assignment, Variant
 from reference.authored.formula import Formula
 from reference.authored.toml_file import LENGTH_UNITS_M, SideText, Text
 from reference.authored.variant_table import KEYS, LENGTHS, formulas_in
 from reference.construction.derive import image_name
 from reference.construction.graph import Construction, ancestors
+from reference.errors import Parameter
 from reference.geometry import FloatArray
 from reference.plan import Plan, construction_for, exact_plan
 
@@ -71,7 +75,7 @@ class Lint:
     findings : the gravest first
     scales : the proposed ones, and round ones; none if no variant can be solved
     plan : of the variants that can be solved
-    worst : the variant of those that is hardest to draw; None if there are none
+    worst : the variant of those that is hardest to draw, and why; None if there are none
     """
 
     assignment: Assignment
@@ -79,7 +83,7 @@ class Lint:
     findings: tuple[LintFinding, ...]
     scales: tuple[Proposal, ...] = ()
     plan: Plan | None = None
-    worst: LintWorst | None = None
+    worst: tuple[Variant, Reason] | None = None
 
     @property
     def needs_a_person(self) -> bool:
@@ -186,28 +190,27 @@ def _least(figures: Mapping[str, FloatArray], count: int, **pages: int) -> list[
 
 
 _REASONS = (
-    ("transmission", LEAST_TRANSMISSION, "the sine of the transmission angle at {at} is {value:.2g}"),
-    ("crossing_deg", LEAST_CROSSING_DEG, "the construction lines of {at} meet at {value:.1f} degrees"),
-    ("room", 1.0, "the {at} would fit the zone at only {value:.2f} times the size"),
-    ("shortest_mm", np.inf, "{at} is the shortest vector asked for, {value:.2g} mm"),
-    (
-        "crossing_deg",
-        np.inf,
-        "the construction lines of {at} meet at {value:.1f} degrees, the least of all",
-    ),
+    ("transmission", LEAST_TRANSMISSION, "worst_transmission", "least_number"),
+    ("crossing_deg", LEAST_CROSSING_DEG, "worst_crossing", "angle_deg"),
+    ("room", 1.0, "worst_room", "size_number"),
+    ("shortest_mm", np.inf, "worst_shortest", "length_number"),
+    ("crossing_deg", np.inf, "worst_crossing", "angle_deg"),
 )
-"""Figures of a row, the limit below which each makes a variant hard to draw, and the reason in words;
-the gravest first."""
+"""Figures of a row, the limit below which each makes a variant hard to draw, the code of the reason and the
+parameter that holds the figure; the gravest first."""
 
 
-def _worst(rows: Sequence[LintVariant]) -> LintWorst:
+def _worst(rows: Sequence[LintVariant]) -> tuple[Variant, Reason]:
     """Return the variant that is hardest to draw: badly conditioned before too large before too short."""
-    for name, limit, reason in _REASONS:
+    for name, limit, code, figure in _REASONS:
         known = [(least, row) for row in rows if (least := getattr(row, name)) is not None]
         least, row = min(known, key=lambda entry: entry[0].value, default=(None, rows[0]))
         if least is not None and least.value < limit:
-            return LintWorst(**_numbers(row), why=reason.format(at=least.at, value=least.value))
-    return LintWorst(**_numbers(rows[0]), why="all are alike")
+            told: dict[str, Parameter] = {"name": least.at, figure: least.value}
+            if least.page is not None:
+                told["page"] = least.page
+            return Variant(row.n, row.position), Reason(code, told)
+    return Variant(rows[0].n, rows[0].position), Reason("worst_none")
 
 
 # Names in the files: unknown, unused, not told to the student -------------------------------------
@@ -259,21 +262,20 @@ def _untranslated(assignment: Assignment, rubric: RubricFile) -> Iterator[LintFi
             if not getattr(text, language)
         ]
         if missing:
-            more = f" and {len(missing) - NAMED} more" if len(missing) > NAMED else ""
-            message = f"students read English in place of {', '.join(missing[:NAMED])}{more}"
-            yield LintFinding("hint", "not_translated", name, missing[0], message)
+            yield LintFinding("hint", "not_translated", name, missing[0], {"texts": first_of(missing)})
 
 
 def _rubric_faults(
     assignment: Assignment, rubric: RubricFile, construction: Construction
 ) -> Iterator[LintFinding]:
     for fault in (*check_rubric(rubric, construction), *check_accelerations(assignment, rubric)):
-        yield LintFinding("fault", "unknown_in_rubric", "rubric", fault.path, fault.message)
+        known, why = fault.parameters, fault.code
+        yield LintFinding("fault", "unknown_in_rubric", "rubric", fault.path, known, why=why)
     judged_by: dict[str, str] = {}
     for index, criterion in enumerate(rubric.criterion):
         if criterion.name in judged_by:
-            message = f"{criterion.name} is judged by {judged_by[criterion.name]} already"
-            yield LintFinding("hint", "asked_twice", "rubric", f"$.criterion[{index}]", message)
+            known = {"name": criterion.name, "other": judged_by[criterion.name]}
+            yield LintFinding("hint", "asked_twice", "rubric", f"$.criterion[{index}]", known)
         judged_by.setdefault(criterion.name, criterion.id)
 
 
@@ -289,13 +291,11 @@ def _odd_sizes(assignment: Assignment) -> Iterator[LintFinding]:
     longest = max(lengths.values(), default=0.0)
     for path, length in lengths.items():
         if length * ODD_RATIO < longest:
-            message = (
-                f"{length:g} beside {longest:g}: all lengths here are in {unit}; is this one in another unit?"
-            )
-            yield LintFinding("warning", "odd_size", *mechanism_place(assignment, path), message)
+            known = {"text": f"{length:g}", "length": f"{longest:g} {unit}"}
+            yield LintFinding("warning", "odd_size", *mechanism_place(assignment, path), known)
     if lengths and not SMALLEST_M <= longest * LENGTH_UNITS_M[unit] <= LARGEST_M:
-        message = f"the longest link is {longest:g} {unit}: are the lengths in another unit?"
-        yield LintFinding("warning", "odd_size", *mechanism_place(assignment, ".length_unit"), message)
+        known = {"length": f"{longest:g} {unit}"}
+        yield LintFinding("warning", "odd_size", *mechanism_place(assignment, ".length_unit"), known)
 
 
 def _with_their_own(assignment: Assignment, names: Iterable[str]) -> set[str]:
@@ -319,17 +319,17 @@ def _unused_values(assignment: Assignment) -> Iterator[LintFinding]:
     for name in file.variant.values:
         if name not in needed:
             path = f"$.variant.values.{name}"
-            yield LintFinding("hint", "unused", "assignment", path, "no formula uses this value")
+            yield LintFinding("hint", "unused", "assignment", path, {"text": name}, why="unused_name")
     for name in assignment.rows.columns if assignment.rows else ():
         if name not in needed:
-            message = f"no formula uses the column {name}"
-            yield LintFinding("hint", "unused", "assignment", "$.variant.table", message)
+            path = "$.variant.table"
+            yield LintFinding("hint", "unused", "assignment", path, {"text": name}, why="unused_name")
     drawn = _with_their_own(assignment, names_in(assignment.mechanism_file))
     for name, in_table in zip(KEYS, assignment.rows.has if assignment.rows else (False, False), strict=True):
         by_row = in_table and not drawn.isdisjoint(assignment.rows.columns if assignment.rows else ())
         if assignment.numbers(name) is not None and name not in drawn and not by_row:
-            message = f"the mechanism does not depend on {name}: every student has the same"
-            yield LintFinding("warning", "same_for_all", "assignment", f"$.variant.{name}", message)
+            known = {"name": name}
+            yield LintFinding("warning", "same_for_all", "assignment", f"$.variant.{name}", known)
 
 
 def _not_told(assignment: Assignment) -> Iterator[LintFinding]:
@@ -346,8 +346,7 @@ def _not_told(assignment: Assignment) -> Iterator[LintFinding]:
 
     missing = [name for name in sorted(names_in(assignment.mechanism_file)) if not is_stated(name)]
     if missing:
-        message = f"{', '.join(missing)}: sets the mechanism, and no [[given]] tells it to the student"
-        yield LintFinding("hint", "not_told", "assignment", "$.given", message)
+        yield LintFinding("hint", "not_told", "assignment", "$.given", {"texts": tuple(missing)})
 
 
 OTHER_UNITS = frozenset({"m", "cm", "mm", "°", "rev/min"})
@@ -362,8 +361,7 @@ def _told_results(assignment: Assignment, rubric: RubricFile, plan: Plan) -> Ite
     for index, datum in enumerate(assignment.file.given):
         told = np.abs(datum.value(values)) if datum.unit not in OTHER_UNITS else np.nan
         for name in (name for name in asked if np.allclose(told, np.abs(results[name]), rtol=1e-3)):
-            message = f"{name} is told here, and the rubric asks for it: tell what it is computed from"
-            yield LintFinding("warning", "result_told", "assignment", f"$.given[{index}]", message)
+            yield LintFinding("warning", "result_told", "assignment", f"$.given[{index}]", {"name": name})
 
 
 def _unknown_names(assignment: Assignment, construction: Construction) -> Iterator[LintFinding]:
@@ -372,8 +370,7 @@ def _unknown_names(assignment: Assignment, construction: Construction) -> Iterat
     known |= TRADITIONS.get(assignment.file.tradition, {}).keys()
     for name in assignment.file.names:
         if name not in known:
-            message = "is neither a node nor a vector nor a scale of this assignment"
-            yield LintFinding("hint", "unused", "assignment", f'$.names."{name}"', message)
+            yield LintFinding("hint", "unused", "assignment", f'$.names."{name}"', why="names_nothing")
 
 
 def _unneeded(
@@ -387,33 +384,48 @@ def _unneeded(
         if name is not None and name in construction.rates
     ]
     if not asked:
-        message = "asks for no vector: only what is declared can be marked"
-        yield LintFinding("hint", "no_vector_asked", "rubric", "$.criterion", message)
+        yield LintFinding("hint", "no_vector_asked", "rubric", "$.criterion")
         return
     needed = ancestors(construction, {end for vector in asked for end in (vector.tail, vector.head)})
     for index, table in enumerate(assignment.mechanism_file.group):
         joint = table.node
         if needed.isdisjoint({joint, image_name(joint), image_name(joint, primed=True)}):
-            message = f"nothing that the rubric asks for depends on {joint}"
-            yield LintFinding("hint", "unused", *mechanism_place(assignment, f".group[{index}]"), message)
+            place = mechanism_place(assignment, f".group[{index}]")
+            yield LintFinding("hint", "unused", *place, {"joint": joint}, why="unused_joint")
     figures = {construction.figure_of(vector.head) for vector in asked}
     for index, page in enumerate(assignment.file.page):
         for figure in page.figures:
             if figure != "mechanism" and figure not in figures:
-                message = f"the rubric asks for nothing in the {figure.replace('_', ' ')}"
-                yield LintFinding("hint", "unused", "assignment", f"$.page[{index}].figures", message)
+                path, known = f"$.page[{index}].figures", {"figure": figure}
+                yield LintFinding("hint", "unused", "assignment", path, known, why="unused_figure")
 
 
 # JSON document ------------------------------------------------------------------------------------
 
 
-def lint_document(result: Lint) -> LintDocument:
-    """Return the document of `planmark lint --json`."""
+def lint_document(result: Lint, speaker: Tongue = ENGLISH) -> LintDocument:
+    """Return the document of `planmark lint --json`, with messages in a language."""
+    worst = None
+    if result.worst is not None:
+        variant, why = result.worst
+        parameters = as_json(why.parameters)
+        worst = LintWorst(**_numbers(variant), why=clause(why, speaker), code=why.code, parameters=parameters)
     return LintDocument(
         assignment=result.assignment.id,
         needs_a_person=result.needs_a_person,
-        findings=[LintFindingDocument.model_validate(finding) for finding in result.findings],
+        findings=[
+            LintFindingDocument(
+                severity=one.severity,
+                code=one.code,
+                file=one.file,
+                path=one.path,
+                message=one.message(speaker),
+                parameters=as_json(one.parameters),
+                variants=[VariantDocument(**_numbers(variant)) for variant in one.variants],
+            )
+            for one in result.findings
+        ],
         variants=list(result.rows),
         scales=[proposal.over_all for proposal in result.scales],
-        worst=result.worst,
+        worst=worst,
     )

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from grader.authoring.findings import NAMED, BoolArray, LintFinding, Severity, chosen
+from grader.authoring.findings import BoolArray, LintFinding, Severity, chosen, first_of
 from grader.documents import LintLeast, LintScales
 from grader.printed.layout import (
     FRAME_MM,
@@ -27,11 +27,13 @@ from grader.printed.layout import (
 from grader.records import MECHANISM, Box
 from grader.rubric import RubricFile
 from reference.authored.assignment import SCALE_NAMES, Assignment, Scales, Variant
+from reference.errors import Parameter
 from reference.geometry import FloatArray
 from reference.plan import ZERO_SHARE, Plan
-from reference.quantities import FORCE_PLANS, group_of, scale_of, unit_of, zone_of
+from reference.quantities import group_of, scale_of, unit_of, zone_of
 
 WELL_READ_MM = 8.0
+WELL_READ: dict[str, Parameter] = {"least_number": WELL_READ_MM}
 """Shorter vectors are read from scans with less certainty."""
 Sheet = tuple[Template, Sequence[str]]
 """A printed page's division and its figures."""
@@ -107,20 +109,17 @@ def length_findings(rubric: RubricFile, plan: Plan, asked: AskedVectors) -> Iter
         short, zero = asked.short(least)[row], asked.is_zero[row]
         if np.any(short):
             shortest = float(np.min(asked.length_mm[row][short]))
-            message = f"{name} is shorter than {least:g} mm at the proposed scales, down to {shortest:.2g} mm"
+            known: dict[str, Parameter] = {"name": name, "least_number": least, "length_number": shortest}
             grave: Severity = "warning" if asked.mostly_short[row] else "hint"
-            yield LintFinding(grave, "short_vector", "rubric", path, message, chosen(plan.variants, short))
+            yield LintFinding(grave, "short_vector", "rubric", path, known, chosen(plan.variants, short))
         if np.any(zero):
-            message = f"{name} is zero: it has a length to be judged, and no direction"
-            yield LintFinding("hint", "zero_vector", "rubric", path, message, chosen(plan.variants, zero))
+            meant = chosen(plan.variants, zero)
+            yield LintFinding("hint", "zero_vector", "rubric", path, {"name": name}, meant)
     few = asked.short(WELL_READ_MM)
     if np.any(few):
-        message = (
-            f"{int(few.sum())} of {int((~asked.is_zero).sum())} asked vectors are shorter than"
-            f" {WELL_READ_MM:g} mm at the proposed scales: on scans they are read with less certainty"
-        )
+        counts = {"each": int(few.sum()), "count": int((~asked.is_zero).sum())}
         meant = chosen(plan.variants, np.any(few, axis=0))
-        yield LintFinding("hint", "hard_to_read", "assignment", "$.scales", message, meant)
+        yield LintFinding("hint", "hard_to_read", "assignment", "$.scales", WELL_READ | counts, meant)
     yield from _unasked_findings(rubric, plan, asked)
 
 
@@ -130,15 +129,14 @@ def _unasked_findings(rubric: RubricFile, plan: Plan, asked: AskedVectors) -> It
     lengths[zeros] = 0.0
     short, count = lengths < rubric.tolerance.least_mm, len(plan.variants)
     unasked = [
-        f"{name} (in {few.sum()} of {count} variants, down to {np.min(length[few]):.2g} mm)"
+        f"{name} ({few.sum()}/{count}, {np.min(length[few]):.2g} mm)"
         for name, length, few in zip(names, lengths, short, strict=True)
         if np.any(few)
     ]
     if unasked:
-        least = f"{rubric.tolerance.least_mm:g} mm"
-        message = f"not asked for, and shorter than {least}: {', '.join(unasked)}"
+        known: dict[str, Parameter] = {"least_number": rubric.tolerance.least_mm, "texts": tuple(unasked)}
         meant = chosen(plan.variants, np.any(short, axis=0))
-        yield LintFinding("hint", "short_unasked", "assignment", "$.scales", message, meant)
+        yield LintFinding("hint", "short_unasked", "assignment", "$.scales", known, meant)
 
 
 # Room on the sheets -------------------------------------------------------------------------------
@@ -208,31 +206,20 @@ def room_findings(
 ) -> Iterator[LintFinding]:
     """Report figures too large for their zone, and pages whose figures do not fit a plain A3 sheet either."""
     for index, room in rooms.items():
-        checks = [
-            (
-                "does_not_fit",
-                factor,
-                "the force plans do not fit their zone on the A3 answer sheet: they would"
-                if zone == FORCE_PLANS
-                else f"the {zone.replace('_', ' ')} does not fit its zone on the A3 answer sheet: it would",
-            )
-            for zone, factor in room.zones.items()
-        ]
-        side_by_side = "the page's figures do not fit side by side into the frame of a plain A3 sheet"
-        checks.append(("does_not_fit_a3", room.frame, f"{side_by_side}: they would"))
-        for code, factor, what in checks:
+        for zone, factor in {**room.zones, "": room.frame}.items():
             if np.any(factor < 1.0):
-                message = f"{what} at {np.min(factor):.2f} of the proposed size"
+                code = "does_not_fit" if zone else "does_not_fit_a3"
+                known: dict[str, Parameter] = {"figure": zone} if zone else {}
+                known |= {"size_number": float(np.min(factor))}
                 meant = chosen(plan.variants, factor < 1.0)
-                yield LintFinding("warning", code, "assignment", f"$.page[{index}]", message, meant)
+                yield LintFinding("warning", code, "assignment", f"$.page[{index}]", known, meant)
     shown = {figure for page in assignment.file.page for figure in page.figures}
     built = plan.construction
     needed = {built.figure_of(built.vectors[name].head) for name in asked.names}
     for figure in plan.nodes_mm:
         # Of force plans only those are needed whose vectors are asked for.
         if figure not in shown and (not group_of(figure) or figure in needed):
-            message = f"no page has the {figure.replace('_', ' ')}, which the rubric needs"
-            yield LintFinding("warning", "no_page", "assignment", "$.page", message)
+            yield LintFinding("warning", "no_page", "assignment", "$.page", {"figure": figure})
 
 
 # Round scales -------------------------------------------------------------------------------------
@@ -390,30 +377,21 @@ def scale_findings(assignment: Assignment, plan: Plan, proposed: Sequence[Propos
     names = [name for name in SCALE_NAMES if name in drawn]
     own, round_, each = (proposal.over_all for proposal in proposed)
     if own.shortest_link_mm < LEAST_DRAWN_MM:
-        message = (
-            f"the shortest link is drawn {own.shortest_link_mm:.2g} mm long: kL is metres on a millimetre,"
-            " 1:2.5 is 0.0025"
-        )
-        yield LintFinding("warning", "tiny_sketch", "assignment", "$.scales.kL", message)
+        known: dict[str, Parameter] = {"length_number": own.shortest_link_mm}
+        yield LintFinding("warning", "tiny_sketch", "assignment", "$.scales.kL", known)
     values = {name: np.asarray(getattr(plan.scales, name)) for name in names}
     is_round = all(np.allclose(round_up(scale), scale, rtol=1e-6) for name, scale in values.items())
     if own.room < 1.0 or not is_round:
-        why = "do not fit" if own.room < 1.0 else "are not round"
-        round_text = written(proposed[1].scales, names)
-        message = (
-            f"the proposed scales {why}; round ones that fit every variant: {round_text};"
-            f" then {round_.under_8_mm} of {round_.asked} asked vectors are under {WELL_READ_MM:g} mm"
-            f" instead of {own.under_8_mm}; with round scales of each variant's own {each.under_8_mm}"
-        )
-        yield LintFinding("hint", "round_scales", "assignment", "$.scales", message)
+        counts = (round_.under_8_mm, round_.asked, own.under_8_mm, each.under_8_mm)
+        known = WELL_READ | dict(zip(("left", "count", "now", "each"), counts, strict=True))
+        known |= {"why": "scales_do_not_fit" if own.room < 1.0 else "scales_not_round"}
+        known |= {"texts": written(proposed[1].scales, names)}
+        yield LintFinding("hint", "round_scales", "assignment", "$.scales", known)
     yield from _short_findings(plan, own, proposed[2])
     if "acceleration_plan" in plan.nodes_mm and any("_n" in name for name in plan.vectors_si):
         ratio = plan.scales.kL * plan.scales.ka / plan.scales.kv**2
         if not np.allclose(ratio, 1.0, rtol=1e-6):
-            message = (
-                "kL ka is not kv^2: normal components cannot be built by the right triangle (altitude) method"
-            )
-            yield LintFinding("hint", "no_altitude_method", "assignment", "$.scales", message)
+            yield LintFinding("hint", "no_altitude_method", "assignment", "$.scales")
 
 
 def _short_findings(plan: Plan, own: LintScales, each: Proposal) -> Iterator[LintFinding]:
@@ -421,18 +399,12 @@ def _short_findings(plan: Plan, own: LintScales, each: Proposal) -> Iterator[Lin
     if own.under_8_mm == 0:
         return
     if each.over_all.under_8_mm == 0:
-        message = f"with round scales of each variant's own no asked vector is under {WELL_READ_MM:g} mm"
-        yield LintFinding("hint", "scales_of_its_own", "assignment", "$.scales", message)
+        yield LintFinding("hint", "scales_of_its_own", "assignment", "$.scales", WELL_READ)
         return
     left, still = each.short > 0, each.over_all.under_8_mm
-    names = ", ".join(each.still_short[:NAMED]) + (" and more" if len(each.still_short) > NAMED else "")
-    message = (
-        f"even at the largest round scales that fit the sheet, {still} of {own.asked} asked"
-        f" vectors stay under {WELL_READ_MM:g} mm ({names}): no scale makes them easy to read; a page for"
-        " each plan, or a criterion that is optional, would help"
-    )
+    known = WELL_READ | {"left": still, "count": own.asked, "texts": first_of(each.still_short)}
     meant = chosen(plan.variants, left)
-    yield LintFinding("hint", "short_at_any_scale", "assignment", "$.scales", message, meant)
+    yield LintFinding("hint", "short_at_any_scale", "assignment", "$.scales", known, meant)
 
 
 def suggestions(proposed: Sequence[Proposal], plan: Plan, figures: Collection[str]) -> dict[Variant, str]:

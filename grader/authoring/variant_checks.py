@@ -11,6 +11,7 @@ from grader.authoring.findings import (
     BoolArray,
     LintFinding,
     chosen,
+    first_of,
     group_of_image,
     group_place,
     mechanism_place,
@@ -20,7 +21,7 @@ from grader.authoring.round_scales import AskedVectors
 from grader.rubric import RubricFile
 from reference.authored.assignment import Assignment, Variant
 from reference.authored.flat_positions import other_assemblies
-from reference.errors import MechanismError, counted
+from reference.errors import MechanismError, Parameter
 from reference.geometry import FloatArray
 from reference.kinematics.motion import move_where_possible, reason_at
 from reference.plan import Plan, conditioning
@@ -34,8 +35,6 @@ LARGEST_ERROR = 1e-9
 """Relative error of a computed plan above which it is reported: far below a pencil's, far above rounding."""
 SAME_MM = 0.5
 """Drawings whose nodes all lie this close are the same drawing: the tolerance of drawing by hand."""
-NAMED_GROUPS = 3
-"""Groups of equal drawings named in the message; the others are counted."""
 MOST_PAIRS = 100_000
 """Largest number of pairs searched: if all variants are equal, the pairs are their number squared."""
 
@@ -61,13 +60,14 @@ def broken_findings(assignment: Assignment, broken: Broken) -> Iterator[LintFind
     by_reason: dict[str, list[Variant]] = defaultdict(list)
     for variant, error in broken.items():
         by_reason[error.template].append(variant)
-    for template, variants in by_reason.items():
+    for variants in by_reason.values():
         error = broken[variants[0]]
         gaps = sorted(gap for variant in variants if (gap := broken[variant].gap_m) is not None)
-        same = not gaps or f"{gaps[0]:.6g}" == f"{gaps[-1]:.6g}"
-        message = error.message if same else template.replace("{gap}", f"{gaps[0]:.3g} to {gaps[-1]:.3g} m")
+        known: dict[str, Parameter] = {"node": error.group or ""}
+        if gaps:
+            known["texts"] = " .. ".join(dict.fromkeys(f"{gap:.3g} m" for gap in (gaps[0], gaps[-1])))
         place = group_place(assignment, error.group)
-        yield LintFinding("fault", error.code, *place, message, tuple(variants))
+        yield LintFinding("fault", error.code, *place, known, tuple(variants))
 
 
 def assembly_findings(assignment: Assignment, variants: Sequence[Variant]) -> Iterator[LintFinding]:
@@ -83,12 +83,8 @@ def assembly_findings(assignment: Assignment, variants: Sequence[Variant]) -> It
                 by_node[node].update(rows)
     for node, others in by_node.items():
         file, path = group_place(assignment, node)
-        message = (
-            f"{node} is on the side that is given, yet in another assembly than in the neighbouring variants:"
-            " a flat position lies between them; give side by a column of a table or by a formula"
-        )
         meant = tuple(variants[row] for row in sorted(others))
-        yield LintFinding("warning", "another_assembly", file, f"{path}.side", message, meant)
+        yield LintFinding("warning", "another_assembly", file, f"{path}.side", {"node": node}, meant)
 
 
 # Conditioning: transmission angles, crossing angles, predicted error ------------------------------
@@ -120,30 +116,23 @@ def condition_findings(assignment: Assignment, plan: Plan, conditions: Condition
     variants, whole = plan.variants, mechanism_place(assignment)
     for node, sine in conditions.transmission.items():
         if np.any(weak := sine < LEAST_TRANSMISSION):
-            message = (
-                f"near a singular position: the sine of the transmission angle at {node} falls to"
-                f" {np.min(sine):.2g}"
-            )
+            known: dict[str, Parameter] = {"node": node, "least_number": float(np.min(sine))}
             place = group_place(assignment, node)
-            yield LintFinding("warning", "transmission", *place, message, chosen(variants, weak))
+            yield LintFinding("warning", "transmission", *place, known, chosen(variants, weak))
     for nodes, angle in _joined(conditions.crossing_deg).items():
         if np.any(flat := angle < LEAST_CROSSING_DEG):
             least = float(np.min(angle))
             error_mm = 1.0 / np.sin(np.radians(max(least, 1e-3)))
-            message = (
-                f"the construction lines of {' and '.join(nodes)} meet at only {least:.1f} degrees;"
-                f" a line 1 mm off moves the node by {error_mm:.2g} mm"
-            )
+            known = {"nodes": nodes, "angle_deg": least, "off_number": float(error_mm)}
             place = group_of_image(assignment, nodes[0])
-            yield LintFinding("warning", "crossing", *place, message, chosen(variants, flat))
+            yield LintFinding("warning", "crossing", *place, known, chosen(variants, flat))
     sines = [np.ones(len(variants)), *plan.motion.transmission.values()]
     again = plan.motion.recomputed & (np.min(sines, axis=0) < LEAST_TRANSMISSION)
     if np.any(again):
-        message = "would lose a digit or two in double precision, and was computed with more"
-        yield LintFinding("hint", "recomputed", *whole, message, chosen(variants, again))
+        yield LintFinding("hint", "recomputed", *whole, variants=chosen(variants, again))
     if np.any(lost := conditions.error > LARGEST_ERROR):
-        message = f"the computed plan may be off by {np.max(conditions.error):.1g} of its size"
-        yield LintFinding("warning", "predicted_error", *whole, message, chosen(variants, lost))
+        known = {"text": f"{np.max(conditions.error):.1g}"}
+        yield LintFinding("warning", "predicted_error", *whole, known, chosen(variants, lost))
 
 
 def _joined(angles: Mapping[str, FloatArray]) -> dict[tuple[str, ...], FloatArray]:
@@ -267,21 +256,15 @@ def tie_findings(plan: Plan, ties: Ties) -> Iterator[LintFinding]:
     if groups:
         members = sorted(index for group in groups for index in group)
         meant = tuple(variants[index] for index in members)
-        listed = "; ".join(named([variants[index] for index in group]) for group in groups[:NAMED_GROUPS])
-        more = (
-            f" and {counted(len(groups) - NAMED_GROUPS, 'more group')}" if len(groups) > NAMED_GROUPS else ""
-        )
-        message = f"the same drawing within {SAME_MM:g} mm: {listed}{more}"
-        yield LintFinding("warning", "ties", "assignment", "$.variant", message, meant, names_them=True)
+        listed = first_of([named([variants[index] for index in group]) for group in groups], "; ")
+        known: dict[str, Parameter] = {"least_number": SAME_MM, "text": listed}
+        yield LintFinding("warning", "ties", "assignment", "$.variant", known, meant, names_them=True)
     count = len(variants)
     further = np.setdiff1d(ties.passing[0] * count + ties.passing[1], ties.same[0] * count + ties.same[1])
     if len(further):
         i, j = divmod(int(further[0]), count)
-        least = "at least " if len(ties.passing[0]) >= MOST_PAIRS else ""
-        message = (
-            f"{least}{len(further)} pair(s) of variants differ by less than the rubric's tolerance: a copied"
-            f" drawing would get full marks, such as that of {variants[i]} for {variants[j]}"
-        )
+        least = ">= " if len(ties.passing[0]) >= MOST_PAIRS else ""
+        known = {"count": f"{least}{len(further)}", "first": str(variants[i]), "second": str(variants[j])}
         members = np.unique(np.concatenate(divmod(further, count))).tolist()
         meant = tuple(variants[index] for index in members)
-        yield LintFinding("hint", "near_ties", "assignment", "$.variant", message, meant)
+        yield LintFinding("hint", "near_ties", "assignment", "$.variant", known, meant)

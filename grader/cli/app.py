@@ -116,10 +116,10 @@ class Commands(_Help, TyperGroup):
         try:
             return super().invoke(ctx)
         except PlanmarkError as error:
-            from grader.texts.spoken import in_english  # pydantic and documents: only for an error
+            from grader.texts.spoken import at_terminal  # pydantic and documents: only for an error
 
             terminal.LOG.debug("%s", error.code, exc_info=error)
-            self._end(ctx, in_english(error), error.exit_status)
+            self._end(ctx, at_terminal(error, tongue(ctx.obj or "en")), error.exit_status)
         except KeyboardInterrupt:
             # A second Ctrl+C would only break the end of this one.
             signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -192,7 +192,7 @@ class _Application(typer.Typer):
                 terminal.note_call()
                 class_folder.tell_used(context)
                 if values.get("lang") is not None:
-                    values["lang"] = tongue(values["lang"]).lang
+                    values["lang"] = context.find_root().obj = tongue(values["lang"]).lang
                 for whole, record in records.items():
                     values[whole] = record(**{one.name: values.pop(one.name) for one, _ in offered(record)})
                 start = time.monotonic()

@@ -52,11 +52,12 @@ def lint(
         Path | None,
         typer.Option("--svg", help="Draw the variant that is hardest to draw into this SVG file."),
     ] = None,
+    lang: LanguageOption = "en",
 ) -> None:
     """Check an assignment and its rubric against every variant, and list all findings."""
     from grader.cli.linting import lint_assignment
 
-    if lint_assignment(assignment, as_json=as_json, svg=svg):
+    if lint_assignment(assignment, as_json=as_json, svg=svg, lang=lang):
         raise typer.Exit(1)
     if not as_json:
         tell_next("sheet", assignment, "--roster", "roster.csv", "-o", "sheets.pdf")

@@ -13,9 +13,12 @@ from grader.authoring.lint import Lint, lint, lint_document
 from grader.authoring.round_scales import WELL_READ_MM, ratio_text
 from grader.cli import terminal
 from grader.cli.app import new_table
-from grader.documents import LintLeast, LintScales, LintVariant, LintWorst
+from grader.documents import LintLeast, LintScales, LintVariant
 from grader.files import write_whole
+from grader.language import Tongue, tongue
+from grader.records import Reason
 from grader.rubric import load_both
+from grader.texts.spoken import clause
 from reference.authored.assignment import Variant
 from reference.drawing.canvas import Label
 from reference.drawing.canvas import svg as as_svg
@@ -29,19 +32,20 @@ REASON_MM, REASON_COLOUR = 4.0, "#a03014"
 COLOURS = {"fault": "bold red", "warning": "yellow", "hint": "cyan"}
 
 
-def lint_assignment(name: str, *, as_json: bool, svg: Path | None) -> bool:
-    """Print every finding on an assignment and its rubric; whether any needs a person."""
+def lint_assignment(name: str, *, as_json: bool, svg: Path | None, lang: str) -> bool:
+    """Print every finding on an assignment and its rubric in a language; whether any needs a person."""
+    speaker = tongue(lang)
     assignment, rubric = load_both(name)
     result = lint(assignment, rubric)
     if svg is not None and result.plan is not None and result.worst is not None:
-        worst = _variant_of(result.worst)
-        why = f"{worst}: {result.worst.why}"
+        worst = result.worst[0]
+        why = _hardest(result.worst, speaker)
         reason = Label((FRAME[0], FRAME[3] + 1.5 * REASON_MM), why, REASON_MM, colour=REASON_COLOUR)
         drawing = reference_drawing(assignment, result.plan, result.plan.variants.index(worst))
         sheets = [(*sheet.shapes, reason) for sheet in drawing]
         write_whole(svg, as_svg(sheets))
     if as_json:
-        terminal.say(lint_document(result).model_dump_json(indent=2))
+        terminal.say(lint_document(result, speaker).model_dump_json(indent=2))
         return result.needs_a_person
     console = Console()
     console.print(f"[bold]{assignment.file.title.en}[/bold]", highlight=False)
@@ -53,8 +57,8 @@ def lint_assignment(name: str, *, as_json: bool, svg: Path | None) -> bool:
     # A line each, which terminals break and programs can search.
     for finding in result.findings:
         console.print(f"[{COLOURS[finding.severity]}]{finding.severity:<8}[/] ", end="")
-        console.print(str(finding), markup=False, highlight=False, soft_wrap=True)
-    _tell_end(result, svg)
+        console.print(finding.told(speaker), markup=False, highlight=False, soft_wrap=True)
+    _tell_end(result, svg, speaker)
     return result.needs_a_person
 
 
@@ -91,7 +95,7 @@ def _ranges(rows: Sequence[LintVariant]) -> list[list[LintVariant]]:
     ]
 
 
-def _variant_of(row: LintVariant | LintWorst) -> Variant:
+def _variant_of(row: LintVariant) -> Variant:
     return Variant(row.n, row.position)
 
 
@@ -140,9 +144,14 @@ def _span(ends: tuple[float, float]) -> str:
     return low if low == high else f"{low}..{high}"
 
 
-def _tell_end(result: Lint, svg: Path | None) -> None:
+def _hardest(worst: tuple[Variant, Reason], speaker: Tongue) -> str:
+    """Return the variant that is hardest to draw, and why."""
+    return f"{worst[0]}: {clause(worst[1], speaker)}"
+
+
+def _tell_end(result: Lint, svg: Path | None, speaker: Tongue) -> None:
     if result.worst is not None and result.plan is not None:
-        terminal.say(f"hardest to draw: {_variant_of(result.worst)}: {result.worst.why}")
+        terminal.say(f"hardest to draw: {_hardest(result.worst, speaker)}")
         if svg is not None:
             terminal.say(f"drawn in {svg}")
     elif svg is not None:

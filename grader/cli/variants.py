@@ -87,7 +87,7 @@ def _sound(assignment: Assignment) -> list[Variant]:
         told = f"no variant can be solved; {variants[0]}: {error.template}"
         raise MechanismError(error.code, told, group=error.group, gap_m=error.gap_m)
     for finding in broken_findings(assignment, broken):
-        typer.secho(f"left out: {finding}", err=True, fg="red")
+        typer.secho(f"left out: {finding.told()}", err=True, fg="red")
     return [variant for variant in variants if variant not in broken]
 
 

@@ -20,7 +20,7 @@ from grader.lms.table import criteria_text, not_as_meant, parsed, summary_text
 from grader.records import Reason
 from grader.texts.spoken import failure
 from reference.authored.toml_file import findings_of
-from reference.errors import CallError, InputFileError, lines_of
+from reference.errors import CallError, InputFileError
 
 
 def read_results(out_dir: Path) -> ResultsDocument:
@@ -35,8 +35,8 @@ def read_results(out_dir: Path) -> ResultsDocument:
             InputFileError, "results_missing", "unreadable", file=path, error=error.strerror
         ) from error
     except ValidationError as error:
-        found = lines_of(list(findings_of(error, ResultsDocument)))
-        raise failure(InputFileError, "results_wrong", "no_results", file=path, findings=found) from error
+        faults = tuple(findings_of(error, ResultsDocument))
+        raise failure(InputFileError, "results_wrong", "no_results", faults=faults, file=path) from error
     except ValueError as error:
         raise failure(InputFileError, "results_wrong", "results_no_json", file=path, error=error) from error
 

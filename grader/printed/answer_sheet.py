@@ -442,7 +442,7 @@ def variants_of(assignment: Assignment, rows: Sequence[RosterRow], roster: str) 
         try:
             variants.append(assignment.variant(row.n, row.position))
         except CallError as error:
-            findings.append(Finding(f"line {row.line}, {row.student_id}", error.message))
+            findings.append(Finding(row.student_id, "row_variant", error.parameters, row.line))
     if findings:
         raise AuthoredFileError(roster, tuple(findings))
     return variants

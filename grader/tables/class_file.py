@@ -1,7 +1,7 @@
 """`planmark.toml` in a class's folder: options that are the same for every command on that class."""
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,13 +10,13 @@ from pydantic import AfterValidator, BaseModel
 from grader.options import GradeOptions, model_of, offered
 from reference.authored.assignment import built_in, locate
 from reference.authored.toml_file import NOT_TOML, Authored, is_file, load
-from reference.errors import AuthoredFileError, Finding
+from reference.errors import AuthoredFileError, FaultError, Finding
 
 
 def _check_path(text: str) -> str:
     if not text or not text.isprintable():
         # In double quotes TOML takes the backslash of a path for the begin of a sign: \\r, \\t.
-        raise ValueError("is no path: write it with / or between single quotes: 'lists\\roster.csv'")
+        raise FaultError("no_path", advice="path_quotes")
     return text
 
 
@@ -69,7 +69,7 @@ def read_class_file(path: Path, platforms: Collection[str]) -> ClassSettings:
         key: text if key == "assignment" and not text.endswith(".toml") else str(path.parent / text)
         for key, text in texts.items()
     }
-    faults = list(_faults(path, {**written, **resolved}, platforms))
+    faults = list(_faults({**written, **resolved}, platforms))
     if faults:
         raise AuthoredFileError(str(path), tuple(faults))
     keys = {key: _PARAMETERS.get(key, key) for key in written}
@@ -85,18 +85,16 @@ def _loaded(path: Path) -> BaseModel:
         (first, *_) = error.findings
         if first.code != NOT_TOML or b"\\" not in path.read_bytes():
             raise
-        told = f"{first.message}; write a path with / or between single quotes: 'lists\\roster.csv'"
-        raise AuthoredFileError(error.file, (Finding(first.path, told),)) from error
+        told = replace(first, parameters={"advice": "path_quotes", **first.parameters})
+        raise AuthoredFileError(error.file, (told,)) from error
 
 
-def _faults(path: Path, values: dict[str, Any], platforms: Collection[str]) -> Iterator[Finding]:
+def _faults(values: dict[str, Any], platforms: Collection[str]) -> Iterator[Finding]:
     """Report files and platforms that the values name and that do not exist."""
     name, roster, platform = (values.get(key) for key in ("assignment", "roster", "platform"))
     if name is not None and not is_file(locate("assignment", name)):
-        known = f"the built-in ones are {', '.join(built_in())}"
-        yield Finding("$.assignment", f"there is no '{name}': {known}; or write the path of a .toml file")
+        yield Finding("$.assignment", "class_assignment", {"text": name, "names": tuple(built_in())})
     if roster is not None and not is_file(Path(roster)):
-        told = f"there is no file {roster}; write its path relative to the folder of {path.name}"
-        yield Finding("$.roster", told)
+        yield Finding("$.roster", "no_file_beside", {"file": roster})
     if platform is not None and platform not in platforms:
-        yield Finding("$.platform", f"'{platform}' is not known; write one of {', '.join(platforms)}")
+        yield Finding("$.platform", "one_of", {"names": tuple(platforms)})

@@ -17,9 +17,9 @@ from pathlib import Path
 
 from grader.language import Tongue
 from grader.records import Reason, Value
-from grader.texts.spoken import ENGLISH, fault
+from grader.texts.spoken import ENGLISH, fault, lines_of
 from reference.authored.variant_table import delimiter_of, number_of, table_lines
-from reference.errors import InputFileError, lines_of, near_names
+from reference.errors import InputFileError, near_names
 
 _STUDENT_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 _DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECASE)
@@ -46,7 +46,7 @@ class TableError(InputFileError):
         first, *others = faults
         more: dict[str, Value] = {"more": len(others)} if others else {}
         said = [fault(one, speaker) for one in faults]
-        message = f"{file}:\n{lines_of(said)}" if others else f"{file}: {said[0]}"
+        message = f"{file}:\n{lines_of(said, speaker)}" if others else f"{file}: {said[0]}"
         super().__init__(code, message, why=first.code, **first.parameters, **more)
         self.file, self.faults = file, tuple(faults)
 

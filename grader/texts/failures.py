@@ -6,7 +6,7 @@ FAILURES: dict[str, str] = {
     # Results and folders
     "results_missing": N_("%(file)s: there is no such file; run planmark grade first"),
     "unreadable": N_("%(file)s: cannot be read (%(error)s)"),
-    "no_results": N_("%(file)s: is not a planmark results file; grade again\n%(findings)s"),
+    "no_results": N_("%(file)s: is not a planmark results file; grade again\n%(faults)s"),
     "results_no_json": N_("%(file)s: is not JSON (%(error)s); grade again"),
     "results_newer": N_(
         "%(file)s: a later version of planmark wrote this (schema_version %(version)s, known is"
@@ -174,6 +174,7 @@ FAILURES: dict[str, str] = {
     "template_exists": N_("--template %(file)s: already exists, perhaps filled in; choose another name"),
     "unknown_level": N_("--level %(level)s: known are %(names)s"),
     "unknown_assignment": N_("no assignment '%(name)s'; built in are %(names)s; or give a .toml file's path"),
+    "unknown_rubric": N_("no rubric '%(name)s' is built in; give a .toml file's path"),
     "number_needed": N_("--%(what)s is needed: this assignment has %(what)s from %(first)s to %(last)s"),
     "number_range": N_("%(what)s = %(value)s: this assignment has %(what)s from %(first)s to %(last)s"),
     "number_disagrees": N_("--%(what)s %(called)s, but %(file)s says %(what)s %(filed)s: which is right?"),

@@ -4,8 +4,10 @@ Each code has its texts, the most precise first: the first one is said whose par
 """
 
 from grader.language import N_
+from grader.texts.authored import AUTHORED
 
 FAULTS: dict[str, tuple[str, ...]] = {
+    **AUTHORED,
     # Of a file or line as a whole.
     "not_there": (
         N_("there is no such file; check its path, or write a CSV table with the columns %(names)s"),

@@ -6,13 +6,14 @@ from typing import Any, Protocol, TypeVar, cast
 from grader.documents import ProblemDocument, UnmatchedDocument, UnreadDocument
 from grader.language import N_, NO_NAMES, ROOT_LANGUAGE, Tongue, tongue
 from grader.records import Reason, Unread, Value, of_error
+from grader.texts.authored import REMARKS
 from grader.texts.clauses import CLAIMS, CLAUSES
 from grader.texts.exports import EXPORTS
 from grader.texts.failures import FAILURES
 from grader.texts.faults import FAULTS, WHERE
 from grader.texts.problems import ADVICE, PROBLEMS
 from grader.texts.refusals import REFUSALS
-from reference.errors import PlanmarkError, lines_of
+from reference.errors import MOST_FINDINGS, AuthoredFileError, Finding, PlanmarkError, writable
 from reference.quantities import sort_of, unit_of, vector_of_value
 
 ENGLISH = tongue(ROOT_LANGUAGE)
@@ -64,6 +65,8 @@ AREAS = {
     "lower_right": N_("at the lower right"),
 }
 """Position of a flaw on the sheet."""
+_AS_WRITTEN = {"text", "texts", "cell"}
+"""Parameters in which no word stands for something else."""
 _NOUNS = {"corners": CORNERS, "areas": AREAS}
 """Words for the codes in lists, by the parameter's name."""
 
@@ -92,9 +95,11 @@ def spoken(
     for key, value in parameters.items():
         stem, _, suffix = key.rpartition("_")
         if isinstance(value, str):
-            said[key] = value if key in {"text", "cell"} else place(value, speaker, names)  # as written
+            said[key] = value if key in _AS_WRITTEN else place(value, speaker, names)
         elif key == "students":
             said[key] = _some(cast("Sequence[str]", value), speaker)
+        elif key in _AS_WRITTEN:
+            said[key] = ", ".join(cast("Sequence[str]", value))
         elif not isinstance(value, int | float):
             words = _NOUNS.get(key, PLACES)
             said[key] = ", ".join(
@@ -201,6 +206,7 @@ _UNIT_WRITERS: dict[str, Callable[[Tongue, float], str]] = {
     "dpi": _with_unit("dpi"),
     "mb": _with_unit("MB"),
     "points": lambda speaker, value: speaker.trimmed(value, 6),
+    "number": lambda speaker, value: speaker.trimmed(float(f"{value:.2g}"), 6),
     "s": lambda speaker, value: f"{speaker.trimmed(value, 1)}\N{NO-BREAK SPACE}{speaker.unit('s')}",
 }
 
@@ -229,12 +235,40 @@ def sentence(reason: Coded, speaker: Tongue, *, brief: bool = False) -> str:
 
 def clause(reason: Coded, speaker: Tongue) -> str:
     """Return why something is not read or understood, as part of a sentence; the code if it has no words."""
-    return filled(clauses(reason.code), spoken(reason.parameters, speaker), speaker) or reason.code
+    said, texts = spoken(reason.parameters, speaker), clauses(reason.code)
+    chosen = next((text for text in texts if filled([text], said, speaker)), "")
+    remarks = [one for key, one in REMARKS.items() if key in said and f"%({key})s" not in chosen]
+    behind = "; ".join(filled(one, said, speaker) for one in remarks)
+    return (filled([chosen], said, speaker) or reason.code) + (f" ({behind})" if behind else "")
 
 
 def fault(reason: Coded, speaker: Tongue = ENGLISH) -> str:
     """Return a fault of a file that people wrote, behind its place: `line` and `cell` say which it is."""
-    return _placed(clause(reason, speaker), spoken(reason.parameters, speaker), speaker)
+    said = spoken(reason.parameters, speaker)
+    if isinstance(reason, Finding):
+        said |= {"cell": reason.path} | ({"line": str(reason.line)} if reason.line else {})
+    return _placed(clause(reason, speaker), said, speaker)
+
+
+MOST_CHARACTERS = 500
+"""Longest line of a fault: a name in the file may be a megabyte long."""
+MORE_LINES = N_("... and %(more)s more")
+
+
+def lines_of(faults: Sequence[str], speaker: Tongue = ENGLISH) -> str:
+    """Format faults as lines of a message: the first twenty, and how many more there are."""
+    lines = [
+        line[:MOST_CHARACTERS] + "..." * (len(line) > MOST_CHARACTERS) for line in faults[:MOST_FINDINGS]
+    ]
+    if len(faults) > MOST_FINDINGS:
+        lines.append(speaker.gettext(MORE_LINES) % {"more": len(faults) - MOST_FINDINGS})
+    return "\n".join(f"  {line}" for line in lines)
+
+
+def _authored(error: AuthoredFileError, speaker: Tongue) -> str:
+    """Return all faults of an authored file, and of the files with it."""
+    files = [(one.file, [fault(each, speaker) for each in one.findings]) for one in (error, *error.others)]
+    return "\n".join(f"{writable(file)}:\n{lines_of(told, speaker)}" for file, told in files)
 
 
 def message(reason: Coded, speaker: Tongue = ENGLISH) -> str:
@@ -247,7 +281,7 @@ def refusal(reason: Reason, speaker: Tongue = ENGLISH, faults: Sequence[Reason] 
     text = SENTENCES.get(str(reason.parameters.get("cause", reason.code)))
     said = {key: _plain(one, speaker) for key, one in reason.parameters.items()}
     if faults:
-        said["faults"] = lines_of([fault(one, speaker) for one in faults])
+        said["faults"] = lines_of([fault(one, speaker) for one in faults], speaker)
     if text and (told := filled([text], said, speaker)):
         return told
     return (speaker is not ENGLISH and sentence(reason, speaker)) or message(reason, speaker)
@@ -272,9 +306,7 @@ def failure(
     """
     told: dict[str, Value] = {"cause": cause} if cause else {}
     for name, one in known.items():
-        # A path may hold bytes that are no text: no answer could be written with them.
-        text = str(one).encode("utf-8", "backslashreplace").decode()
-        told[name] = one if isinstance(one, int | float | tuple) else text
+        told[name] = one if isinstance(one, int | float | tuple) else writable(str(one))
     error = kind(code, refusal(Reason(code, told), speaker, faults), **told)
     error.faults = tuple(faults)
     return error
@@ -295,8 +327,15 @@ class RefusedError(PlanmarkError):
 
 def told_of(error: PlanmarkError, speaker: Tongue) -> str:
     """Return the sentence of an error in a language."""
+    if isinstance(error, AuthoredFileError):
+        return _authored(error, speaker)
     reason = error.reason if isinstance(error, RefusedError) else of_error(error)
     return refusal(reason, speaker, error.faults)
+
+
+def at_terminal(error: PlanmarkError, speaker: Tongue) -> str:
+    """Return the faults of authored files in the call's language, other errors in English."""
+    return told_of(error, speaker) if isinstance(error, AuthoredFileError) else in_english(error)
 
 
 def in_english(error: PlanmarkError) -> str:

@@ -160,7 +160,8 @@ def publication(call: Called, own: Own) -> dict[str, Any]:
 def lint_assignment(call: Called, own: Own) -> LintDocument:
     """Run `planmark lint` on the assignment: every variant's figures, and findings."""
     service = call.service
-    return result_of(service.queue.workers, linted, service.settings.data, own.key, own.assignment)
+    asked = (service.settings.data, own.key, own.assignment, call.lang)
+    return result_of(service.queue.workers, linted, *asked)
 
 
 @router.patch("/publications/{key}")
@@ -236,10 +237,10 @@ def check_assignment(data: pathlib.Path, key: str, name: str) -> None:
     rubric_of(assignment_of(data, Publication(key=key, assignment=name)))
 
 
-def linted(data: pathlib.Path, key: str, name: str) -> LintDocument:
+def linted(data: pathlib.Path, key: str, name: str, lang: str) -> LintDocument:
     """Return what `planmark lint` finds, in a worker."""
     assignment = assignment_of(data, Publication(key=key, assignment=name))
-    return lint_document(lint(assignment, rubric_of(assignment)))
+    return lint_document(lint(assignment, rubric_of(assignment)), tongue(lang))
 
 
 def standing_of(places: Places) -> dict[str, Any] | None:

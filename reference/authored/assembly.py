@@ -22,7 +22,7 @@ from reference.authored.mechanism import (
     SlottedLinkTable,
 )
 from reference.authored.toml_file import LENGTH_UNITS_M, SideText
-from reference.errors import near_names
+from reference.errors import nearest
 from reference.geometry import ComplexArray, FloatArray, cross, dot
 from reference.kinematics import assur
 from reference.mechanism import (
@@ -68,19 +68,15 @@ class Numbers:
         """Return a number as written; raises FormulaError for one beyond any mechanism."""
         numbers = formula(self.values)
         if np.abs(numbers).max(initial=0.0) > LARGEST:
-            message = f"'{formula.text}' is larger than {LARGEST:g}: beyond any mechanism"
-            raise FormulaError(message, np.abs(numbers) > LARGEST)
+            raise FormulaError("limit", np.abs(numbers) > LARGEST, text=formula.text, limit=f"<= {LARGEST:g}")
         return numbers if numbers.ndim else numbers[None]
 
     def length(self, formula: Formula, what: str) -> FloatArray:
         """Return a length above zero, m; raises FormulaError, which calls it `what`, for any other."""
         lengths = self.distance(formula)
-        least = lengths.min(initial=LARGEST)
-        if least <= 0.0:
-            raise FormulaError(f"'{formula.text}' ({what}) must be a positive length", lengths <= 0.0)
-        if least < SHORTEST_M:
-            message = f"'{formula.text}' ({what}) is shorter than {SHORTEST_M:g} m"
-            raise FormulaError(message, lengths < SHORTEST_M)
+        for limit, is_short in (("> 0", lengths <= 0.0), (f">= {SHORTEST_M:g} m", lengths < SHORTEST_M)):
+            if np.any(is_short):
+                raise FormulaError("limit", is_short, text=formula.text, name=what, limit=limit)
         return lengths
 
     def distance(self, formula: Formula) -> FloatArray:
@@ -92,7 +88,7 @@ class Numbers:
         """Return a number that is not negative; raises FormulaError, which calls it `what`, for any other."""
         numbers = self.number(formula)
         if np.any(numbers < 0.0):
-            raise FormulaError(f"'{formula.text}' ({what}) must not be negative", numbers < 0.0)
+            raise FormulaError("limit", numbers < 0.0, text=formula.text, name=what, limit=">= 0")
         return numbers
 
     def angle(self, formula: Formula) -> FloatArray:
@@ -104,16 +100,13 @@ class Numbers:
         if isinstance(text.side, int):
             return text.side
         first, second = text.words
+        known = {"text": text.side.text, "first": first, "second": second}
         unknown = text.side.names - self.values.keys()
         if unknown:
-            near = near_names(min(unknown), self.values)
-            meant = f"; did you mean {' or '.join(near)}?" if near else ""
-            message = f"is neither {first} nor {second}, nor data of a variant{meant}"
-            raise FormulaError(f"side = '{text.side.text}' {message}")
+            raise FormulaError("side_unknown", **known, **nearest(min(unknown), self.values, 2))
         signs = np.sign(self.number(text.side))
         if np.any(signs == 0.0):
-            detail = f"above zero is {first}, below {second}"
-            raise FormulaError(f"side = '{text.side.text}' is zero: {detail}", signs == 0.0)
+            raise FormulaError("side_zero", signs == 0.0, **known)
         return signs
 
     def point(self, point: list[Formula]) -> ComplexArray:
@@ -176,7 +169,8 @@ def _located(index: int, table: AnyGroupTable, numbers: Numbers, bodies: _LinkAx
     try:
         return _group(table, numbers, bodies)
     except FormulaError as error:
-        raise FormulaError(f"group[{index}]: {error}", error.which) from error
+        error.path = f".group[{index}]"
+        raise
 
 
 def _driver(file: MechanismFile, numbers: Numbers) -> Driver:
@@ -223,8 +217,8 @@ def _by_cylinder(crank: CrankTable, cylinder: CylinderTable, file: MechanismFile
         along, across, sine = assur.rrr_place(base, length, arm, numbers.side(cylinder.side))
     if np.any(~(sine > LEAST_SINE)):
         least, most = np.abs(np.abs(base) - arm).max(), (np.abs(base) + arm).min()
-        message = f"'{cylinder.length.text}' (cylinder) must lie between {least:g} and {most:g} m"
-        raise FormulaError(f"{message}, in line with the crank", ~(sine > LEAST_SINE))
+        limits = {"least": f"{least:g}", "most": f"{most:g}"}
+        raise FormulaError("cylinder_length", ~(sine > LEAST_SINE), text=cylinder.length.text, **limits)
     reach = base * (along + 1j * across)
     u, r = reach / length, reach - base
     speed = numbers.distance(cylinder.speed)
@@ -245,7 +239,8 @@ def _omega(
     if rpm is None:
         return numbers.number(cast("Formula", crank.omega))  # the table has one of the two
     if ratio is not None and np.any(ratio == 0.0):
-        raise FormulaError(f"'{cast('Formula', crank.gear_ratio).text}' (gear_ratio) must not be zero")
+        text = cast("Formula", crank.gear_ratio).text
+        raise FormulaError("limit", text=text, name="gear_ratio", limit="!= 0")
     return np.asarray(np.pi * (rpm if ratio is None else rpm / ratio) / 30.0)
 
 
@@ -291,7 +286,7 @@ def _slotted_link(table: SlottedLinkTable, numbers: Numbers, bodies: _LinkAxes) 
     bodies.axes[table.link] = {table.pivot: np.zeros(1, complex)}
     if table.foot is not None:
         if np.any(offset == 0.0):
-            raise FormulaError(f"the offset of link {table.link} is zero: leave out offset and foot")
+            raise FormulaError("offset_zero", link=table.link)
         bodies.axes[table.link][table.foot] = np.asarray(1j * offset)
     bodies.slots[table.link] = table.node
     side = numbers.side(table.side)
@@ -319,8 +314,7 @@ def _link_point(
             side = numbers.side(table.side) if table.side else 1
             shape = _shape(np.abs(base), first, second, side)
             if table.side is None and np.any(shape.imag != 0.0):
-                detail = f"{node} may lie to the left or to the right of {p} -> {q}; say which: side"
-                raise FormulaError(f"side of {node} is missing: {detail}")
+                raise FormulaError("side_of_plate", joint=node, first=p, second=q)
         case _:
             local = numbers.point(table.at)
             shape = np.asarray(local / np.abs(base))

@@ -33,7 +33,16 @@ from reference.authored.variant_table import (
     or_its_file,
     read_rows,
 )
-from reference.errors import AuthoredFileError, CallError, Faults, Finding, near_names, ranges_of
+from reference.errors import (
+    AuthoredFileError,
+    CallError,
+    FaultError,
+    Faults,
+    Finding,
+    Parameter,
+    nearest,
+    ranges_of,
+)
 from reference.geometry import FloatArray
 from reference.kinematics.motion import BoolArray
 from reference.mechanism import Crank, Driver, Mechanism, members_of
@@ -66,7 +75,7 @@ class VariantTable(Authored):
         for numbers in (self.n, self.position):
             count *= 1 if numbers is None else max(numbers.last - numbers.first + 1, 0)
         if count > MOST_VARIANTS:
-            raise ValueError(f"has {count} variants, more than {MOST_VARIANTS}: narrow n or position")
+            raise FaultError("variants_many", count=count, most=MOST_VARIANTS)
         return self
 
 
@@ -99,7 +108,7 @@ GridSide = Annotated[int, Field(ge=1, le=6)]
 def _of_a_figure(name: str) -> str:
     if not re.fullmatch(FIGURE, name):
         known = "mechanism, velocity_plan, acceleration_plan"
-        raise ValueError(f"must be one of {known}, or {FORCE_PLAN} and the joint of a group")
+        raise FaultError("one_of", names=f"{known}, {FORCE_PLAN}JOINT")
     return name
 
 
@@ -120,7 +129,7 @@ class PageTable(Authored):
     @model_validator(mode="after")
     def _has_one_figure_in_a_grid(self) -> Self:
         if self.grid is not None and len(self.figures) > 1:
-            raise ValueError("a page with a grid has one figure, in all positions")
+            raise FaultError("grid_one_figure")
         return self
 
 
@@ -166,9 +175,9 @@ class AssignmentFile(Masses):
         for page in self.page:
             columns, rows = page.grid or (1, 1)
             if page.grid and position is None:
-                raise ValueError("a page with a grid needs [variant] position = { from, to }")
+                raise FaultError("grid_positions")
             if position and 1 < columns * rows < len(position.values):
-                raise ValueError(f"a grid of {columns} by {rows} has no zone for some of the positions")
+                raise FaultError("grid_small", columns=columns, rows=rows)
         return self
 
     @model_validator(mode="before")
@@ -306,11 +315,14 @@ class Assignment:
             known = sorted({getattr(variant, name) for variant in variants} - {None})
             if not known:
                 continue
-            said = f"{name} {ranges_of(known)}" + (f", by {self.rows.source}" if self.rows else "")
+            ranges, by = ranges_of(known), self.rows.source if self.rows else ""
+            told: dict[str, Parameter] = {"name": name, "texts": ranges + (f" ({by})" if by else "")}
+            said = f"{name} = {ranges}" + (f", by {by}" if by else "")
             if given is None:
-                raise CallError(f"{name}_needed", f"assignment {self.id} needs --{name} ({said})")
+                raise CallError(f"{name}_needed", f"assignment {self.id} needs --{name} ({said})", **told)
             if given not in known:
-                raise CallError(f"{name}_range", f"{name} = {given}: assignment {self.id} has {said}")
+                message = f"{name} = {given}: assignment {self.id} has {said}"
+                raise CallError(f"{name}_range", message, value=given, **told)
             variants = [variant for variant in variants if getattr(variant, name) == given]
         return variants[0]
 
@@ -452,11 +464,7 @@ def load_assignment(name: str | Path) -> Assignment:
     """
     path = locate("assignment", str(name))
     if not toml_file.is_file(path) and not str(name).endswith(".toml"):
-        raise CallError(
-            "unknown_assignment",
-            f"there is no assignment '{name}': built in are {', '.join(built_in())};"
-            " or give the path of an assignment file (.toml)",
-        )
+        raise CallError("unknown_assignment", name=str(name), names=tuple(built_in()))
     return _load(path.resolve(), path.stat().st_mtime_ns if toml_file.is_file(path) else 0)
 
 
@@ -496,12 +504,8 @@ def _load_mechanism(name: str, source: Path, beside: Path) -> MechanismFile:
     """Load the mechanism that an assignment names; AuthoredFileError of the assignment if there is none."""
     if not toml_file.is_file(source):
         known = (*names_in(beside.parent, "mechanism"), *names_in(library(), "mechanism"))
-        near = near_names(name, known, most=1)
-        meant = f" (did you mean {near[0]}?)" if near else ""
-        missing = f"there is no mechanism '{name}'{meant}: {source.name} was looked for beside this file"
-        raise AuthoredFileError(
-            str(beside), (Finding("$.mechanism", f"{missing} and among the built-in ones"),)
-        )
+        looked = {"text": name, "file": source.name, **nearest(name, known)}
+        raise AuthoredFileError(str(beside), (Finding("$.mechanism", "no_file_of_name", looked),))
     return toml_file.load(MechanismFile, source)
 
 
@@ -509,12 +513,11 @@ def _check_values(file: AssignmentFile) -> Iterator[Finding]:
     """Report names that formulas already define, and empty ranges."""
     for name in file.variant.values:
         if name in CONSTANTS or name in FUNCTIONS or name in KEYS:
-            message = f"{name} has a meaning in formulas already: choose another name"
-            yield Finding(f"$.variant.values.{name}", message)
+            yield Finding(f"$.variant.values.{name}", "name_of_formulas", {"name": name})
     for name in KEYS:
         numbers = getattr(file.variant, name)
         if numbers is not None and not numbers.values:
-            yield Finding(f"$.variant.{name}", "the range is empty: 'from' must not exceed 'to'")
+            yield Finding(f"$.variant.{name}", "range_empty")
 
 
 def _check_table(assignment: Assignment) -> Iterator[Finding]:
@@ -524,15 +527,15 @@ def _check_table(assignment: Assignment) -> Iterator[Finding]:
         return
     for name, has in zip(KEYS, rows.has, strict=True):
         if has and getattr(spec, name) is not None:
-            yield Finding(f"$.variant.{name}", f"{rows.source} has a column {name}: leave one of them out")
-    if len(assignment.variants()) > MOST_VARIANTS:
-        yield Finding("$.variant", f"has {len(assignment.variants())} variants, more than {MOST_VARIANTS}")
+            yield Finding(f"$.variant.{name}", "column_too", {"name": name, "file": rows.source})
+    if (count := len(assignment.variants())) > MOST_VARIANTS:
+        yield Finding("$.variant", "variants_many", {"count": count, "most": MOST_VARIANTS})
     for name in spec.values:
         if name in rows.columns:
-            yield Finding(
-                f"$.variant.values.{name}", f"{rows.source} has a column {name}: rename one of them"
-            )
-    place = "$.mechanism" if isinstance(assignment.file.mechanism, MechanismFile) else "mechanism file, $"
+            yield Finding(f"$.variant.values.{name}", "column_too", {"name": name, "file": rows.source})
+    named, place = assignment.file.mechanism, "$.mechanism"
+    if isinstance(named, str):
+        place = f"{locate('mechanism', named, assignment.path).name} $"
     yield from misused_columns(assignment.mechanism_file, rows, place)
     yield from misused_columns(assignment.file.body, rows, "$.body")
     yield from misused_columns(assignment.file.load, rows, "$.load")
@@ -555,7 +558,7 @@ def _check_formulas(assignment: Assignment, source: Path) -> Faults:
             if not broken & names:
                 evaluate()
         except FormulaError as error:
-            return [Finding(path, str(error) + _failing(variants, error.which))]
+            return [error.at(path + error.path, **_failing(variants, error.which))]
         return []
 
     own: list[Finding] = []
@@ -565,10 +568,10 @@ def _check_formulas(assignment: Assignment, source: Path) -> Faults:
             broken.add(name)
         else:
             known[name] = formula(known)
-    is_inside = isinstance(file.mechanism, MechanismFile)
+    top = "$.mechanism" if isinstance(file.mechanism, MechanismFile) else "$"
     numbers = Numbers(known, len(variants), LENGTH_UNITS_M[assignment.mechanism_file.length_unit])
     of_mechanism: list[Finding] = []
-    for path, key, leaf in formulas_in(assignment.mechanism_file, "$.mechanism" if is_inside else "$"):
+    for path, key, leaf in formulas_in(assignment.mechanism_file, top):
         if isinstance(leaf, SideText):
             names = leaf.side.names if isinstance(leaf.side, Formula) else frozenset()
             of_mechanism += check(path, names, partial(numbers.side, leaf))
@@ -584,7 +587,7 @@ def _check_formulas(assignment: Assignment, source: Path) -> Faults:
     if not (own or of_mechanism):
         none = {name: field.default for name, field in Masses.model_fields.items()}
         plain = replace(assignment, file=file.model_copy(update=none))
-        of_mechanism += check("$", frozenset(), partial(plain.mechanism, variants))
+        of_mechanism += check(top, frozenset(), partial(plain.mechanism, variants))
         own += [] if of_mechanism else check_masses(file, plain.mechanism_file, plain.mechanism(variants[:1]))
         if file.has_forces and not (own or of_mechanism):
             own += check("$.body", frozenset(), partial(assignment.mechanism, variants))
@@ -602,10 +605,10 @@ def _check_scales(assignment: Assignment, variants: list[Variant]) -> Iterator[F
         try:
             known[name] = getattr(assignment.scales(variants, **known), name)
         except FormulaError as error:
-            yield Finding(f"$.scales.{name}", str(error) + _failing(variants, error.which))
+            yield error.at(f"$.scales.{name}", **_failing(variants, error.which))
             return
         if not np.all((known[name] > 1.0 / LARGEST) & (known[name] < LARGEST)):
-            yield Finding(f"$.scales.{name}", f"{name} must be above zero for every variant")
+            yield Finding(f"$.scales.{name}", "limit", {"text": name, "limit": "> 0"})
             return
 
 
@@ -614,29 +617,26 @@ def _check_force_plans(assignment: Assignment) -> Iterator[Finding]:
     if "kF" not in assignment.scale_names:
         return
     if assignment.file.scales.kF is None:
-        detail = 'a page shows a force plan. Write it in N/mm: kF = 50, or "force / 60"'
-        yield Finding("$.scales.kF", f"is missing: {detail}")
+        yield Finding("$.scales.kF", "force_scale_missing")
     mechanism = assignment.mechanism(assignment.variants()[:1])
     # A cylinder that drives stands in the plan of its crank.
     driving = getattr(mechanism.driver, "cylinder", None)
     groups = [group for group in reversed(mechanism.groups) if members_of(group)]
     joints = [group.node for group in groups if driving is None or getattr(group, "link", "") != driving]
-    known = ", ".join(f"{FORCE_PLAN}{joint}" for joint in (*joints, mechanism.driver.pin))
+    known = tuple(f"{FORCE_PLAN}{joint}" for joint in (*joints, mechanism.driver.pin))
     for index, page in enumerate(assignment.file.page):
         others = {zone_of(figure) for figure in page.figures} - {FORCE_PLANS, "mechanism"}
         if others and any(map(group_of, page.figures)):
-            told = " and ".join(sorted(others)).replace("_", " ")
-            message = f"force plans share a sheet with the mechanism only: put the {told} on another page"
-            yield Finding(f"$.page[{index}].figures", message)
+            yield Finding(f"$.page[{index}].figures", "force_plans_apart", {"figures": tuple(sorted(others))})
         for place, figure in enumerate(page.figures):
             if (joint := group_of(figure)) and joint not in (*joints, mechanism.driver.pin):
-                message = f"{joint} names no group of this mechanism; its force plans are {known}"
-                yield Finding(f"$.page[{index}].figures[{place}]", message)
+                told: dict[str, Parameter] = {"joint": joint, "texts": known}
+                yield Finding(f"$.page[{index}].figures[{place}]", "force_plan_unknown", told)
 
 
-def _failing(variants: list[Variant], which: BoolArray | None) -> str:
-    """Return the first variant for which a formula fails, and how many more there are."""
+def _failing(variants: list[Variant], which: BoolArray | None) -> dict[str, Parameter]:
+    """Return, as parameters, the first variant for which a formula fails, and how many more there are."""
     if which is None or which.shape != (len(variants),) or len(variants) == 1:
-        return ""
-    more = int(which.sum()) - 1
-    return f" (for {variants[int(np.argmax(which))]}{f' and {more} more' if more else ''})"
+        return {}
+    first, more = str(variants[int(np.argmax(which))]), int(which.sum()) - 1
+    return {"variant": first, "more": more} if more else {"variant": first}

@@ -12,7 +12,7 @@ from reference.authored.formula import Formula
 from reference.authored.mechanism import MechanismFile, PointOnLineTable, PointTable, check_mechanism
 from reference.authored.toml_file import Authored, FormulaText, Joint, LinkName, Point, TwoJoints
 from reference.authored.variant_table import formulas_in
-from reference.errors import Finding, near_names
+from reference.errors import FaultError, Finding, Parameter, nearest
 from reference.geometry import FloatArray
 from reference.kinematics import assur
 from reference.mechanism import (
@@ -31,7 +31,6 @@ from reference.mechanism import (
 
 BodyName = Annotated[str, Field(pattern=r"^(slider_)?[A-Za-z0-9]{1,6}$")]
 """A link's name; of a slider ``slider_`` and its joint, of the second one there a 2 behind it."""
-CENTRE = '"C", a joint of the link, or { base = ["A", "B"], ratio = 0.5 }, or base with at = [x, y]'
 
 Points = Mapping[str, tuple[str, ...]]
 """The joints and points fixed on each link."""
@@ -58,7 +57,7 @@ class CentreTable(Authored):
     @classmethod
     def _by_its_name(cls, data: Any) -> Any:  # noqa: ANN401 - not yet validated
         if not isinstance(data, str | dict):
-            raise ValueError(f"the centre of mass is {CENTRE}")  # noqa: TRY004 - pydantic catches this one
+            raise FaultError("centre_form")
         return {"joint": data} if isinstance(data, str) else data
 
     @model_validator(mode="after")
@@ -66,7 +65,7 @@ class CentreTable(Authored):
         given = tuple(one is not None for one in (self.joint, self.base, self.ratio, self.at))
         if given in {(True, False, False, False), (False, True, True, False), (False, True, False, True)}:
             return self
-        raise ValueError(f"the centre of mass is {CENTRE}")
+        raise FaultError("centre_form")
 
 
 class BodyTable(Authored):
@@ -84,7 +83,7 @@ class BodyTable(Authored):
     @model_validator(mode="after")
     def _says_something(self) -> Self:
         if self.mass is None and self.inertia is None and not self.pins:
-            raise ValueError("needs mass (kg), inertia (kg m^2) or pins; a link without mass has no [[body]]")
+            raise FaultError("body_needs")
         return self
 
     @property
@@ -110,17 +109,12 @@ class LoadTable(Authored):
     @model_validator(mode="after")
     def _is_one_kind(self) -> Self:
         if (self.force is None) == (self.couple is None):
-            raise ValueError("needs one of force (N) and couple (N m); a load with both is two loads")
+            raise FaultError("load_needs")
         directions = (self.angle_deg is not None) + (self.motion is not None)
         if self.couple is not None and directions:
-            raise ValueError(
-                "a couple has no direction: leave out angle_deg and motion; its sign is its sense"
-            )
+            raise FaultError("couple_direction")
         if self.force is not None and directions != 1:
-            raise ValueError(
-                "a force needs a direction: either angle_deg, counter-clockwise from +x,"
-                ' or motion = "along" or "against", of a slider'
-            )
+            raise FaultError("force_direction")
         return self
 
 
@@ -220,7 +214,7 @@ def check_masses(masses: Masses, file: MechanismFile, mechanism: Mechanism) -> I
     """
     bodies, points = masses.body, points_of(mechanism)
     if masses.gravity is not None and not any(body.mass is not None for body in bodies):
-        yield Finding("$.gravity", "no [[body]] has a mass that would weigh: leave gravity out, or add one")
+        yield Finding("$.gravity", "gravity_alone")
     if not masses.has_forces:
         return
     faults = [*_check_names(points), *_check_tables(mechanism, points, bodies)]
@@ -235,25 +229,19 @@ def check_masses(masses: Masses, file: MechanismFile, mechanism: Mechanism) -> I
 
 def _check_names(points: Points) -> Iterator[Finding]:
     """Report links whose forces would have the same names."""
-    by_name: dict[str, str] = {GROUND: "the frame"}
+    by_name: dict[str, str] = {GROUND: GROUND}
     for link in points:
         short = short_name(link)
         if short in by_name:
-            detail = f"the forces on link {link} and on {by_name[short]} would both be called by {short}"
-            yield Finding("$.body", f"{detail}: rename a link in the mechanism's file")
+            yield Finding("$.body", "forces_alike", {"link": link, "other": by_name[short], "name": short})
         by_name.setdefault(short, link)
 
 
 def _check_link(link: str, points: Points, where: str) -> Iterator[Finding]:
     if link in points:
         return
-    known = ", ".join(points)
-    if link == GROUND:
-        yield Finding(where, f"{GROUND} is the frame, which does not move: known are {known}")
-        return
-    near = [SLIDER + link] if SLIDER + link in points else near_names(link, points, most=1)
-    meant = f" (did you mean {near[0]}?)" if near else ""
-    yield Finding(where, f"{link} is not a moving link{meant}: known are {known}")
+    near = {"near": SLIDER + link} if SLIDER + link in points else nearest(link, points)
+    yield Finding(where, "link_unknown", {"link": link, "names": tuple(points), **near})
 
 
 def _check_tables(mechanism: Mechanism, points: Points, bodies: Sequence[BodyTable]) -> Iterator[Finding]:
@@ -265,27 +253,23 @@ def _check_tables(mechanism: Mechanism, points: Points, bodies: Sequence[BodyTab
         where, link, centre = f"$.body[{index}]", body.link, body.centre
         yield from _check_link(link, points, f"{where}.link")
         if link in seen:
-            yield Finding(f"{where}.link", f"link {link} has a [[body]] already: leave one of them out")
+            yield Finding(f"{where}.link", "body_twice", {"link": link})
         if link in seen or link not in points:
             continue
         seen.add(link)
-        held = ", ".join(points[link])
         if link in sliding and centre is not None and centre.joint not in points[link]:
-            yield Finding(f"{where}.centre", f"the mass of a slider is at its joint {held}: leave out centre")
+            yield Finding(f"{where}.centre", "slider_centre", {"names": points[link]})
         elif link not in sliding and centre is None and body.has_mass:
-            yield Finding(f"{where}.centre", f"is missing: the centre of mass of link {link} is {CENTRE}")
+            yield Finding(f"{where}.centre", "centre_form")
         elif centre is not None and centre.joint is not None and centre.joint not in points[link]:
-            yield Finding(f"{where}.centre", _not_carried(centre.joint, link, points))
+            yield _not_carried(f"{where}.centre", centre.joint, link, points)
         elif centre is not None and centre.base is not None and _point_name(body) in mechanism.joints:
-            name = _point_name(body)
-            advice = f'write centre = "{name}" if it is the centre of mass, else rename it'
-            yield Finding(f"{where}.centre", f"the mechanism has a joint {name} already: {advice}")
+            yield Finding(f"{where}.centre", "centre_is_joint", {"joint": _point_name(body)})
         yield from _check_pins(mechanism, points, body, pinned, where)
 
 
-def _not_carried(joint: str, link: str, points: Points) -> str:
-    held = ", ".join(points[link])
-    return f"{joint} is no point that is fixed on link {link}: it carries {held}"
+def _not_carried(where: str, joint: str, link: str, points: Points) -> Finding:
+    return Finding(where, "not_carried", {"joint": joint, "link": link, "names": points[link]})
 
 
 def _check_pins(
@@ -299,12 +283,12 @@ def _check_pins(
     for index, joint in enumerate(body.pins):
         path = f"{where}.pins[{index}]"
         if joint not in points[body.link]:
-            yield Finding(path, _not_carried(joint, body.link, points))
+            yield _not_carried(path, joint, body.link, points)
         elif body.link not in hinged[joint]:
-            on = " or ".join(hinged[joint])
-            yield Finding(path, f"link {body.link} is hinged to {joint} later: its pin is on link {on}")
+            known: dict[str, Parameter] = {"link": body.link, "joint": joint, "names": tuple(hinged[joint])}
+            yield Finding(path, "hinged_later", known)
         elif joint in pinned:
-            yield Finding(path, f"the pin of {joint} is on link {pinned[joint]} already")
+            yield Finding(path, "pinned_twice", {"joint": joint, "link": pinned[joint]})
         pinned.setdefault(joint, body.link)
 
 
@@ -318,30 +302,26 @@ def _check_centres(file: MechanismFile, bodies: Sequence[BodyTable]) -> Iterator
         path, sign, key = finding.path.removeprefix("$.group[").partition("]")
         if sign and path.isdigit() and int(path) >= len(file.group):
             index = tables[int(path) - len(file.group)]
-            yield Finding(f"$.body[{index}].centre{key}", finding.message)
+            yield replace(finding, path=f"$.body[{index}].centre{key}")
         else:
-            yield Finding("$.body", finding.message)
+            yield replace(finding, path="$.body")
 
 
 def _check_loads(mechanism: Mechanism, points: Points, loads: Sequence[LoadTable]) -> Iterator[Finding]:
-    sliding, names = sliders_of(mechanism), {"b": "of the balancing force"}
-    names |= {f"i{short_name(link)}": f"of the inertia force of link {link}" for link in points}
+    sliding = sliders_of(mechanism)
+    names = {"b", *(f"i{short_name(link)}" for link in points)}
     for index, load in enumerate(loads):
         where, link = f"$.load[{index}]", load.link
         yield from _check_link(link, points, f"{where}.link")
         if link not in points:
             continue
         if load.point is not None and load.point not in points[link]:
-            yield Finding(f"{where}.point", _not_carried(load.point, link, points))
+            yield _not_carried(f"{where}.point", load.point, link, points)
         elif load.point is None and load.force is not None and link not in sliding:
-            held = ", ".join(points[link])
-            yield Finding(f"{where}.point", f"is missing: the force acts on link {link} at one of {held}")
+            yield Finding(f"{where}.point", "load_point", {"link": link, "names": points[link]})
         if load.motion is not None and not isinstance(sliding.get(link), FixedGuide):
-            on = "slides on a moving link" if link in sliding else "is no slider"
-            yield Finding(f"{where}.motion", f"link {link} {on}: give angle_deg in place of motion")
+            yield Finding(f"{where}.motion", "motion_no_slider", {"link": link})
         name = _load_name(load, points)
         if name in names:
-            yield Finding(
-                f"{where}.name", f"{name} is the name {names[name]} already: give the load another one"
-            )
-        names.setdefault(name, f"of $.load[{index}]")
+            yield Finding(f"{where}.name", "force_name", {"name": name})
+        names.add(name)

@@ -8,13 +8,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-from reference.errors import counted
+from reference.errors import FaultError, Parameter
 
 GROUND = "ground"
 MOST_SEARCHED = 14
 """A larger chain is not searched for groups: the number of its parts grows as a power of two."""
 LARGEST_GROUP = 6
-ONE_DRIVING_LINK = "planmark solves mechanisms with one driving link"
 Links = frozenset[str]
 
 
@@ -56,21 +55,21 @@ class Chain:
             known |= group
 
     def class_of(self, group: Links) -> str:
-        """Return a group's class in words: by the pairs of its largest contour, rigid or movable."""
+        """Return a group's class: by the pairs of its largest contour, rigid or movable; empty if unclear."""
         loops = self.pairs(group) - len(group) + 1
         pairs = [sum(link in met for met in [*self.hinges.values(), *self.slides]) for link in group]
         if loops == 0 and max(pairs) == 3:
-            return "the third class"
-        return "the fourth class" if loops == 1 and len(group) == 4 else "a higher class than the second"
+            return "III"
+        return "IV" if loops == 1 and len(group) == 4 else ""
 
-    def named(self, links: Links) -> str:
-        """Name links by their joints: ``AB, CDE``; a block by its one joint."""
+    def named(self, links: Links) -> tuple[str, ...]:
+        """Name links by their joints: ``AB``, ``CDE``; a block as `slider_` and its one joint."""
         names = []
         for link, held in self.links.items():
             joints = [joint for joint in held if joint in self.hinges]
             if link in links:
-                names.append("".join(joints) if len(joints) > 1 else f"the block at {held[0]}")
-        return ", ".join(names)
+                names.append("".join(joints) if len(joints) > 1 else f"slider_{held[0]}")
+        return tuple(names)
 
 
 def chain_of(links: Mapping[str, Sequence[str]], slides: Sequence[tuple[str, str]], driver: str) -> Chain:
@@ -87,32 +86,31 @@ def chain_of(links: Mapping[str, Sequence[str]], slides: Sequence[tuple[str, str
     return Chain(links, hinges, slides, driver)
 
 
-def refusal(chain: Chain) -> str:
+def refusal(chain: Chain) -> FaultError:
     """Return why the links of a file cannot be placed group after group as the file has them."""
     free, joints = chain.mobility, chain.pairs(frozenset(chain.links))
     if free != 1:
-        size = f"{counted(len(chain.links), 'link')} with the ground, {counted(joints, 'joint')}"
-        more = ONE_DRIVING_LINK if free > 1 else "nothing moves, or a joint only repeats what others do"
-        return f"{counted(free, 'degree')} of freedom ({size}): {more}"
-    known, order = frozenset({GROUND, chain.driver}), []
+        code = "free_more" if free > 1 else "free_none"
+        return FaultError(code, free=free, links=len(chain.links), count=joints)
+    known, order = frozenset({GROUND, chain.driver}), list[str]()
     for group in chain.groups(chain.driver):
         if 2 * chain.pairs(group, known) > 3 * len(group):
-            return f"{chain.named(group)} cannot move: a joint too many; and another part is free"
+            return FaultError("joint_too_many", names=chain.named(group))
         if len(group) > 2:
             return _of_higher_class(chain, group)
-        order.append(chain.named(group).replace(", ", " with "))
+        order.append(" + ".join(chain.named(group)))
         known |= group
-    steps = ", then ".join(order)
-    return f"all groups are of the second class: write one for each of these pairs of links: {steps}"
+    return FaultError("pairs_of_links", names=tuple(order))
 
 
-def _of_higher_class(chain: Chain, group: Links) -> str:
+def _of_higher_class(chain: Chain, group: Links) -> FaultError:
     """Return the refusal of a group, with ways to its velocities."""
-    ways = "velocities can be found by Assur points, or by interpolation between two trial plans"
+    known: dict[str, Parameter] = {"names": chain.named(group), "advice": "assur_points"}
+    if rank := chain.class_of(group):
+        known["rank"] = rank
     for other, held in chain.links.items():
         is_on_ground = other not in {GROUND, chain.driver} and {*held} & {*chain.links[GROUND]}
         if is_on_ground and all(len(one) == 2 for one in chain.groups(other)):
-            name = chain.named(frozenset({other}))
-            ways += f", or with {name} as the driving link: all groups are then of the second class"
+            known["link"] = chain.named(frozenset({other}))
             break
-    return f"{chain.named(group)} form a group of {chain.class_of(group)}: not solved; {ways}"
+    return FaultError("higher_class", **known)

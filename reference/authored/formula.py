@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.errors import look_alikes, near_names
+from reference.errors import FaultError, Parameter, look_alikes, nearest
 from reference.geometry import FloatArray
 
 MAX_LENGTH = 200
@@ -64,12 +64,15 @@ _OPERATORS: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
 }
 
 
-class FormulaError(ValueError):
-    """A formula that cannot be parsed, or has no usable value for the variants in `which`."""
+class FormulaError(FaultError):
+    """A formula that cannot be parsed, or has no usable value for the variants in `which`.
 
-    def __init__(self, message: str, which: NDArray[np.bool_] | None = None) -> None:
-        super().__init__(message)
-        self.which = which
+    `path` is its place below the mechanism, where it is known.
+    """
+
+    def __init__(self, code: str, which: NDArray[np.bool_] | None = None, /, **parameters: Parameter) -> None:
+        super().__init__(code, **parameters)
+        self.which, self.path = which, ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +93,7 @@ class Formula:
             return _constant(self.text)
         unknown = sorted(self.names - values.keys())
         if unknown:
-            raise FormulaError(f"'{self.text}': {_unknown_name(unknown[0], values)}")
+            raise _unknown_name(self.text, unknown[0], values)
         return _finite(self, values)
 
 
@@ -104,9 +107,7 @@ def _finite(formula: Formula, values: Mapping[str, Value]) -> FloatArray:
     with np.errstate(all="ignore"):
         result = np.asarray(_evaluate(formula.tree, values), dtype=np.float64)
     if not np.isfinite(result).all():
-        raise FormulaError(
-            f"'{formula.text}' does not give a finite number for these data", ~np.isfinite(result)
-        )
+        raise FormulaError("no_finite_value", ~np.isfinite(result), text=formula.text)
     return result
 
 
@@ -117,36 +118,36 @@ def parse(text: str | float) -> Formula:
     """
     text = str(text).strip()
     if len(text) > MAX_LENGTH:
-        raise FormulaError(f"a formula of {len(text)} characters; at most {MAX_LENGTH} are allowed")
+        raise FormulaError("too_long", most=MAX_LENGTH)
     try:
         tree = ast.parse(text.replace("^", "**"), mode="eval").body
     except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
-        raise FormulaError(f"'{text}' is not a formula{_advice(text)}") from error
+        raise FormulaError("not_formula", text=text, **_advice(text)) from error
     names: set[str] = set()
     _check(tree, names, text, depth=0)
     return Formula(text, tree, frozenset(names))
 
 
-def _advice(text: str) -> str:
-    """Return advice on a text that is often written in place of a formula; empty for any other."""
+def _advice(text: str) -> dict[str, Parameter]:
+    """Return advice on a text that is often written in place of a formula; nothing for any other."""
     if re.fullmatch(r"\d+([.,]\d+)?\s*:\s*\d+([.,]\d+)?", text):
-        return ": a scale is a number of metres on a millimetre, 1:2.5 is 0.0025"
+        return {"advice": "scale_number"}
     if text.count("(") != text.count(")"):
-        return ": a bracket is opened and not closed, or closed and not opened"
+        return {"advice": "bracket_unclosed"}
     if re.search(r"\d,\d", text) and "(" not in text:
-        return ": write a decimal point"
+        return {"advice": "decimal_point"}
     if re.fullmatch(r"[+-]?\d+(\.\d*)?\s*[^\d\s(+*/-][^(+*]*", text):
-        return ": write the number alone; the key and length_unit say its unit"
-    return ""
+        return {"advice": "unit_of_key"}
+    return {}
 
 
 def _check(node: ast.expr, names: set[str], text: str, depth: int) -> None:
     if depth > MAX_DEPTH:
-        raise FormulaError(f"'{text}' is nested deeper than {MAX_DEPTH}")
+        raise FormulaError("nested", most=MAX_DEPTH)
     match node:
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
             if not math.isfinite(float(value)):
-                raise FormulaError(f"'{text}' holds a number that is not finite")
+                raise FormulaError("no_finite_value", text=text)
         case ast.Name(id=name):
             if name not in CONSTANTS:
                 names.add(name)
@@ -162,17 +163,16 @@ def _check(node: ast.expr, names: set[str], text: str, depth: int) -> None:
             for argument in arguments:
                 _check(argument, names, text, depth + 1)
         case _:
-            known = f": only numbers, names, + - * / % ** and {', '.join(FUNCTIONS)} may be used"
-            raise FormulaError(f"'{text}'{_advice(text) or known}")
+            raise FormulaError("not_in_formulas", text=text, names=tuple(FUNCTIONS), **_advice(text))
 
 
 def _check_function(function: str, count: int, text: str) -> None:
     if function not in FUNCTIONS:
-        raise FormulaError(f"'{text}': {_unknown_name(function, FUNCTIONS)}")
+        raise _unknown_name(text, function, FUNCTIONS)
     least, most = ARGUMENTS.get(function, (1, 1))
     if not least <= count <= most:
-        wanted = "one number" if most == 1 else f"{least} numbers{' or more' if most > least else ''}"
-        raise FormulaError(f"'{text}': {function} takes {wanted}")
+        wanted = f"{least}..{most}" if most > least else least
+        raise FormulaError("takes", text=text, name=function, count=wanted)
 
 
 def _check_exponent(exponent: ast.expr, text: str) -> None:
@@ -183,7 +183,7 @@ def _check_exponent(exponent: ast.expr, text: str) -> None:
             abs(value) <= MAX_EXPONENT
         ):
             return
-    raise FormulaError(f"'{text}': an exponent must be a number of at most {MAX_EXPONENT}")
+    raise FormulaError("exponent_large", text=text, most=MAX_EXPONENT)
 
 
 def _evaluate(node: ast.expr, values: Mapping[str, Value]) -> Any:  # noqa: ANN401 - floats or arrays
@@ -202,7 +202,6 @@ def _evaluate(node: ast.expr, values: Mapping[str, Value]) -> Any:  # noqa: ANN4
     raise AssertionError(f"an unchecked node {node!r}")  # pragma: no cover - `parse` refuses all others
 
 
-def _unknown_name(name: str, known: Mapping[str, object]) -> str:
-    near = near_names(name, known)
-    hint = f"; did you mean {' or '.join(near)}?" if near else f"; known: {', '.join(sorted(known))}"
-    return f"unknown name {name}{look_alikes(name)}{hint}"
+def _unknown_name(text: str, name: str, known: Mapping[str, object]) -> FormulaError:
+    near = nearest(name, known, 2) or {"names": tuple(sorted(known))}
+    return FormulaError("name_unknown", text=text, name=name, **near, **look_alikes(name))

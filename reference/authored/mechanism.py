@@ -10,7 +10,7 @@ from typing import Annotated, Literal, Self, cast
 
 from pydantic import AliasChoices, ConfigDict, Field, model_validator
 
-from reference.authored.chain import GROUND, ONE_DRIVING_LINK, Chain, chain_of, refusal
+from reference.authored.chain import GROUND, Chain, chain_of, refusal
 from reference.authored.toml_file import (
     AHEAD_BEHIND,
     AheadBehind,
@@ -26,10 +26,8 @@ from reference.authored.toml_file import (
     TwoFormulas,
     TwoJoints,
 )
-from reference.errors import Finding
+from reference.errors import FaultError, Finding, Parameter
 
-UNSOLVED = "unsolved"
-"""The code of a mechanism of more or less than one degree of freedom, or with a group of a higher class."""
 MOST_LINKS, MOST_NAMED = 40, 6
 """Links of a mechanism whose chain is examined; joints named in a message."""
 
@@ -69,16 +67,14 @@ class CrankTable(Authored):
     def _has_one_speed(self) -> Self:
         if self.cylinder is not None:
             if any(one is not None for one in (self.angle_deg, self.omega, self.rpm, self.epsilon)):
-                raise ValueError(
-                    "angle, speed and acceleration come from the cylinder: leave out the crank's"
-                )
+                raise FaultError("motion_of_cylinder")
             return self
         if self.angle_deg is None:
-            raise ValueError("needs angle_deg, or a cylinder that drives it")
+            raise FaultError("crank_needs_angle")
         if (self.omega is None) == (self.rpm is None):
-            raise ValueError("needs one speed: either omega (rad/s) or rpm (rev/min)")
+            raise FaultError("crank_needs_speed")
         if self.gear_ratio is not None and self.rpm is None:
-            raise ValueError("gear_ratio goes with rpm: the crank then turns at rpm / gear_ratio")
+            raise FaultError("ratio_without_rpm")
         return self
 
 
@@ -99,9 +95,7 @@ class GuideTable(Authored):
         moving = (self.joints is not None, self.coincident is not None)
         if (all(fixed) and not any(moving)) or (all(moving) and not any(fixed)):
             return self
-        raise ValueError(
-            "needs through and angle_deg (a fixed guide), or joints and coincident (a guide on a moving link)"
-        )
+        raise FaultError("guide_needs")
 
 
 class DrivingSliderTable(Authored):
@@ -120,10 +114,7 @@ class DrivingSliderTable(Authored):
     @model_validator(mode="after")
     def _has_a_fixed_guide(self) -> Self:
         if self.guide.joints is not None:
-            raise ValueError(
-                "a driving slider's guide is fixed; a cylinder that turns drives the link at its rod's end:"
-                " [crank] with cylinder = { pivot, length, speed, side }"
-            )
+            raise FaultError("driving_guide_moves")
         return self
 
 
@@ -171,7 +162,7 @@ class SlottedLinkTable(Authored):
     @model_validator(mode="after")
     def _has_foot_and_offset(self) -> Self:
         if (self.offset is None) != (self.foot is None):
-            raise ValueError("offset and foot go together; foot names the guide's nearest point to the pivot")
+            raise FaultError("offset_and_foot")
         return self
 
 
@@ -200,10 +191,7 @@ class YokeTable(Authored):
     def _has_slot_or_link(self) -> Self:
         fixed = self.guide.joints is None
         if fixed is not (self.slot_deg is not None) or fixed is not (self.link is None):
-            raise ValueError(
-                "a yoke on a fixed guide needs slot_deg; on a moving one, to which its slot is perpendicular,"
-                " it needs link, its own name, and no slot_deg"
-            )
+            raise FaultError("yoke_needs")
         return self
 
 
@@ -266,8 +254,7 @@ class MechanismFile(Authored):
     @model_validator(mode="after")
     def _has_one_driver(self) -> Self:
         if (self.crank is None) == (self.driving_slider is None):
-            two = f"; two have 2 degrees of freedom: {ONE_DRIVING_LINK}" if self.crank else ""
-            raise ValueError(f"needs one driving link: either [crank] or [driving_slider]{two}")
+            raise FaultError("drivers")
         return self
 
     @property
@@ -358,23 +345,22 @@ class _CarriedJoints:
         """Points that lie under a slider at this instant only, and their links."""
 
     def body_of(self, joints: set[str]) -> str | None:
-        """Return the body that carries all these joints, in words; the ground is one."""
+        """Return the link that carries all these joints; the ground is one."""
         link = next((link for link, held in self.links.items() if joints <= held), None)
-        return "the ground" if joints <= self.ground else link and f"link {link}"
+        return GROUND if joints <= self.ground else link
 
     def of(self, joints: list[str]) -> str | None:
         """Return the moving link that carries all these joints."""
         return next((link for link, held in self.links.items() if set(joints) <= held), None)
 
-    def carriers_of(self, joints: list[str]) -> str:
-        """Describe which links carry each joint, for a message."""
-        detail = []
-        for joint in joints:
-            links = [link for link, held in self.links.items() if joint in held]
-            on = f"link {', '.join(links)}" if links else "no link"
-            momentary = f"link {self.moments.get(joint)} for this instant only"
-            detail.append(f"{joint} is on {momentary if joint in self.moments else on}")
-        return f" ({'; '.join(detail)})"
+    def carriers_of(self, joints: list[str]) -> dict[str, Parameter]:
+        """Return, as parameters, the links that carry each joint, and one that does so for this instant."""
+        links = {joint: [link for link, held in self.links.items() if joint in held] for joint in joints}
+        momentary = [joint for joint in joints if joint in self.moments]
+        known: dict[str, Parameter] = {
+            "carriers": "; ".join(f"{a}: {', '.join(on) or '-'}" for a, on in links.items())
+        }
+        return known | ({"joint": momentary[0], "link": self.moments[momentary[0]]} if momentary else {})
 
 
 def check_mechanism(file: MechanismFile) -> Iterator[Finding]:
@@ -388,18 +374,19 @@ def check_mechanism(file: MechanismFile) -> Iterator[Finding]:
     left = [(index, group) for index, group in enumerate(file.group) if index not in done]
     known = placed.union(joint for group in file.group for _, joint in _added(group))
     if left and all(joint in known for _, group in left for _, joint in _needed(group)):
-        yield Finding("$.group", _why_unplaced(file, [group for _, group in left]), UNSOLVED)
+        yield _why_unplaced(file, [group for _, group in left]).at("$.group")
         left = []
     for index, group in ordered + left:
         where = f"$.group[{index}]"
         for key, joint in _needed(group):
             if joint not in known:
-                yield Finding(f"{where}.{key}", _unknown(joint, known, "placed by any group"))
+                yield _unknown("joint_unplaced", joint, known).at(f"{where}.{key}")
         for key, joint in _added(group):
             if joint in placed:
-                detail = f"{joint} has a place already: over-constrained; a group places a new joint"
                 counts = file.chain if key == "node" else None
-                yield Finding(f"{where}.{key}", f"{detail}; {refusal(counts)}" if counts else detail)
+                why = refusal(counts) if counts else None
+                known_of = {**why.parameters, "why": why.code} if why else {}
+                yield Finding(f"{where}.{key}", "joint_placed", {**known_of, "joint": joint})
             placed.add(joint)
         yield from _check_hinges(group, bodies, where)
         yield from _check_links(group, bodies, where)
@@ -414,26 +401,25 @@ def _check_driver(file: MechanismFile, bodies: _CarriedJoints) -> Iterator[Findi
             pivots[".cylinder"] = file.crank.cylinder.pivot
             slots = [(one.pivot, one.pin) for one in file.group if isinstance(one, SlottedLinkTable)]
             if (pivots[".cylinder"], file.crank.pin) not in slots:
-                detail = f'of type = "RPR", its pin {file.crank.pin}, its pivot {pivots[".cylinder"]}'
-                yield Finding("$.crank.cylinder", f"the cylinder itself is missing: a group {detail}")
+                known = {"joint": file.crank.pin, "fixed": pivots[".cylinder"]}
+                yield Finding("$.crank.cylinder", "cylinder_missing", known)
         for key, pivot in pivots.items():
             if pivot not in file.ground:
-                yield Finding(f"$.crank{key}.pivot", _unknown(pivot, {*file.ground}, "a ground pivot"))
+                yield _unknown("no_ground_pivot", pivot, {*file.ground}).at(f"$.crank{key}.pivot")
         if len({*pivots.values()}) < len(pivots):
-            yield Finding("$.crank.cylinder.pivot", "the cylinder needs a pivot of its own")
+            yield Finding("$.crank.cylinder.pivot", "cylinder_pivot")
         bodies.links[file.crank.link] = {file.crank.pivot, file.crank.pin}
     pin = file.driver.pin
     if pin in file.ground:
         where = "$.crank.pin" if file.crank else "$.driving_slider.pin"
-        yield Finding(where, f"{pin} is a ground pivot already")
+        yield Finding(where, "pin_on_ground", {"joint": pin})
 
 
-def _why_unplaced(file: MechanismFile, waiting: list[AnyGroupTable]) -> str:
+def _why_unplaced(file: MechanismFile, waiting: list[AnyGroupTable]) -> FaultError:
     """Return why groups wait for one another: the mechanism's mobility, or the class of its groups."""
     if (chain := file.chain) is not None:
         return refusal(chain)
-    nodes = ", ".join(group.node for group in waiting[:MOST_NAMED])
-    return f"the groups of {nodes} wait for one another: none of them can be placed first"
+    return FaultError("groups_wait", nodes=tuple(group.node for group in waiting[:MOST_NAMED]))
 
 
 def _check_hinges(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> Iterator[Finding]:
@@ -441,10 +427,8 @@ def _check_hinges(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> I
     hinges = {joint for key, joint in _needed(group) if key.startswith(("pin", "pivot"))}
     for joint in sorted(hinges & bodies.moments.keys()):
         link = bodies.moments[joint]
-        detail = f'hinge it to a fixed point of the link, a group of type = "point" on link {link}'
-        if not bodies.links[link]:
-            detail = "a yoke on a moving guide carries no further joint"
-        yield Finding(where, f"{joint} is a point of link {link} for this instant only: {detail}")
+        code = "hinge_of_instant" if bodies.links[link] else "hinge_of_yoke"
+        yield Finding(where, code, {"joint": joint, "link": link})
     moving = [set(guide.joints) for _, guide in _guides(group) if guide.joints]
     match group:
         case CrossSliderTable():
@@ -455,8 +439,7 @@ def _check_hinges(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> I
     alone = len(hinges) == 1 and not hinges <= bodies.ground
     body = bodies.body_of(hinges) if hinges and not alone else None
     if body is not None:
-        detail = f"what it is hinged to and slides on is all on {body}: nothing moves between"
-        yield Finding(where, f'{detail}; a further point of a link is a group of type = "plate" or "point"')
+        yield Finding(where, "all_on_link", {"link": body})
 
 
 def _check_names(joints: set[str]) -> Iterator[Finding]:
@@ -464,7 +447,7 @@ def _check_names(joints: set[str]) -> Iterator[Finding]:
     lower = [joint.lower() for joint in joints]
     for joint in sorted(joints):
         if lower.count(joint.lower()) > 1:
-            yield Finding("$", f"joint {joint}: another one has the same letters in another case")
+            yield Finding("$", "joint_case", {"joint": joint})
 
 
 def _ambiguous_names(joints: set[str]) -> Iterator[Finding]:
@@ -473,8 +456,8 @@ def _ambiguous_names(joints: set[str]) -> Iterator[Finding]:
     for first, second in permutations(sorted(joints), 2):
         other = read_as.setdefault(first + second, (first, second))
         if other != (first, second):
-            detail = f"{first + second} would mean both {' about '.join(other)} and {first} about {second}"
-            yield Finding("$", f"joints {', '.join(sorted({*other, first, second}))}: {detail}; rename one")
+            alike = FaultError("joints_alike", name=first + second, first=first, second=second)
+            yield alike.at("$", names=tuple(sorted({*other, first, second})))
 
 
 def _guides(group: AnyGroupTable) -> list[tuple[str, GuideTable]]:
@@ -516,14 +499,14 @@ def _check_links(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> It
     match group:
         case DyadTable():
             if group.pins[0] == group.pins[1]:
-                yield Finding(f"{where}.pins", "the two pins must be different joints")
+                yield Finding(f"{where}.pins", "joints_equal")
             for index, (pin, link) in enumerate(zip(group.pins, group.links, strict=True)):
                 yield from _add_link(link, {pin, group.node}, bodies, f"{where}.links[{index}]")
         case SliderTable():
             yield from _add_link(group.link, {group.pin, group.node}, bodies, f"{where}.link")
         case SlottedLinkTable():
             if group.pin == group.pivot:
-                yield Finding(f"{where}.pivot", "pin and pivot must be different joints")
+                yield Finding(f"{where}.pivot", "joints_equal")
             carried = {group.pivot, *([group.foot] if group.foot else [])}
             yield from _add_link(group.link, carried, bodies, f"{where}.link")
             bodies.slots[group.link] = {group.pivot, group.node}
@@ -533,8 +516,7 @@ def _check_links(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> It
             bodies.moments[group.node] = link
         case CrossSliderTable(guides=(first, second)):
             if not first.joints and not second.joints:
-                detail = "two fixed guides cross in a fixed point: one of them must be on a moving link"
-                yield Finding(f"{where}.guides", detail)
+                yield Finding(f"{where}.guides", "guides_fixed")
         case PlateTable() | PointOnLineTable() | PointTable():
             yield from _check_base(group, bodies, f"{where}.base")
 
@@ -542,8 +524,8 @@ def _check_links(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> It
 def _check_guides(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> Iterator[Finding]:
     for key, guide in _guides(group):
         if guide.joints and (guide.joints[0] == guide.joints[1] or bodies.of(guide.joints) is None):
-            detail = f"{guide.joints[0]} and {guide.joints[1]} must be two joints of one moving link"
-            yield Finding(f"{where}.{key}.joints", detail + bodies.carriers_of(guide.joints))
+            known = {"names": tuple(guide.joints), **bodies.carriers_of(guide.joints)}
+            yield Finding(f"{where}.{key}.joints", "guide_joints", known)
         elif guide.joints and guide.coincident:
             bodies.moments[guide.coincident] = bodies.of(guide.joints) or ""
 
@@ -554,27 +536,25 @@ def _check_base(
     held = bodies.links.setdefault(group.link, set())
     on_slot = isinstance(group, PointTable) and set(group.base) == bodies.slots.get(group.link)
     if group.base[0] == group.base[1] or not (on_slot or set(group.base) <= held):
-        detail = ", ".join(sorted(held)) or "no joints yet"
-        advice = ""
+        known: dict[str, Parameter] = {"link": group.link}
+        if held:
+            known["names"] = tuple(sorted(held))
         if group.link in bodies.slots:
-            pivot_and_node = ", ".join(
-                sorted(bodies.slots[group.link], key=lambda joint: joint in bodies.moments)
-            )
-            advice = f'; points of a slotted link are given by type = "point" from {pivot_and_node}'
-        yield Finding(where, f"must be two joints of link {group.link} ({detail}){advice}")
+            known["base"] = tuple(sorted(bodies.slots[group.link], key=lambda joint: joint in bodies.moments))
+        yield Finding(where, "base_joints", known)
     elif on_slot and group.base[0] not in held:
-        yield Finding(where, "the pivot comes first, then the slotted link's node")
+        yield Finding(where, "pivot_first")
     held.add(group.node)
 
 
 def _add_link(link: str, joints: set[str], bodies: _CarriedJoints, where: str) -> Iterator[Finding]:
     """Add a group's links, and report used names: under one name, two bodies would pass for one."""
     if link in bodies.links:
-        yield Finding(where, f"there is a link {link} already: each link needs a name of its own")
+        yield Finding(where, "link_taken", {"link": link})
     bodies.links.setdefault(link, joints)
 
 
-def _unknown(joint: str, known: set[str], what: str) -> str:
+def _unknown(code: str, joint: str, known: set[str]) -> FaultError:
     near = difflib.get_close_matches(joint, sorted(known), n=1, cutoff=0.5)
-    meant = f" (did you mean {near[0]}?)" if near else ""
-    return f"{joint} is not {what}{meant}: known are {', '.join(sorted(known))}"
+    meant: dict[str, Parameter] = {"near": near[0]} if near else {}
+    return FaultError(code, joint=joint, names=tuple(sorted(known)), **meant)

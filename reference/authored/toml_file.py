@@ -2,7 +2,7 @@
 
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -19,9 +19,17 @@ from pydantic import (
 )
 
 from reference.authored import formula
-from reference.authored.chain import ONE_DRIVING_LINK
 from reference.authored.formula import Formula
-from reference.errors import MOST_FINDINGS, AuthoredFileError, Finding, counted, look_alikes, near_names
+from reference.errors import (
+    MOST_FINDINGS,
+    AuthoredFileError,
+    FaultError,
+    Finding,
+    Parameter,
+    look_alikes,
+    near_names,
+    nearest,
+)
 
 LENGTH_UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 MAX_BYTES = 200_000
@@ -50,16 +58,14 @@ class Authored(BaseModel):
 
 def _read_formula(value: object) -> Formula:
     if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise ValueError('a number or a formula in quotes, such as "2*(30+n)", is expected')  # noqa: TRY004
+        raise FaultError("no_formula")
     return formula.parse(value)
 
 
 def _check_joint(name: str) -> str:
     if not (name.isalnum() and name.isascii()) or not name[0].isupper() or name.lower() in {"o", "n"}:
         # A joint's image in the plans is its name in lower case: the two must differ.
-        raise ValueError(
-            f"'{name}' is no joint's name: a capital, then letters or digits (not O or N){look_alikes(name)}"
-        )
+        raise FaultError("no_joint_name", text=name, **look_alikes(name))
     return name
 
 
@@ -92,11 +98,11 @@ def _side_of(words: tuple[str, str]) -> BeforeValidator:
         if str(value).lower() in NO_SIDES or (
             isinstance(value, str) and near_names(value, SIDES, cutoff=0.75)
         ):
-            raise ValueError(f"'{value}' is no side of this group: it must be '{words[0]}' or '{words[1]}'")
+            raise FaultError("no_side", text=str(value), names=words)
         try:
             return SideText(words, _read_formula(value))
-        except ValueError as error:
-            raise ValueError(f"must be {words[0]} or {words[1]}, or a formula: {error}") from error
+        except FaultError as error:
+            raise FaultError("side_or_formula", names=words, why=error.code, **error.parameters) from error
 
     return BeforeValidator(read)
 
@@ -154,19 +160,19 @@ def _no_toml(error: Exception, text: str) -> Finding:
     """Report invalid TOML with the faulty line and the most likely remedy."""
     found = re.search(r" \(at line (\d+), column \d+\)", str(error))
     if found is None:
-        return Finding("$", f"is not TOML: {error}", NOT_TOML)
-    line = text.split("\n")[int(found[1]) - 1].strip()
-    advice = ""
+        return Finding("$", NOT_TOML, {"error": str(error)})
+    number = int(found[1])
+    line = text.split("\n")[number - 1].strip()
+    known: dict[str, Parameter] = {"text": line[:MAX_NAME], "error": str(error).replace(found[0], "")}
     if re.search(r"=.*\d,\d", line):
-        advice = "; a number has a decimal point"
+        known["advice"] = "decimal_point"
     elif re.search(r"=\s*[\d.+-]+\s*[^\d\s#]", line):
-        advice = "; a number stands alone, without its unit, and a formula in quotes"
+        known["advice"] = "number_alone"
     elif line.count('"') % 2:
-        advice = "; a quote is opened and never closed"
+        known["advice"] = "quote_unclosed"
     elif line.startswith("[") and re.search("twice|overwrite", str(error)):
-        advice = f"; a table that stands more than once has two brackets: [[{line.strip('[] ')}]]"
-    what = str(error).replace(found[0], "")
-    return Finding(f"line {found[1]}", f"is not TOML: {line[:MAX_NAME]} ({what}{advice})", NOT_TOML)
+        known |= {"advice": "two_brackets", "name": line.strip("[] ")}
+    return Finding("", NOT_TOML, known, number)
 
 
 def text_of(path: Path) -> str:
@@ -174,27 +180,29 @@ def text_of(path: Path) -> str:
     try:
         return _content_of(path).decode("utf-8-sig")
     except FileNotFoundError as error:
-        raise AuthoredFileError(str(path), (Finding("$", "there is no such file"),)) from error
+        raise AuthoredFileError(str(path), (Finding("$", "no_such_file"),)) from error
     except OSError as error:
-        raise AuthoredFileError(str(path), (Finding("$", f"cannot be read: {error.strerror}"),)) from error
+        raise AuthoredFileError(
+            str(path), (Finding("$", "not_readable", {"error": str(error.strerror)}),)
+        ) from error
     except UnicodeDecodeError as error:
-        raise AuthoredFileError(str(path), (Finding("$", "is not UTF-8 text; save it as UTF-8"),)) from error
+        raise AuthoredFileError(str(path), (Finding("$", "text_not_utf8"),)) from error
 
 
 def _content_of(path: Path) -> bytes:
     """Return a file's bytes, up to the largest authored size; raises OSError or AuthoredFileError."""
     if path.exists() and not path.is_file():
-        why = "cannot be read: it is a folder or a device, not a file"
+        found = Finding("$", "no_file")
     else:
         with path.open("rb") as stream:
             content = stream.read(MAX_BYTES + 1)
         if len(content) > MAX_BYTES:
-            why = f"is larger than {MAX_BYTES // 1000} kB: nothing that is written by hand is"
+            found = Finding("$", "file_large", {"most": MAX_BYTES // 1000})
         elif _ENDLESS_KEY.search(content):
-            why = f"has a key of more than {MAX_DEPTH} parts: nothing that is authored nests so"
+            found = Finding("$", "nested", {"most": MAX_DEPTH})
         else:
             return content
-    raise AuthoredFileError(str(path), (Finding("$", why),))
+    raise AuthoredFileError(str(path), (found,))
 
 
 def is_file(path: Path) -> bool:
@@ -211,14 +219,14 @@ def _check_tree(data: dict[str, Any]) -> Iterator[Finding]:
     while waiting:
         path, value, depth = waiting.pop()
         if isinstance(value, dict | list) and depth == MAX_DEPTH:
-            yield Finding(path, f"is nested deeper than {MAX_DEPTH} tables")
+            yield Finding(path, "nested", {"most": MAX_DEPTH})
         elif isinstance(value, dict):
             waiting += [(f"{path}.{key[:MAX_NAME]}", inner, depth + 1) for key, inner in value.items()]
         elif isinstance(value, list):
             waiting += [(f"{path}[{index}]", inner, depth + 1) for index, inner in enumerate(value)]
         elif isinstance(value, int | float) and not abs(value) <= LARGEST_NUMBER:
             # Comparisons with nan are false.
-            yield Finding(path, "is no number that can be computed with")
+            yield Finding(path, "number_unusable")
 
 
 def validate(model: type[Model], data: dict[str, Any], file: str) -> Model:
@@ -230,97 +238,103 @@ def validate(model: type[Model], data: dict[str, Any], file: str) -> Model:
 
 
 def findings_of(error: ValidationError, model: type[BaseModel]) -> Iterator[Finding]:
-    """Convert Pydantic's errors to paths and plain sentences: the first twenty, and how many more."""
-    faults = error.errors(include_url=False, include_context=False)
-    for fault in faults[:MOST_FINDINGS]:
+    """Convert Pydantic's errors to findings: the first twenty, and how many more."""
+    faults = error.errors(include_url=False)
+    told = faults if len(faults) <= MOST_FINDINGS else faults[: MOST_FINDINGS - 1]
+    for fault in told:
         *above, last = fault["loc"] or ("",)
         is_field = fault["type"] in {"extra_forbidden", "missing"}
         path = "$" + "".join(map(_path_part, above)) + (f".{last}" if is_field else _path_part(last))
-        message, given = fault["msg"].removeprefix("Value error, "), fault["input"]
-        if fault["type"] == "extra_forbidden":
-            message = _not_known(str(last), model, given)
-        elif fault["type"] == "missing":
-            message = "is missing" + _WHY_NEEDED.get(str(fault["loc"][-1]), "")
-        elif fault["type"].startswith("union_tag"):
-            path, message = f"{path}.type", _no_type(given)
-        elif fault["type"] in {"model_type", "model_attributes_type"}:
-            message = "must be a table" + (f": [{last}], not [[{last}]]" if isinstance(given, list) else "")
-            if last in DRIVING and isinstance(given, list) and len(given) > 1:
-                message = f"{len(given)} degrees of freedom: {ONE_DRIVING_LINK}"
-        elif fault["type"] == "list_type":
-            message = f"must be a list{_a_list(str(last), given)}"
-        elif fault["type"] in {"too_long", "too_short"}:
-            message = fault["msg"].replace("List should have", "must have").replace(" after validation", "")
-            message += "; a number has a decimal point" if fault["type"] == "too_long" else ""
-        elif fault["type"] == "string_pattern_mismatch" and isinstance(given, str):
-            message = f"'{given[:MAX_NAME]}' is no name here: letters A-Z a-z and digits{look_alikes(given)}"
-            path = path.removesuffix(".[key]")
-        elif fault["type"] in {"float_type", "int_type"} and isinstance(given, str):
-            message = "must be a number, without quotes"
-        elif fault["type"] == "string_too_long":
-            message = message.replace("String should have", "must have")
-        yield Finding(
-            path,
-            message.replace("Input should be a valid", "must be a").replace("Input should be", "must be"),
-        )
-    if len(faults) > MOST_FINDINGS:
-        yield Finding("$", f"and {counted(len(faults) - MOST_FINDINGS, 'more fault')}")
+        if fault["type"].startswith("union_tag"):
+            path = f"{path}.type"
+        yield _fault_of({**fault}, str(last), model).at(path.removesuffix(".[key]"))
+    if len(faults) > len(told):
+        yield Finding("$", "more_faults", {"count": len(faults) - len(told)})
+
+
+_TYPES = {
+    "literal_error": "one_of", "enum": "one_of", "greater_than": "limit", "greater_than_equal": "limit",
+    "less_than": "limit", "less_than_equal": "limit", "finite_number": "number_unusable",
+    "float_type": "no_number", "int_type": "no_whole_number", "int_from_float": "no_whole_number",
+    "string_type": "no_quotes", "bool_type": "true_or_false", "dict_type": "must_be_table",
+    "model_type": "must_be_table", "list_type": "must_be_list", "tuple_type": "must_be_list",
+    "string_too_long": "too_long", "string_too_short": "cell_empty",
+    "too_long": "list_long", "too_short": "list_short",
+}  # fmt: skip
+"""Codes of Pydantic's errors that need no more than their limits."""
+_LIMITS = {"min_length": "least", "max_length": "most", "actual_length": "count"}
+_MISSING = {"side": "side_missing"}
+_SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
+
+
+def _fault_of(fault: Mapping[str, Any], last: str, model: type[BaseModel]) -> FaultError:
+    """Return one of Pydantic's errors, at the key `last`, with its code."""
+    kind, given, known = fault["type"], fault["input"], fault.get("ctx", {})
+    if isinstance(fault_of_value := known.get("error"), FaultError):
+        return fault_of_value
+    match kind:
+        case "extra_forbidden":
+            return _not_known(last, model, given)
+        case "missing":
+            return FaultError(_MISSING.get(last, "key_missing"))
+        case "union_tag_not_found" | "union_tag_invalid":
+            return _no_type(given)
+        case "model_type" if last in DRIVING and isinstance(given, list) and len(given) > 1:
+            return FaultError("drivers")
+        case "string_pattern_mismatch" if isinstance(given, str):
+            return FaultError("no_name", text=given[:MAX_NAME], **look_alikes(given))
+        case "float_type" | "int_type" if isinstance(given, str):
+            return FaultError("number_in_quotes")
+    told: dict[str, Parameter] = {name: known[key] for key, name in _LIMITS.items() if key in known}
+    if isinstance(given, dict | list):
+        told["name"] = last
+    elif given is not None:
+        told["text"] = str(given)[:MAX_NAME]
+    for key in _SIGNS.keys() & known.keys():
+        told["limit"] = f"{_SIGNS[key]} {known[key]:g}"
+    if "expected" in known:
+        told["names"] = known["expected"].replace(" or ", ", ")
+    return FaultError(_TYPES.get(kind, "other_form"), **told, error=fault["msg"])
 
 
 DRIVING = ("crank", "driving_slider", "driven_slider")
-_EQUIVALENT = "by its equivalent linkage for the instant, see Cams and gears in docs/assignments.md"
 _OTHER_KINDS = {
-    ".*(cam(?!e)|follower|tappet).*": f"replace a cam {_EQUIVALENT}",
-    ".*(gears?$|gear.?(pair|set|train|wheel)|planet|epicycl|pinion|belt|pulley|friction).*":
-        f"a gear before the crank is its gear_ratio; replace a pair of gears between links {_EQUIVALENT}",
-    ".*(geneva|maltese).*": 'a Geneva wheel: while the pin is in a slot, it is a slotted link, type = "RPR"',
-    ".*(spring|damper|rope|cable|screw|spheric|cardan).*":
-        "planmark solves plane mechanisms of rigid links, hinges and sliders",
-    "triad|.*third.*|class.?iii|rr[rp].?[rp]+":
-        "a group of more than two links: only groups of the second class are solved",
-    "oldham.*|(scotch.?)?yoke|ppr|pp": 'a block in a yoke on a guide is type = "RPP"',
-    "dyad|rr|bars?|rods?|rocker|lever": 'two links that meet in a joint are type = "RRR"',
-    "cylinder|slott?ed.*|quick.?return": 'a block in the slot of a turning link is type = "RPR"',
-    "prr|slider|piston|slider.?crank": 'a rod with a slider on a guide is type = "RRP"',
-    "triangle|coupler|ternary|body": 'a third point of a link is type = "plate" or "point"',
-    "(crank|driv(en|ing).?slider|driver|motor|second).?([2-9]|crank|driver|motor)":
-        f"a second driving link makes 2 degrees of freedom: {ONE_DRIVING_LINK}",
+    ".*(cam(?!e)|follower|tappet).*": "kind_cam",
+    ".*(gears?$|gear.?(pair|set|train|wheel)|planet|epicycl|pinion|belt|pulley|friction).*": "kind_gears",
+    ".*(geneva|maltese).*": "kind_geneva",
+    ".*(spring|damper|rope|cable|screw|spheric|cardan).*": "kind_not_rigid",
+    "triad|.*third.*|class.?iii|rr[rp].?[rp]+": "kind_class",
+    "oldham.*|(scotch.?)?yoke|ppr|pp": "kind_yoke",
+    "dyad|rr|bars?|rods?|rocker|lever": "kind_links",
+    "cylinder|slott?ed.*|quick.?return": "kind_slot",
+    "prr|slider|piston|slider.?crank": "kind_slider",
+    "triangle|coupler|ternary|body": "kind_point",
+    "(crank|driv(en|ing).?slider|driver|motor|second).?([2-9]|crank|driver|motor)": "kind_driver",
 }  # fmt: skip
-"""Advice about kinds of parts that no file has, or has by another name; the names as regular expressions."""
+"""Codes of advice about kinds of parts that no file has, or has by another name; the names as regular
+expressions."""
 
 
-def _other_kind(name: str) -> str:
-    """Return advice about a kind of part that a file does not have by this name; empty if it means none."""
+def _other_kind(name: str, **known: Parameter) -> FaultError | None:
+    """Return advice about a kind of part that a file does not have by this name; None if it means none."""
     word = name[:MAX_NAME]
-    advice = (text for kind, text in _OTHER_KINDS.items() if re.fullmatch(kind, word.lower()))
-    return next((f"'{word}': {text}" for text in advice), "")
+    code = next((code for kind, code in _OTHER_KINDS.items() if re.fullmatch(kind, word.lower())), None)
+    return FaultError(code, text=word, **known) if code else None
 
 
 _GROUP_TYPES = ("RRR", "RRP", "RPR", "PRP", "RPP", "plate", "point_on_line", "point")
 _UNION_TAGS = {*_GROUP_TYPES, "str", "MechanismFile"}
 
 
-def _no_type(table: object) -> str:
-    """Describe what is wrong with a group's type."""
+def _no_type(table: object) -> FaultError:
+    """Return what is wrong with a group's type."""
     given = table.get("type") if isinstance(table, dict) else None
-    known = f"one of {', '.join(_GROUP_TYPES)}"
     if not isinstance(given, str):
-        return f"is missing: it must be {known}"
-    if other := _other_kind(given):
-        return f"{other}; types are {', '.join(_GROUP_TYPES)}"
-    near = near_names(given, _GROUP_TYPES, most=1)
-    meant = f"; did you mean {near[0]}?" if near else ""
-    return f"'{given[:MAX_NAME]}' is no type: it must be {known}{meant}{look_alikes(given)}"
-
-
-def _a_list(name: str, given: object) -> str:
-    """Explain how a list of tables or of numbers is written."""
-    return f" of tables: [[{name}]], not [{name}]" if isinstance(given, dict) else ", in square brackets"
-
-
-_WHY_NEEDED = {
-    "side": ": without it two assemblies are possible, and the mechanism is never guessed",
-}
+        return FaultError("key_missing", types=_GROUP_TYPES)
+    if other := _other_kind(given, types=_GROUP_TYPES):
+        return other
+    known = nearest(given, _GROUP_TYPES) | look_alikes(given)
+    return FaultError("no_type", text=given[:MAX_NAME], types=_GROUP_TYPES, **known)
 
 
 def _path_part(part: str | int) -> str:
@@ -329,18 +343,19 @@ def _path_part(part: str | int) -> str:
     return "" if not part or part in _UNION_TAGS or part.startswith("function-") else f".{part}"
 
 
-def _not_known(name: str, model: type[BaseModel], given: object) -> str:
+def _not_known(name: str, model: type[BaseModel], given: object) -> FaultError:
     schema = model.model_json_schema()
     tables = (schema, *schema.get("$defs", {}).values())
     fields = {field for table in tables for field in table.get("properties", ())}
     if name in schema.get("properties", ()) and not isinstance(given, dict | list):
-        return "belongs to the file, not to this table: write it above the first [table]"
+        return FaultError("of_the_file")
     if name in fields:
-        return "does not belong here: another kind of table has it; leave it out"
+        return FaultError("of_another_table")
     if other := _other_kind(name):
         return other
     single = re.sub("ies$", "y", name).removesuffix("s")
     near = [single] if single in fields else near_names(name, sorted(fields), most=1)
+    if not near:
+        return FaultError("key_unknown")
     is_tables = isinstance(given, list) and given and isinstance(given[0], dict)
-    meant = f" (did you mean {f'[[{near[0]}]]' if is_tables else near[0]}?)" if near else ""
-    return f"is not known here; check its spelling{meant}"
+    return FaultError("key_unknown", near=f"[[{near[0]}]]" if is_tables else near[0])

@@ -27,23 +27,16 @@ from reference.authored.toml_file import (
     SideText,
     text_of,
 )
-from reference.errors import AuthoredFileError, Finding, look_alikes
+from reference.errors import AuthoredFileError, FaultError, Finding, Parameter, look_alikes
 from reference.geometry import FloatArray
 
 MEASURES = {
-    **dict.fromkeys(("length", "lengths", "offset", "through", "at", "ground", "displacement"), "a length"),
-    **dict.fromkeys(("angle_deg", "slot_deg"), "an angle"),
-    "rpm": "revolutions per minute",
-    "omega": "an angular velocity",
-    "epsilon": "an angular acceleration",
-    "speed": "a speed",
-    "acceleration": "an acceleration",
-    "mass": "a mass",
-    "inertia": "a moment of inertia",
-    "force": "a force",
-    "couple": "a moment",
+    **dict.fromkeys(("length", "lengths", "offset", "through", "at", "ground", "displacement"), "length"),
+    **dict.fromkeys(("angle_deg", "slot_deg"), "angle"),
+    **{key: key for key in ("rpm", "omega", "epsilon", "speed", "acceleration")},
+    **{key: key for key in ("mass", "inertia", "force", "couple")},
 }
-"""The kind of quantity that a key of a mechanism, a body or a load holds, in the words of `UNITS`."""
+"""The kind of quantity that a key of a mechanism, a body or a load holds, as `UNITS` names it."""
 LENGTHS = {"length", "lengths"}
 """Keys of lengths that must be above zero; coordinates need not be."""
 MOST_VARIANTS = 10_000
@@ -55,17 +48,17 @@ KEYS = ("n", "position")
 """Columns that identify the variant of a row."""
 
 UNITS = {
-    **{unit: ("a length", unit) for unit in LENGTH_UNITS_M},
-    **{f"{unit}/s": ("a speed", unit) for unit in LENGTH_UNITS_M},
-    **{f"{unit}/s^2": ("an acceleration", unit) for unit in LENGTH_UNITS_M},
-    **dict.fromkeys(("deg", "°", "rad"), ("an angle", "")),
-    **dict.fromkeys(("rpm", "rev/min"), ("revolutions per minute", "")),
-    "rad/s": ("an angular velocity", ""),
-    "rad/s^2": ("an angular acceleration", ""),
-    "kg": ("a mass", ""),
-    "kg m^2": ("a moment of inertia", ""),
-    "N": ("a force", ""),
-    "N m": ("a moment", ""),
+    **{unit: ("length", unit) for unit in LENGTH_UNITS_M},
+    **{f"{unit}/s": ("speed", unit) for unit in LENGTH_UNITS_M},
+    **{f"{unit}/s^2": ("acceleration", unit) for unit in LENGTH_UNITS_M},
+    **dict.fromkeys(("deg", "°", "rad"), ("angle", "")),
+    **dict.fromkeys(("rpm", "rev/min"), ("rpm", "")),
+    "rad/s": ("omega", ""),
+    "rad/s^2": ("epsilon", ""),
+    "kg": ("mass", ""),
+    "kg m^2": ("inertia", ""),
+    "N": ("force", ""),
+    "N m": ("couple", ""),
 }
 """The kind of quantity of a unit in a heading, and its unit of length."""
 _LETTERS = str.maketrans({"м": "m", "с": "s", "²": "^2", "р": "r", "а": "a", "д": "d"})
@@ -103,15 +96,9 @@ class Column:
     words: tuple[str, ...] = ()
 
 
-_FORMS = (
-    'needs either file = "NAME.csv" (a table beside this file), or columns and rows, such as'
-    ' columns = ["n", "a [mm]"] and rows = [[1, 40], [2, 45]]'
-)
-
-
 def _read_cell(value: object) -> object:
     if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise ValueError("a number or a side is expected in a cell")  # noqa: TRY004 - as above
+        raise FaultError("no_number", text=str(value), sides=tuple(SIDES))
     return value
 
 
@@ -131,7 +118,7 @@ class DataTable(Authored):
         if isinstance(data, str):
             return {"file": data}
         if not isinstance(data, dict | list):
-            raise ValueError(_FORMS)  # noqa: TRY004 - pydantic's way to refuse
+            raise FaultError("table_forms")
         if isinstance(data, list) and data and all(isinstance(row, dict) for row in data):
             columns = [*dict.fromkeys(name for row in data for name in row)]
             return {"columns": columns, "rows": [[row.get(name, "") for name in columns] for row in data]}
@@ -146,7 +133,7 @@ class DataTable(Authored):
     def _has_rows_once(self) -> Self:
         inside = (self.columns is not None, self.rows is not None)
         if (self.file is None) != all(inside) or (self.file is not None and any(inside)):
-            raise ValueError(_FORMS)
+            raise FaultError("table_forms")
         return self
 
 
@@ -166,14 +153,14 @@ class VariantRows:
     ----------
     source : its name in messages
     keys : n and position of each row, None if the table has no such column; ascending
-    places : the place of each row, in words
+    lines : the number of each row, in a CSV of its line
     columns : by name, in the order of the rows
     """
 
     source: str
     keys: tuple[VariantKey, ...]
     columns: dict[str, Column]
-    places: tuple[str, ...]
+    lines: tuple[int, ...]
 
     @property
     def has(self) -> tuple[bool, bool]:
@@ -203,22 +190,18 @@ def table_lines(text: str, delimiter: str, most: int) -> tuple[list[tuple[int, l
 
     A record of several lines has the number of its first, from 1. More than `most` lines are a fault.
     """
-
-    def fault(code: str, why: str) -> list[Finding]:
-        return [Finding(f"line {number}", why, code, number)]
-
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
     lines: list[tuple[int, list[str]]] = []
     number = 1
     try:
         for cells in reader:
             if number > most:
-                return lines, fault("too_many_lines", f"more than {most} lines are no table")
+                return lines, [Finding("", "too_many_lines", {"most": most}, number)]
             if any(cell.strip() for cell in cells):
                 lines.append((number, cells))
             number = reader.line_num + 1
-    except csv.Error as error:
-        return lines, fault("no_csv", f"is no CSV: {error}; check its quotes")
+    except csv.Error:
+        return lines, [Finding("", "no_csv", line=number)]
     return lines, []
 
 
@@ -234,29 +217,27 @@ def read_rows(table: DataTable, beside: Path, length_unit_m: float) -> tuple[Dat
     if table.file is None:
         lines: list[tuple[int, list[Cell]]] = [(0, [*(table.columns or ())])]
         lines += enumerate(table.rows or (), 1)
-        reader = _Reader("$.variant.table", "$.variant.table, row {}", "", length_unit_m, [])
-        source, name = str(beside), "the table"
+        reader = _Reader("$.variant.table", "", length_unit_m, [])
+        source, name = str(beside), "[variant.table]"
     else:
         path = beside.parent / table.file
         if path.suffix.lower() in SPREADSHEETS:
-            raise AuthoredFileError(str(path), (Finding("$", "is a spreadsheet: save it as CSV in UTF-8"),))
+            raise AuthoredFileError(str(path), (Finding("$", "is_spreadsheet"),))
         if not path.is_file():
-            missing = Finding("$.variant.table", f"there is no file {table.file} beside this one")
+            missing = Finding("$.variant.table", "no_file_beside", {"file": table.file})
             raise AuthoredFileError(str(beside), (missing,))
         text = text_of(path)
         delimiter = delimiter_of(text)
         split, findings = table_lines(text, delimiter, MOST_VARIANTS)
         lines = [(number, [cell.strip() for cell in cells]) for number, cells in split]
-        reader = _Reader("line 1", "line {}", delimiter, length_unit_m, findings)
+        reader = _Reader("", delimiter, length_unit_m, findings)
         source, name = str(path), path.name
-    keys, columns, places = reader.read(lines)
+    keys, columns, numbers = reader.read(lines)
     if reader.findings:
         raise AuthoredFileError(source, tuple(reader.findings))
     cells = [cells for _, cells in lines]
     whole = table.model_copy(update={"columns": [str(cell) for cell in cells[0]], "rows": cells[1:]})
-    if table.file is not None:
-        places = tuple(f"{name} {place}" for place in places)
-    return whole, VariantRows(name, keys, columns, places)
+    return whole, VariantRows(name, keys, columns, numbers)
 
 
 @dataclass(slots=True)
@@ -265,36 +246,34 @@ class _Reader:
 
     Attributes
     ----------
-    head, row : names of the heading, and of a row by its number
+    table : the path of a table in the assignment's file; empty for a CSV
     delimiter : of a CSV; with semicolons or tabs, 4,5 is a number
     """
 
-    head: str
-    row: str
+    table: str
     delimiter: str
     length_unit_m: float
     findings: list[Finding]
 
-    def fault(self, where: str, message: str) -> None:
-        """Note a fault."""
-        self.findings.append(Finding(where, message))
+    def fault(self, fault: FaultError, number: int | None = None, column: str = "") -> None:
+        """Note a fault of a row by its number, of the heading if there is none, or of a cell."""
+        path = ".".join(filter(None, (self.table, column)))
+        row = {"table_row": number} if self.table and number is not None else {}
+        self.findings.append(fault.at(path, 0 if self.table else number or 1, **row))
 
     def read(
         self, lines: Sequence[tuple[int, Sequence[Cell]]]
-    ) -> tuple[tuple[VariantKey, ...], dict[str, Column], tuple[str, ...]]:
-        """Return the variant and place of each row, and the columns, in the order of the variants."""
+    ) -> tuple[tuple[VariantKey, ...], dict[str, Column], tuple[int, ...]]:
+        """Return the variant and number of each row, and the columns, in the order of the variants."""
         headings = self._headings(lines[0][1] if lines else ())
         rows = lines[1:]
         if self.findings:
             return (), {}, ()
         if not rows:
-            self.fault(self.head, "there are no rows below the names of the columns")
+            self.fault(FaultError("no_rows"))
         for number, cells in rows:
             if any(cell != "" for cell in cells[len(headings) :]):
-                message = f"has {len(cells)} cells, the heading names {len(headings)} columns"
-                self.fault(
-                    self.row.format(number), f"{message}; a decimal comma needs semicolons between cells"
-                )
+                self.fault(FaultError("cells_surplus", fields=len(cells), columns=len(headings)), number)
         if self.findings:
             return (), {}, ()
         columns = {
@@ -312,8 +291,7 @@ class _Reader:
             for name, column in columns.items()
             if name not in KEYS
         }
-        places = tuple(self.row.format(rows[row][0]) for row in order)
-        return tuple(keys[row] for row in order), in_order, places
+        return tuple(keys[row] for row in order), in_order, tuple(rows[row][0] for row in order)
 
     def _headings(self, cells: Sequence[Cell]) -> list[Column]:
         """Return the columns as their headings name them, without numbers."""
@@ -322,30 +300,28 @@ class _Reader:
         while texts and not texts[-1]:
             texts.pop()
         for place, text in enumerate(texts, 1):
-            where = f"{self.head}, column {place}"
+            where = f"[{place}]"
             parts = _HEADING.fullmatch(text)
             name = parts[1] if parts else text
             if parts is None or not _NAME.fullmatch(name):
-                example = "a name and its unit are expected, such as l_AB [mm]: letters A-Z a-z, digits and _"
-                why = f"'{text}' is no heading: {example}{look_alikes(name)}"
-                self.fault(where, why if text else "has no heading")
+                known: dict[str, Parameter] = {"text": text, **look_alikes(name)} if text else {}
+                self.fault(FaultError("no_heading", **known), column=where)
             elif name in CONSTANTS or name in FUNCTIONS:
-                self.fault(where, f"{name} has a meaning in formulas already: choose another name")
+                self.fault(FaultError("name_of_formulas", name=name), column=where)
             elif name in {heading.name for heading in headings}:
-                self.fault(where, f"there are two columns {name}")
+                self.fault(FaultError("column_twice", name=name, count=2), column=where)
             else:
                 headings.append(Column(name, self._unit(where, parts[2] or parts[3] or "")))
         if not self.findings and not {heading.name for heading in headings} & {*KEYS}:
-            message = "there is no column n (or position), which says whose row it is"
-            first = f": if {headings[0].name} holds the numbers, call it n" if headings else ""
-            self.fault(self.head, message + first)
+            first: dict[str, Parameter] = {"near": headings[0].name} if headings else {}
+            self.fault(FaultError("column_n_missing", **first))
         return headings
 
     def _unit(self, where: str, text: str) -> str:
         """Return a heading's unit in one spelling; empty if there is none."""
         unit = _unit_of(text)
         if unit and unit not in UNITS:
-            self.fault(where, f"'{text}' is no unit known here: there are {', '.join(UNITS)}, or none")
+            self.fault(FaultError("unit_unknown", text=text, texts=tuple(UNITS)), column=where)
             return ""
         return unit
 
@@ -361,8 +337,8 @@ class _Reader:
                     if words
                     else _number_in(cell, heading.name, decimal_comma=self.delimiter in {";", "\t"})
                 )
-            except ValueError as error:
-                self.fault(f"{self.row.format(number)}, column {heading.name}", str(error))
+            except FaultError as error:
+                self.fault(error, number, heading.name)
                 value = math.nan
             numbers.append(self._in_file_units(value, heading.unit))
         return replace(heading, numbers=tuple(numbers), words=words)
@@ -388,14 +364,13 @@ class _Reader:
                 continue
             broken = [name for name in named if numbers[name] % 1.0 or abs(numbers[name]) > LARGEST_KEY]
             for name in broken:
-                self.fault(f"{self.row.format(line)}, column {name}", f"{numbers[name]:g} is no whole number")
+                self.fault(FaultError("no_whole_number", text=f"{numbers[name]:g}"), line, name)
             if broken:
                 continue
             n, position = (int(numbers[name]) if name in numbers else None for name in KEYS)
             if (n, position) in first:
-                whose, before = ", ".join(f"{name} = {numbers[name]:g}" for name in named), first[n, position]
-                message = f"{whose} has a row already ({self.row.format(before)})"
-                self.fault(self.row.format(line), message)
+                whose = ", ".join(f"{name} = {numbers[name]:g}" for name in named)
+                self.fault(FaultError("row_twice", text=whose, first=first[n, position]), line)
             first.setdefault((n, position), line)
             keys.append((n, position))
         return keys
@@ -410,7 +385,7 @@ def _unit_of(text: str) -> str:
 def _side_in(cell: Cell, words: tuple[str, ...]) -> float:
     """Convert a word to +1 or -1."""
     if str(cell).lower() not in words:
-        raise ValueError(f"'{cell}' is neither {' nor '.join(words)}" if cell != "" else "is empty")
+        raise FaultError("no_side", text=str(cell), names=words) if cell != "" else FaultError("cell_empty")
     return float(SIDES[str(cell).lower()])
 
 
@@ -425,17 +400,16 @@ def _number_in(cell: Cell, name: str, *, decimal_comma: bool) -> float:
     if not isinstance(cell, str):
         return float(cell)
     if not cell:
-        raise ValueError("is empty")
+        raise FaultError("cell_empty")
     number = number_of(cell, decimal_comma=decimal_comma)
     if number is not None:
         return number
     if "," in cell:
-        raise ValueError(f"'{cell}' is no number: write a decimal point")
+        raise FaultError("no_decimal_point", text=cell)
     parts = re.fullmatch(r"([-+\N{MINUS SIGN}0-9.,]+)\s*(\D.*)", cell)
     if parts is not None and (unit := _unit_of(parts[2])) in UNITS:
-        raise ValueError(f"'{cell}' is no number: the unit stands in the heading, as {name} [{unit}]")
-    side = f" (a side is {', '.join(SIDES)})" if "side" in name.lower() else ""
-    raise ValueError(f"'{cell}' is no number{side}")
+        raise FaultError("unit_in_cell", text=cell, name=name, unit=unit)
+    raise FaultError("no_number", text=cell, **({"sides": tuple(SIDES)} if "side" in name.lower() else {}))
 
 
 def formulas_in(thing: object, path: str, key: str = "") -> Iterator[tuple[str, str, Formula | SideText]]:
@@ -460,25 +434,24 @@ def misused_columns(thing: object, rows: VariantRows, path: str) -> Iterator[Fin
         column = rows.columns.get(formula.text) if isinstance(formula, Formula) else None
         if column is None:
             continue
-        message = _misuse(column, key, leaf.words if isinstance(leaf, SideText) else ())
-        if message:
-            yield Finding(where, f"column {column.name} of {rows.source} {message}")
+        misuse = _misuse(column, key, leaf.words if isinstance(leaf, SideText) else ())
+        if misuse:
+            yield misuse.at(where, name=column.name, file=rows.source)
         elif key in LENGTHS:
-            for place, number in zip(rows.places, column.numbers, strict=True):
+            for line, number in zip(rows.lines, column.numbers, strict=True):
                 if number <= 0.0:
-                    cell = f"{place}, column {column.name}"
-                    yield Finding(cell, f"{number:g}: a length must be above zero ({where})")
+                    negative = FaultError("column_not_positive", text=f"{number:g}", table_row=line)
+                    yield negative.at(where, name=column.name, file=rows.source)
 
 
-def _misuse(column: Column, key: str, words: tuple[str, ...]) -> str | None:
-    """Describe what is wrong with a column in a key; None if nothing is."""
-    if words:
-        if not {*column.words} <= {*words}:
-            return f"holds {' and '.join(column.words)}; {' or '.join(words)} is needed here"
-        return f"is in {column.unit}, not a side" if column.unit else None
-    if column.words:
-        return f"holds {' and '.join(column.words)}, a number is needed here"
+def _misuse(column: Column, key: str, words: tuple[str, ...]) -> FaultError | None:
+    """Return what is wrong with a column in a key; None if nothing is."""
+    if words and (column.unit or not {*column.words} <= {*words}):
+        return FaultError("column_holds", values=column.words or column.unit, names=words)
+    if column.words and not words:
+        return FaultError("column_holds", values=column.words)
     measures, needed = UNITS.get(column.unit, ("", ""))[0], MEASURES.get(key)
     if column.unit and measures != needed:
-        return f"is in {column.unit}, {measures}; {needed or 'a number without a unit'} is needed here"
+        units = tuple(unit for unit, (kind, _) in UNITS.items() if kind == needed)
+        return FaultError("column_holds", values=column.unit, **({"names": units} if units else {}))
     return None

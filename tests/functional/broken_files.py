@@ -221,9 +221,9 @@ CASES = [
     _a("unknown tradition", 'rubric = "course"', 'rubric = "course"\ntradition = "q"', "$.tradition"),
     _a("no translation", 'ru = "Планы конвейера"\n', "", "$.title.ru"),
     # The table of variants.
-    _t("letter for a digit", "2,90,250", "2,9O,250", "line 3, column a"),
-    _t("unit in a cell", "2,90,250", "2,90 mm,250", "line 3, column a"),
-    _t("cell left out", "2,90,250", "2,,250", "line 3, column a"),
+    _t("letter for a digit", "2,90,250", "2,9O,250", "line 3, a"),
+    _t("unit in a cell", "2,90,250", "2,90 mm,250", "line 3, a"),
+    _t("cell left out", "2,90,250", "2,,250", "line 3, a"),
     _t("a row too short", "2,90,250", "2,90", "line 3"),
     _t("n twice", "2,90,250", "1,90,250", "line 3"),
     _t("no column n", "n,a [mm]", "no,a [mm]", "line 1"),
@@ -231,7 +231,7 @@ CASES = [
     _t("column twice", "d [mm]", "a [mm]", "line 1"),
     _t("Cyrillic column", "a [mm]", "а [mm]", "line 1"),
     _t("reserved column", "d [mm]", "pi [mm]", "line 1"),
-    _t("length of nothing", "2,90,250", "2,0,250", "line 3"),
+    _t("length of nothing", "2,90,250", "2,0,250", "row 3"),
     _t("decimal commas between commas", "2,90,250", "2,90,5,250", "line 3"),
     # The rubric.
     _r("unknown vector", 'vector = "v_B"', 'vector = "v_K"', "$.criterion[0].vector"),

@@ -99,7 +99,7 @@ def test_a_new_author_comes_from_a_six_bar_of_a_textbook_to_printed_sheets(planm
     path.write_text(third, encoding="utf-8")
     told = planmark("new", "other", "--mechanism", "six.mechanism.toml")
     assert told.returncode == 2
-    assert "AC, BCD, O2B, O1D form a group of the third class: not solved" in told.stderr
+    assert "AC, BCD, O2B, O1D form a group of class III: not solved" in told.stderr
     assert "or with O2B as the driving link" in told.stderr
     assert not (tmp_path / "other.assignment.toml").exists()
 
@@ -144,3 +144,22 @@ def test_a_cylinder_of_driven_length_is_given_to_students_and_has_no_cycle(planm
     ran = planmark("new", "other", "--mechanism", "arm.mechanism.toml")
     assert ran.returncode == 2
     assert "$: '500 + 8*n' (cylinder) must lie between 0.110555 and 0.610555 m" in ran.stderr
+
+
+@pytest.mark.parametrize(
+    ("lang", "fault"),
+    [
+        ("ro", "lipsește: fără ea sunt posibile două asamblări"),
+        ("ru", "отсутствует: без этого возможны две сборки"),
+    ],
+)
+def test_faults_and_findings_are_told_in_the_language_of_the_call(planmark, tmp_path, lang, fault):
+    assert planmark("new", "mine").returncode == 0
+    found = json.loads(planmark("lint", "mine.assignment.toml", "--lang", lang, "--json").stdout)["findings"]
+    english = json.loads(planmark("lint", "mine.assignment.toml", "--json").stdout)["findings"]
+    assert [one["parameters"] for one in found] == [one["parameters"] for one in english]
+    assert all(one["message"] != other["message"] for one, other in zip(found, english, strict=True))
+    path = tmp_path / "mine.mechanism.toml"
+    path.write_text(re.sub(r"(?m)^side = .*$", "", path.read_text(encoding="utf-8")), encoding="utf-8")
+    told = planmark("lint", "mine.assignment.toml", "--lang", lang)
+    assert (told.returncode, "[0].side: " + fault in told.stderr) == (2, True), told.stderr

@@ -94,7 +94,7 @@ def test_rows_that_are_missing_are_refused_wherever_n_is_given(planmark, conveyo
     (tmp_path / "roster.csv").write_text("student_id,name,n\ns1,Ana,3\ns2,Ion,4\n", encoding="utf-8")
     (tmp_path / "m.csv").write_text("student_id,n,v_A\ns2,4,50\n", encoding="utf-8")
     (tmp_path / "in").mkdir()
-    known = "n = 1..3, 5..15, by conveyor.csv"
+    known = re.compile(r"n = 1\.\.3, 5\.\.15(, by | \()conveyor\.csv")
     for call in (
         ("plan", conveyor, "--n", 4, "--json"),
         ("check", conveyor, "--n", 4, "--measured", "m.csv"),
@@ -102,9 +102,9 @@ def test_rows_that_are_missing_are_refused_wherever_n_is_given(planmark, conveyo
         ("cycle", conveyor, "--n", 4),
     ):
         ran = planmark(*call)
-        assert (ran.returncode, known in ran.stderr) == (2, True), (call, ran.stderr, ran.stdout)
+        assert (ran.returncode, bool(known.search(ran.stderr))) == (2, True), (call, ran.stderr, ran.stdout)
     ran = planmark("grade", "in", "--assignment", conveyor, "--roster", "roster.csv", "--out", "out")
-    assert (ran.returncode, known in ran.stdout) == (1, True), ran.stdout
+    assert (ran.returncode, bool(known.search(ran.stdout))) == (1, True), ran.stdout
 
 
 def test_sheets_say_the_side_in_the_students_language(planmark, conveyor, tmp_path):
@@ -154,9 +154,9 @@ def test_a_fault_in_the_table_stops_every_command_before_anything_is_written(pla
     table.write_text(table.read_text(encoding="utf-8").replace("95,230", "95 mm,23O"), encoding="utf-8")
     ran = planmark("plan", conveyor, "--all", "--csv", "all.csv")
     assert ran.returncode == 2
-    assert "conveyor.csv: 2 faults" in ran.stderr
-    assert "line 4, column a: '95 mm' is no number: the unit stands in the heading, as a [mm]" in ran.stderr
-    assert "line 4, column b: '23O' is no number" in ran.stderr
+    assert "conveyor.csv:\n" in ran.stderr
+    assert "line 4, a: '95 mm' is no number: the unit stands in the heading, as a [mm]" in ran.stderr
+    assert "line 4, b: '23O' is no number" in ran.stderr
     assert not (tmp_path / "all.csv").exists()
     with pytest.raises(AuthoredFileError):
         load_assignment(conveyor)

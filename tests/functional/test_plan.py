@@ -204,5 +204,5 @@ def test_a_handout_is_written_for_one_number_and_nothing_for_a_wrong_one(planmar
     assert (tmp_path / "task.pdf").read_bytes().startswith(b"%PDF")
     ran = planmark("handout", "pump", "--n", 99, "--out", tmp_path / "none.pdf")
     assert ran.returncode == 2
-    assert "n from 1 to 30" in ran.stderr
+    assert "n = 1..30" in ran.stderr
     assert not (tmp_path / "none.pdf").exists()

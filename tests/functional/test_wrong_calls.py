@@ -7,9 +7,9 @@ import pytest
     ("call", "status", "words"),
     [
         ("plan pmup", 2, "built in are engine, piston, press"),
-        ("plan pump", 2, "needs --n (n from 1 to 30)"),
-        ("plan pump --n 31", 2, "has n from 1 to 30"),
-        ("plan press --position 8", 2, "has position from 0 to 7"),
+        ("plan pump", 2, "needs --n (n = 1..30)"),
+        ("plan pump --n 31", 2, "has n = 1..30"),
+        ("plan press --position 8", 2, "has position = 0..7"),
         ("plan nowhere.toml --n 1", 2, "no such file"),
         ("plan pump --n 1 --crank-mm 0", 2, "above 0"),
         ("plan pump --n 1 --crank-mm nan", 2, "above 0"),

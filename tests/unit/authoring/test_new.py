@@ -79,7 +79,7 @@ def test_a_start_can_be_drawn_and_lint_finds_nothing_to_change(tmp_path, start):
     vectors = {name for name, vector in plan.construction.vectors.items() if not vector.is_sum}
     assert {criterion.vector for criterion in rubric.criterion} - {None} == vectors
     found = lint(assignment, rubric)
-    assert [str(one) for one in found.findings if one.severity != "hint"] == []
+    assert [one.told() for one in found.findings if one.severity != "hint"] == []
     assert found.scales[0].over_all.under_8_mm == 0
 
 

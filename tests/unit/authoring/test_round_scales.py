@@ -99,9 +99,9 @@ def test_round_scales_that_do_not_fit_are_told_with_those_that_do(tmp_path):
     assignment = load_assignment(path)
     found = lint(assignment, load_rubric("engine"))
     (told,) = [one for one in found.findings if one.code == "round_scales"]
-    assert "do not fit" in told.message
-    assert f"kv = {float(found.scales[1].scales.kv[0]):g} (m/s)/mm" in told.message
-    assert any(one.code == "does_not_fit" and "velocity plan" in one.message for one in found.findings)
+    assert "do not fit" in told.message()
+    assert f"kv = {float(found.scales[1].scales.kv[0]):g} (m/s)/mm" in told.message()
+    assert any(one.code == "does_not_fit" and "velocity plan" in one.message() for one in found.findings)
 
 
 @pytest.mark.parametrize("name", built_in())

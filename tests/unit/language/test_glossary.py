@@ -17,14 +17,17 @@ ROWS = [
     if line.startswith("|")
 ][2:]
 COLUMN = {"ro": 1, "ru": 2}
-NAMES = re.compile(r"%\(\w+\)s|--replace-guide|--what rubric")
-"""Placeholders and options: no words of the language."""
+NAMES = re.compile(
+    r"%\(\w+\)s|--replace-guide|--what rubric|\"\w+\"|\[\w+\]|\{[^}]*\}|joints and coincident|needs link,"
+)
+"""Placeholders, options, and keys and values of files: no words of the language."""
 OTHER_SENSES = {
     "link": r"personal links?|link to (?:a|choose)|no such link|this link is|slotted link|the link's pivot",
     "block": r"title block",
     "guide": r"marking guide|(?:a|this) guide|the guide there",
     "scale": r"graded by a scale",
     "pole": r"acceleration poles?",
+    "rod": r"its rod's end",
 }
 """The same English word for something else, or within another term of the table."""
 OTHER_WAYS = {

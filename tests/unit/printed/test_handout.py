@@ -13,6 +13,7 @@ from grader.tables.roster import RosterRow
 from reference.authored.assignment import Variant, built_in, library, load_assignment
 from reference.errors import AuthoredFileError
 from reference.plan import exact_plan
+from tests.told import tells
 
 A4_POINTS = (595.3, 841.9)
 
@@ -137,7 +138,7 @@ def test_many_vectors_take_several_pages(monkeypatch):
 
 
 def test_a_row_that_does_not_suit_the_assignment_is_told_with_its_line():
-    with pytest.raises(AuthoredFileError, match="line 2, s07"):
+    with pytest.raises(AuthoredFileError, check=tells("line 2, s07")):
         pages_of(load_assignment("pump"), RosterRow("s07", "Ana", 77, line=2))
 
 

@@ -38,6 +38,7 @@ from reference.authored.assignment import built_in, load_assignment
 from reference.errors import AuthoredFileError
 from reference.quantities import zone_of
 from tests.rendered import rendered
+from tests.told import by_path
 
 A3_POINTS = (420.0 / 25.4 * 72.0, 297.0 / 25.4 * 72.0)
 QUIET_MM = 2.0
@@ -225,7 +226,7 @@ def test_every_row_that_does_not_suit_the_assignment_is_told():
     rows = [RosterRow("s1", n=None, line=2), RosterRow("s2", n=3, line=3), RosterRow("s3", n=99, line=4)]
     with pytest.raises(AuthoredFileError) as caught:
         make_sheets(load_assignment("pump"), rows, roster="class.csv")
-    assert [finding.path for finding in caught.value.findings] == ["line 2, s1", "line 4, s3"]
+    assert list(by_path(caught.value.findings)) == ["line 2, s1", "line 4, s3"]
     assert "class.csv" in str(caught.value)
 
 

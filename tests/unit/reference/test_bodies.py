@@ -11,6 +11,7 @@ from reference.mechanism import Crank, FixedGuide, Load, Mechanism, PointOnLine,
 from reference.plan import exact_plan
 from tests import every_group
 from tests.laws.mechanisms import array
+from tests.told import by_path
 
 MASSES = """
 gravity = 10
@@ -68,7 +69,7 @@ def faults(path) -> dict[str, str]:
     with pytest.raises(AuthoredFileError) as error:
         load_assignment(path)
     assert error.value.exit_status == 2
-    return {finding.path: finding.message for finding in error.value.findings}
+    return by_path(error.value.findings)
 
 
 def test_masses_and_loads_are_formulas_of_the_variant(write):
@@ -146,17 +147,17 @@ side = "ahead"
     [
         (('link = "slider_E"', 'link = "E"'), "$.body[3].link", "did you mean slider_E"),
         (('link = "6"', 'link = "66"'), "$.body[2].link", "known are 1, 3, slider_A"),
-        (('link = "6"', 'link = "0"'), "$.body[2].link", "is the frame"),
+        (('link = "6"', 'link = "0"'), "$.body[2].link", "0 is not a moving link"),
         (('link = "6"', 'link = "3"'), "$.body[2].link", "already: leave one of them out"),
-        (("mass = 3", "mass = -3"), "$.body[2].mass", "must not be negative"),
+        (("mass = 3", "mass = -3"), "$.body[2].mass", "must be >= 0"),
         (("mass = 3", 'mass = "n - 10"'), "$.body[2].mass", "for n = 1 and 8 more"),
-        (("gravity = 10", "gravity = -10"), "$.gravity", "must not be negative"),
+        (("gravity = 10", "gravity = -10"), "$.gravity", "must be >= 0"),
         (('centre = "O1"', 'centre = "B"'), "$.body[0].centre", "link 1: it carries O1, A"),
-        (('centre = "O1"', ""), "$.body[0].centre", "is missing"),
+        (('centre = "O1"', ""), "$.body[0].centre", 'is "C", a joint of the link'),
         (('centre = "O1"', 'centre = { base = ["O1", "A"] }'), "$.body[0].centre", "or base with at"),
         (('centre = "O1"', "centre = [1, 2]"), "$.body[0].centre", "a joint of the link, or"),
         (('["A", "B"]', '["A", "G"]'), "$.body[2].centre.base", "must be two joints of link 6"),
-        (('pins = ["B"]', 'pins = ["A"]'), "$.body[2].pins[0]", "its pin is on link 1"),
+        (('pins = ["B"]', 'pins = ["A"]'), "$.body[2].pins[0]", "its pin is on one of the links 1"),
         (('pins = ["B"]', 'pins = ["E"]'), "$.body[2].pins[0]", "no point that is fixed on link 6"),
         (("mass = 5", 'mass = 5\ncentre = "D"'), "$.body[3].centre", "at its joint E: leave out centre"),
         (("mass = 5", ""), "$.body[3]", "needs mass"),
@@ -166,10 +167,14 @@ side = "ahead"
         (("force = 30", "force = 30\ncouple = 2"), "$.load[1]", "needs one of force"),
         (("couple = -5", ""), "$.load[2]", "needs one of force"),
         (("angle_deg = 90", ""), "$.load[1]", "needs a direction"),
-        (("angle_deg = 90", 'motion = "along"'), "$.load[1].motion", "is no slider: give angle_deg"),
-        (('"slider_E"\nforce', '"slider_H"\nforce'), "$.load[0].motion", "slides on a moving link"),
-        (("couple = -5", 'couple = -5\nname = "E"'), "$.load[2].name", "of $.load[0] already"),
-        (("couple = -5", 'couple = -5\nname = "b"'), "$.load[2].name", "of the balancing force already"),
+        (
+            ("angle_deg = 90", 'motion = "along"'),
+            "$.load[1].motion",
+            ": give angle_deg in place of",
+        ),
+        (('"slider_E"\nforce', '"slider_H"\nforce'), "$.load[0].motion", "is no slider on a fixed guide"),
+        (("couple = -5", 'couple = -5\nname = "E"'), "$.load[2].name", "of another force already"),
+        (("couple = -5", 'couple = -5\nname = "b"'), "$.load[2].name", "of another force already"),
     ],
 )
 def test_each_fault_of_a_body_or_load_is_told_with_its_path(write, change, path, words):
@@ -179,7 +184,8 @@ def test_each_fault_of_a_body_or_load_is_told_with_its_path(write, change, path,
 
 
 @pytest.mark.parametrize(
-    ("heading", "words"), [("m [kg]", None), ("m [кг]", None), ("m", None), ("m [N]", "is in N, a force")]
+    ("heading", "words"),
+    [("m [kg]", None), ("m [кг]", None), ("m", None), ("m [N]", "holds N; here it must hold kg")],
 )
 def test_masses_come_from_a_table_with_their_unit(write, heading, words):
     path = write(MASSES, ("mass = 3", 'mass = "m"'))

@@ -13,7 +13,7 @@ from reference.errors import AuthoredFileError, CallError, Finding, MechanismErr
         CallError("n_needed", "needs --n"),
         MechanismError("singular", "in line", group="B"),
         MechanismError("does_not_assemble", "the links of B miss each other by {gap}", group="B", gap_m=0.5),
-        AuthoredFileError("my.toml", (Finding("$.id", "is missing"),)),
+        AuthoredFileError("my.toml", (Finding("$.id", "key_missing"),)),
     ],
 )
 def test_an_error_is_the_same_after_a_journey_between_processes(error):

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reference.authored.formula import MAX_DEPTH, MAX_LENGTH, FormulaError, parse
+from tests.told import tells
 
 HOSTILE = [
     "__import__('os').system('true')",
@@ -121,21 +122,21 @@ def test_functions_of_several_numbers_work_on_whole_classes():
 
 
 def test_a_wrong_count_of_numbers_is_told():
-    with pytest.raises(FormulaError, match="atan2 takes 2 numbers"):
+    with pytest.raises(FormulaError, check=tells("numbers that atan2 takes is 2")):
         parse("atan2(1)")
-    with pytest.raises(FormulaError, match="min takes 2 numbers or more"):
+    with pytest.raises(FormulaError, check=tells("numbers that min takes is 2..20")):
         parse("min(3)")
 
 
 def test_a_decimal_comma_is_answered_by_a_point():
-    with pytest.raises(FormulaError, match=r"'9,81\*n': write a decimal point"):
+    with pytest.raises(FormulaError, check=tells(r"'9,81\*n': write a decimal point")):
         parse("9,81*n")
 
 
 def test_an_unknown_name_is_told_with_the_near_ones():
-    with pytest.raises(FormulaError, match="unknown name phi_dge; did you mean phi_deg"):
+    with pytest.raises(FormulaError, check=tells("unknown name phi_dge \\(did you mean phi_deg")):
         parse("phi_dge")({"phi_deg": 1.0})
-    with pytest.raises(FormulaError, match="unknown name sqr; did you mean sqrt"):
+    with pytest.raises(FormulaError, check=tells("unknown name sqr \\(did you mean sqrt")):
         parse("sqr(2)")
 
 
@@ -143,13 +144,13 @@ def test_an_unknown_name_is_told_with_the_near_ones():
     "text", ["1/n", "sqrt(-1-n)", "acos(1.1+n)", "asin(-2-n)", "0*(1/n)", "tan(pi/2)/n", "1e200*1e200"]
 )
 def test_a_result_that_is_no_number_is_an_error_and_never_nan(text):
-    with pytest.raises(FormulaError, match="does not give a finite number"):
+    with pytest.raises(FormulaError, check=tells("does not give a finite number")):
         parse(text)({"n": 0.0})
 
 
 def test_letters_of_other_alphabets_are_names_and_look_alikes_are_told_apart():
     assert float(parse("φ + 1")({"φ": 2.0})) == 3.0
-    with pytest.raises(FormulaError, match="unknown name"):
+    with pytest.raises(FormulaError, check=tells("unknown name")):
         parse("\u0440i")({"n": 1.0})  # a Cyrillic letter in what looks like pi
 
 

@@ -4,6 +4,7 @@ import itertools
 
 import pytest
 
+from grader.texts.spoken import fault
 from reference.authored.mechanism import MechanismFile, check_mechanism
 from reference.authored.toml_file import validate
 from reference.errors import AuthoredFileError
@@ -37,8 +38,8 @@ def told(table: dict) -> list[str]:
     try:
         file = validate(MechanismFile, table, "the file")
     except AuthoredFileError as error:
-        return [str(finding) for finding in error.findings]
-    return [str(finding) for finding in check_mechanism(file)]
+        return [fault(finding) for finding in error.findings]
+    return [fault(finding) for finding in check_mechanism(file)]
 
 
 # The six-bar chains of Stephenson and Watt: the crank's further point, then groups in an order of assembly.
@@ -85,7 +86,7 @@ def test_six_bars_of_the_second_class_are_accepted_in_any_order_of_their_groups(
 REFUSED = {
     "Stephenson II by its ternary link": (
         (third("B", "O1 A", "1"), two("C", "A D", "2 3"), two("D", "B E", "4 3"), two("E", "C O2", "3 5")),
-        "form a group of the third class: not solved; velocities can be found by Assur points",
+        "form a group of class III: not solved; velocities can be found by Assur points",
         "AC, DCE, BD, O2E",
     ),
     "Stephenson II by its binary link": (
@@ -96,7 +97,7 @@ REFUSED = {
             third("F", "O2 E", "2"),
             two("D", "F C", "4 5"),
         ),
-        "form a group of the fourth class: not solved",
+        "form a group of class IV: not solved",
         "ACD, EC, O2EF, FD",
     ),
     "Stephenson III by its third pivot": (
@@ -106,23 +107,23 @@ REFUSED = {
     ),
     "a five-bar": (
         (two("B", "A C", "2 3"), two("C", "B O2", "3 4")),
-        f"2 degrees of freedom (5 links with the ground, 5 joints): {ONE}",
+        f"degrees of freedom: 2 (links with the ground: 5, pairs: 5); {ONE}",
         "$.group",
     ),
     "a five-bar whose middle link has two names": (
         (two("B", "A C", "2 3"), two("C", "B O2", "5 4")),
-        f"2 degrees of freedom (5 links with the ground, 5 joints): {ONE}",
+        f"degrees of freedom: 2 (links with the ground: 5, pairs: 5); {ONE}",
         "$.group",
     ),
     "a link too many": (
         (two("B", "A O2", "2 3"), third("C", "A B", "2"), two("C", "A O3", "4 5")),
-        "0 degrees of freedom (5 links with the ground, 6 joints): nothing moves",
+        "degrees of freedom: 0 (links with the ground: 5, pairs: 6); nothing moves",
         "C has a place already",
     ),
     "groups written about the wrong joints": (
         (two("C", "A D", "2 4"), two("B", "C O2", "2 3"), two("D", "C O3", "4 5"), third("B", "A C", "2")),
         "all groups are of the second class: write one for each",
-        "links: ACB with O2B, then DC with O3D",
+        "in this order: ACB + O2B, DC + O3D",
     ),
 }
 
@@ -138,11 +139,14 @@ def test_mechanisms_that_are_not_of_the_second_class_are_refused_with_their_mobi
 @pytest.mark.parametrize(
     ("table", "words"),
     [
-        (mechanism(crank=[CRANK, CRANK | {"pivot": "O2"}]), f"$.crank: 2 degrees of freedom: {ONE}"),
-        (mechanism(driving_slider=SLIDER), f"or [driving_slider]; two have 2 degrees of freedom: {ONE}"),
+        (
+            mechanism(crank=[CRANK, CRANK | {"pivot": "O2"}]),
+            "$.crank: needs one driving link",
+        ),
+        (mechanism(driving_slider=SLIDER), "or [driving_slider]; planmark solves mechanisms with one"),
         (
             mechanism(crank2=CRANK),
-            f"$.crank2: 'crank2': a second driving link makes 2 degrees of freedom: {ONE}",
+            f"$.crank2: 'crank2': a second driving link makes 2 degrees of freedom, and {ONE}",
         ),
         (
             mechanism(two("B", "A O2", "2 3") | {"type": "planetary gear"}),
@@ -156,7 +160,10 @@ def test_mechanisms_that_are_not_of_the_second_class_are_refused_with_their_mobi
             mechanism({"type": "cam", "node": "B"}),
             "'cam': replace a cam by its equivalent linkage for the instant, see Cams and gears",
         ),
-        (mechanism({"type": "Geneva", "node": "B"}), "while the pin is in a slot, it is a slotted link"),
+        (
+            mechanism({"type": "Geneva", "node": "B"}),
+            "a Geneva wheel is a slotted link",
+        ),
         (mechanism({"type": "RRR-RRR", "node": "B"}), "only groups of the second class are solved"),
         (mechanism({"type": "oldham_coupling", "node": "B"}), 'a block in a yoke on a guide is type = "RPP"'),
         (
@@ -228,9 +235,12 @@ def test_sliding_pairs_count_as_hinges_do():
     }
     slotted = {"type": "RPR", "node": "B5", "pin": "B", "pivot": "O2", "link": "5"}
     table = mechanism(slider, two("C", "B O3", "3 4"), yoke, crossed, slotted)
-    assert told(table)[0].startswith("$.group: 2 degrees of freedom (11 links with the ground, 14 joints)")
+    free = "$.group: degrees of freedom: 2 (links with the ground: 11, pairs: 14)"
+    assert told(table)[0].startswith(free)
     driven = {key: value for key, value in table.items() if key != "crank"}
-    assert told(driven | {"driving_slider": SLIDER})[0].startswith("$.group: 2 degrees of freedom (11 links")
+    assert told(driven | {"driving_slider": SLIDER})[0].startswith(
+        "$.group: degrees of freedom: 2 (links with the ground: 11"
+    )
 
 
 def test_a_yoke_on_a_moving_guide_is_accepted_and_nothing_is_hinged_to_it():

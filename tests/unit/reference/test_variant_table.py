@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+from grader.texts.spoken import fault
 from reference.authored.assignment import Variant, load_assignment
 from reference.construction.graph import evaluate
 from reference.errors import AuthoredFileError, CallError, ranges_of
 from reference.plan import exact_plan
 from tests import conveyor
+from tests.told import by_path
 
 MECHANISM = (
     conveyor.MECHANISM.replace('"course"', '"six"')
@@ -64,7 +66,7 @@ def course(tmp_path):
 def faults(path) -> tuple[str, dict[str, str]]:
     with pytest.raises(AuthoredFileError) as error:
         load_assignment(path)
-    return error.value.file, {finding.path: finding.message for finding in error.value.findings}
+    return error.value.file, by_path(error.value.findings)
 
 
 def test_rows_are_variants_in_the_order_of_n_with_gaps(course):
@@ -142,9 +144,9 @@ def test_columns_by_name_and_rows_as_tables_are_the_same_table(course, table):
 
 def test_columns_of_unequal_length_and_rows_that_lack_a_cell_are_told(course):
     _, told = faults(course(variant="[variant.table]\nn = [2, 1]\na = [41]"))
-    assert told == {"$.variant.table, row 2, column a": "is empty"}
+    assert told == {"$.variant.table.a": "is empty"}
     _, told = faults(course(variant="[[variant.table]]\nn = 2\na = 41\n[[variant.table]]\nn = 1"))
-    assert told == {"$.variant.table, row 2, column a": "is empty"}
+    assert told == {"$.variant.table.a": "is empty"}
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
@@ -167,27 +169,27 @@ def test_every_faulty_cell_is_told_at_once_with_row_and_column(course):
     file, told = faults(path)
     assert file.endswith("six.csv")
     assert set(told) == {
-        "line 2, column a", "line 3, column a", "line 3, column c", "line 3, column side_B",
-        "line 4", "line 4, column b", "line 4, column side_C", "line 5, column n", "line 6, column n",
+        "line 2, a", "line 3, a", "line 3, c", "line 3, side_B",
+        "line 4", "line 4, b", "line 4, side_C", "line 5, n", "line 6, n",
     }  # fmt: skip
-    assert "heading, as a [mm]" in told["line 2, column a"]
-    assert told["line 3, column a"] == "is empty"
-    assert "neither left nor right" in told["line 3, column side_B"]
-    assert told["line 4"] == "n = 2 has a row already (line 3)"
-    assert told["line 5, column n"] == "2.5 is no whole number"
+    assert "heading, as a [mm]" in told["line 2, a"]
+    assert told["line 3, a"] == "is empty"
+    assert "sides are left, right" in told["line 3, side_B"]
+    assert told["line 4"] == "n = 2 has a row already (3)"
+    assert told["line 5, n"] == "'2.5' is not a whole number"
 
 
 @pytest.mark.parametrize(
     ("heading", "where", "words"),
     [
-        ("n;a, mm;b (stone)", "line 1, column 3", "'stone' is no unit"),
-        ("n;a [inch]", "line 1, column 2", "'inch' is no unit known here"),
-        ("n;l AB", "line 1, column 2", "is no heading"),
-        ("n;;a", "line 1, column 2", "has no heading"),
-        ("n;a;a", "line 1, column 3", "two columns a"),
-        ("n;pi", "line 1, column 2", "has a meaning in formulas already"),
-        ("number;a", "line 1", "no column n (or position), which says whose row it is: if number holds"),
-        ("n;\u0430", "line 1, column 2", "'\u0430' is CYRILLIC SMALL LETTER A"),
+        ("n;a, mm;b (stone)", "line 1, [3]", "'stone' is no unit"),
+        ("n;a [inch]", "line 1, [2]", "'inch' is no unit known here"),
+        ("n;l AB", "line 1, [2]", "is no heading"),
+        ("n;;a", "line 1, [2]", "has no heading"),
+        ("n;a;a", "line 1, [3]", "column a is there 2 times"),
+        ("n;pi", "line 1, [2]", "has a meaning in formulas already"),
+        ("number;a", "line 1", "no column n (or position), which says whose row it is (did you mean number"),
+        ("n;\u0430", "line 1, [2]", "'\u0430' is CYRILLIC SMALL LETTER A"),
     ],
 )
 def test_a_heading_that_is_none_is_told(course, heading, where, words):
@@ -199,7 +201,7 @@ def test_too_many_cells_an_empty_table_and_no_table_are_told(course):
     assert "12 cells" in faults(course(HEADING, ROWS[1] + ";7"))[1]["line 2"]
     assert "no rows" in faults(course(HEADING))[1]["line 1"]
     assert faults(course(variant='table = "seven.csv"'))[1] == {
-        "$.variant.table": "there is no file seven.csv beside this one"
+        "$.variant.table": "there is no file seven.csv; write its path relative to the folder of this file"
     }
     assert "either file" in faults(course(variant="[variant.table]\nrows = [[1]]"))[1]["$.variant.table"]
 
@@ -211,7 +213,7 @@ def test_too_many_cells_an_empty_table_and_no_table_are_told(course):
         (
             "table = { columns = ['n', 'a'], rows = [[1, true]] }",
             "$.variant.table.rows[0][1]",
-            "a number or a side",
+            "a side is left, right",
         ),
         ("table = {}", "$.variant.table", "either file"),
     ],
@@ -233,7 +235,7 @@ def test_a_faulty_row_in_the_file_itself_is_told_with_its_path(course):
     table = '[variant.table]\ncolumns = ["n", "a"]\nrows = [[1, 40], [2, "4O"]]'
     file, told = faults(course(variant=table))
     assert file.endswith("six.assignment.toml")
-    assert told == {"$.variant.table, row 2, column a": "'4O' is no number"}
+    assert told == {"$.variant.table.a": "'4O' is no number"}
 
 
 def test_a_table_and_a_range_of_one_number_contradict_each_other(course):
@@ -244,10 +246,10 @@ def test_a_table_and_a_range_of_one_number_contradict_each_other(course):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('rpm = "n1"', 'omega = "n1"', "in rpm, revolutions per minute; an angular velocity is needed"),
-        ('length = "a"', 'length = "phi"', "in °, an angle; a length is needed here"),
-        ('side = "side_B"', 'side = "side_C"', "holds ahead and behind; left or right is needed"),
-        ('length = "a"', 'length = "side_B"', "holds left and right, a number is needed"),
+        ('rpm = "n1"', 'omega = "n1"', "holds rpm; here it must hold rad/s"),
+        ('length = "a"', 'length = "phi"', "holds °; here it must hold m, cm, mm"),
+        ('side = "side_B"', 'side = "side_C"', "holds ahead, behind; here it must hold left, right"),
+        ('length = "a"', 'length = "side_B"', "holds left, right; a number without a unit is needed"),
     ],
 )
 def test_a_column_in_a_key_of_another_kind_is_told(course, old, new, words):
@@ -257,14 +259,22 @@ def test_a_column_in_a_key_of_another_kind_is_told(course, old, new, words):
 
 def test_lengths_that_are_none_are_told_row_by_row(course):
     lines = [line.replace(";45;125;", ";-45;0;").replace(";50;130;", ";50;-1;") for line in (HEADING, *ROWS)]
-    _, told = faults(course(*lines))
-    assert set(told) == {"six.csv line 2, column b", "six.csv line 5, column a", "six.csv line 5, column b"}
-    assert "above zero (mechanism file, $.crank.length)" in told["six.csv line 5, column a"]
+    with pytest.raises(AuthoredFileError) as error:
+        load_assignment(course(*lines))
+    told = [fault(finding) for finding in error.value.findings]
+    assert [one.removesuffix(": a length must be above zero") for one in told] == [
+        f"row {row}, six.mechanism.toml $.{place}: {number} in column {name} of six.csv"
+        for number, name, row, place in (
+            ("-45", "a", 5, "crank.length"),
+            ("0", "b", 5, "group[0].lengths[0]"),
+            ("-1", "b", 2, "group[0].lengths[0]"),
+        )
+    ]
 
 
 def test_a_formula_that_fails_names_the_first_row_where_it_does(course):
     _, told = faults(course(mechanism=[('length = "a"', 'length = "a - 42"')]))
-    assert told["$.crank.length"] == "'a - 42' (length) must be a positive length (for n = 1)"
+    assert told["$.crank.length"] == "'a - 42' (length) must be > 0 (for n = 1)"
     _, told = faults(course(mechanism=[('length = "e"', 'length = "sqrt(42 - a)"')]))
     assert told["$.group[1].length"].endswith("(for n = 2 and 2 more)")
 
@@ -303,6 +313,6 @@ def test_a_side_is_a_formula_of_the_data(course):
 
 
 def test_numbers_in_words():
-    assert ranges_of([4]) == "from 4 to 4"
-    assert ranges_of([1, 2, 3]) == "from 1 to 3"
-    assert ranges_of([1, 2, 3, 5, 6, 9]) == "= 1..3, 5, 6, 9"
+    assert ranges_of([4]) == "4"
+    assert ranges_of([1, 2, 3]) == "1..3"
+    assert ranges_of([1, 2, 3, 5, 6, 9]) == "1..3, 5, 6, 9"

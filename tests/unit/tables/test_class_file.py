@@ -3,7 +3,9 @@
 import pytest
 
 from grader.tables.class_file import read_class_file
+from grader.texts.spoken import fault, in_english
 from reference.errors import AuthoredFileError
+from tests.told import by_path
 
 PLATFORMS = ("csv", "moodle")
 
@@ -57,12 +59,12 @@ def test_an_absolute_path_stays(tmp_path):
         ('assignmnt = "pump"', "$.assignmnt", "did you mean assignment?"),
         ('assignment = "pmup"', "$.assignment", "built-in ones are"),
         ('assignment = "mine.toml"', "$.assignment", "the path of a .toml file"),
-        ('roster = "r.csv"', "$.roster", "relative to the folder of planmark.toml"),
+        ('roster = "r.csv"', "$.roster", "relative to the folder of this file"),
         ('roster = ""', "$.roster", "is no path"),
         ('roster = "lists\\roster.csv"', "$.roster", "between single quotes"),
         ('roster = "C:\\Users\\ana.csv"', "line 1", "between single quotes"),
-        ('language = "de"', "$.language", "'en', 'ro' or 'ru'"),
-        ("pages = 0", "$.pages", "greater than or equal to 1"),
+        ('language = "de"', "$.language", "'en', 'ro', 'ru'"),
+        ("pages = 0", "$.pages", "must be >= 1"),
         ('pages = "2"', "$.pages", "without quotes"),
         ('platform = "canva"', "$.platform", "csv, moodle"),
         ("roster = ", "line 1", "is not TOML"),
@@ -73,9 +75,9 @@ def test_a_fault_is_told_with_file_key_and_what_to_do(tmp_path, text, path, advi
     with pytest.raises(AuthoredFileError) as caught:
         read_class_file(file, PLATFORMS)
     (finding,) = caught.value.findings
-    assert finding.path == path
-    assert advice in finding.message
-    assert str(file) in caught.value.message
+    assert list(by_path([finding])) == [path]
+    assert advice in fault(finding)
+    assert str(file) in in_english(caught.value)
 
 
 def test_all_faults_are_told_at_once(tmp_path):

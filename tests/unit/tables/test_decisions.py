@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from grader.tables.decision_texts import PageDecision, page_decision, place, place_text
 from grader.tables.decisions import COLUMNS, VERDICTS, ClashError, Decision, DecisionFile, read_table
 from grader.tables.reader import TableError
-from grader.texts.spoken import fault
-from reference.errors import InputFileError, PlanmarkError, lines_of
+from grader.texts.spoken import fault, lines_of
+from reference.errors import InputFileError, PlanmarkError
 from tests.examples import examples
 
 HEADER = ",".join(COLUMNS)

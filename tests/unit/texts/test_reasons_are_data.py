@@ -12,6 +12,7 @@ import pytest
 from grader.files import OutputError, create_whole, write_whole
 from grader.language import LANGUAGES, tongue
 from grader.records import Reason, Unread, of_error
+from grader.texts.authored import AUTHORED, REMARKS
 from grader.texts.clauses import CLAIMS, CLAUSES
 from grader.texts.exports import EXPORTS
 from grader.texts.failures import FAILURES
@@ -40,8 +41,12 @@ APART = {
     "removesuffix", "replace", "find", "index",
 }  # fmt: skip
 SEARCHES = {"match", "fullmatch", "search", "findall", "finditer", "sub"}
-MAKERS = {"Reason", "_why", "_no_order", "TextError", "_at", "refused"}
-"""Functions that make a reason: the codes are in their arguments."""
+MAKERS = {
+    **dict.fromkeys(("Reason", "_why", "_no_order", "TextError", "_at", "refused"), 0),
+    **dict.fromkeys(("FaultError", "FormulaError", "_unknown"), 0),
+    "Finding": 1,
+}  # fmt: skip
+"""Functions that make a reason or a finding, and which of their arguments is its code."""
 PLACEHOLDER = re.compile(r"%\((\w+)\)s")
 
 
@@ -121,9 +126,13 @@ def codes_made() -> Iterator[tuple[str, str]]:
         for node in nodes(tree):
             match node:
                 case ast.Call(func=ast.Name(id=maker), args=[*args]) if maker in MAKERS:
-                    for one in ast.walk(ast.Module([ast.Expr(arg) for arg in args[:1]], [])):
+                    for one in ast.walk(ast.Tuple(args[MAKERS[maker] :][:1])):
                         if isinstance(one, ast.Constant) and re.fullmatch("[a-z][a-z0-9_]+", str(one.value)):
                             yield str(one.value), f"{name}:{node.lineno}"
+                case ast.Call(func=ast.Name(id="LintFinding"), args=[_, code, *_], keywords=more):
+                    whys = [one.value for one in more if one.arg == "why"]
+                    told = [one.value for one in whys or [code] if isinstance(one, ast.Constant)]
+                    yield from ((str(one), f"{name}:{node.lineno}") for one in told)
                 case ast.Dict(keys=keys, values=values):
                     for key, value in zip(keys, values, strict=True):
                         is_why = isinstance(key, ast.Constant) and key.value in {"why", "advice"}
@@ -136,6 +145,52 @@ def test_every_code_that_is_made_has_its_sentence() -> None:
     found = dict(codes_made())
     assert len(found) > 160
     assert {code: where for code, where in found.items() if code not in known} == {}
+
+
+def words_of_findings(tree: ast.AST) -> Iterator[int]:
+    """The lines on which a finding or a fault is made with a text of the code itself."""
+    for node in nodes(tree):
+        match node:
+            case ast.Call(func=ast.Name(id="Finding" | "LintFinding" | "FaultError" | "FormulaError")):
+                parts = [*node.args, *(one.value for one in node.keywords)]
+            case ast.Raise(exc=ast.Call(func=ast.Name(id="ValueError"), args=parts)):
+                pass
+            case _:
+                continue
+        constants = [one for one in ast.walk(ast.Tuple(parts)) if isinstance(one, ast.Constant)]
+        if any(re.search("[a-z]{2,} [a-z]", str(one.value)) for one in constants):
+            yield node.lineno
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        'Finding("$", "is missing here")',
+        'FaultError("limit", limit=f"more than {most}")',
+        'raise ValueError(f"has {count} of them")',
+    ],
+)
+def test_a_findings_own_words_are_seen(code: str) -> None:
+    assert list(words_of_findings(ast.parse(code))) == [1]
+
+
+def test_faults_of_authored_files_have_no_words_of_their_own() -> None:
+    rooms = (
+        "reference/authored/",
+        "grader/rubric.py",
+        "grader/tables/",
+        "grader/printed/answer_sheet",
+        "grader/authoring/",
+    )
+    found = [f"{name}:{line}" for name, tree in trees() for line in words_of_findings(tree)]
+    assert [where for where in found if where.startswith(rooms)] == []
+
+
+def test_every_sentence_of_authored_files_has_its_fault() -> None:
+    said = {one.value for _, tree in trees() for one in nodes(tree) if isinstance(one, ast.Constant)}
+    assert AUTHORED.keys() <= said
+    assert all(FAULTS[code] is texts for code, texts in AUTHORED.items())
+    assert AUTHORED.keys() & {*CLAIMS, *EXPORTS, *CLAUSES} == set()
 
 
 def refusals_made() -> Iterator[tuple[str, str]]:
@@ -175,7 +230,7 @@ def test_every_failure_has_its_sentence_and_every_sentence_its_failure() -> None
                     assert [*filter(None, named), "item"][-1] in FAILURES, f"{name}:{node.lineno}"
 
 
-BELOW_TEXTS = ("grader/files.py", "grader/language.py", "grader/rubric.py", "reference/")
+BELOW_TEXTS = ("grader/files.py", "grader/language.py", "reference/")
 """Rooms that `texts` imports: their errors hold parameters beside their words."""
 
 
@@ -306,6 +361,7 @@ def test_every_code_has_a_sentence_in_every_language(lang: str) -> None:
     for code in HINTS:
         assert reason_sentence(Reason(code), speaker, "full") not in {"", code}
     several = [text for code in (*FAULTS, *CLAIMS, *EXPORTS) for text in clauses(code)]
+    several += [text for texts in REMARKS.values() for text in texts]
     for text in (*several, *CLAUSES.values(), *FULL.values()):
         assert lang == "en" or not PLACEHOLDER.sub("", text).strip() or speaker.gettext(text) != text
 
