@@ -128,7 +128,7 @@ def _catalogue(code: str) -> gnu.NullTranslations:
 _GREEK = {"omega": "ω", "epsilon": "ε"}
 _NAME = re.compile(
     r"\b(?:([vank])_([A-Z][A-Za-z0-9]{0,7})(?:_([ntcr])\b)?|(omega|epsilon)_(\w{1,4})|([kμ])([LlvaF])(?=\b|²)"
-    r"|([FGRM])_(b|i?[0-9A-Z][0-9A-Za-z]{0,7}(?:-[0-9A-Za-z]{1,8})?)(?:_([nt]))?\b"
+    r"|([FGRM])_([0-9A-Za-z]{1,9}(?:-[0-9A-Za-z]{1,8})?)(?:_([nt]))?\b"
     r"|(O)([0-9])(?=[A-Z]?\b)|(a)_([ntcr])\b|([ωε])([0-9]))"
 )
 """A name in running text: its letter, its index below, and perhaps one above."""

@@ -18,6 +18,8 @@ place_off             off_mm, tolerance_mm                                   a p
 off_sheet                                                                    a centre off the sheet
 should_be_zero        measured_mm, tolerance_mm                              a zero vector was drawn
 too_short_to_judge    length_mm, least_mm                                    no direction is asked of it
+made_trivial                                                                 an earlier mistake leaves it
+                                                                             too short: not judged
 value_too_large,      measured, expected, off, tolerance, unit               a computed value is off
 value_too_small
 value_reversed        measured, expected, unit                               its sign is wrong

@@ -77,10 +77,12 @@ RELATIVE = {
 FORCES = {
     "F_i": N_("Inertia force of link %(name)s"), "G_": N_("Weight of link %(name)s"),
     "F_": N_("Load %(name)s"), "R_": N_("Reaction of link %(other)s on link %(name)s"),
+    "R_0": N_("Reaction of the frame on link %(name)s"),
+    "R_0t": N_("Part, across the link, of the reaction of the frame on link %(name)s"),
     "R_t": N_("Part, across the link, of the reaction of link %(other)s on link %(name)s"),
     "M_": N_("Balancing moment"),
 }  # fmt: skip
-"""Titles of forces, by the start of their names; the frame is link 0."""
+"""Titles of forces, by the start of their names, and the part of a reaction; the frame is 0."""
 _POINTS = {"scale": 1.0, "link": 0.5, "vector": 2.0, "angular": 0.5, "moment": 3.0}
 _OPTIONAL = {"scale", "link", "angular", "moment"}
 """Items that a student may leave out without losing points."""
@@ -337,6 +339,7 @@ def _criteria(assignment: Assignment) -> Iterator[tuple[str, str, str, Mapping[s
     """
     construction, shown = construction_for(assignment), assignment.figures
     crank = assignment.mechanism_file.crank
+    computed = {"omega"} if crank and crank.rpm is not None else set()  # of the driving link
     yield from (("scale", name, SCALES[name], {}) for name in assignment.scale_names)
     links = [name for name, pair in construction.links.items() if construction.dots.isdisjoint(pair)]
     yield from (("link", name, LINK, {"name": name}) for name in links)
@@ -346,8 +349,9 @@ def _criteria(assignment: Assignment) -> Iterator[tuple[str, str, str, Mapping[s
         if name in drawn and (vector.part != "n" if of_forces else not vector.is_sum):
             yield "vector", name, *(_force_titled(name) if of_forces else titled(name, construction))
     for name, rate in construction.rates.items():
-        if rate.vector in drawn and (not rate.drives or (crank and crank.rpm is not None)):
-            yield "angular", name, RATES[name.partition("_")[0]], {"name": name.partition("_")[2]}
+        kind, _, link = name.partition("_")
+        if rate.vector in drawn and (not rate.drives or kind in computed):
+            yield "angular", name, RATES[kind], {"name": link}
     for name in construction.moments:
         yield "moment", name, FORCES["M_"], {}
 
@@ -355,8 +359,9 @@ def _criteria(assignment: Assignment) -> Iterator[tuple[str, str, str, Mapping[s
 def _force_titled(name: str) -> tuple[str, dict[str, str]]:
     """Return the phrase for a force, and the links that it names: ``R_13`` is of 1 on 3, ``R_2a-3`` of 2a."""
     letter, body, *part = name.split("_")
-    kind = "F_i" if name.startswith("F_i") else f"{letter}_{''.join(part)}"
     by, on = body.split("-") if "-" in body else (body[:1], body[1:])
+    of_frame = "0" if letter == "R" and by == "0" else ""
+    kind = "F_i" if name.startswith("F_i") else f"{letter}_{of_frame}{''.join(part)}"
     return FORCES[kind], {"name": on if letter == "R" else body.removeprefix("i"), "other": by}
 
 

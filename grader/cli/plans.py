@@ -109,7 +109,7 @@ def _print_table(assignment: Assignment, plan: Plan) -> None:
         direction = "-" if row.direction_deg is None else f"{row.direction_deg:.2f}"
         table.add_row(vector, f"{row.drawn_mm:.2f}", f"{row.value:.4f}", row.unit, direction)
     for rate, value in document.angular.items():
-        table.add_row(rate, "", f"{value + 0.0:.4f}", unit_of(rate), "")
+        table.add_row(rate, "", f"{value:z.4f}", unit_of(rate), "")
     pivot = plan.construction.pivot
     for name in plan.construction.centres:
         if (point := document.centres_m[name]) is not None:

@@ -126,6 +126,8 @@ class Charges:
             self.inherited.add(segment.head)
             return
         self.remember(segment.head, choice.mark)
+        if any(one.code == "too_short_to_judge" for one in choice.mark.reasons):
+            self.cleared.discard(segment.head)  # its direction was not judged
         drawn = self.evidence.vector(segment.name)
         is_laid_off = isinstance(self.task.construction.step(segment.head), Given)
         if is_laid_off and drawn is not None and drawn.direction_rad is None:

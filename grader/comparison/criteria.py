@@ -237,13 +237,12 @@ def _segment(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) ->
     """The outcome of a vector that was drawn (or measured), or of a link of the sketch."""
     one, rubric, evidence = charges.task.segments[criterion.name], charges.task.rubric, charges.evidence
     is_read = drawn is evidence.drawn.get(one.name)
-    held = HeldVector(rubric, criterion, drawn, evidence.remarks[one.name] if is_read else ())
+    right_mm = abs(one.drawn(charges.following.used))
+    held = HeldVector(rubric, criterion, drawn, evidence.remarks[one.name] if is_read else (), right_mm)
     choice = _chosen(charges, criterion, held)
     mark, scale = choice.mark, charges.following.used[one.scale]
     if choice.is_trivial:
-        least = rubric.least_followed_share * abs(one.drawn(charges.following.used))
-        short = Reason("too_short_to_judge", {"length_mm": drawn.length_mm, "least_mm": least})
-        return unjudged(criterion, "not_judged", (short,), expected=Quantity())
+        return unjudged(criterion, "not_judged", (Reason("made_trivial"),), expected=Quantity())
     if is_read and rubric.follows_through(criterion):
         mark = charges.opened(one, mark)
     if is_read and criterion.optional and not mark.is_certain and drawn.confidence < EVEN:
@@ -511,7 +510,7 @@ def _rate(charges: Charges, criterion: CriterionTable) -> Outcome:
         per_mm = following.used[task.segments[rate.vector].scale] / task.lengths_m[name]
     held = HeldValue(task.rubric, criterion, value, per_mm, sense)
     exact, followed = Expectation(right / held.per_mm), False
-    mark = held.against(exact)
+    right, mark = held.expected(exact), held.against(exact)
     is_drawn = rate is None or not rate.drives
     if not mark.is_full and is_drawn:
         exact = replace(exact, uncertainty=_uncertainty_of(charges, name, per_mm))
@@ -524,6 +523,8 @@ def _rate(charges: Charges, criterion: CriterionTable) -> Outcome:
         if candidate.is_better(mark):
             right, followed = one.vector.real * per_mm, True
             mark = the_better(candidate, mark, *charges.why(one))
+            if mark.is_full and rate and following.is_trivial(task.segments[rate.vector], one.vector):
+                return unjudged(criterion, "not_judged", (Reason("made_trivial"),), expected=Quantity())
     read = charges.evidence.sure
     sure = min(read.get(f"{name}_sense", 1.0), 1.0 if criterion.sense else read.get(name, 1.0))
     mark = with_confidence(mark, sure, task.rubric.doubt.settle)

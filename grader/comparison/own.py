@@ -363,7 +363,7 @@ def own_length(task: Task, evidence: Evidence, rate: AngularRate) -> float:
 def own_rate(
     task: Task, evidence: Evidence, rate: AngularRate, scale: float, instead: Mapping[str, complex]
 ) -> float | None:
-    """The angular rate that the student's own vector gives; None without one, or a trivial one.
+    """The angular rate that the student's own vector gives; None without one.
 
     It turns its link as that was drawn, where it was read. Where the vector's direction is not known, the
     sense is the right one's, or that of another mechanism.
@@ -372,7 +372,7 @@ def own_rate(
     mechanism that was certainly drawn and not handed in.
     """
     own, along = evidence.vector(rate.vector), task.real[rate.vector]
-    if own is None or own.length_mm < task.rubric.tolerance_of(rate.vector).least_mm:
+    if own is None:
         return None
     vector, direction, right = (
         task.construction.vectors[rate.vector],

@@ -306,12 +306,17 @@ longer holds, and the error may be anything."""
 
 @dataclass(frozen=True, slots=True)
 class HeldVector:
-    """A drawn vector judged by the rubric; `remarks` are added to its reasons unless it is right."""
+    """A drawn vector judged by the rubric; `remarks` are added to its reasons unless it is right.
+
+    `right_mm` is the length by the data. Where that is long enough to have a direction, what follows from
+    own values has one down to half of it: none is excused because its own length is a little less.
+    """
 
     rubric: RubricFile
     criterion: CriterionTable
     drawn: DrawnVector
     remarks: tuple[Reason, ...] = ()
+    right_mm: float = 0.0
 
     def allowed(self, one: Expectation, at_most: float | None = None) -> Tolerance:
         """Return the tolerance of full marks on paper.
@@ -320,6 +325,9 @@ class HeldVector:
         """
         with_direction = self.criterion.direction and self.drawn.direction_rad is not None
         table, most = self.rubric.tolerance_of(self.criterion), at_most or self.rubric.hand.at_most
+        if self.right_mm >= table.least_mm:
+            least = min(table.least_mm, self.right_mm / 2.0)
+            table = table.model_copy(update={"least_mm": least})
         return widened(table, most, one, with_direction=with_direction)
 
     def against(self, one: Expectation) -> MarkRange:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from grader.documents import MistakeDocument, RivalDocument
 from grader.language import N_
-from reference.construction.mistakes import RIGHT_TRIANGLE
+from reference.construction.mistakes import RIGHT_TRIANGLE, SLIP
 
 ALONG_GUIDE = "guide"
 """Value of a mistake's detail `line` for a line along a moving guide."""
@@ -18,6 +18,8 @@ DRIVING_ACROSS, DRIVING_ALONG = "driving across", "driving along"
 """Its values for the driving link's vectors: one is perpendicular to the link, one points along it."""
 OF_FORCE, ACROSS_GUIDE = "force", "force across a guide"
 """Its values in force plans."""
+HALVED = "half"
+"""Its value for a computed length that is half of the right one."""
 CORIOLIS_END, NORMAL_END = "k_", "n_"
 """First letters of the nodes at the ends of Coriolis and normal components."""
 _NAMED = re.compile(r"%\((\w+)\)s")
@@ -397,12 +399,12 @@ def precise(code: str, at: str, line: str, known: Collection[str]) -> str | None
 def words_of(code: str, at: str = "", line: str = "") -> Words:
     """Return the words for a mistake of this code made there, in a `line` along a guide or across a link.
 
-    For a slip of units, `line` is its kind; for a wrong length, its cause.
+    For a slip of units, `line` is its kind; for a wrong length, its cause, or `HALVED`.
 
     Raises KeyError for an unknown code.
     """
     usual = MISTAKES[code]
-    if at.startswith(CORIOLIS_END):
+    if at.startswith(CORIOLIS_END) and (code != SLIP or line == HALVED):
         return _CORIOLIS.get(code, usual)
     if code == "units":
         return _UNITS.get(line, usual)
@@ -413,7 +415,8 @@ def words_of(code: str, at: str = "", line: str = "") -> Words:
 
 def line_in(details: Mapping[str, object]) -> str:
     """Return the kind of line or slip among a mistake's details, as `words_of` takes it; empty if none."""
-    return str(details.get("line", details.get("slip", "")))
+    half = HALVED if details.get("factor") == 0.5 else ""
+    return str(details.get("line", details.get("slip", half)))
 
 
 def mistake_title(cause: MistakeDocument | RivalDocument) -> str:

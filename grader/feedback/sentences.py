@@ -114,7 +114,9 @@ def _worth_telling(outcome: Outcome, level: Level = "full") -> list[Reason]:
     if outcome.verdict == "review":
         needless |= RESIDUALS if outcome.proposed == 1.0 else IN_FAVOUR
         needless |= {"counted_for_you"} if outcome.probability == EVEN else set()
-        if outcome.proposed == 1.0 and codes & RESIDUALS and not codes & {"follows", "counted_for_you"}:
+        # What was entered was not read.
+        may_be_misread = outcome.proposed == 1.0 and outcome.confidence < 1.0
+        if may_be_misread and codes & RESIDUALS and not codes & {"follows", "counted_for_you"}:
             return [
                 Reason(MISREAD),
                 *(one for one in outcome.reasons if one.code in {"doubtful", "other_variant"}),
@@ -123,7 +125,7 @@ def _worth_telling(outcome: Outcome, level: Level = "full") -> list[Reason]:
         needless |= OPEN_ONLY
     if "doubtful" in codes:
         needless |= {"near_limit"}
-    if level != "full" and codes & {"not_measured", "unread"}:
+    if "should_be_zero" in codes or (level != "full" and codes & {"not_measured", "unread"}):
         # If nothing was drawn, the right length would be an answer.
         needless |= {"too_short_to_judge"}
     if "optional" in codes:

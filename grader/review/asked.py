@@ -67,7 +67,7 @@ def asked_question(session: Session, student: Student, name: str, speaker: Tongu
     return {**question_facts(session, student, name, speaker), "settles": _settles(doubt, speaker)}
 
 
-def asked_facts(session: Session, student: Student, speaker: Tongue, *, counted: bool) -> list[Facts]:
+def asked_facts(session: Session, student: Student, speaker: Tongue, *, until: float) -> list[Facts]:
     """Return the open questions on a student, which replace the rows that they cover."""
     standing = session.standing()
     rows = {one.id: one for one in student.report.criteria}
@@ -87,7 +87,7 @@ def asked_facts(session: Session, student: Student, speaker: Tongue, *, counted:
             "asked": False,
             "seen": mark_of(standing.of(student, doubt.id)),
         }
-        for rank, doubt in enumerate(session.doubts(student, counted=counted))
+        for rank, doubt in enumerate(session.doubts(student, until=until))
     ]
 
 

@@ -145,7 +145,7 @@ class Review:
         """Yield the facts of each student; the consequences of questions are counted for `COUNTING_S`."""
         until = time.monotonic() + COUNTING_S
         for one in students:
-            open_ones = asked.asked_facts(self.session, one, self.speaker, counted=time.monotonic() < until)
+            open_ones = asked.asked_facts(self.session, one, self.speaker, until=until)
             yield questions.student_facts(one, standing, self.session.batch.rubric, self.speaker, open_ones)
 
     def question(self, request: Request) -> Response:

@@ -4,7 +4,9 @@ The file of decisions is the only thing that is kept. Reports in memory are of t
 and pages on the disk are of the last run, and `bring_up_to_date` makes them anew.
 """
 
+import math
 import threading
+import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -459,10 +461,11 @@ class Session:
 
     # Questions ------------------------------------------------------------------------------------
 
-    def doubts(self, student: Student, *, counted: bool = True) -> list[Doubt]:
+    def doubts(self, student: Student, *, until: float = math.inf) -> list[Doubt]:
         """Return the open questions on a student, in the order in which they are asked.
 
-        Arguments: `counted` judges the submission with the likeliest answer to each, to see what it settles.
+        The submission is judged with the likeliest answer to each, to see what it settles: to those that are
+        reached by the time `until` (of `time.monotonic`).
         """
         if student.doubts is not None and student.doubts[0] == student.version:
             return student.doubts[1]
@@ -471,10 +474,9 @@ class Session:
             return []
         task = task_of(self.batch.assignment, self.batch.rubric, variant)
         found = doubts_of(task, student.report, figures_read(student.report, self.pages_of(student)))
-        if not counted:
-            return in_order(found)
-        found = in_order([self._counted(student, one) for one in found])
-        student.doubts = student.version, found
+        found = in_order([self._counted(student, one) if time.monotonic() < until else one for one in found])
+        if time.monotonic() < until:
+            student.doubts = student.version, found
         return found
 
     def _counted(self, student: Student, doubt: Doubt) -> Doubt:
@@ -488,7 +490,8 @@ class Session:
 
     def doubt(self, student: Student, name: str) -> Doubt | None:
         """Return an open question by its id; None if there is none."""
-        return next((one for one in self.doubts(student) if one.id == name), None)
+        found = (one for one in self.doubts(student, until=0.0) if one.id == name)
+        return next((self._counted(student, one) for one in found), None)
 
     def snapped(self, key: str, sheet: int, figure: str, at: tuple[float, float]) -> tuple[float, float]:
         """Return the point of the ink that a place on a page means, both in sheet millimetres.

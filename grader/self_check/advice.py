@@ -23,7 +23,7 @@ from grader.self_check.results import Checked, Result, certain_mistakes, checked
 from grader.texts.reasons import reason_sentence
 from grader.texts.spoken import place
 from reference.authored.assignment import SCALE_NAMES, Assignment
-from reference.construction.mistakes import RIGHT_TRIANGLE
+from reference.construction.mistakes import RIGHT_TRIANGLE, SLIP
 from reference.quantities import kind_of
 
 RESULTS: Mapping[Result, tuple[str, str]] = {
@@ -48,6 +48,11 @@ _LINES = N_(
 )
 _LETTERS = N_("Look at the letters of its name: from which point of the plan to which does it run?")
 _ENTRY = N_("Look at this entry again: its number and its unit.")
+_BY_MOMENTS = N_("The sum of moments about the inner joint gives the size and the sense of the part across.")
+_LAID_OFF = N_(
+    "Look at what it is: m·a against the acceleration of the centre of mass, m·g downwards, or the load as it"
+    " is given; then at the scale kF."
+)
 _AS_IN_PLAN = N_("It must be parallel to the vector of the plan, of its sense, and as long.")
 SIZE = {
     "sketch": _AS_IN_PLAN,
@@ -58,6 +63,8 @@ SIZE = {
     "c": N_(
         "Look at 2·ω·v again: which link turns, what slides along it, and by which scale did you divide?"
     ),
+    "laid off": _LAID_OFF,
+    "across": _BY_MOMENTS,
     "": _LINES,
 }
 TURN = {
@@ -66,6 +73,8 @@ TURN = {
     "n": N_("Look at the link that it lies along."),
     "t": N_("Look at the link that it stands perpendicular to."),
     "c": N_("Look at the sliding velocity that it is turned from."),
+    "laid off": _LAID_OFF,
+    "across": N_("Look at the link that it stands perpendicular to."),
     "": N_("Look at what sets the direction of its lines: which link, or which guide?"),
 }
 SENSE = {
@@ -73,6 +82,8 @@ SENSE = {
     "driving": N_("Look at the sense in which the driving link moves."),
     "n": N_("Look at the point that it must point towards."),
     "c": N_("Look at the sense in which the guide turns."),
+    "laid off": _LAID_OFF,
+    "across": _BY_MOMENTS,
     "force": N_("Look at which link acts on which, and at how the arrows follow one another."),
     "": _LETTERS,
 }
@@ -176,7 +187,6 @@ _DRIVING = {
     },
     DRIVING_ALONG: {"parallel_for_perpendicular": N_("a_n lies along the link, towards the pivot.")},
 }
-_BY_MOMENTS = N_("The sum of moments about the inner joint gives the size and the sense of the part across.")
 _BY_LINES = N_("Without friction a guide presses across itself; what moments leave acts along the link.")
 _OF_FORCES = {
     "parallel_for_perpendicular": _BY_LINES,
@@ -262,13 +272,14 @@ def advice_on(reasons: Sequence[Reason], name: str, driving: str) -> str:
 
 
 def _kind(name: str, driving: str) -> str:
-    """Return the kind of a value: scale, rate, driving, sketch, part of an acceleration, or none."""
+    """Return the kind of a value: scale, rate, force, driving, sketch, part of an acceleration, or none."""
     if name in SCALE_NAMES:
         return "scale"
     if name.startswith(("omega", "epsilon")):
         return "rate"
     if kind_of(name).name == "force":
-        return "force"
+        is_laid_off = name[0] in "FG" and name != "F_b"
+        return "laid off" if is_laid_off else "across" if name.endswith("_t") else "force"
     _, about, part = f"{name}__".split("_")[:3]
     return "driving" if about == driving and part != "sketch" else part
 
@@ -279,6 +290,8 @@ def law_of(mistake: NamedMistake) -> str:
     if mistake.at.startswith(CORIOLIS_END):
         return _CORIOLIS.get(mistake.code, usual)
     line = line_in(mistake.detail)
+    if mistake.code == SLIP and _kind(mistake.at, "") == "laid off":
+        return usual
     known = {**_DRIVING, ALONG_GUIDE: _GUIDE, RIGHT_TRIANGLE: _BY_TRIANGLE}
     others = {**known, OF_FORCE: _OF_FORCES, ACROSS_GUIDE: _OF_FORCES}.get(line, {})
     return others.get(mistake.code, usual)

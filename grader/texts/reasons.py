@@ -25,6 +25,7 @@ HINTS: dict[str, str] = {
     "off_sheet": N_("It lies off the sheet here, and is not asked for."),
     "should_be_zero": N_("Look at this position of the mechanism again: how large can it be here?"),
     "too_short_to_judge": N_("It is too short for its direction to be judged; only its length counts."),
+    "made_trivial": N_("An earlier mistake makes the vector too short to show anything: it is not judged."),
     "value_too_large": N_("The value is too large."),
     "value_too_small": N_("The value is too small."),
     "value_reversed": N_("The sign is wrong: counter-clockwise is positive."),

@@ -101,7 +101,7 @@ def truth_of(read: ReadWork, task: Task, student: StudentSubmission) -> Truth:
     points = frozenset(
         one.id
         for one in report.criteria
-        if one.verdict == "not_judged" and "too_short_to_judge" in one.reasons
+        if one.verdict == "not_judged" and {"too_short_to_judge", "made_trivial"} & set(one.reasons)
     )
     return Truth(verdicts, _total(review, report), _on_sheets(read), points)
 

@@ -55,6 +55,13 @@ def test_coordinates_of_a_point_of_a_link_are_given_with_the_line_along_which_th
     assert (given["x(K, A→B)"], given["y(K, A→B)"]) == (-40.0, 12.0)
 
 
+def test_of_the_driving_link_what_is_given_is_not_asked(tmp_path):
+    mechanism, table = written(tmp_path, SIX_BAR.replace('rpm = "n1"', 'rpm = "n1"\nepsilon = 3'))
+    new = new_assignment(tmp_path / "six", mechanism=str(mechanism), table=table)
+    asked = {one.turning for one in rubric_of(load_assignment(new.assignment)).criterion}
+    assert asked & {"omega_1", "epsilon_1"} == {"omega_1"}
+
+
 @pytest.mark.parametrize("near_dead_point", [1, 3])
 def test_vectors_too_short_in_most_variants_are_criteria_behind_comment_signs(tmp_path, near_dead_point):
     """Two variants, and some near the dead point, 33.85 degrees."""

@@ -273,6 +273,7 @@ def test_a_rubric_that_asks_for_no_force_gets_what_the_force_plans_show(tmp_path
     assert built_in <= asked.keys()
     assert {"R_13_n", "v_A", "omega_3", "kv", "AS3", "BS3"}.isdisjoint(asked)
     assert asked["R_13_t"].title.in_language("ro").endswith("reacțiunii elementului 1 asupra elementului 3")
+    assert asked["R_0D"].title.en == "Reaction of the frame on link D"
     assert not [one for one in asked.values() if one.title.ru == one.title.en]
     findings = lint(load_assignment(second.assignment), load_rubric(second.rubric)).findings
     assert not [one for one in findings if one.severity == "fault"]

@@ -121,6 +121,10 @@ def test_at_a_dead_point_nothing_drawn_is_right_and_something_drawn_is_not():
     outcome = outcome_of(compare(DEAD, Submission(measured=changed(reading, "v_B", length_mm=5.0))), "v_B")
     assert outcome.verdict == "none"
     assert codes(outcome)[0] == "should_be_zero"
+    rates = {name: rate for name, rate in DEAD.rates.items() if name.startswith("omega") and abs(rate) < 1e-9}
+    entered = compare(DEAD, Submission(measured=reading, values=dict.fromkeys(rates, 9.0)))
+    assert [outcome_of(entered, name).expected.value for name in rates] == [0.0] * len(rates)
+    assert any(rates.values())
     assert outcome.expected.direction_deg is None
 
 
@@ -649,8 +653,39 @@ def test_what_an_earlier_answer_makes_trivial_is_neither_credited_nor_charged():
     reading = measured(PUMP, directions=False)
     reading = changed(reading, "v_BA", length_mm=2.0)
     reading = changed(reading, "a_BA_n", length_mm=0.1)
-    comparison = compare(PUMP, Submission(measured=reading))
-    assert outcome_of(comparison, "a_BA_n").verdict == "not_judged"
+    outcome = outcome_of(compare(PUMP, Submission(measured=reading)), "a_BA_n")
+    assert (outcome.verdict, codes(outcome)) == ("not_judged", ["made_trivial"])
+
+
+def test_a_value_from_a_vector_that_an_earlier_answer_makes_trivial_is_not_charged_again():
+    reading = changed(measured(PUMP), "v_BA", length_mm=2.0)
+    value = PUMP.rates["omega_3"] * 2.0 / abs(PUMP.segments["v_BA"].drawn(rule_scales(PUMP)))
+    for entered, verdict in ((value, "not_judged"), (-3.0 * value, "none")):
+        comparison = compare(PUMP, Submission(measured=reading, values={"omega_3": entered}))
+        assert outcome_of(comparison, "omega_3").verdict == verdict
+
+
+def test_no_vector_follows_the_opposite_way_because_its_own_length_is_just_too_short():
+    by_length = {n: abs(task_for("press", position=n).real["a_BA_n"]) for n in range(8)}
+    task = task_for("press", position=max(by_length, key=by_length.__getitem__))
+    exact = abs(task.segments["a_BA_n"].drawn(rule_scales(task)))
+    task = with_rubric(task, tolerance=task.rubric.tolerance.model_copy(update={"least_mm": exact - 0.01}))
+    reading = measured(task)
+    shorter = reading.figures["velocity_plan"].vectors["v_BA"].length_mm - 0.1
+    drawn = reading.figures["acceleration_plan"].vectors["a_BA_n"]
+    reading = changed(reading, "v_BA", length_mm=shorter)
+    reading = changed(reading, "a_BA_n", direction_deg=(drawn.direction_deg + 180.0) % 360.0)
+    assert outcome_of(compare(task, Submission(measured=reading)), "a_BA_n").verdict == "none"
+
+
+def test_a_component_too_short_for_its_direction_is_charged_where_its_wrong_sense_shows():
+    exact = abs(PUMP.segments["a_BA_n"].drawn(rule_scales(PUMP)))
+    least = PUMP.rubric.tolerance.model_copy(update={"least_mm": exact + 1.0})
+    task = with_rubric(PUMP, tolerance=least)
+    reading = measured(task, mistakes=(Mistake("normal_reversed", "n_BA"),))
+    comparison = compare(task, Submission(measured=reading))
+    assert outcome_of(comparison, "a_BA_n").verdict == "full"
+    assert len([one for one in verdicts(comparison).values() if one in {"none", "partial"}]) == 1
 
 
 def test_what_hangs_on_a_doubtful_node_is_doubtful_too():

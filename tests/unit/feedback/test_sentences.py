@@ -88,9 +88,22 @@ def test_a_partial_verdict_says_so_and_what_is_off_but_not_that_it_is_right():
     assert "Right." not in text
 
 
+def test_of_a_zero_vector_no_direction_is_spoken_of():
+    zero = Reason("should_be_zero", {"measured_mm": 4.0, "tolerance_mm": 1.0})
+    short = Reason("too_short_to_judge", {"length_mm": 0.0, "least_mm": 3.0})
+    assert "direction" not in criterion_feedback(outcome("none", zero, short), "en")
+
+
 def test_what_waits_for_a_person_says_why():
     told = criterion_feedback(outcome("review", Reason("doubtful", {"confidence": 0.62})), "en")
     assert told == "It was read with too little certainty (62\u00a0%)."
+
+
+@pytest.mark.parametrize(("confidence", "told"), [(0.8, "It was probably misread"), (1.0, "These vectors")])
+def test_only_what_was_read_is_called_misread(confidence, told):
+    unexplained = Reason("not_explained", {"unfit": "2", "of": "24"})
+    waiting = replace(outcome("review", unexplained, TOO_LONG), proposed=1.0, confidence=confidence)
+    assert criterion_feedback(waiting, "en").startswith(told)
 
 
 @pytest.mark.parametrize(

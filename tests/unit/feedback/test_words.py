@@ -16,6 +16,8 @@ from grader.language import symbols
         ("v_BA", "<i>v</i><sub>BA</sub>"),
         ("a_BA_n", "<i>a</i><sub>BA</sub><sup>n</sup>"),
         ("n_BA", "<i>n</i><sub>BA</sub>"),
+        ("R_k2_t", "<i>R</i><sub>k2</sub><sup>t</sup>"),
+        ("F_w", "<i>F</i><sub>w</sub>"),
         ("omega_3", "<i>ω</i><sub>3</sub>"),
         ("epsilon_2", "<i>ε</i><sub>2</sub>"),
         ("kL", "<i>k</i><sub>L</sub>"),

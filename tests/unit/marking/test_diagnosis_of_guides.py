@@ -72,6 +72,15 @@ def test_no_mistake_is_offered_that_changes_nothing():
     assert not [one for one in offered if set(one.other) == {"A", "A3"}]
 
 
+@pytest.mark.parametrize(
+    ("factor", "told"), [(0.5, "is half of"), (2.0, "does not follow"), (0.7, "does not follow")]
+)
+def test_a_coriolis_component_is_called_half_only_where_it_is(factor, told):
+    slip = Mistake("arithmetic", "k_A3A", factor=factor)
+    (named,) = found(slip, "measured").mistakes
+    assert told in mistake_feedback(named, "en")
+
+
 def test_words_are_those_of_the_code_but_at_guides():
     assert words_of("normal_missing", "n_A3").title == "normal component left out"
     assert words_of("normal_missing", "k_A3A").title == "Coriolis component left out"

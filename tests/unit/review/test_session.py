@@ -12,6 +12,7 @@ from grader.folder.decisions import basis_of
 from grader.records import ACCELERATION_PLAN
 from grader.review.records import mark_of
 from grader.review.server import application
+from grader.review.session import Session
 from grader.tables.decisions import Decision, DecisionFile
 from tests.examples import slow
 from tests.unit.marking.test_answers import unsure
@@ -88,7 +89,7 @@ def test_what_is_expected_of_a_stroke_is_judged_with_the_likeliest_answer(page, 
         if ACCELERATION_PLAN in one.reading.figures
     ]
     student.report, student.version = session.report_if(student, ()), student.version + 1
-    offered = [one for one in session.doubts(student, counted=True) if one.kind == "node" and one.default]
+    offered = [one for one in session.doubts(student) if one.kind == "node" and one.default]
     assert offered
     for doubt in offered:
         question = page.get("/api/question", params={"student": SCANNED, "criterion": doubt.id}).json()
@@ -96,6 +97,17 @@ def test_what_is_expected_of_a_stroke_is_judged_with_the_likeliest_answer(page, 
         vector = next(one.vector for one in doubt.choices if one.vector)
         expected = next(one.expected for one in after.criteria if one.vector == vector)
         assert f"{expected.length_mm:.1f}" in dict(question["numbers"])["Expected"]
+
+
+def test_no_question_waits_until_all_others_are_judged(session, monkeypatch):
+    student = max(session.students, key=lambda one: len(session.doubts(one)))
+    student.doubts, judged, judge = None, [], Session.report_if
+    monkeypatch.setattr(Session, "report_if", lambda *args: judged.append(args) or judge(*args))
+    questions = session.doubts(student, until=0.0)
+    assert len(questions) > 1
+    assert judged == []
+    assert session.doubt(student, questions[-1].id).id == questions[-1].id
+    assert len(judged) <= 1
 
 
 def test_without_a_scan_there_is_nothing_to_look_at(page):

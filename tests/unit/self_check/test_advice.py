@@ -5,7 +5,7 @@ import re
 import pytest
 
 from grader.comparison.evidence import Submission
-from grader.feedback.mistakes import ALONG_GUIDE, DRIVING_ACROSS, DRIVING_ALONG, MISTAKES
+from grader.feedback.mistakes import ALONG_GUIDE, DRIVING_ACROSS, DRIVING_ALONG, MISTAKES, OF_FORCE
 from grader.language import tongue
 from grader.marking.mark import judge
 from grader.outcomes import NamedMistake
@@ -84,11 +84,21 @@ def test_every_mistake_but_a_missing_vector_has_a_law():
         (Mistake("parallel_for_perpendicular", "a"), DRIVING_ACROSS, "across the line to the pivot"),
         (Mistake("parallel_for_perpendicular", "a'"), DRIVING_ALONG, "along the link"),
         (Mistake("wrong_link", "d"), ALONG_GUIDE, "its own guide"),
+        (Mistake("arithmetic", "F_i3"), OF_FORCE, "real value / scale"),
+        (Mistake("arithmetic", "R_34_t"), OF_FORCE, "moments"),
         (Mistake("arithmetic", "n_B", other=("right_triangle",)), "", "only where kL·ka = kv²"),
     ],
 )
 def test_a_law_suits_the_line_that_the_mistake_was_made_in(mistake, line, word):
     assert word in law_of(NamedMistake(mistake, (), 1.0, {"line": line} if line else {}))
+
+
+@pytest.mark.parametrize(
+    ("name", "word"),
+    [("F_i3", "m·a"), ("G_D", "m·g"), ("R_34_t", "moments"), ("R_34", "lines"), ("F_b", "lines")],
+)
+def test_the_size_of_a_force_is_sought_where_it_comes_from(name, word):
+    assert word in advice_on([Reason("too_short")], name, "A")
 
 
 def test_advice_is_on_reasons_that_exist():
