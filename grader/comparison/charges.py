@@ -11,6 +11,7 @@ from grader.comparison.verdicts import (
     FULL,
     NONE,
     OPENING,
+    SHORT_MM,
     Expectation,
     Held,
     MarkRange,
@@ -20,6 +21,7 @@ from grader.comparison.verdicts import (
 from grader.outcomes import CHARGED, CREDITED, EVEN
 from grader.records import Reason
 from reference.construction.steps import Given
+from reference.quantities import group_of
 
 BY_HAND = frozenset({"hand_may_miss", "near_limit"})
 """Reasons why a vector's verdict is open although it was read well."""
@@ -79,7 +81,11 @@ def choose(
                     chosen = Choice(better, one, is_followed=True, is_trivial=is_trivial)
         if chosen.mark.is_full:
             return chosen
-    if not chosen.is_trivial and not chosen.mark.is_certain and segment.name in following.explanation.blamed:
+    is_known = segment.name in following.explanation.blamed
+    if group_of(charges.task.construction.figure_of(segment.head)):
+        # A force polygon is read by known mistakes: they confirm nothing that was read in doubt.
+        is_known &= all(reason.code != "doubtful" for reason in chosen.mark.reasons)
+    if not chosen.is_trivial and not chosen.mark.is_certain and is_known:
         chosen = replace(chosen, mark=at_worst(chosen.mark))
     return replace(chosen, shown=frozenset(shown))
 
@@ -205,7 +211,7 @@ class Charges:
 
     def opened(self, segment: TaskSegment, mark: MarkRange) -> MarkRange:
         """Return a mark; a loss on a sheet is open while one of its sources was not read for certain."""
-        unknown = () if mark.share == FULL else self._unknown_upstream(segment)
+        unknown = () if mark.share == FULL else self._unknown_upstream(segment) + self._unread_beside(segment)
         if not unknown:
             return mark
         self.charged.discard(segment.head)
@@ -214,7 +220,7 @@ class Charges:
         return replace(mark, best=FULL, reasons=(*mark.reasons, unread), sure=min(mark.sure, EVEN))
 
     def _unknown_upstream(self, segment: TaskSegment) -> tuple[str, ...]:
-        """Return the unknown sources of a vector: nodes, of figures that were read, and its scale.
+        """Return the unknown sources of a vector: nodes, of figures that were read or force plans, its scale.
 
         Known are nodes that were read, those from which a vector was made that is right, and those at which
         it is nearly certain what was done.
@@ -223,6 +229,7 @@ class Charges:
         scale = self.settled[segment.scale].mark
         is_unseen = scale is not None and any(reason.code == "unread" for reason in scale.reasons)
         read = {construction.figure_of(node) for node in nodes}
+        read |= {figure for figure in construction.figures if group_of(figure)}
         unread = [
             need
             for need in dict.fromkeys(construction.step(segment.head).needs)
@@ -233,6 +240,18 @@ class Charges:
             sure = construction.needed_for(right) | self.following.explanation.explained
             unread = [need for need in unread if need not in sure]
         return (*((segment.scale,) if is_unseen else ()), *unread)
+
+    def _unread_beside(self, segment: TaskSegment) -> tuple[str, ...]:
+        """Return the forces of the same polygon that were not read: one may be read as a part of another."""
+        construction, following = self.task.construction, self.following
+        figure = construction.figure_of(segment.head)
+        return tuple(
+            side.name
+            for side in construction.polygon_of(figure) * bool(group_of(figure))
+            if self.evidence.vector(side.name) is None
+            and side.head not in following.explanation.explained
+            and abs(self.task.segments[side.name].drawn(following.used)) >= SHORT_MM
+        )
 
     def why(self, one: Expectation) -> tuple[Reason, ...]:
         """The reasons for an expectation: what it follows from, and whether its scale was assumed."""

@@ -57,7 +57,7 @@ from reference.construction.graph import AngularRate
 from reference.construction.mistakes import line_of
 from reference.construction.steps import Given
 from reference.construction.uncertainty import EndSpread
-from reference.quantities import kind_of, unit_of, vector_of_value
+from reference.quantities import group_of, kind_of, unit_of, vector_of_value
 
 
 @dataclass(frozen=True, slots=True)
@@ -478,11 +478,15 @@ def _leave_out(charges: Charges, segment: TaskSegment | None, verdict: Verdict) 
 
 
 def _is_not_drawn(task: Task, evidence: Evidence, name: str, length_mm: float) -> bool:
-    """Return whether a vector of this expected length is missing, though both its ends were read."""
+    """Return whether a vector of this expected length is missing, though both its ends were read.
+
+    The sum of parts of a force can be measured between them.
+    """
     vector = task.construction.vectors.get(name)
     if vector is None or name not in evidence.blank or length_mm < SHORT_MM:
         return False
-    return {vector.tail, vector.head} <= {*evidence.nodes, *task.construction.poles.values()}
+    is_sum_of_forces = vector.is_sum and group_of(task.construction.figure_of(vector.head))
+    return not is_sum_of_forces and {vector.tail, vector.head} <= evidence.nodes.keys()
 
 
 # Angular quantities --------------------------------------------------------------------------------

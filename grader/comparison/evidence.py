@@ -2,6 +2,7 @@
 
 import cmath
 import math
+import statistics
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import cast
@@ -11,7 +12,7 @@ import numpy as np
 from grader.comparison.task import Task
 from grader.records import MECHANISM, Figure, OtherReading, Reading, ReadNode, Reason
 from grader.rubric import ToleranceTable
-from reference.quantities import value_name
+from reference.quantities import group_of, value_name
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +52,8 @@ class DrawnVector:
     read, and what is told of it, is `direction_rad` + this."""
     others: tuple[OtherReading, ...] = ()
     """Other readings, the likeliest first, as on the sheet."""
+    is_doubted: bool = False
+    """True if it is laid off in a force polygon that was mostly read in doubt."""
 
     def if_others(self) -> Iterator["DrawnVector"]:
         """The vector as each of the others, with the confidence that it is this one or one before it."""
@@ -126,7 +129,9 @@ def gather(task: Task, submission: Submission) -> Evidence:
     for name, one in sheets.drawn.items():
         table = task.rubric.tolerance_of(name)
         sure, remarks[name] = held_against_cells(one, written.get(name), table, least)
-        drawn[name] = replace(one, confidence=sure, others=one.others if sure >= one.confidence else ())
+        others = one.others if sure >= one.confidence else ()
+        is_doubted = one.is_doubted and sure <= one.confidence
+        drawn[name] = replace(one, confidence=sure, others=others, is_doubted=is_doubted)
     return Evidence(
         drawn=drawn,
         measured=measured,
@@ -180,7 +185,8 @@ class _Sheets:
         for figure, read in reading.figures.items():
             if figure != MECHANISM:
                 names = [vector.name for vector in self.task.construction.vectors_of(figure)]
-                self.add_vectors(_vectors(self.task, read, names, turn, se_turn))
+                vectors = _vectors(self.task, read, names, turn, se_turn)
+                self.add_vectors(dict(_doubted(self.task, vectors)) if group_of(figure) else vectors)
                 self.add_nodes(_plan_nodes(self.task, figure, read, turn), read)
                 if joints:
                     self.sketches.setdefault(figure, joints)
@@ -246,6 +252,19 @@ def _vectors(
                 one.length_mm, one.se_mm, direction, se_deg, one.confidence, whole, one.others
             )
     return found
+
+
+MOSTLY_DOUBTED = 0.79
+"""Median confidence of a force polygon's vectors below which the polygon was mostly read in doubt."""
+
+
+def _doubted(task: Task, drawn: Mapping[str, DrawnVector]) -> Iterator[tuple[str, DrawnVector]]:
+    """Yield the vectors of a force polygon, those laid off `is_doubted` where it was mostly read in doubt."""
+    is_doubtful = statistics.median([one.confidence for one in drawn.values()] or [1.0]) < MOSTLY_DOUBTED
+    for name, one in drawn.items():
+        vector = task.construction.vectors[name]
+        is_laid_off = task.construction.laid_off(vector.tail, vector.head) is not None
+        yield name, replace(one, is_doubted=is_doubtful and is_laid_off)
 
 
 def _own_turn(task: Task, name: str) -> float:

@@ -138,6 +138,8 @@ def _evidence_of(
     least = task.rubric.least_confidence
     if drawn.confidence >= least or however_doubtful:
         return shown
+    if evidence.remarks.get(vector):
+        return None  # the length in its cells is another
     # Where others that were surely read are right at its scale, it was read rightly.
     return shown if _fitting(task, evidence, name, shown[0] / shown[1], least) >= TELLING else None
 

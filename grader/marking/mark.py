@@ -458,13 +458,16 @@ def _confirmed(task: Task, submission: Submission, comparison: Comparison) -> Su
     """The submission, surer of what its explanation predicts; None where that changes nothing.
 
     Where it is nearly certain what was done, the explanation predicts every vector of the drawing. One that
-    was read in doubt and lies just where it is predicted was read rightly, however wrong it is.
+    was read in doubt and lies just where it is predicted was read rightly, however wrong it is. Of what is
+    doubted with its force polygon it is no evidence: the reader looked there for it.
     """
     explanations = () if comparison.explanation is None else comparison.explanation.explanations
     least, evidence = task.rubric.least_confidence, comparison.evidence
     waiting = {one.name for one in comparison.outcomes if one.verdict == "review"}
     doubtful = {
-        name: one for name, one in evidence.drawn.items() if one.confidence < least or name in waiting
+        name: one
+        for name, one in evidence.drawn.items()
+        if (one.confidence < least or name in waiting) and not one.is_doubted
     }
     if not doubtful or not explanations:
         return None

@@ -182,6 +182,12 @@ def draw(task: DrawingTask, hand: HandStyle, student: Student, rng: Rng) -> tupl
 
     first = drawn_nodes(construction, parameters, hand, rng)
     forces = [name for name in construction.figures if name.startswith(FORCES)]
+    pages = {page.kind for page in task.assignment.file.page}
+    if forces and "mechanism" in pages:
+        return (
+            DrawnSheet("mechanism", figures((MECHANISM,), first)),
+            DrawnSheet("forces", figures(forces, first)),
+        )
     if forces and VELOCITY not in construction.figures:
         return (DrawnSheet("forces", figures((MECHANISM, *forces), first)),)
     if forces:

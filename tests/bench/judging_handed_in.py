@@ -269,9 +269,9 @@ def _readings(work: StudentWork, lot: np.random.Generator) -> tuple[Reading, ...
         figures, unread, swapped = {}, [], []
         for drawn in sheet.figures:
             named = work.named(drawn.nodes, "nodes")
+            origin = PAPER.get(drawn.name, PAPER[VELOCITY_PLAN])
             places = {
-                name: PAPER[drawn.name] + place + se * complex(*lot.standard_normal(2))
-                for name, place in named.items()
+                name: origin + place + se * complex(*lot.standard_normal(2)) for name, place in named.items()
             }
             nodes = {
                 name: ReadNode(place, np.eye(2) * se**2, float(lot.uniform(*SURE)))

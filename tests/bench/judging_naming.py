@@ -10,14 +10,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from grader.outcomes import NamedMistake as Named
-from reference.construction.graph import Construction
 from reference.construction.mistakes import Mistake
-from samples.simulation.mistakes import StudentMistake
+from samples.simulation.mistakes import CODES_OF_FORCES, StudentMistake
 from tests.bench.judging_handed_in import CLEAR, Visible, off
-from tests.bench.judging_students import ON_SHEETS, Asked, Source, StudentWork, is_same, meant, vectors_of
-
-ALIKE_MM = 0.3
-"""Two mistakes whose drawings differ by less in every observed vector count as each other."""
+from tests.bench.judging_students import (
+    ALIKE_MM,
+    ON_SHEETS,
+    Asked,
+    Source,
+    StudentWork,
+    is_same,
+    meant,
+    vectors_of,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,12 +44,13 @@ class Made:
 
 def mistakes_due(work: StudentWork, source: Source, visible: Visible) -> list[Made]:
     """The mistakes made, in order of construction."""
-    order = sorted(work.task.mistakes, key=lambda one: _place(work.construction, one))
+    order = sorted(work.task.mistakes, key=lambda one: _place(work, one))
     return [Made(one, _shows(work, source, visible, one)) for one in order]
 
 
-def _place(construction: Construction, mistake: StudentMistake) -> int:
+def _place(work: StudentWork, mistake: StudentMistake) -> int:
     """The index of the construction's step where a mistake is made; -1 for data and kL."""
+    construction = work.construction
     nodes = [step.node for step in construction.steps]
     match mistake.code, mistake.at:
         case "other_variant", _:
@@ -55,6 +61,8 @@ def _place(construction: Construction, mistake: StudentMistake) -> int:
             return nodes.index(construction.vectors[name].head)
         case "labels_swapped", _:
             return min(nodes.index(node) for node in mistake.other)
+        case code, _ if code in CODES_OF_FORCES:
+            return min((nodes.index(node) for node in work.changed_by(mistake)), default=-1)
         case _, ("kv" | "ka") as scale:
             return nodes.index(construction.poles["velocity_plan" if scale == "kv" else "acceleration_plan"])
         case _, at if at in construction.poles:
@@ -72,6 +80,10 @@ def _shows(work: StudentWork, source: Source, visible: Visible, mistake: Student
         return 0.0
     if mistake.code == "labels_swapped" and work.by_letters(source):
         return math.inf
+    if mistake.code in CODES_OF_FORCES:
+        # People draw polygons that nobody asks for, and err there.
+        asked = {one.name for one in work.rubric.criterion}
+        visible = Visible({name: how for name, how in visible.directed.items() if name in asked})
     rest = [one for one in work.task.mistakes if one is not mistake]
     return _most_apart(
         work, visible, as_handed_in(work, source, work.task.mistakes), _try(work, source, rest)
@@ -115,6 +127,10 @@ def is_named(work: StudentWork, source: Source, visible: Visible, made: StudentM
     """Return whether a report names this mistake, or one that gives the same drawing as seen."""
     if is_same(made, named):
         return True
+    if made.code in CODES_OF_FORCES and made.code == named.code:
+        vector = work.construction.vectors.get(named.at)
+        is_there = vector is not None and vector.head in work.changed_by(made)
+        return is_there or made.at.startswith(named.at)
     if {made.code, named.code} & {"vector_missing", "rpm_not_converted"}:
         return False
     asked = Asked(work.assignment, work.variant, work.task.right)

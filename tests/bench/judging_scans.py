@@ -1,13 +1,14 @@
 """Simulated students' scans, read once and stored, so that they can be judged many times.
 
 The kinds of sheets are those that instructors get: flatbed scans of plain and printed sheets, 1-bit copies,
-photos, and sloppy hands. Half of the drawings are right, a third have one mistake, the others two.
+photos, and sloppy hands. Half of the drawings are right, a third have one mistake, the others two. Force
+sheets, plain and printed, are a kind of their own: a third are right, the others have one mistake in forces.
 """
 
 import pickle
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,7 +21,8 @@ from grader.rubric import asked_of
 from grader.tables.measurements import StudentSubmission
 from reference.authored.assignment import Variant
 from reference.construction.graph import Vector
-from samples.simulation import SimulatedSheet, any_settings, simulate
+from samples.simulation import Settings, SimulatedSheet, any_settings, simulate
+from samples.simulation.forces import any_drawer_of_forces
 from samples.simulation.mixture import Device
 from samples.simulation.student import drawn_by
 from samples.simulation.wording import declared_texts
@@ -32,12 +34,15 @@ from tests.bench.judging_students import (
     assignment_named,
     codes_of,
     is_hidden,
+    vectors_of,
 )
 from tests.bench.reading_scenes import answer_sheets
 
 _TRIES = 40
 SCANNED = ("pump", "press", "engine", "shaper", "piston")
+WITH_FORCES = ("pump-forces", "press-forces")
 KIND_SHARES: Mapping[Kind, float] = {"right": 0.5, "single": 0.35, "pair": 0.15}
+FORCE_SHARES: Mapping[Kind, float] = {"right": 0.35, "single": 0.65}
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +54,8 @@ class SheetKind:
     dpi: float | None = 300.0
     printed: bool = False
     hands: tuple[str, ...] = ("careful", "typical")
+    assignments: tuple[str, ...] = SCANNED
+    shares: Mapping[Kind, float] = field(default_factory=lambda: KIND_SHARES)
 
 
 SHEET_KINDS: Mapping[str, SheetKind] = {
@@ -57,6 +64,10 @@ SHEET_KINDS: Mapping[str, SheetKind] = {
     "copies": SheetKind("1-bit copies", device="copier"),
     "phone": SheetKind("phone photos, answer sheet", device="phone", dpi=None, printed=True),
     "sloppy": SheetKind("flatbed 300 dpi, sloppy hands", hands=("sloppy",)),
+    "forces": SheetKind("force sheets", assignments=(*WITH_FORCES, "shaper-forces"), shares=FORCE_SHARES),
+    "forces-printed": SheetKind(
+        "force sheets, answer sheet", printed=True, assignments=WITH_FORCES, shares=FORCE_SHARES
+    ),
 }
 
 
@@ -107,10 +118,10 @@ def _read(kind: str, seed: int) -> ReadWork | None:
 
 def _student(kind: str, seed: int) -> tuple[StudentKey, np.random.Generator]:
     lot = np.random.default_rng([seed, sum(map(ord, kind)), 77])
-    hands = SHEET_KINDS[kind].hands
-    hand = hands[int(lot.integers(len(hands)))]
-    what: Kind = lot.choice(list(KIND_SHARES), p=list(KIND_SHARES.values()))
-    return StudentKey(SCANNED[seed % len(SCANNED)], hand, what, seed), lot
+    own = SHEET_KINDS[kind]
+    hand = own.hands[int(lot.integers(len(own.hands)))]
+    what: Kind = lot.choice(list(own.shares), p=list(own.shares.values()))
+    return StudentKey(own.assignments[seed % len(own.assignments)], hand, what, seed), lot
 
 
 def drawn_on(
@@ -126,6 +137,8 @@ def drawn_on(
         settings = any_settings(seed, device=kind.device, dpi=kind.dpi, mistakes=0.0)
         habits = replace(settings.student, mistakes=codes_of(key, lot))
         settings = replace(settings, hand=HANDS[key.hand], student=habits)
+        if assignment.forces is not None:
+            settings = with_forces(settings, lot)
         try:
             desk, drawn = drawn_by(assignment, variant, seed, settings, printed=printed)
         except ValueError:  # a mistake that cannot be made here
@@ -134,11 +147,14 @@ def drawn_on(
             continue
         pages = simulate(assignment, variant, seed, settings, printed=printed)
         figures = [figure for page in pages for figure in page.truth["figures"].values()]
+        due = vectors_of(desk.task.right, ())
         left_out = {
             name
             for figure in figures
-            for name in figure.get("missing", {})
+            for name, reason in figure.get("missing", {}).items()
             if not _lies_under_lines(figure, desk.task.right.construction.vectors[name])
+            # A force that is laid off with no length by mistake is wrong, not left out.
+            and not (reason == "too short to draw" and abs(due[name]) > SHORT_MM)
         }
         work = StudentWork(
             key,
@@ -154,7 +170,13 @@ def drawn_on(
     return None
 
 
-ON_LINE_MM, STEPS = 0.6, 50
+def with_forces(settings: Settings, lot: np.random.Generator) -> Settings:
+    """Return the settings with habits in force polygons; a force without an arrowhead is none."""
+    pen = replace(settings.pen, arrow="open") if settings.pen.arrow == "none" else settings.pen
+    return replace(settings, student=any_drawer_of_forces(settings.student, lot), pen=pen)
+
+
+ON_LINE_MM, STEPS, SHORT_MM = 0.6, 50, 4.0
 
 
 def _lies_under_lines(figure: Mapping[str, Any], vector: Vector) -> bool:

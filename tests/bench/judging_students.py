@@ -17,18 +17,19 @@ from typing import Literal, get_args
 import numpy as np
 
 from grader.outcomes import NamedMistake as Named
-from grader.records import ACCELERATION_PLAN
 from grader.rubric import RubricFile, rubric_of
 from reference.authored.assignment import Assignment, AssignmentFile, Variant, load_assignment
 from reference.authored.mechanism import check_mechanism
 from reference.authored.toml_file import validate
+from reference.construction.elements import View
 from reference.construction.graph import Construction, evaluate, parameters_of
 from reference.construction.mistakes import Drawing, Mistake, commit, single_mistakes
 from reference.errors import AuthoredFileError
 from samples.simulation import CAREFUL, SLOPPY, TYPICAL, HandStyle
 from samples.simulation.hand import DrawingTask, DrawnSheet, draw, task_of
-from samples.simulation.mistakes import CODES, Intent, StudentMistake, scalars, with_mistake
+from samples.simulation.mistakes import CODES, CODES_OF_FORCES, Intent, StudentMistake, scalars, with_mistake
 from samples.simulation.settings import Student
+from tests.bench.force_students import force_task
 from tests.whole_rubric import rubric_for
 
 _SCALES = 'scales = { crank_mm = 50, kL = "crank_m / crank_mm", kv = "omega * kL", ka = "kv**2 / kL" }'
@@ -114,6 +115,8 @@ ASSIGNMENTS = ("pump", "press", "engine", "shaper", "piston", *_OWN)
 @cache
 def assignment_named(name: str) -> tuple[Assignment, RubricFile]:
     """An assignment and its rubric by name. Raises CallError for an unknown one."""
+    if name == "shaper-forces":
+        return force_task("shaper")
     if name not in _OWN:
         assignment = load_assignment(name)
         return assignment, rubric_of(assignment)
@@ -129,6 +132,8 @@ def assignment_named(name: str) -> tuple[Assignment, RubricFile]:
 
 
 SCALES = ("kL", "kv", "ka")
+ALIKE_MM = 0.3
+"""Two mistakes whose drawings differ by less in every observed vector count as each other."""
 
 
 def with_mistakes(right: Intent, mistakes: Sequence[Mistake | StudentMistake]) -> Intent:
@@ -290,12 +295,23 @@ class StudentWork:
 
     def own(self, figure: str) -> dict[str, complex]:
         """The student's own nodes that a plan depends on: those of its sheet's sketch, and the velocities."""
-        sheet = self.sheets[-1] if figure == ACCELERATION_PLAN else self.sheets[0]
+        sheet = next(one for one in self.sheets if figure in {drawn.name for drawn in one.figures})
         nodes: dict[str, complex] = {}
         for one in (self.sheets[0], sheet):
             for drawn in one.figures:
                 nodes.update(drawn.nodes)
         return nodes
+
+    def changed_by(self, mistake: StudentMistake) -> frozenset[str]:
+        """The nodes that a mistake in forces lays off wrongly from right earlier nodes."""
+        right = self.task.right
+        nodes = evaluate(right.construction, right.parameters)
+
+        def placed(drawing: Intent, node: str) -> complex:
+            return complex(drawing.construction.step(node).place(View(nodes, drawing.parameters)))
+
+        wrong = with_mistake(right, mistake)
+        return frozenset(node for node in nodes if abs(placed(right, node) - placed(wrong, node)) > ALIKE_MM)
 
     def swaps(self) -> list[tuple[str, str]]:
         """Pairs of nodes whose letters are swapped."""
@@ -360,11 +376,12 @@ def codes_of(key: StudentKey, lot: np.random.Generator) -> tuple[str, ...]:
     """Codes of the mistakes to make; another student's data come first, as the others follow from them."""
     if key.kind in {"right", "slip"}:
         return ()
-    turn = CODES[(key.seed + zlib.crc32(f"{key.assignment} {key.hand}".encode())) % len(CODES)]
-    first = turn if lot.random() < 0.9 else str(lot.choice(list(CODES)))
+    codes = CODES_OF_FORCES if key.assignment.endswith("-forces") else CODES
+    turn = codes[(key.seed + zlib.crc32(f"{key.assignment} {key.hand}".encode())) % len(codes)]
+    first = turn if lot.random() < 0.9 else str(lot.choice(list(codes)))
     if key.kind == "single":
         return (first,)
-    second = str(lot.choice([code for code in CODES if code != first]))
+    second = str(lot.choice([code for code in codes if code != first]))
     return tuple(sorted((first, second), key=lambda code: code != "other_variant"))
 
 

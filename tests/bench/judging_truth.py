@@ -33,6 +33,8 @@ By code:
 - `rpm_not_converted`: velocities and scales are both too large, so the drawing is right: the declared
   kv is wrong, ka either (the same mistake again). Undeclared, nothing shows.
 - `vector_missing`: nothing to judge; crediting it in full is wrong unless it is optional.
+- mistakes in forces: the vectors that end in nodes that are laid off otherwise, as above. A couple or an arm
+  changes only parts across links; a force its own side, and those parts: one mistake.
 - angular quantities, computed from the student's own drawing (`tests.bench.judging_handed_in`): right or
   following, whatever was drawn; either if the submission does not show the sense. A *slip* in computing
   one value is wrong there and nowhere else.
@@ -41,7 +43,7 @@ By code:
   nodes named by their lines.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -51,7 +53,7 @@ from reference.construction.elements import Scaled, View
 from reference.construction.graph import Construction, Vector, ancestors, evaluate
 from reference.construction.steps import ArcAndLine, Given, Pivot, TwoArcs
 from reference.geometry import ComplexArray
-from samples.simulation.mistakes import Intent, StudentMistake, with_mistake
+from samples.simulation.mistakes import CODES_OF_FORCES, Intent, StudentMistake, with_mistake
 from tests.bench.judging_handed_in import CLEAR, PLAIN, Due, Visible, computed, off, rate_due
 from tests.bench.judging_students import ON_SHEETS, SCALES, Source, StudentWork
 
@@ -219,7 +221,8 @@ def charged_once(work: StudentWork, due: Mapping[str, Due], said: Mapping[str, s
     """
     found, vectors, ends = dict(due), work.construction.vectors, ends_of(work.construction)
     for mistake in work.task.mistakes:
-        nodes = set(mistake.other) if mistake.code == "labels_swapped" else {mistake.at}
+        nodes = {*mistake.other} if mistake.code == "labels_swapped" else {mistake.at}
+        nodes |= _nodes_of(work, mistake) if mistake.code in CODES_OF_FORCES else set()
         shown = [
             one.id
             for one in work.rubric.criterion
@@ -227,7 +230,9 @@ def charged_once(work: StudentWork, due: Mapping[str, Due], said: Mapping[str, s
             and due[one.id] == "wrong"
             and nodes & (set(ends[one.name]) if mistake.code == "labels_swapped" else {ends[one.name][1]})
         ]
-        paying = [name for name in shown if said[name] in {"none", "partial"}]
+        # Of a force that waits a person says whether it is wrong; what follows from it is right then.
+        asked = {"review"} if mistake.code in CODES_OF_FORCES else set()
+        paying = [name for name in shown if said[name] in {"none", "partial"} | asked]
         if paying:
             found.update(dict.fromkeys(set(shown) - set(paying), "either"))
     for scale in (one for one in work.rubric.criterion if one.scale and due[one.id] == "wrong"):
@@ -363,14 +368,14 @@ class _Drawn:
     def open_first_shown(self, mistake: StudentMistake) -> None:
         """Allow either verdict up to the first node that shows the mistake, if its own node does not."""
         construction = self.work.construction
-        node = _node_of(construction, mistake)
-        if node is None or self._shows_where_made(mistake, node):
+        nodes = _nodes_of(self.work, mistake)
+        if not nodes or self._shows_where_made(mistake, nodes):
             return
         ends = ends_of(construction)
         plan = construction.figures[mistake.at] if mistake.code == "figure_rotated" else ()
         for step in construction.steps:
-            hangs_on_it = step in plan or node in ancestors(construction, [step.node])
-            if step.node == node or not hangs_on_it:
+            hangs_on_it = step in plan or nodes & {*ancestors(construction, [step.node])}
+            if step.node in nodes or not hangs_on_it:
                 continue
             here = [name for name in self.due if ends[name][1] == step.node and self.moved[name] > PLAIN]
             open_ones = [name for name in here if self.due[name] in {"right", "follows"}]
@@ -378,10 +383,10 @@ class _Drawn:
             if any(self.moved[name] > CLEAR for name in here):
                 return
 
-    def _shows_where_made(self, mistake: StudentMistake, node: str) -> bool:
-        """Return whether it is charged at its own node, or for another student's data at the driving link."""
+    def _shows_where_made(self, mistake: StudentMistake, nodes: Collection[str]) -> bool:
+        """Return whether it is charged at its own nodes, or another student's data at the driving link."""
         ends = ends_of(self.work.construction)
-        if any(one == "wrong" and ends[name][1] == node for name, one in self.due.items()):
+        if any(one == "wrong" and ends[name][1] in nodes for name, one in self.due.items()):
             return True
         driving = {name for name in self.due if is_driving(self.work.construction, ends[name][1])}
         of_another = mistake.code == "other_variant"
@@ -412,14 +417,18 @@ def _is_scale_unknown(work: StudentWork, name: str) -> bool:
     return is_driving(work.construction, vector.head)
 
 
-def _node_of(construction: Construction, mistake: StudentMistake) -> str | None:
-    """The node at which a mistake is made; None for scales, letters and what is not drawn."""
+def _nodes_of(work: StudentWork, mistake: StudentMistake) -> frozenset[str]:
+    """The nodes at which a mistake is made; none for scales, letters and what is not drawn."""
+    construction = work.construction
+    if mistake.code in CODES_OF_FORCES:
+        return work.changed_by(mistake)
     if mistake.code in {"rpm_not_converted", "labels_swapped", "vector_missing"}:
-        return None
+        return frozenset()
     if mistake.code == "scale_wrong" and mistake.at in SCALES:
-        return None
+        return frozenset()
+    steps = construction.figures.get("mechanism" if mistake.code == "other_variant" else mistake.at, ())
     if mistake.code == "other_variant":
-        return next(s.node for s in construction.figures["mechanism"] if not isinstance(s, Pivot))
+        return frozenset((next(s.node for s in steps if not isinstance(s, Pivot)),))
     if mistake.at in construction.poles:
-        return next(s.node for s in construction.figures[mistake.at] if isinstance(s, Given))
-    return mistake.at
+        return frozenset((next(s.node for s in steps if isinstance(s, Given)),))
+    return frozenset((mistake.at,))

@@ -6,7 +6,10 @@
 
 reads the scans of 300 simulated students of each kind of sheet (some 5 s each; kept in the folder), judges
 them, and compares every verdict with the one due (`judging_truth`). Verdicts have a probability: the
-second table shows how often those of each probability are right.
+second table shows how often those of each probability are right. The third counts mistakes named; with
+`--failures` sheets with a wrong verdict or name are listed::
+
+    python -m tests.bench.settling --kinds forces forces-printed --students 18 --seed 99101 --failures
 """
 
 import argparse
@@ -14,17 +17,18 @@ import itertools
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 from grader.comparison.evidence import Submission
-from grader.comparison.task import task_of
-from grader.marking.mark import judge
 from grader.outcomes import Judgement, Outcome
+from grader.pipeline import judged
+from grader.records import PageRef, Reason
+from grader.tables.measurements import StudentSubmission
 from tests.bench.judging_handed_in import Due, Visible
 from tests.bench.judging_scans import SHEET_KINDS, ReadWork, read_works
-from tests.bench.judging_tally import CHARGED, CREDITED
+from tests.bench.judging_tally import CHARGED, CREDITED, Result, result_of
 from tests.bench.judging_truth import charged_once, verdicts_due
 from tests.bench.plain_text import Table, as_text
 
@@ -60,6 +64,7 @@ class Marked:
     of_another: bool
     was_read: bool
     verdicts: tuple[Verdict, ...] = ()
+    result: Result | None = None
 
     @property
     def waiting(self) -> int:
@@ -79,16 +84,22 @@ class Marked:
 
 def marked(read: ReadWork) -> Marked:
     """Judge a student's sheets and compare with the truth."""
-    work, drawn = read.work, tuple(one for one in read.readings if one.figures)
+    work, declared = read.work, read.declared
     of_another = any(one.code == "other_variant" for one in work.task.mistakes)
     about = read.kind, work.key.hand, work.key.kind == "right", of_another
-    if not drawn:
+    submission = StudentSubmission("s", work.variant, (PageRef("scan"),), declared)
+    judged_or_reason = judged(submission, work.assignment, work.rubric, read.readings)
+    if isinstance(judged_or_reason, Reason):
         return Marked(*about, was_read=False)
-    task = task_of(work.assignment, work.rubric, work.variant)
-    judgement = judge(task, Submission(readings=drawn, declared=read.declared))
+    _, judgement, _ = judged_or_reason
     due = _due(read, judgement)
-    judged = [one for one in judgement.outcomes if one.verdict != "not_judged"]
-    return Marked(*about, was_read=True, verdicts=tuple(_verdict(one, due[one.criterion]) for one in judged))
+    verdicts = [
+        _verdict(one, due[one.criterion]) for one in judgement.outcomes if one.verdict != "not_judged"
+    ]
+    drawn = Submission(tuple(one for one in read.readings if one.figures), declared=declared)
+    found = result_of(work, "scans", drawn, judgement)
+    result = replace(found, criteria=tuple(replace(one, due=due[one.criterion]) for one in found.criteria))
+    return Marked(*about, was_read=True, verdicts=tuple(verdicts), result=result)
 
 
 def _due(read: ReadWork, judgement: Judgement) -> dict[str, Due]:
@@ -140,6 +151,8 @@ def tables(students: Sequence[Marked]) -> Iterator[Table]:
         for name, verdicts in found.items()
     ]
     yield "Settling: right verdicts, by their probability", heads, rows
+    heads = ["sheets", "with a mistake that shows", "named", "other mistakes named", "right drawings accused"]
+    yield "Settling: mistakes named", heads, [_names(title, own) for title, own in groups.items()]
 
 
 def _row(title: str, students: Sequence[Marked]) -> list[str]:
@@ -155,6 +168,17 @@ def _row(title: str, students: Sequence[Marked]) -> list[str]:
         _percent(len(verdicts) - len(settled), len(verdicts)),
         f"{wrong[True]} of {len(settled)}", f"{wrong[False]} of {len(settled)}",
         f"{losing} of {len(right)}", str(sum(not one.was_read for one in students)),
+    ]  # fmt: skip
+
+
+def _names(title: str, students: Sequence[Marked]) -> list[str]:
+    results = [one.result for one in students if one.result is not None]
+    shown = [one for one in results if one.first is not None]
+    accused = [bool(one.mistakes) for one in results if not one.made]
+    others = sum(len(one.not_made) for one in results if one.made)
+    return [
+        title, str(len(shown)), str(sum(one.named for one in shown)), str(others),
+        f"{sum(accused)} of {len(accused)}",
     ]  # fmt: skip
 
 
@@ -180,9 +204,11 @@ def _marked_seed(kept: Path | None, task: tuple[str, int]) -> list[Marked]:
     return [marked(read) for read in read_works(kind, [seed], kept)]
 
 
-def measure(students: int, kinds: Sequence[str], kept: Path | None, jobs: int) -> list[Marked]:
+def measure(
+    students: int, kinds: Sequence[str], kept: Path | None, jobs: int, first_seed: int = FIRST_SEED
+) -> list[Marked]:
     """Read and judge students of each kind, in several processes."""
-    tasks = [(kind, seed) for seed in range(FIRST_SEED, FIRST_SEED + students) for kind in kinds]
+    tasks = [(kind, seed) for seed in range(first_seed, first_seed + students) for kind in kinds]
     with ProcessPoolExecutor(jobs) as pool:
         found = pool.map(partial(_marked_seed, kept), tasks, chunksize=4)
         return [one for some in found for one in some]
@@ -195,8 +221,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--kinds", nargs="+", default=list(SHEET_KINDS), choices=list(SHEET_KINDS))
     parser.add_argument("--kept", type=Path, help="folder in which readings are kept")
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--seed", type=int, default=FIRST_SEED)
+    parser.add_argument("--failures", action="store_true", help="list sheets with a wrong verdict or name")
     chosen = parser.parse_args(arguments)
-    print(as_text(tables(measure(chosen.students, chosen.kinds, chosen.kept, chosen.jobs))))
+    students = measure(chosen.students, chosen.kinds, chosen.kept, chosen.jobs, chosen.seed)
+    print(as_text(tables(students)))
+    for one in students if chosen.failures else ():
+        if one.result is not None and not one.result.is_clean:
+            print(one.result)
 
 
 if __name__ == "__main__":

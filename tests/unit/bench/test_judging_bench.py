@@ -9,6 +9,7 @@ from grader.authoring.lint import lint
 from grader.comparison.task import task_of
 from grader.marking.mark import judge
 from grader.outcomes import NamedMistake as Named
+from reference.authored.assignment import load_assignment
 from reference.construction.mistakes import Mistake as Operator
 from samples.simulation.hand import draw
 from samples.simulation.hand import task_of as drawing_task
@@ -217,6 +218,18 @@ def test_a_vector_that_is_not_drawn_shows_on_a_sheet_and_not_among_measurements(
     assert found["v_D"] == "absent"
     assert made[0].visible
     assert not due(work, "lengths")[1][0].visible
+
+
+def test_a_force_drawn_the_wrong_way_is_wrong_itself_and_what_closes_its_polygon_follows():
+    task = task_of(*assignment_named("press-forces"), load_assignment("press-forces").variant(None, 4))
+    occasion = Occasion(task.assignment, task.variant, drawn("press-forces", position=4).task.right)
+    mistake = next(one for one in possible("force_reversed", occasion) if one.at == "F_D")
+    work = drawn("press-forces", mistake, position=4)
+    assert work.changed_by(mistake) == {task.construction.vectors["F_D"].head}
+    found, made, _ = due(work)
+    assert group(found, "wrong") == {"F_D"}
+    assert {"R_0D", "R_24", "R_13", "R_01"} <= group(found, "follows")
+    assert [one.visible for one in made] == [True]
 
 
 def test_what_a_hand_misses_by_itself_is_neither_right_nor_wrong():

@@ -20,7 +20,7 @@ def test_sheets_are_counted_as_they_are():
         student(OPEN, of_another=True),
     ]  # fmt: skip
     assert [one.is_finished for one in students] == [True, False, True, False, False]
-    (_, heads, rows), (_, _, shares) = tables(students)
+    (_, heads, rows), (_, _, shares), _ = tables(students)
     row = dict(zip(heads, rows[0], strict=True))
     assert row["students"] == "5"
     assert row["finished"] == "50.0 %"

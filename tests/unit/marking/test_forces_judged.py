@@ -2,18 +2,22 @@
 
 import cmath
 import math
+from dataclasses import replace
 
 import pytest
 
 from grader.comparison.criteria import compare
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
-from grader.records import Reading
+from grader.marking.mark import judge
+from grader.records import Figure, Reading, Reason, Unread
 from grader.rubric import rubric_of
 from grader.tables.measurements import columns_of, measurements_in, names_of
 from reference.authored.assignment import Variant, library, load_assignment
+from reference.construction.mistakes import Mistake
 from reference.errors import AuthoredFileError
 from reference.numbers import cross
+from tests.hands import changed, rule_scales, sheet, task_for, without
 from tests.told import tells
 
 LOADED = """
@@ -238,3 +242,75 @@ def test_accelerations_that_no_page_shows_are_a_fault(forces, name, told, words)
 
 PAGE = '[[page]]\nkind = "velocity"\nfigures = ["velocity_plan"]\n'
 VELOCITIES = HEAD + '[[criterion]]\nid = "v"\ntitle = { en = "x" }\npoints = 1\nvector = "v_B"\n'
+
+
+# On scans ------------------------------------------------------------------------------------------
+
+PUMP, PRESS = task_for("pump-forces", 7), task_for("press-forces", position=4)
+UNSURE, CAPPED = 0.5, 0.8
+
+
+def on_scan(task, reading, *blank):
+    """The verdicts on a sheet that was read; no ink lies along the vectors `blank`."""
+    gaps = tuple(Unread(name, Reason("not_found", {"name": name}), is_blank=True) for name in blank)
+    told = Reading(without(reading, *blank).figures, gaps)
+    return verdicts({one.name: one for one in judge(task, Submission(readings=(told,))).outcomes})
+
+
+def test_a_force_that_may_be_laid_off_the_wrong_way_waits_where_its_polygon_was_read_in_doubt():
+    read = changed(sheet(PUMP), "F_D", confidence=UNSURE)
+    assert on_scan(PUMP, read)["F_D"] == "full"
+    for name in read.figures["force_plan_D"].vectors:
+        read = changed(read, name, confidence=UNSURE)
+    found = on_scan(PUMP, read)
+    assert (found["F_D"], found["F_iD"], found["R_0D"]) == ("review", "review", "full")
+
+
+def test_a_sum_that_is_not_drawn_out_waits():
+    found = on_scan(PRESS, sheet(PRESS), "R_02", "F_i2")
+    assert (found["R_02"], found["F_i2"]) == ("review", "none")
+
+
+def test_the_start_of_a_polygon_is_not_known_unless_it_was_read():
+    read = sheet(PRESS)
+    plan = read.figures["force_plan_D"]
+    assert PRESS.construction.vectors["F_iD"].tail == PRESS.construction.poles["force_plan_D"]
+    assert on_scan(PRESS, read, "F_iD")["F_iD"] == "none"
+    start = PRESS.construction.vectors["F_iD"].tail
+    nodes = {**plan.nodes, start: replace(plan.nodes[start], confidence=UNSURE)}
+    unsure = replace(read, figures={**read.figures, "force_plan_D": Figure(nodes, plan.vectors)})
+    assert on_scan(PRESS, unsure, "F_iD")["F_iD"] == "review"
+
+
+def test_a_force_that_is_too_long_beside_one_that_was_not_read_waits():
+    read = sheet(PRESS)
+    length = read.figures["force_plan_D"].vectors["F_D"].length_mm
+    longer = changed(read, "F_D", length_mm=1.2 * length)
+    assert on_scan(PRESS, longer)["F_D"] in {"none", "partial"}
+    assert on_scan(PRESS, without(longer, "F_iD"))["F_D"] == "review"
+
+
+def test_a_reaction_whose_source_was_not_read_is_not_charged():
+    both = sheet(PUMP)
+    length = both.figures["force_plan_B"].vectors["R_43"].length_mm
+    longer = changed(both, "R_43", length_mm=1.2 * length)
+    alone = Reading({name: one for name, one in longer.figures.items() if name != "force_plan_D"})
+    assert on_scan(PUMP, longer)["R_43"] in {"none", "partial"}
+    assert on_scan(PUMP, alone)["R_43"] == "review"
+
+
+def test_a_force_is_not_known_to_be_missing_where_it_was_read_so_in_doubt():
+    head = PUMP.construction.vectors["F_i2"].head
+    read = sheet(PUMP, mistakes=(Mistake("force_missing", head),))
+    assert on_scan(PUMP, read)["F_i2"] == "none"
+    assert on_scan(PUMP, changed(read, "F_i2", confidence=CAPPED))["F_i2"] == "review"
+
+
+def test_a_doubtful_force_shows_no_scale_where_the_length_in_its_cells_is_another():
+    scales = rule_scales(PUMP)
+    read = changed(sheet(PUMP, {**scales, "kF": 1.6 * scales["kF"]}), "F_D", confidence=UNSURE)
+    declared = {"kF": f"{scales['kF']:g} N/mm"}
+    written = replace(read, lengths={"F_D": (abs(PUMP.real["F_D"]) / scales["kF"], 0.99)})
+    judged = [judge(PUMP, Submission(readings=(one,), declared=declared)) for one in (read, written)]
+    found = [one.verdict for judgement in judged for one in judgement.outcomes if one.name == "kF"]
+    assert found == ["none", "review"]
