@@ -161,7 +161,10 @@ class FollowThrough:
             for one in self.from_vectors(segment, self.followed):
                 yield replace(one, causes=others)
         for heads, other in self.entered_otherwise(segment.head, wrong):
-            yield replace(other.from_nodes(segment, self.followed), causes=others | heads)
+            basis = other.own_forces(segment.head, wrong)
+            made, causes = other.from_nodes(segment, self.followed, basis), others | heads
+            for one in (made, *other.joined(segment, wrong)):
+                yield replace(one, causes=causes | basis.wrong if basis else causes)
 
     @property
     def wrong_scales(self) -> frozenset[str]:
@@ -263,25 +266,32 @@ class FollowThrough:
     def entered_otherwise(
         self, at: str, wrong: frozenset[str]
     ) -> Iterator[tuple[frozenset[str], "FollowThrough"]]:
-        """Yield what follows if wrong forces are wrong in their entry alone, with the nodes where they end.
+        """Yield what follows if wrong vectors are wrong in their entry alone, with the nodes where they end.
 
-        One was drawn as it is due; one or two point the other way.
+        One or two point the other way; a force that acts was drawn as it is due.
         """
-        measured, segments = self.evidence.measured, self.task.segments
-        forces = {} if self.evidence.has_sheets else self._wrong_forces(at, wrong)
-        drawn = {name: one for name in forces if (one := measured.get(name)) and one.as_complex}
+        if self.evidence.has_sheets:
+            return
+        construction, measured = self.task.construction, self.evidence.measured
+        forces = self._wrong_forces(at, wrong)
+        steps = map(construction.step, (construction.sources(at) & wrong) - {at})
+        laid = forces | {laid_off(step, construction): step for step in steps if isinstance(step, Given)}
         turned, due = dict[str, DrawnVector](), dict[str, DrawnVector]()
-        for name, one in drawn.items():
-            right = segments[name].drawn(self.followed)
-            turned[name] = replace(one, direction_rad=(one.direction_rad or 0.0) + math.pi)
-            due[name] = replace(one, length_mm=abs(right), direction_rad=cmath.phase(right))
-        ways = [{name: each[name]} for name in drawn for each in (turned, due)]
-        ways += [{one: turned[one], other: turned[other]} for one, other in combinations(drawn, 2)]
+        for name in laid:
+            one = measured.get(name)
+            if one is None or one.direction_rad is None:
+                continue
+            right = self.task.segments[name].drawn(self.followed)
+            turned[name] = replace(one, direction_rad=one.direction_rad + math.pi)
+            if name in forces:
+                due[name] = replace(one, length_mm=abs(right), direction_rad=cmath.phase(right))
+        ways = [{name: each[name]} for each in (turned, due) for name in each]
+        ways += [{one: turned[one], other: turned[other]} for one, other in combinations(turned, 2)]
         for entries in ways:
             evidence = replace(self.evidence, measured={**measured, **entries})
             make = partial(replace, self, evidence=evidence, cache={})
             other = self._cached(("entered", *entries.items()), make)
-            yield frozenset(forces[name].node for name in entries), other
+            yield frozenset(laid[name].node for name in entries), other
 
     def _own_force(self, vector: Vector, step: Given) -> dict[str, FloatArray]:
         """The data by which a force is what the student has drawn; zero for one that was not."""
@@ -304,8 +314,7 @@ class FollowThrough:
 
         Arguments: with `as_laid_off` it is of the forces as the student laid them off in the last plan.
         """
-        moment, construction = self.task.construction.moments[name], self.task.construction
-        relies_on = frozenset[str]().union(*map(construction.upstream, moment.needs))
+        moment, relies_on = self.task.construction.moments[name], self.task.construction.sources(name)
         if as_laid_off:
             moment, relies_on = self._as_laid_off(moment)
         one = self._evaluated(lambda view: moment.at(view) / per_mm, moment.needs, relies_on, basis)
@@ -445,9 +454,7 @@ class FollowThrough:
     def between_own_nodes(self, segment: TaskSegment) -> Expectation | None:
         """The vector between the student's own nodes, for one that joins what other vectors have made."""
         construction, own = self.task.construction, self.own(self.followed)
-        step = construction.step(segment.head)
-        line = line_of(construction.vectors[segment.name], construction)
-        if line and not (isinstance(step, Given) and laid_off(step, construction) != segment.name):
+        if not self._joins(segment):
             return None
         nodes = {name: node for figure in construction.poles for name, node in own.get(figure, {}).items()}
         nodes |= {pole: OwnNode(0j) for pole in construction.poles.values()}
@@ -456,6 +463,13 @@ class FollowThrough:
         vector = nodes[segment.head].at - nodes[segment.tail].at
         made = self.from_nodes(segment, self.followed)
         return replace(made, vector=vector, causes=frozenset({segment.head}))
+
+    def _joins(self, segment: TaskSegment) -> bool:
+        """Return whether a vector joins nodes that other vectors have made."""
+        construction, step = self.task.construction, self.task.construction.step(segment.head)
+        if isinstance(step, Given):
+            return laid_off(step, construction) != segment.name
+        return line_of(construction.vectors[segment.name], construction) is None
 
     def causes_at(self, node: str, *, only_sense: bool = False) -> frozenset[str]:
         """The causes of an own node's position beside the student's own earlier nodes.
@@ -576,7 +590,7 @@ class FollowThrough:
         Arguments: at `wrong` nodes a vector may have been left out.
         """
         construction, hand = self.task.construction, self.task.rubric.hand
-        if self.evidence.has_sheets or line_of(construction.vectors[segment.name], construction):
+        if self.evidence.has_sheets or not self._joins(segment):
             return
         own = [
             (one, drawn.as_complex if drawn else 0j if one.head in wrong else None)

@@ -130,7 +130,7 @@ def _evidence_of(
         if task.yardstick is None or evidence.yardstick_mm is None or evidence.yardstick_mm[0] <= 0.0:
             return None
         return (task.yardstick.length_m, *evidence.yardstick_mm)
-    vector = task.driving_vector(name)
+    vector = _telling(task, evidence, name)
     drawn = evidence.vector(vector)
     if drawn is None or drawn.length_mm <= 0.0 or not task.real.get(vector):
         return None
@@ -142,6 +142,24 @@ def _evidence_of(
         return None  # the length in its cells is another
     # Where others that were surely read are right at its scale, it was read rightly.
     return shown if _fitting(task, evidence, name, shown[0] / shown[1], least) >= TELLING else None
+
+
+def _telling(task: Task, evidence: Evidence, name: str) -> str:
+    """Return the vector that shows a scale other than that of lengths: of those by the data the largest.
+
+    Where that is drawn at another scale than most of them, it is the largest of these.
+    """
+    largest = task.driving_vector(name)
+    sizes = {one: abs(task.real[one]) for one in task.vectors_by_data(name) if task.real.get(one)}
+    least = task.rubric.least_confidence
+    drawn = {one: own for one in sizes if (own := evidence.vector(one)) and own.confidence >= least}
+
+    def alike(one: str) -> int:
+        per_size = drawn[one].length_mm / sizes[one]
+        expected = {other: per_size * sizes[other] for other in drawn}
+        return sum(_fits(drawn[each], mm, task.rubric.tolerance_of(each)) for each, mm in expected.items())
+
+    return max(drawn, key=lambda one: (alike(one), one == largest, sizes[one]), default=largest)
 
 
 def _contradiction(task: Task, evidence: Evidence, name: str, used: float) -> float | None:
@@ -167,9 +185,9 @@ def _fitting(
 
     Arguments: with `data` only those that are laid off from the data.
     """
-    known = task.parameters if data else task.real
+    known, shown_by = task.parameters if data else task.real, _telling(task, evidence, name)
     vectors = [v for v in task.construction.vectors.values() if v.scale == name and v.name in known]
-    drawn_as = [(v.name, evidence.vector(v.name)) for v in vectors if v.name != task.driving_vector(name)]
+    drawn_as = [(v.name, evidence.vector(v.name)) for v in vectors if v.name != shown_by]
     return sum(
         _fits(drawn, abs(task.real[vector]) / scale, task.rubric.tolerance_of(vector))
         for vector, drawn in drawn_as
@@ -235,7 +253,7 @@ def _unseen(
 
     Arguments: `doubtful` is what shows it as read, where that contradicts it.
     """
-    unread = Reason("unread", {"why": "scale_vector_unsure", "vector": task.driving_vector(name)})
+    unread = Reason("unread", {"why": "scale_vector_unsure", "vector": _telling(task, evidence, name)})
     other = None if doubtful is None else doubtful[0] / doubtful[1]
     off = 0.0 if other is None else _is_off(task, evidence, name, scale.used, other)
     if other is None or off < EVEN:
@@ -254,7 +272,7 @@ def _is_off(task: Task, evidence: Evidence, name: str, declared: float, other: f
 
     Else that vector was misread; the other vectors of the plan fit one or the other.
     """
-    drawn = evidence.vector(task.driving_vector(name))
+    drawn = evidence.vector(_telling(task, evidence, name))
     confidence = 0.0 if drawn is None else drawn.confidence
     more = _fitting(task, evidence, name, other) - _fitting(task, evidence, name, declared)
     is_other, is_misread = WRONG_SCALE * confidence, FITS_BY_CHANCE**more * (1.0 - confidence)
@@ -302,7 +320,7 @@ def _is_confirmed(
 def _allowed_mm(task: Task, evidence: Evidence, name: str, expected_mm: float) -> float:
     """The tolerance (mm) of the length that shows a scale, widened by its propagated drafting error."""
     table, hand = task.rubric.tolerance_of(name), task.rubric.hand
-    plain, ends = table.length_at(expected_mm), _ends(task, name)
+    plain, ends = table.length_at(expected_mm), _ends(task, evidence, name)
     drawn = task.traced(task.rule_scales)
     uncertainty = hand.sigmas * spread(drawn.shifts(*ends), drawn.vector(*ends)).along
     if not evidence.has_sheets:
@@ -310,12 +328,12 @@ def _allowed_mm(task: Task, evidence: Evidence, name: str, expected_mm: float) -
     return max(plain, min(uncertainty, hand.at_most * plain))
 
 
-def _ends(task: Task, name: str) -> tuple[str, str]:
+def _ends(task: Task, evidence: Evidence, name: str) -> tuple[str, str]:
     """Tail and head of what shows a scale; there must be evidence of it."""
     if name == "kL":
         yardstick = cast("Yardstick", task.yardstick)
         return yardstick.tail, yardstick.head
-    vector = task.construction.vectors[task.driving_vector(name)]
+    vector = task.construction.vectors[_telling(task, evidence, name)]
     return vector.tail, vector.head
 
 

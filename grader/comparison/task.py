@@ -1,7 +1,7 @@
 """The task of one variant: its exact plan, its construction, and the rubric."""
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
 from typing import TypeVar, cast
@@ -99,20 +99,26 @@ class Task:
     def driving_vector(self, name: str) -> str:
         """The vector by the data of the kind of a vector or scale: it shows the scale and the turn.
 
-        It is the driving link's; of forces, which have none, the largest given one of the vector's plan: of
-        those that do not follow from accelerations as drawn, and that are asked for, if there are any.
+        It is the driving link's; of forces, which have none, the largest of `vectors_by_data`.
+        """
+        return max(self.vectors_by_data(name), key=lambda one: abs(self.real.get(one, 0.0)), default=name)
+
+    def vectors_by_data(self, name: str) -> Sequence[str]:
+        """The vectors by the data of the kind of a scale, or of that of a vector in its plan.
+
+        That is the driving link's alone; of forces, those that do not follow from accelerations as drawn, and
+        that are asked for, if there are any.
         """
         kind, vectors, figure = kind_of(name), self.construction.vectors, self.construction.figure_of
         if kind.omegas is not None:
-            return f"{kind.letter}_{self.pin}"
+            return (f"{kind.letter}_{self.pin}",)
         given = [one for one in vectors.values() if one.scale == kind.scale and one.name in self.parameters]
         if name in vectors:
             given = [one for one in given if figure(one.head) == figure(vectors[name].head)]
         lengths = {step.node: getattr(step, "length", None) for step in self.construction.steps}
         given = [one for one in given if not isinstance(lengths[one.head], Inertia)] or given
-        asked = [one for one in given if one.name in self.rubric.vectors] or given
-        largest = max(asked, key=lambda one: abs(self.real[one.name]), default=None)
-        return name if largest is None else largest.name
+        names = [one.name for one in given]
+        return [one for one in names if one in self.rubric.vectors] or names
 
     def tolerance_at(self, node: str) -> ToleranceTable:
         """The tolerance of a node's position: that of the vector or link asked for that ends there.

@@ -16,13 +16,15 @@ import numpy as np
 
 from grader.records import MECHANISM
 from reference.construction.elements import Fixed, Nodes, Scaled, data_in, is_force
-from reference.construction.graph import evaluate
+from reference.construction.graph import Construction, evaluate
 from reference.construction.mistakes import (
+    OF_FORCES,
     RIGHT_TRIANGLE,
     SLIP,
     Drawing,
     Mistake,
     commit,
+    made_at,
     mistakes_of_forces,
 )
 from reference.construction.steps import Given
@@ -104,8 +106,7 @@ def explained(case: Case) -> tuple[Replay, ...]:
         explanations = _searched_further(case, roots, explanations)
     elif _may_be_assembled_otherwise(explanations, case):
         explanations = _by_cost(explanations, _replayed(case, roots, [explanations[0].care]))
-    # Made twice, a mistake undoes itself: such an explanation only fits by chance.
-    explanations = [one for one in explanations if len({*map(key_of, one.made)}) == len(one.made)]
+    explanations = [one for one in explanations if not _is_by_chance(one, case.drawing.construction)]
     explanations = with_nothing(explanations, case.drawing.construction, case.observations)
     has_directions = any(one.has_direction for one in case.observations.entries)
     doubt = BEYOND_DOUBT if has_directions else BEYOND_DOUBT_BY_LENGTHS
@@ -124,18 +125,24 @@ def _searched_further(case: Case, scales: Sequence[Root], explanations: Sequence
     best, construction = explanations[0], case.drawing.construction
     off = {*best.unexplained, *(one.at for one in best.made)} & {one.node for one in construction.steps}
     is_of_forces = best.care > USUAL or any(group_of(construction.figure_of(node)) for node in off)
-    whole = [Root(), *(_of_forces(case) if is_of_forces else ())]
+    acting = [*_of_forces(case)] if is_of_forces else []
+    whole = [Root(), *acting]
     scales = [*scales, *_scales_of_the_driver(case, best)]
     if not _is_explained(best) or not all(one.has_direction for one in case.observations.entries):
         whole += _of_the_whole(case)
     by_scale = [[_both(scale, one) for one in whole] for scale in scales]
     roots = [one for some in by_scale for one in some]
-    own = [*_own_forces(case)] if is_of_forces else []
+    own = [*_own_forces(case, Root())] if is_of_forces else []
     by_scale += [own] if own else []
     roots += own
     cares = sorted({best.care, min(best.care, USUAL)})
     # Apart, as a search drops what costs much before anything is observed.
     found = _by_cost(*(_replayed(case, some, cares) for some in by_scale)) or [*explanations]
+    if acting and not _is_explained(found[0]):
+        # Beside what explains most of it, a further mistake in what acts.
+        start = _root_of(found[0], roots)
+        further = [_both(start, one) for one in (*acting, *_own_forces(case, start))]
+        found, roots = _by_cost(found, _replayed(case, further, cares)), roots + further
     swaps = [*_swaps(case, found[0])]
     found = _by_cost(found, *(_replayed(case, scales, cares, swap) for swap in swaps))
     scale = _scale_of_slips(case, found[0])
@@ -206,12 +213,10 @@ def _with_a_guess(
 
     Both together cost so much before anything is observed that a search from all roots drops them.
     """
-    keys = {key_of(one) for one in best.made}
+    keys, root = {key_of(one) for one in best.made}, _root_of(best, roots)
     swap = next((one for one in swaps if key_of(one) in keys), None)
-    beside = [root for root in roots if root.made and keys >= {key_of(one) for one in root.made}]
-    if (swap is None and not beside) or (len(best.made) == 1 and not best.unexplained):
+    if (swap is None and not root.made) or (len(best.made) == 1 and not best.unexplained):
         return []
-    root = max(beside, key=lambda one: len(one.made), default=Root())
     observations = case.observations
     if swap is not None:
         root = _both(root, Root((swap,), cost=RARITY[swap.code]))
@@ -239,6 +244,13 @@ def _with_another_guess(
     start = next(root for root in roots if {id(one) for one in root.made} == kept)
     guessed = Root(tuple(first), cost=sum(RARITY[one.code] for one in first))
     return replay(drawing, case.observations, [_both(start, guessed)], case.skill, cares=cares, blind=True)
+
+
+def _root_of(best: Replay, roots: Sequence[Root]) -> Root:
+    """The root with the most mistakes of an explanation and no others."""
+    keys = {key_of(one) for one in best.made}
+    beside = [root for root in roots if root.made and keys >= {key_of(one) for one in root.made}]
+    return max(beside, key=lambda one: len(one.made), default=Root())
 
 
 def _both(one: Root, other: Root) -> Root:
@@ -284,6 +296,15 @@ def _is_clear(explanations: Sequence[Replay], case: Case) -> bool:
         # What acts on a link may be wrong, and with it all that is computed from that.
         return False
     return step is not None and places.issuperset({step.node, *step.needs} - joints)
+
+
+def _is_by_chance(explanation: Replay, construction: Construction) -> bool:
+    """Return whether a mistake was made twice, which undoes it, or two in what makes one vector."""
+    made = explanation.made
+    acting = [node for one in made if one.code in OF_FORCES for node in made_at(one, construction)]
+    others = {one.at for one in made if one.code not in OF_FORCES}
+    is_twice = len({*acting}) < len(acting) or not others.isdisjoint(acting)
+    return is_twice or len({*map(key_of, made)}) < len(made)
 
 
 def _may_be_assembled_otherwise(explanations: Sequence[Replay], case: Case) -> bool:
@@ -359,16 +380,17 @@ def _of_forces(case: Case) -> Iterator[Root]:
         yield Root((mistake,), mistake.parameters, cost=cost)
 
 
-def _own_forces(case: Case) -> Iterator[Root]:
-    """Roots with a force as it was drawn: by a slip in its size, or in an unknown way."""
-    known, drawn = case.drawing.parameters, {one.node: one for one in case.observations.entries}
+def _own_forces(case: Case, start: Root) -> Iterator[Root]:
+    """Roots with a force as it was drawn, beside other mistakes: by a slip, or in an unknown way."""
+    known = {**case.drawing.parameters, **start.parameters}
+    drawn = {one.node: one for one in case.observations.entries}
     nodes = evaluate(case.drawing.construction, known) if drawn else {}
     for step in case.drawing.construction.steps:
         if not isinstance(step, Given) or not is_force(step.length) or step.node not in drawn:
             continue
-        start, one = drawn.get(step.start), drawn[step.node]
+        tail, one = drawn.get(step.start), drawn[step.node]
         right = complex(np.ravel(nodes[step.node] - nodes[step.start])[0])
-        value = one.value if start is None or one.tail is not None else one.value - start.value
+        value = one.value if tail is None or one.tail is not None else one.value - tail.value
         share = value / right if right and one.has_direction else 1.0
         if not LEAST_FACTOR < abs(share) < MOST_FACTOR or abs(share - 1.0) < LEAST_WRONG:
             continue

@@ -227,7 +227,7 @@ def _explanations(task: Task, comparison: Comparison, owner: Owner | None) -> tu
     if (by_vector or is_other_scale) and not is_of_two:
         explanation = comparison.explanation or explain(task, comparison.evidence, scales, owner=owner)
         explanations = explanation.explanations
-    right = {one.name for one in comparison.outcomes if one.verdict == "full" and one.name in vectors}
+    right = {one.name for one in comparison.outcomes if one.verdict in CREDITED and one.name in vectors}
     return explanations, Lost(by_vector, by_scale, task.gear_ratio, frozenset(right))
 
 

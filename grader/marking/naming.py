@@ -73,15 +73,15 @@ SUSPICIOUS, GROSS = 2.0, 3.0
 slight to be named. (Below the first the mistake shows elsewhere.)"""
 
 
-OF_MOMENTS = OF_FORCES | {"wrong_arm"}
-"""Mistakes in moments, or in what acts on a link."""
+OF_MOMENTS = OF_FORCES | {"wrong_arm", SLIP}
+"""Mistakes in moments, or in what acts on a link, and in any other computing."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lost:
     """The criteria that lost points, or may lose some, by vector, link and scale; and the crank's gear.
 
-    `right`: the vectors that are right by the exact plan.
+    `right`: the vectors that are right by the exact plan, or by earlier work.
     """
 
     vectors: Mapping[str, str]

@@ -275,16 +275,19 @@ class Construction:
 
     def data_of(self, name: str) -> frozenset[str]:
         """Return the names of the data of forces and couples from which a node or a moment is made."""
-        moments = self.moments.get(name)
-        needs = (name,) if moments is None else moments.needs
-        nodes = frozenset[str]().union(*map(self.upstream, needs))
-        lengths = [step.length for step in map(self.step, nodes) if isinstance(step, Given)]
+        moments, steps = self.moments.get(name), map(self.step, self.sources(name))
+        lengths = [step.length for step in steps if isinstance(step, Given)]
         parts: list[Length | Moments] = [*lengths, *((moments,) if moments else ())]
         return frozenset[str]().union(*map(data_in, parts))
 
     def upstream(self, node: str) -> frozenset[str]:
         """Return a node and all nodes that it is made from. Raises KeyError for an unknown node."""
         return self._upstream[node]
+
+    def sources(self, name: str) -> frozenset[str]:
+        """Return the nodes from which a node or a moment is made, with the node itself."""
+        moments = self.moments.get(name)
+        return frozenset[str]().union(*map(self.upstream, (name,) if moments is None else moments.needs))
 
     def vectors_of(self, figure: str) -> tuple[Vector, ...]:
         """Return the vectors of one plan."""

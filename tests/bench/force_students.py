@@ -222,6 +222,7 @@ class StudentForces:
         self.acting: dict[str, list[Acting]] = {}
         self.couples: dict[str, list[tuple[float, float]]] = {}
         self.known = set(plan.construction.vectors)
+        self.exactly = {name: complex(plan.drawn_mm(name)[0]) for name in plan.construction.vectors}
         made = self.mistake or ForceMistake("", "")
         if made.kind == "scale":
             self.kf *= made.factor

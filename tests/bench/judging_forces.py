@@ -1,8 +1,9 @@
 """Measure judging of entered force sheets: simulated students of `tests.bench.force_students`.
 
 A verdict is clear where the truth is: a vector within its tolerance of what its right step gives must be
-credited, one in which the mistake was made must be charged if it is off by more than 2.5 tolerances (of
-several such vectors of one mistake, one charge is enough). All else may be judged either way::
+credited, one in which the mistake was made must be charged if it is off that, and the exact vector, by more
+than 2.5 tolerances (of several such vectors of one mistake, one charge is enough). All else may be judged
+either way::
 
     python -m tests.bench.judging_forces --students 20
 """
@@ -59,9 +60,9 @@ class Tally:
     false: list[str] = field(default_factory=list)
 
 
-def tolerances_off(student: StudentForces, name: str) -> float:
-    """Return by how many tolerances an entry is off what its right step gives."""
-    due, (length, turn) = student.due[name], student.entered[name]
+def tolerances_off(student: StudentForces, name: str, due: complex | None = None) -> float:
+    """Return by how many tolerances an entry is off what its right step gives, or off another vector."""
+    due, (length, turn) = due or student.due[name], student.entered[name]
     size = abs(due)
     off = abs(length - size) / max(1.0, 0.02 * size)
     if size >= 3.0 and length >= 3.0:
@@ -73,7 +74,11 @@ def tolerances_off(student: StudentForces, name: str) -> float:
 def count(tally: Tally, label: str, student: StudentForces, judgement: Judgement) -> None:
     """Add one sheet."""
     said = {one.name: one.verdict for one in judgement.outcomes}
-    wrong = {name for name in student.wrong if name in student.due and tolerances_off(student, name) > CLEAR}
+    wrong = {
+        name
+        for name in student.wrong & student.due.keys()
+        if tolerances_off(student, name) > CLEAR < tolerances_off(student, name, student.exactly[name])
+    }
     wrong |= student.wrong & {"M_b", "kF"}
     charged = {name for name in wrong if said[name] in CHARGED}
     if wrong:

@@ -1,5 +1,6 @@
 """Entered force sheets: one mistake costs one criterion, what follows is credited, and it is named."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -156,6 +157,7 @@ def test_the_bench_judges_right_sheets_right():
     ("name", "seed", "kinds", "made"),
     [
         pytest.param("press", 98101, "others", ("entry", "G_3"), id="a moment after a wrong entry"),
+        pytest.param("press", 98404, "known", ("missing", "F_D"), id="a reaction beside the one it equals"),
         pytest.param("pump", 98052, "known", ("missing", "F_i"), id="a reaction that closes a triangle"),
         pytest.param("pump", 98101, "known", ("reversed", "F_i"), id="what follows is too short to judge"),
     ],
@@ -170,6 +172,21 @@ def test_what_was_drawn_rightly_after_a_mistake_is_not_charged(name, seed, kinds
     count(tally, *found, judge(task_of(task, rubric, found[1].variant), found[1].submission))
     assert tally.clear > 10
     assert tally.wrong == []
+
+
+@pytest.mark.parametrize(
+    ("seed", "made"),
+    [
+        (98415, ForceMistake("scale", "kF", factor=1.25)),
+        (98416, ForceMistake("line", "R_0D", turn_deg=90.0)),
+    ],
+    ids=str,
+)
+def test_no_computing_is_called_wrong_where_its_vector_is_credited(seed, made):
+    task, rubric = force_task("press")
+    (student,) = (one for _, one in sheets("press", "typical", seed, "known") if one.mistake == made)
+    judgement = judge(task_of(task, rubric, student.variant), student.submission)
+    assert [one.at for one in judgement.mistakes] == [made.at]
 
 
 def test_a_wrong_entry_of_a_reaction_between_right_ones_is_charged():
@@ -254,6 +271,13 @@ CHARGED_ALONE = {
         | {"R_12": (11.0, 345.0), "R_B2": (36.0, 171.0), "R_21": (12.0, 164.5), "R_01": (12.0, 344.5)},
         {"F_i2", "F_iB", "F_B"},
     ),
+    "F_iB twice as long, and R_12_t entered the other way": (
+        29,
+        {"R_12_t": (6.1, 267.8), "F_i2": (27.3, 344.7), "G_2": (1.8, 273.3), "F_B": (73.6, 179.9)}
+        | {"F_iB": (76.7, 359.8), "G_B": (2.6, 265.1), "R_0B": (5.3, 91.3), "R_12_n": (29.6, 178.3)}
+        | {"R_12": (30.2, 166.2), "R_B2": (3.4, 36.6), "R_21": (29.9, 346.6), "R_01": (30.1, 166.2)},
+        {"F_iB", "R_12_t"},
+    ),
 }
 
 
@@ -284,10 +308,21 @@ def test_an_unknown_mistake_in_one_force_is_neither_another_variant_nor_another_
 
 
 @pytest.mark.parametrize("made", CHARGED_ALONE)
-def test_what_follows_from_a_wrong_force_that_was_entered_the_other_way_is_credited(made, tmp_path):
+def test_what_follows_beside_a_vector_that_was_entered_the_other_way_is_credited(made, tmp_path):
     n, drawn, charged = CHARGED_ALONE[made]
     found = crank(tmp_path, n, drawn)
     assert {one.name for one in found.outcomes if one.verdict in CHARGED} == charged
+
+
+def test_a_couple_of_the_other_sense_is_named_beside_a_wrong_load(tmp_path):
+    drawn = {"R_12_t": (2.4, 76.7), "G_2": (1.9, 273.4), "F_i2": (24.2, 166.3), "F_iB": (26.5, 180.2)}
+    drawn |= {"F_B": (116.4, 0.1), "G_B": (2.2, 273.2), "R_0B": (21.6, 270.6), "R_12_n": (69.5, 165.1)}
+    drawn |= {"R_12": (69.7, 163.5), "R_B2": (93.3, 344.8), "R_21": (69.7, 343.3), "R_01": (69.7, 163.6)}
+    found = crank(tmp_path, 13, drawn)
+    assert {(one.code, one.at) for one in found.mistakes} == {
+        ("arithmetic", "F_B"),
+        ("couple_reversed", "M_i2"),
+    }
 
 
 def test_a_moment_waits_while_a_force_from_which_it_follows_cannot_be_used(tmp_path):
@@ -307,6 +342,14 @@ def test_a_force_taken_over_from_a_plan_at_another_scale_is_credited(name, joint
         student.entered[one.name] = 2.0 * length, turn
     said = {one.name: one.verdict for one in judge(task, student.submission).outcomes}
     assert (said["kF"], said["R_43"]) == (scale, "follow_through")
+
+
+@pytest.mark.parametrize(("declared", "charged"), [(50, {"F_D"}), (100, {"F_D", "kF"})])
+def test_a_scale_is_shown_by_most_given_forces_and_not_by_a_wrong_one(declared, charged):
+    student, _ = pump(ForceMistake("slip", "F_D", factor=2.0))
+    entered = replace(student.submission, declared={"kF": f"{declared} N/mm"})
+    judgement = judge(task_of(*force_task("pump"), student.variant), entered)
+    assert {one.name for one in judgement.outcomes if one.verdict in CHARGED} == charged
 
 
 def test_of_two_vectors_that_end_where_a_force_was_laid_off_only_that_force_is_blamed():

@@ -308,7 +308,9 @@ def test_a_force_is_not_known_to_be_missing_where_it_was_read_so_in_doubt():
 
 def test_a_doubtful_force_shows_no_scale_where_the_length_in_its_cells_is_another():
     scales = rule_scales(PUMP)
-    read = changed(sheet(PUMP, {**scales, "kF": 1.6 * scales["kF"]}), "F_D", confidence=UNSURE)
+    read = sheet(PUMP, {**scales, "kF": 1.6 * scales["kF"]})
+    for name in PUMP.vectors_by_data("kF"):
+        read = changed(read, name, confidence=UNSURE)
     declared = {"kF": f"{scales['kF']:g} N/mm"}
     written = replace(read, lengths={"F_D": (abs(PUMP.real["F_D"]) / scales["kF"], 0.99)})
     judged = [judge(PUMP, Submission(readings=(one,), declared=declared)) for one in (read, written)]
