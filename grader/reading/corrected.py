@@ -11,7 +11,7 @@ from grader.reading.lines import Lines, lines_of
 from grader.reading.matching import StrokeAssignment
 from grader.reading.nodes import LINK_ENDS, PLAN_ENDS, fit_nodes
 from grader.reading.orders import corners_of, ends_on_sheet, ring_of
-from grader.reading.read import LEAST_VECTOR_MM, NEAR_MM, vector_of
+from grader.reading.vectors import LEAST_VECTOR_MM, NEAR_MM, vector_of
 from grader.records import MECHANISM, Figure, FloatArray, Ink, Reading, ReadNode, ReadVector, ScannedPage
 from reference.construction.graph import Construction
 from reference.geometry import ComplexArray

@@ -160,7 +160,7 @@ class PlanReading:
     Attributes
     ----------
     hypothesis, pose : how it was drawn and where
-    placed : the expectation there before strokes were assigned
+    expected, placed : the expectation about its own pole, and there, before strokes were assigned
     assignment, lines : strokes by vector, and the lines whose rows it names
     score : log likelihood ratio less costs, nats
     rivals : other explanations, best first
@@ -171,6 +171,7 @@ class PlanReading:
 
     hypothesis: PlanHypothesis
     pose: Pose
+    expected: Expected
     placed: Expected
     assignment: StrokeAssignment
     score: float
@@ -476,7 +477,9 @@ def _read(
     for index, best, around in assign_groups(placed, lines, _near, prior, beam, constrain):
         case = cases[index]
         plans.extend(
-            PlanReading(case.hypothesis, case.pose, placed[index], one, one.score - case.cost, around)
+            PlanReading(
+                case.hypothesis, case.pose, case.expected, placed[index], one, one.score - case.cost, around
+            )
             for one in best[:ALTERNATIVES]
             if one.score > best[0].score - NEARLY
         )

@@ -8,7 +8,7 @@ import pytest
 
 from grader.reading.corrected import corrected
 from grader.reading.orders import ends_on_sheet, reordered, ring_of, to_usual
-from grader.reading.read import vector_of
+from grader.reading.vectors import vector_of
 from grader.records import Figure, PageRef, Reading, ReadNode, ScannedPage
 from reference.construction.graph import evaluate
 from reference.plan import exact_plan
@@ -76,11 +76,34 @@ def test_a_polygon_drawn_in_another_order_is_read(order):
 
 
 @pytest.mark.slow
-def test_a_polygon_whose_arrowheads_point_back_is_not_asserted():
-    one = work_with_mistake("shaper", 96404)
+@pytest.mark.parametrize(
+    ("name", "seed"),
+    [("shaper", 96404), ("shaper", 96402), ("press", 96421)],
+    ids=["arrowheads point back", "one line fits two sums", "two opposite forces lie on a letter"],
+)
+def test_what_the_ink_does_not_tell_is_not_asserted(name, seed):
+    one = work_with_mistake(name, seed)
     with tempfile.TemporaryDirectory() as folder:
         pages = read(one, Path(folder))
     assert not any(vector.misread for vector in judged(one, pages))
+
+
+@pytest.mark.slow
+def test_sides_at_an_acute_corner_are_no_arrowheads():
+    one = work("pump", 96321)
+    with tempfile.TemporaryDirectory() as folder:
+        pages = read(one, Path(folder))
+    asserted = [vector.true.name for vector in judged(one, pages) if vector.sure]
+    assert {"R_13_t", "F_i3", "R_43", "F_i2"} <= set(asserted)
+
+
+@pytest.mark.slow
+def test_a_force_is_asserted_where_its_prediction_is_rough_and_a_sum_where_one_part_is_next_to_nothing():
+    one = work("pump", 96706)
+    with tempfile.TemporaryDirectory() as folder:
+        pages = read(one, Path(folder))
+    asserted = [vector.true.name for vector in judged(one, pages) if vector.sure and vector.right]
+    assert {"R_02_n", "R_D4", "R_34"} <= set(asserted)
 
 
 def test_a_corner_is_moved_where_it_lies_on_the_sheet():

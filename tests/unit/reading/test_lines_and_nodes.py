@@ -11,7 +11,7 @@ from grader.reading.expected import DraftingErrors, Edge, Expected, Pose, Slack,
 from grader.reading.lines import Lines, lines_of
 from grader.reading.matching import Beliefs, Constraint, EndPrior, StrokeAssignment, assign_strokes, updated
 from grader.reading.nodes import fit_nodes
-from grader.reading.read import Signs, within
+from grader.reading.vectors import Signs, within
 from grader.records import VELOCITY_PLAN
 from reference.plan import exact_plan
 from tests.bench.force_sheets import task_with_forces

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from grader.reading.read import INKED, ON_IT_PX, read_figures
+from grader.reading.read import read_figures
+from grader.reading.vectors import INKED, ON_IT_PX
 from grader.records import ACCELERATION_PLAN, HEAD_AHEAD, MECHANISM, VELOCITY_PLAN, InkMap, Reading, Tips
 from reference.authored.assignment import Assignment, Variant, built_in, load_assignment
 from reference.construction.elements import View
