@@ -183,9 +183,8 @@ class PlanReading:
 
     @cached_property
     def fit(self) -> NodeFit:
-        """The nodes, by the strokes alone unless they were held against the ink."""
-        prior = self.placed if group_of(self.figure) else None
-        return self.by_ink or fit_nodes(self.assignment, self.lines, prior=prior)
+        """The nodes, by strokes and the construction, which places those whose ends nothing marks."""
+        return self.by_ink or fit_nodes(self.assignment, self.lines, prior=self.placed)
 
     @property
     def figure(self) -> str:

@@ -59,8 +59,8 @@ def test_a_sheet_for_one_position_stays_unmatched_where_the_position_is_open():
 @pytest.mark.parametrize(
     ("page", "said"),
     [
-        ({"grid": [2, 2]}, "no zone for some of the positions"),
-        ({"figures": ["mechanism", "velocity_plan"]}, "one figure, in all positions"),
+        ({"grid": [2, 2]}, "grid_small"),
+        ({"figures": ["mechanism", "velocity_plan"]}, "grid_one_figure"),
     ],
 )
 def test_a_grid_that_cannot_be_printed_is_refused(page, said):
