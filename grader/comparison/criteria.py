@@ -513,21 +513,19 @@ def _rate(charges: Charges, criterion: CriterionTable) -> Outcome:
     if rate is not None and not rate.drives:
         per_mm = following.used[task.segments[rate.vector].scale] / task.lengths_m[name]
     held = HeldValue(task.rubric, criterion, value, per_mm, sense)
-    exact, followed = Expectation(right / held.per_mm), False
+    exact = Expectation(right / held.per_mm)
     right, mark = held.expected(exact), held.against(exact)
     is_drawn = rate is None or not rate.drives
     if not mark.is_full and is_drawn:
         exact = replace(exact, uncertainty=_uncertainty_of(charges, name, per_mm))
         mark = held.against(exact)
     charges.remember(criterion.name, mark)
-    follows = not mark.is_full and is_drawn and task.rubric.follows_through(criterion)
-    for one in _own_turnings(charges, name, value, per_mm) if follows else ():
-        candidate, shown = charges.credited(one, held.against(one))
-        charges.charged |= shown
-        if candidate.is_better(mark):
-            right, followed = one.vector.real * per_mm, True
-            mark = the_better(candidate, mark, *charges.why(one))
-            if mark.is_full and rate and following.is_trivial(task.segments[rate.vector], one.vector):
+    followed = False
+    if not mark.is_full and is_drawn and task.rubric.follows_through(criterion):
+        own, mark = _by_own_drawing(charges, held, name, mark)
+        if own is not None:
+            right, followed = own.vector.real * per_mm, True
+            if mark.is_full and rate and following.is_trivial(task.segments[rate.vector], own.vector):
                 return unjudged(criterion, "not_judged", (Reason("made_trivial"),), expected=Quantity())
     read = charges.evidence.sure
     sure = min(read.get(f"{name}_sense", 1.0), 1.0 if criterion.sense else read.get(name, 1.0))
@@ -548,6 +546,19 @@ def _uncertainty_of(charges: Charges, name: str, per_mm: float) -> EndSpread:
         return following.moment(name, per_mm).uncertainty
     source = task.segments[task.construction.rates[name].vector]
     return following.uncertainty_of(source, source.drawn(following.used))
+
+
+def _by_own_drawing(
+    charges: Charges, held: HeldValue, name: str, mark: MarkRange
+) -> tuple[Expectation | None, MarkRange]:
+    """Return what the student's own drawing gives where that earns more than a mark; and the better mark."""
+    best = None
+    for one in _own_turnings(charges, name, held.value, held.per_mm):
+        candidate, shown = charges.credited(one, held.against(one))
+        charges.charged |= shown
+        if candidate.is_better(mark):
+            best, mark = one, the_better(candidate, mark, *charges.why(one))
+    return best, mark
 
 
 def _own_turnings(charges: Charges, name: str, value: float, per_mm: float) -> Iterator[Expectation]:
