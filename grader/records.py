@@ -315,12 +315,15 @@ class InkMap:
     def share_inked(self, first: complex, last: complex, beside_px: int = BESIDE_PX) -> float:
         """Return the share of a segment's middle part (complex mm) with ink on it or beside it, 0..1."""
         along = np.linspace(0.25, 0.75, max(int(abs(last - first)), 4))
-        at = (first + along * (last - first)) * self.px_per_mm
         beside = 1j * np.exp(1j * np.angle(last - first)) * np.arange(-beside_px, beside_px + 1)
-        places = at[:, None] + beside
-        rows = np.clip(np.rint(-places.imag).astype(int), 0, self.ink.shape[0] - 1)
-        columns = np.clip(np.rint(places.real).astype(int), 0, self.ink.shape[1] - 1)
-        return float(np.mean(self.ink[rows, columns].max(axis=1) > FAINT))
+        at = first + along * (last - first)
+        return float(np.mean(self.is_inked(at[:, None] + beside / self.px_per_mm).any(axis=1)))
+
+    def is_inked(self, at: NDArray[np.complex128]) -> NDArray[np.bool_]:
+        """Return which places, complex mm, have ink."""
+        rows = np.clip(np.rint(-at.imag * self.px_per_mm).astype(int), 0, self.ink.shape[0] - 1)
+        columns = np.clip(np.rint(at.real * self.px_per_mm).astype(int), 0, self.ink.shape[1] - 1)
+        return np.asarray(self.ink[rows, columns] > FAINT)
 
 
 @dataclass(frozen=True, slots=True)

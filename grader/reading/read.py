@@ -8,7 +8,7 @@ from functools import cache, partial
 import numpy as np
 
 from grader.reading.apart import told_apart
-from grader.reading.arrowheads import points_backwards
+from grader.reading.arrowheads import TOLD_MM, forward_mm
 from grader.reading.by_ink import Look
 from grader.reading.lettering import lettered, support
 from grader.reading.lines import Lines, lines_of
@@ -353,7 +353,7 @@ def _nodes(plan: PlanReading) -> Nodes:
 def _readings(pages: Sequence[_PageReading], drawing: Drawing, wanted: Collection[str]) -> list[Reading]:
     """Return one Reading per sheet; requested items found nowhere are unread on the last sheet."""
     readings = []
-    is_backwards = False
+    is_told = is_backwards = False
     for page in pages:
         figures: dict[str, Figure] = {}
         unread: list[Unread] = []
@@ -361,9 +361,11 @@ def _readings(pages: Sequence[_PageReading], drawing: Drawing, wanted: Collectio
             figures[MECHANISM] = figure_of_sketch(page.sketch)
         for figure, plan in page.plans.items():
             figures[figure], missing = figure_of_plan(plan, page.sheet.scale_se, page.ink.where)
-            is_backwards |= bool(group_of(figure)) and points_backwards(plan, page.ink.where)
-            if is_backwards:
+            forward = forward_mm(plan, page.ink.where) if group_of(figure) else None
+            if forward is not None:
                 # Later polygons take forces over in their sense.
+                is_told, is_backwards = forward > TOLD_MM, is_backwards or forward < -TOLD_MM
+            if group_of(figure) and (is_backwards or not is_told):
                 figures[figure] = no_surer(Reading({figure: figures[figure]}), MOST_OPEN).figures[figure]
             unread.extend(gap for gap in missing if not wanted or gap.name in wanted)
         readings.append(Reading(figures, tuple(unread)))

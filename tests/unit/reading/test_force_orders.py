@@ -2,14 +2,18 @@
 
 import tempfile
 from pathlib import Path
+from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pytest
 
+from grader.reading.arrowheads import TOLD_MM, forward_mm
 from grader.reading.corrected import corrected
+from grader.reading.expected import Edge
 from grader.reading.orders import ends_on_sheet, reordered, ring_of, to_usual
 from grader.reading.vectors import vector_of
-from grader.records import Figure, PageRef, Reading, ReadNode, ScannedPage
+from grader.records import Figure, InkMap, PageRef, Reading, ReadNode, ScannedPage
 from reference.construction.graph import evaluate
 from reference.plan import exact_plan
 from tests.bench.force_sheets import MASSES, judged, read, task_with_forces, work, work_with_mistake
@@ -78,14 +82,46 @@ def test_a_polygon_drawn_in_another_order_is_read(order):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "seed"),
-    [("shaper", 96404), ("shaper", 96402), ("press", 96421)],
-    ids=["arrowheads point back", "one line fits two sums", "two opposite forces lie on a letter"],
+    [("shaper", 96404), ("shaper", 99301), ("shaper", 96402), ("press", 96421)],
+    ids=[
+        "reversed",
+        "reversed, no arrowheads at ends",
+        "one line fits two sums",
+        "opposite forces on a letter",
+    ],
 )
 def test_what_the_ink_does_not_tell_is_not_asserted(name, seed):
     one = work_with_mistake(name, seed)
     with tempfile.TemporaryDirectory() as folder:
         pages = read(one, Path(folder))
     assert not any(vector.misread for vector in judged(one, pages))
+
+
+@pytest.mark.parametrize("tip", [1.0, 0.55], ids=["at the end", "in the middle"])
+def test_arrowheads_anywhere_on_its_sides_tell_the_sense_of_a_polygon(tip):
+    at, ink = np.array([10.0 - 10.0j, 50.0 - 20.0j, 20.0 - 40.0j]), np.zeros((300, 360), np.uint8)
+    around = [(0, 1), (1, 2), (2, 0)]
+
+    def forward(sides):
+        edges = tuple(Edge(f"F_{tail}", tail, head) for tail, head in sides)
+        drawn = SimpleNamespace(expected=SimpleNamespace(edges=edges), stroke=np.arange(len(edges)))
+        plan = SimpleNamespace(assignment=drawn, fit=SimpleNamespace(at=at))
+        return forward_mm(plan, InkMap(ink, 6.0))
+
+    def line(start, end):
+        first, last = ((round(6.0 * place.real), round(-6.0 * place.imag)) for place in (start, end))
+        cv2.line(ink, first, last, 255, 2)
+
+    for tail, head in around:
+        line(at[tail], at[head])
+    assert abs(forward(around)) < TOLD_MM
+    for tail, head in around:
+        point, out = at[tail] + tip * (at[head] - at[tail]), (at[head] - at[tail]) / abs(at[head] - at[tail])
+        for barb in (0.25, -0.25):
+            line(point, point - 3.5 * out * np.exp(1j * barb))
+    assert forward(around) > TOLD_MM
+    assert forward([(head, tail) for tail, head in around]) < -TOLD_MM
+    assert forward([(0, 1), (1, 0)]) is None
 
 
 @pytest.mark.slow
