@@ -13,8 +13,12 @@ from grader.folder.inventory import (
 )
 from grader.owners.pages import assign_pages
 from grader.records import PageRef
+from grader.tables.measurements import names_of
 from grader.tables.roster import parse_roster
+from reference.authored.assignment import load_assignment
 from tests.inline import Inline
+
+NAMES = names_of(load_assignment("pump"))
 
 
 def test_the_roster_and_files_of_tools_are_no_submissions(tmp_path):
@@ -47,7 +51,7 @@ def told_of(folder):
     """An inventory's result for each file of a folder, by the file's name."""
     files = submissions(folder)
     cache = PageCache(folder.parent / "notes")
-    contents = take_inventory(files, folder, None, Inline(), lambda *_: None, cache)
+    contents = take_inventory(files, folder, NAMES, Inline(), lambda *_: None, cache)
     return {
         name: content.refused or content.pages[0].problem
         for name, content in zip(shown_names(files, folder, {}), contents, strict=True)

@@ -31,9 +31,8 @@ def any_drawing(assignment, variant, seed, hand="typical", mistakes=()):
     rng = np.random.default_rng([seed, 7])
     student = Student(mistakes=mistakes)
     task = task_of(assignment, variant, student, rng)
-    (sheet,) = draw(task, HANDS[hand], student, rng)
     figures = {}
-    for figure in sheet.figures:
+    for figure in (figure for sheet in draw(task, HANDS[hand], student, rng) for figure in sheet.figures):
         place = complex(rng.normal(200.0, 25.0), -rng.normal(150.0, 20.0))
         figures[figure.name] = {node: place + at for node, at in figure.nodes.items()}
     return ComparedSubmission(f"s{seed}", variant, (figures,), {}, task.declared)
