@@ -14,22 +14,22 @@ LEAST_MM = 8.0
 """Least length of a force whose arrowhead is looked for."""
 BARE_MM, STEP_MM = 0.3, 0.1
 """Nothing is looked for nearer to a force's ends; distance of the places along it."""
-ASIDE_MM = 0.45, 0.75
-"""Lines beside a force that cross its arrowhead: that farther off does so farther behind the tip."""
+ASIDE_MM, FARTHER_MM = (0.4, 0.5, 0.6), 0.2
+"""Lines beside a force that cross its arrowhead; so much farther off they do so farther behind the tip."""
 LAGS = 4, 8, 12
-"""How much farther behind, in steps."""
+"""Distances behind the tip that are compared, in steps."""
 CLEAR_MM = 0.7
 """Another side of the polygon that comes nearer has its own ink there, or its arrowhead's."""
 SPECK_MM2 = 1e-9
 """Least squared length of a side, so that it can be divided by."""
-TOLD_MM = 1.0
-"""From this the arrowheads tell the sense: of 116 polygons whose lines were read rightly they told it of 110,
-the opposite of 2."""
+TOLD_MM = 4.0
+"""From this the arrowheads tell the sense: of 173 polygons whose lines were read rightly they told it of 163,
+the opposite of one."""
 Segment = tuple[complex, complex]
 
 
 def forward_mm(plan: PlanReading, where: InkMap) -> float | None:
-    """Return how much ink beside the forces of a polygon widens away from their heads, less towards them.
+    """Return the ink beside a polygon's forces that widens away from their heads, less that towards them.
 
     All forces reversed leave the same lines. Arrowheads stand anywhere on them; on one of two opposite
     forces in either sense: None if there are no others.
@@ -50,8 +50,9 @@ def forward_mm(plan: PlanReading, where: InkMap) -> float | None:
         out = (head - tail) / abs(head - tail)
         along = np.arange(BARE_MM, abs(head - tail) - BARE_MM, STEP_MM)
         on_it = np.asarray(tail + along * out, np.complex128)
-        for across in (1j * out, -1j * out):
-            near, far = (_own_ink(on_it, aside * across, others, where) for aside in ASIDE_MM)
+        for aside in (side * off * out for side in (1j, -1j) for off in ASIDE_MM):
+            farther = aside * (1.0 + FARTHER_MM / abs(aside))
+            near, far = (_own_ink(on_it, off, others, where) for off in (aside, farther))
             for lag in LAGS:
                 behind, before = near[lag:] & far[:-lag], near[:-lag] & far[lag:]
                 told += STEP_MM * (int(behind.sum()) - int(before.sum()))
