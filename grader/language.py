@@ -125,13 +125,13 @@ def _catalogue(code: str) -> gnu.NullTranslations:
         return gnu.GNUTranslations(stream)
 
 
-_GREEK = {"omega": "ω", "epsilon": "ε"}
+_GREEK = {"omega": "ω", "epsilon": "ε", "phi": "φ"}
 _NAME = re.compile(
-    r"\b(?:([vank])_([A-Z][A-Za-z0-9]{0,7})(?:_([ntcr])\b)?|(omega|epsilon)_(\w{1,4})|([kμ])([LlvaF])(?=\b|²)"
+    r"\b(?:([vank])_([A-Z][A-Za-z0-9]{0,7})(?:_([ntcr])\b)?|(omega|epsilon|phi)_([0-9A-Za-z]{1,4})(?![0-9A-Za-z])|([kμ])([LlvaF])(?=\b|²)"
     r"|([FGRM])_([0-9A-Za-z]{1,9}(?:-[0-9A-Za-z]{1,8})?)(?:_([nt]))?\b"
-    r"|(O)([0-9])(?=[A-Z]?\b)|(a)_([ntcr])\b|([ωε])([0-9]))"
+    r"|(O)([0-9])(?=[A-Z]?\b)|(a)_([ntcr])\b|([ωεφ])([0-9]|[b-km-quw-z](?![A-Za-z])))"
 )
-"""A name in running text: its letter, its index below, and perhaps one above."""
+"""A name in running text: its letter, its index below, and perhaps one above; ωr and ωv are products."""
 
 
 @lru_cache(4096)

@@ -107,7 +107,7 @@ def conditions_of(plan: Plan) -> Conditions:
         {name.removeprefix(kind): values for name, values in figures.items() if name.startswith(kind)}
         for kind in ("transmission ", "crossing ")
     )
-    crossing = {plan.construction.drawn_at(node): angle for node, angle in crossing.items()}
+    crossing = {plan.construction.drawn_at(node)[0]: angle for node, angle in crossing.items()}
     return Conditions(transmission, crossing, figures.get("predicted_error", np.zeros(count)))
 
 

@@ -198,6 +198,9 @@ _UNITS: dict[str, Words] = {
         N_("The values were computed in %(unit)s instead of SI units."),
         N_("Enter velocities in m/s, accelerations in m/s², angular velocities in rad/s."),
     ),
+    "moment": Words(
+        N_("values in another unit"), N_("%(at)s was entered in %(unit)s, not N m."), N_("Enter it in N m.")
+    ),
     "exchanged": Words(
         N_("kv and ka exchanged"),
         N_("The scales kv and ka were exchanged: each was declared as the other one."),

@@ -37,7 +37,7 @@ SIMILAR_UNMEASURED = N_(
 DIVIDE_UNMEASURED = N_("Take %(node)s on the line through %(p)s and %(q)s as the link's points divide it.")
 MOST_STEPS = 8
 """Number of a figure's steps that are described in full; later ones are only named."""
-THEN = N_("Then draw again what follows from it: %(nodes)s.")
+THEN = N_("Then redo what follows from it: %(nodes)s.")
 HALF_TURN = N_(
     "If it was found by the right triangle on the sketch, the half turn about %(joint)s is missing."
 )
@@ -47,7 +47,7 @@ RATIO_WITHIN = 0.02
 
 
 def redo(subject: Subject, tongue: Tongue, node: str, *, with_numbers: bool) -> list[str]:
-    """Return the steps from a node on: those of its figure in full, later figures' nodes by name.
+    """Return the steps from a node on: those of its figure in full, all else that follows by name.
 
     Of a link's centre, its own step. Empty if it is no node of the construction. Without numbers, steps of
     the mechanism are left out: they are nothing but given lengths.
@@ -59,13 +59,15 @@ def redo(subject: Subject, tongue: Tongue, node: str, *, with_numbers: bool) -> 
     if all(node != step.node for step in construction.steps):
         return []
     touched = _touched(construction.steps, node)
-    figure = construction.figure_of(node)
-    own = [step for step in touched if construction.figure_of(step.node) == figure]
+    own = [step for step in touched if construction.figure_of(step.node) == construction.figure_of(node)]
     told = [*_told_steps(speaker, own[:MOST_STEPS], with_numbers=with_numbers)]
-    later = [step.node for step in (*own[MOST_STEPS:], *(step for step in touched if step not in own))]
+    sums = {one.name for one in construction.vectors.values() if one.is_sum}
+    ends = [(step, name) for step in touched for name in construction.drawn_at(step.node)]
+    later = [name for step, name in ends if step not in own[:MOST_STEPS] or name in sums]
+    if not speaker.has_letters(touched[-1].node):
+        later += construction.moments
     if later:
-        drawn = tuple(dict.fromkeys(map(construction.drawn_at, later)))
-        told.append(speaker.say(THEN, nodes=speaker.names(drawn)))
+        told.append(speaker.say(THEN, nodes=speaker.names(tuple(later))))
     return [line.unescape() for line in told if line]
 
 

@@ -19,7 +19,7 @@ from grader.marking.drawn import case_of, explain
 from grader.marking.lettering import exchanged_pair, letters_charged, with_letters_exchanged
 from grader.marking.naming import LEAST_CONFIDENCE, Lost, drawn_instead, named, not_explained, speed_mistake
 from grader.marking.settling import at_stake, is_of, of_another, of_nothing, settled
-from grader.marking.units import EXCHANGED, Undone, undone, with_scales_exchanged
+from grader.marking.units import EXCHANGED, Undone, slip_of_value, undone, with_scales_exchanged
 from grader.outcomes import CHARGED, CREDITED, Judgement, NamedMistake, Outcome, Score
 from grader.records import FloatArray, ReadNode, ReadVector, Reason
 from grader.rubric import CriterionTable, RubricFile
@@ -329,7 +329,7 @@ def _slips(task: Task, comparison: Comparison, known: Sequence[NamedMistake]) ->
         value, right = one.measured.value, one.expected.value
         factor = value / right if value and right else 1.0
         at = vector_of_value(one.name) or one.name
-        slip = NamedMistake(Mistake("arithmetic", at, factor=factor), (one.criterion,), SLIPPED)
+        slip = NamedMistake(slip_of_value(at, factor), (one.criterion,), SLIPPED)
         if one.mistake == "arithmetic" or (one.name in task.construction.moments and is_value_off):
             of_vectors.append(slip)
         elif one.mistake == "image_mirrored":

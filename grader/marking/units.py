@@ -335,6 +335,8 @@ VALUE_UNITS: Mapping[str, tuple[tuple[KindName, ...], float]] = {
     "rev/min": (("omega",), RPM_FACTOR),
     "deg/s": (("omega", "epsilon"), 1.0 / DEGREE),
     "kN": (("force",), 0.001),
+    "kN m": (("moment",), 0.001),
+    "N mm": (("moment",), 1000.0),
 }
 """By unit, the kinds of the quantities that are in it, and the factor of all of them."""
 RELATIVE_SIGMA = 0.03
@@ -373,6 +375,14 @@ def _values(
             mistake = Mistake(UNITS, "values", other=("values", unit), factor=factor)
             return mistake, frozenset(names), probability
     return None
+
+
+def slip_of_value(name: str, ratio: float) -> Mistake:
+    """The slip by which one value is so many times the right one: of a moment, perhaps its unit."""
+    for unit, (kinds, factor) in VALUE_UNITS.items():
+        if kinds == ("moment",) == (kind_of(name).name,) and math.isclose(abs(ratio), factor, rel_tol=0.06):
+            return Mistake(UNITS, name, other=("moment", unit), factor=factor)
+    return Mistake("arithmetic", name, factor=ratio)
 
 
 # Scales -------------------------------------------------------------------------------------------

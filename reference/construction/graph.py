@@ -263,11 +263,11 @@ class Construction:
         """Return the figure that a node belongs to. Raises KeyError for an unknown node."""
         return self._by_node[node][0]
 
-    def drawn_at(self, node: str) -> str:
-        """Return a node's name; of a force plan, whose nodes have no letters, the vector that ends there."""
+    def drawn_at(self, node: str) -> tuple[str, ...]:
+        """Return a node's name; of a force plan, whose nodes have no letters, the vectors made with it."""
         if node not in self._by_node or not group_of(self.figure_of(node)):
-            return node
-        return next(one.name for one in self.vectors.values() if one.head == node and not one.is_sum)
+            return (node,)
+        return tuple(one.name for one in self.vectors.values() if one.head == node)
 
     def needed_for(self, nodes: Collection[str]) -> frozenset[str]:
         """Return the nodes from which some nodes are directly made."""

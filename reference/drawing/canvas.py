@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from html import escape
 
-GREEK = {"omega": "ω", "epsilon": "ε"}
+GREEK = {"omega": "ω", "epsilon": "ε", "phi": "φ"}
 INDEX_SIZE = 0.7
 """Size of an index relative to that of its line."""
 RISES = {-1: -0.26, 0: 0.0, 1: 0.44}
@@ -55,7 +55,7 @@ def pieces_of(name: str) -> tuple[Piece, ...]:
     if indices and stem:
         indexed = (Piece(index, height) for index, height in zip(indices, (-1, 1), strict=False))
         return (Piece(GREEK.get(stem, stem)), *indexed)
-    parts = re.split(r"(?<=[^\W\d_])(\d+)", name)
+    parts = re.split(r"((?<=^[ωεφ])\w+$|(?<=[^\W\d_])\d+)", name)
     return tuple(Piece(part, -1 if index % 2 else 0) for index, part in enumerate(parts) if part)
 
 

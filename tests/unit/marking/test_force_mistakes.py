@@ -37,6 +37,8 @@ MADE = {
     ForceMistake("line", "R_0D", turn_deg=90.0): ("parallel_for_perpendicular", "R_0D", {"R_0D"}),
     ForceMistake("slip", "F_i3", factor=1.4): ("arithmetic", "F_i3", {"F_i3"}),
     ForceMistake("slip", "M_b", factor=1.5): ("arithmetic", "M_b", {"M_b"}),
+    ForceMistake("slip", "M_b", factor=0.001): ("units", "M_b", {"M_b"}),
+    ForceMistake("slip", "M_b", factor=0.0012): ("arithmetic", "M_b", {"M_b"}),
     ForceMistake("scale", "kF", factor=2.0): ("scale_wrong", "kF", {"kF"}),
     ForceMistake("arrow", "R_13"): ("force_reversed", "R_13", {"R_13"}),
     ForceMistake("turned", "F_i3", turn_deg=40.0): (None, "", {"F_i3"}),
@@ -58,6 +60,13 @@ def test_a_mistake_costs_where_it_was_made_and_is_named(mistake):
     _, judgement = pump(mistake)
     assert {one.name for one in judgement.outcomes if one.verdict in CHARGED} == charged
     assert [(one.code, one.at) for one in judgement.mistakes] == ([(code, at)] if code else [])
+
+
+def test_a_moment_in_another_unit_is_told_with_that_unit():
+    for factor, unit in {0.001: "kN m", 1000.0: "N mm"}.items():
+        (named_slip,) = pump(ForceMistake("slip", "M_b", factor=factor))[1].mistakes
+        told = mistake_feedback(named_slip, "en", "hint")
+        assert told == f"M_b was entered in {unit}, not N m. Enter it in N m."
 
 
 def test_a_wrong_arm_explains_neither_given_forces_nor_what_stands_beside_a_right_part():

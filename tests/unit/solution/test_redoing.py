@@ -11,6 +11,7 @@ from reference.authored.assignment import load_assignment
 from reference.construction.graph import ancestors
 from reference.drawing.subject import Subject
 from reference.plan import exact_plan
+from reference.quantities import group_of
 from tests.drawn import loaded
 
 
@@ -59,6 +60,17 @@ def test_steps_of_force_plans_name_vectors_and_say_no_number(own, lang, tmp_path
     for step in plan.construction.steps:
         for line in redo(one, tongue(lang), step.node, with_numbers=False):
             assert not re.search(r"\d[.,]\d|\d\s*(?:mm|мм|°)", line.replace("90°", "")), line
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_every_force_and_moment_that_follows_is_named(own, tmp_path):
+    assignment, plan = loaded("slider on a moving link", tmp_path, own=own)
+    one, construction = Subject(assignment, plan, 0, wording_of(tongue("en"))), plan.construction
+    for node in (step.node for step in construction.steps if group_of(construction.figure_of(step.node))):
+        hanging = {step.node for step in construction.steps if node in ancestors(construction, [step.node])}
+        following = {v.name for v in construction.vectors.values() if v.head in hanging} | {"M_b"}
+        told = " ".join(redo(one, tongue("en"), node, with_numbers=False))
+        assert following <= set(re.findall(r"[FGRM]_\w+", told)), node
 
 
 def test_with_numbers_the_lengths_are_those_of_the_plan():
