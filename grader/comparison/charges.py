@@ -245,9 +245,11 @@ class Charges:
         """Return the forces of the same polygon that were not read: one may be read as a part of another."""
         construction, following = self.task.construction, self.following
         figure = construction.figure_of(segment.head)
+        if not group_of(figure):
+            return ()
         return tuple(
             side.name
-            for side in construction.polygon_of(figure) * bool(group_of(figure))
+            for side in construction.polygon_of(figure)
             if self.evidence.vector(side.name) is None
             and side.head not in following.explanation.explained
             and abs(self.task.segments[side.name].drawn(following.used)) >= SHORT_MM

@@ -379,9 +379,10 @@ def _values(
 
 def slip_of_value(name: str, ratio: float) -> Mistake:
     """The slip by which one value is so many times the right one: of a moment, perhaps its unit."""
-    for unit, (kinds, factor) in VALUE_UNITS.items():
-        if kinds == ("moment",) == (kind_of(name).name,) and math.isclose(abs(ratio), factor, rel_tol=0.06):
-            return Mistake(UNITS, name, other=("moment", unit), factor=factor)
+    if kind_of(name).name == "moment":
+        for unit, (kinds, factor) in VALUE_UNITS.items():
+            if "moment" in kinds and math.isclose(abs(ratio), factor, rel_tol=2.0 * RELATIVE_SIGMA):
+                return Mistake(UNITS, name, other=("moment", unit), factor=factor)
     return Mistake("arithmetic", name, factor=ratio)
 
 
