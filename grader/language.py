@@ -15,7 +15,7 @@ from pathlib import Path
 from markupsafe import Markup, escape
 
 from reference.errors import CallError
-from reference.quantities import group_of, sort_of
+from reference.quantities import GREEK, group_of, sort_of
 
 LANGUAGES = ("en", "ro", "ru")
 DOMAIN = "planmark"
@@ -125,7 +125,6 @@ def _catalogue(code: str) -> gnu.NullTranslations:
         return gnu.GNUTranslations(stream)
 
 
-_GREEK = {"omega": "ω", "epsilon": "ε", "phi": "φ"}
 _NAME = re.compile(
     r"\b(?:([vank])_([A-Z][A-Za-z0-9]{0,7})(?:_([ntcr])\b)?|(omega|epsilon|phi)_([0-9A-Za-z]{1,4})(?![0-9A-Za-z])|([kμ])([LlvaF])(?=\b|²)"
     r"|([FGRM])_([0-9A-Za-z]{1,9}(?:-[0-9A-Za-z]{1,8})?)(?:_([nt]))?\b"
@@ -142,5 +141,5 @@ def symbols(text: str) -> Markup:
 
 def _symbol(match: re.Match[str]) -> str:
     letter, below, *above = filter(None, match.groups())
-    shown = letter if letter == "O" else f"<i>{_GREEK.get(letter, letter)}</i>"
+    shown = letter if letter == "O" else f"<i>{GREEK.get(letter, letter)}</i>"
     return f"{shown}<sub>{below}</sub>" + "".join(f"<sup>{part}</sup>" for part in above)

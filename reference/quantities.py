@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Literal
 
+GREEK = {"omega": "ω", "epsilon": "ε", "phi": "φ"}
+"""Starts of names that are shown as Greek letters."""
 KindName = Literal["length", "velocity", "acceleration", "omega", "epsilon", "force", "moment"]
 
 

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from html import escape
 
-GREEK = {"omega": "ω", "epsilon": "ε", "phi": "φ"}
+from reference.quantities import GREEK
+
 INDEX_SIZE = 0.7
 """Size of an index relative to that of its line."""
 RISES = {-1: -0.26, 0: 0.0, 1: 0.44}
