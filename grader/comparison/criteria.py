@@ -459,10 +459,13 @@ def _why_absent(charges: Charges, criterion: CriterionTable) -> Reason:
 
 
 def _is_nothing(charges: Charges, criterion: CriterionTable) -> bool:
-    """Return whether an earlier mistake leaves a component too short to be drawn."""
-    task = charges.task
-    is_component = isinstance(task.construction.step(task.segments[criterion.name].head), Given)
-    if not is_component or not task.rubric.follows_through(criterion):
+    """Return whether an earlier mistake leaves a component of a plan that was drawn too short to be drawn."""
+    task, construction = charges.task, charges.task.construction
+    head = task.segments[criterion.name].head
+    if not isinstance(construction.step(head), Given) or not task.rubric.follows_through(criterion):
+        return False
+    plan = construction.vectors_of(construction.figure_of(head))
+    if all(charges.evidence.vector(one.name) is None for one in plan):
         return False
     choice = _chosen(charges, criterion, HeldVector(task.rubric, criterion, NOTHING))
     return choice.is_trivial or choice.mark.is_full

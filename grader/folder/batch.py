@@ -7,6 +7,7 @@ from contextlib import nullcontext
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from zipfile import is_zipfile
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -258,6 +259,8 @@ def files_of(batch: Batch) -> list[Path]:
     """The files handed in, or the archive of them. Raises CallError where there is neither."""
     folder = batch.folder
     if is_archive(folder) and folder.is_file():
+        if not is_zipfile(folder):
+            raise CallError("archive_damaged", file=str(folder))
         return [folder]
     if not folder.is_dir():
         cause = "submissions_in_file" if folder.is_file() else "submissions_missing"

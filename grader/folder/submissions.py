@@ -237,12 +237,14 @@ def _submission(assignment: Assignment, key: Key, gathered: _Gathered, lang: str
     n = _agreed("n", numbers, problems)
     agreed_position = _agreed("position", positions, problems)
     variant = _variant(assignment, n, agreed_position, problems)
+    # A line of a class's table with nothing in it is not handed in.
+    filled = [one for one in gathered.measured if one.numbers or one.scales or one.problems]
     return StudentSubmission(
         student_id=student_id,
         variant=variant,
         pages=tuple(owned.source for owned in gathered.owned),
         declared=row.scales,
-        measured=combined(gathered.measured) if gathered.measured else None,
+        measured=combined(filled) if filled else None,
         lang=row.lang or lang,
         name=row.name,
         problems=tuple(problems),

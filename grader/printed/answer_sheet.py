@@ -77,9 +77,10 @@ UNITS = (N_("rev/min"), N_("cm"), N_("°"))
 _STUDENT_MM: Box = (39.0, 12.5, 103.0, 36.0)
 _TASK_MM: Box = (159.0, 12.5, 113.0, 36.0)
 _ADVICE = (
-    N_("Draw with a dark, sharp pencil or pen, inside the zones; a plan best from the grey cross."),
+    N_("Draw with a dark, sharp pencil or pen, inside the zones."),
     N_("Draw lines through the joints, arrowheads up to 4 mm long, letters 3 mm clear of lines."),
 )
+_FROM_CROSS = N_("Draw with a dark, sharp pencil or pen, inside the zones; a plan best from the grey cross.")
 _ADVICE_MM: Box = (39.0, 37.8, 103.0, 11.7)
 _CLEAR = N_("Leave the black squares and the code free of ink.")
 _CLEAR_MM: Box = (289.0, 43.0, 118.0, 6.0)
@@ -158,7 +159,7 @@ def draw_page(
     _code(drawing, text.identity)
     _student(drawing, assignment, text, tongue)
     _task(drawing, assignment, text.variants, tongue)
-    _advice(drawing, tongue)
+    _advice(drawing, tongue, has_cross=bool(text.poles))
     for figure, zone in form.template.zones.items():
         title = tongue.gettext(FIGURES[figure])
         apart = set(form.positions.values()) - {zone}
@@ -267,9 +268,10 @@ def _flow(data: list[tuple[Piece, ...]], size_pt: float, wide_mm: float) -> list
     return rows
 
 
-def _advice(drawing: PdfDrawing, tongue: Tongue) -> None:
+def _advice(drawing: PdfDrawing, tongue: Tongue, *, has_cross: bool) -> None:
     """Draw advice on making a drawing easy to read, and on what the registration of the scan needs."""
-    for texts, box in ((_ADVICE, _ADVICE_MM), ((_CLEAR,), _CLEAR_MM)):
+    advice = (_FROM_CROSS, *_ADVICE[1:]) if has_cross else _ADVICE
+    for texts, box in ((advice, _ADVICE_MM), ((_CLEAR,), _CLEAR_MM)):
         words = [tongue.gettext(text) for text in texts]
         drawing.paragraphs(box, words, (7.5, 7.0, 6.5, 6.0, 5.5), lines_down=1)
 

@@ -89,9 +89,13 @@ SENSE = {
 }
 VALUE = {
     "rate": N_("Look at the vector and the length that you divided, and at their units."),
+    "moment": N_("Look at each force and its arm in metres, and at the unit of the moment, N m."),
     "": N_("Look at the drawn length, and at the scale that you multiplied it by."),
 }
-SENSE_OF_LINK = {"": N_("Look at your sketch: which way does the relative vector turn the link?")}
+SENSE_OF_LINK = {
+    "moment": N_("Look at your sketch: which way do the forces turn the link? The moment acts against them."),
+    "": N_("Look at your sketch: which way does the relative vector turn the link?"),
+}
 ADVICE: dict[str, Mapping[str, str]] = {
     "too_long": SIZE,
     "too_short": SIZE,
@@ -272,11 +276,13 @@ def advice_on(reasons: Sequence[Reason], name: str, driving: str) -> str:
 
 
 def _kind(name: str, driving: str) -> str:
-    """Return the kind of a value: scale, rate, force, driving, sketch, part of an acceleration, or none."""
+    """Return a value's kind: scale, rate, moment, force, driving, sketch, part of acceleration, or none."""
     if name in SCALE_NAMES:
         return "scale"
     if name.startswith(("omega", "epsilon")):
         return "rate"
+    if kind_of(name).name == "moment":
+        return "moment"
     if kind_of(name).name == "force":
         is_laid_off = name[0] in "FG" and name != "F_b"
         return "laid off" if is_laid_off else "across" if name.endswith("_t") else "force"

@@ -107,6 +107,11 @@ def test_results_inside_the_folder_are_no_submissions(class_folder):
 def test_a_folder_that_is_not_there_or_empty_is_told(tmp_path):
     with pytest.raises(CallError, match=r"no such folder; .*\.zip"):
         run(tmp_path / "nothing.zip", tmp_path / "out")
+    (tmp_path / "cut.zip").write_bytes(b"PK\x03\x04")
+    with pytest.raises(CallError) as told:
+        run(tmp_path / "cut.zip", tmp_path / "out")
+    assert told.value.code == "archive_damaged"
+    (tmp_path / "cut.zip").unlink()
     with pytest.raises(CallError, match="nothing to grade"):
         run(tmp_path, tmp_path / "out")
     (tmp_path / "roster.csv").write_text("student_id,name,n\ns01,Ana,4\n")

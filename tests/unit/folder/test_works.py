@@ -38,6 +38,13 @@ def test_everybody_on_the_roster_has_a_work_even_with_nothing_handed_in():
     assert found[0].name == "Ana"
 
 
+def test_a_line_of_a_table_with_nothing_in_it_is_not_handed_in():
+    roster = Roster("roster.csv", (RosterRow("s1", n=3, scales={"kL": "0.005 m/mm"}),))
+    ((work,), _) = works(PUMP, roster, owners(), [replace(entered("s1", n=3), values={})])
+    assert work.measured is None
+    assert work.variant == Variant(n=3)
+
+
 def test_pages_and_measurements_of_one_student_come_together():
     roster = Roster("roster.csv", (RosterRow("s1", n=3),))
     found, _ = works(PUMP, roster, owners(owned("s1.jpg", "s1", n=3)), [entered("s1")])

@@ -117,6 +117,13 @@ def test_the_layout_is_told_as_the_contract_says():
     )
 
 
+@pytest.mark.parametrize(("name", "has_cross"), [("pump", True), ("pump-forces", False)])
+def test_a_cross_is_spoken_of_where_one_is_printed(name, has_cross):
+    assignment = load_assignment(name)
+    sheets = make_sheets(assignment, rows_for(assignment))
+    assert ("grey cross" in text_of(sheets.pdf)) == has_cross
+
+
 def test_what_is_printed_is_where_the_layout_says():
     sheets = make_sheets(load_assignment("pump"), [ANA])
     grey = rendered(sheets.pdf, TEN_A_MM)

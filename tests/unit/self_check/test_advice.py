@@ -101,6 +101,11 @@ def test_the_size_of_a_force_is_sought_where_it_comes_from(name, word):
     assert word in advice_on([Reason("too_short")], name, "A")
 
 
+@pytest.mark.parametrize(("code", "word"), [("value_reversed", "against them"), ("value_too_small", "N m")])
+def test_advice_on_a_moment_is_of_forces_and_arms(code, word):
+    assert word in advice_on([Reason(code)], "M_b", "A")
+
+
 def test_advice_is_on_reasons_that_exist():
     assert ADVICE.keys() <= HINTS.keys()
     assert advice_on((Reason("right"),), "v_A", "A") == ""

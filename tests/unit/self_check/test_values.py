@@ -28,6 +28,12 @@ def test_nothing_handed_in_is_not_all_right():
     assert not check().is_all_right
 
 
+def test_nothing_is_told_of_a_plan_in_which_nothing_was_entered():
+    forces = load_assignment("pump-forces")
+    told = check_values(NOTHING_MEASURED, forces, Variant(7), tongue("en"), "hint")
+    assert told.lines == ()
+
+
 def test_an_entry_that_cannot_be_used_is_told():
     assert check(v_A="90", v_D="long").problems
 
