@@ -89,7 +89,7 @@ _MEASURED = N_(
 )
 _COMPUTED = N_("Values computed from them, in the unit beside the cells; the last cells may stay empty")
 _TICKED = N_("Tick the sense of the moment")
-_CELLS_AT_MM = (39.0, 265.2)
+_CELLS_AT_MM = (39.0, 265.9)
 _TICK_MM = 5.0
 """Long enough to be seen, too short to be taken for a stroke."""
 _POLE_MM = (2.0, 4.5)
