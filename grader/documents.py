@@ -359,7 +359,7 @@ class ReportDocument(Document):
     mistakes: list[MistakeDocument] = []
     scales: dict[ScaleName, ScaleDocument] = {}
     problems: list[ProblemDocument] = []
-    reading: ReadSheets = ReadSheets.model_construct()  # builds no validator yet
+    reading: ReadSheets = ReadSheets()
 
 
 class UnmatchedDocument(Document):
