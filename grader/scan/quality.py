@@ -23,7 +23,7 @@ import cv2
 import numpy as np
 
 from grader.printed.layout import MARKER_CORNERS, PAGE_MM
-from grader.records import ZONE_SLACK_MM, Box, FloatArray, Page, Reason, Sheet
+from grader.records import ZONE_SLACK_MM, Box, FloatArray, IntArray, Page, Reason, Sheet
 from grader.scan.pixels import (
     BoolArray,
     Flat,
@@ -451,7 +451,7 @@ def _edge_width_px(flat: Flat, mm_to_px: FloatArray, px_per_mm: float) -> float:
         widths.append(width)
     if not angles:
         return 0.0
-    sector = (np.concatenate(angles) / np.pi * _SECTORS + 0.5).astype(int) % _SECTORS
+    sector = _sectors(np.concatenate(angles))
     width = np.concatenate(widths)
     in_sector = [width[sector == k] for k in range(_SECTORS)]
     return max(
@@ -486,14 +486,17 @@ def _inked_tiles(flat: Flat, mm_to_px: FloatArray, reach: int) -> Iterator[tuple
 
 
 def _edges(tile: Float32Array, paper: float, reach: int) -> tuple[FloatArray, FloatArray]:
-    """Return (n,) direction across each edge of a piece, radians 0..pi, and its width in pixels."""
+    """Return (n,) direction across each edge of a piece, radians, and its width in pixels."""
     soft = np.asarray(cv2.GaussianBlur(tile, (0, 0), 0.7), dtype=np.float32)
     gx, gy = (cv2.Sobel(soft, cv2.CV_32F, dx, 1 - dx, scale=0.125) for dx in (1, 0))
     slope = np.asarray(np.hypot(gx, gy), dtype=np.float32)
     inner = slope[reach:-reach, reach:-reach]
     if inner.size == 0:
         return np.zeros(0), np.zeros(0)
-    steep = np.argwhere(inner > max(0.03 * paper, 0.35 * float(inner.max()))) + reach
+    # A shake leaves the edges along it sharp: those across it are the steepest of their own direction only.
+    sector = _sectors(np.arctan2(gy, gx)[reach:-reach, reach:-reach])
+    steepest = np.array([inner[sector == k].max(initial=0.0) for k in range(_SECTORS)])
+    steep = np.argwhere(inner > np.maximum(0.03 * paper, 0.35 * steepest[sector])) + reach
     y, x = steep.T.astype(np.float32)
     at = slope[steep[:, 0], steep[:, 1]]
     ux, uy = gx[steep[:, 0], steep[:, 1]] / at, gy[steep[:, 0], steep[:, 1]] / at
@@ -504,5 +507,10 @@ def _edges(tile: Float32Array, paper: float, reach: int) -> tuple[FloatArray, Fl
     across = sampled(soft, x[:, None] + ux[:, None] * along, y[:, None] + uy[:, None] * along)
     step = across[:, reach:].max(axis=1) - across[:, : reach + 1].min(axis=1)
     enough = step > _LEAST_STEP * paper
-    angle = np.arctan2(uy[enough], ux[enough]) % np.pi
+    angle = np.arctan2(uy[enough], ux[enough])
     return angle.astype(np.float64), (step[enough] / at[enough]).astype(np.float64)
+
+
+def _sectors(angle: FloatArray | Float32Array) -> IntArray:
+    """Return the sector of the direction across an edge by its angle in radians; its reverse has the same."""
+    return (angle % np.pi / np.pi * _SECTORS + 0.5).astype(int) % _SECTORS

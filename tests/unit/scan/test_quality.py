@@ -120,11 +120,18 @@ def test_a_photo_that_is_spoilt_is_told_what_spoils_it(good: tuple[Page, float],
     assert code in flaws_of(replace(page, grey=SPOILT[code](page.grey, px_per_mm)))
 
 
-@pytest.mark.parametrize("spoil", [defocused, shaken])
+@pytest.mark.parametrize(
+    ("spoil", "scene", "seed"),
+    [
+        (defocused, PRINTED, 1),
+        (shaken, PRINTED, 1),
+        *slow((shaken, PLAIN, 1), (shaken, PRINTED, 2), (shaken, PRINTED, 5)),
+    ],
+)
 def test_blur_is_measured_in_the_direction_in_which_it_is_worst(
-    good: tuple[Page, float], spoil: Callable[[GreyImage, float], GreyImage]
+    spoil: Callable[[GreyImage, float], GreyImage], scene: ReadingScene, seed: int
 ) -> None:
-    page, px_per_mm = good
+    page, px_per_mm = photo(scene, seed)
     flaw = flaws_of(replace(page, grey=spoil(page.grey, px_per_mm)))["blurred"]
     assert MOST_BLUR_MM < flaw.parameters["measured"] < 3.0
 
