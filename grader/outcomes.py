@@ -28,7 +28,9 @@ sense_missing                                                                a m
 not_measured                                                                 nothing was handed in
 optional                                                                     not handed in, not asked
 unread                reason                                                 asked for, not read
-not_drawn                                                                    no ink where it must be
+not_drawn                                                                    no ink between nodes read
+no_line                                                                      no ink to a point's place by
+                                                                             similarity
 value_alone                                                                  computed, and not drawn
 by_similarity         of                                                     replaced by a right image
 letters_exchanged     first, second                                          named by exchanged letters

@@ -55,7 +55,7 @@ from reference.authored.assignment import SCALE_NAMES
 from reference.construction.elements import is_force
 from reference.construction.graph import AngularRate
 from reference.construction.mistakes import line_of
-from reference.construction.steps import Given
+from reference.construction.steps import Divide, Given, Similar
 from reference.construction.uncertainty import EndSpread
 from reference.quantities import group_of, kind_of, unit_of, vector_of_value
 
@@ -409,7 +409,9 @@ def _common_factor(charges: Charges, scale: str) -> float | None:
 PROBABLY_NOT_DRAWN = 0.9
 """Probability that a vector was not drawn if no ink lies along it and an end was not read for certain."""
 NOT_DRAWN = 0.98
-"""Probability that it was not drawn if both its ends were read for certain and no ink is between them."""
+"""Probability that it was not drawn if its ends are known for certain and no ink is between them.
+
+Of 12 between a pole and a point by similarity, on 80 simulated sheets, none was drawn."""
 NOTHING = DrawnVector(0.0, 0.0, None, 0.0, 1.0)
 """A component left blank, as it is compared: a zero."""
 
@@ -438,10 +440,12 @@ def _absent(charges: Charges, criterion: CriterionTable, expected: Quantity) -> 
         blank = "none" if rubric.missing == "review" else rubric.missing
         _leave_out(charges, segment, blank)
         return left(blank, (reason,))
-    is_missing = _is_not_drawn(charges.task, evidence, criterion.name, length or 0.0)
-    if is_missing or (segment is not None and segment.head in following.explanation.left_out):
+    why_lost = _why_not_drawn(charges.task, evidence, criterion.name, length or 0.0)
+    if segment is not None and segment.head in following.explanation.left_out:
+        why_lost = Reason("not_drawn")
+    if why_lost is not None:
         _leave_out(charges, segment, rubric.missing)
-        return left(rubric.missing, (Reason("not_drawn"),), sure=NOT_DRAWN)
+        return left(rubric.missing, (why_lost,), sure=NOT_DRAWN)
     _leave_out(charges, segment, "review")
     sure = PROBABLY_NOT_DRAWN if criterion.name in evidence.blank else EVEN
     return left("review", (reason,), sure=sure)
@@ -480,16 +484,23 @@ def _leave_out(charges: Charges, segment: TaskSegment | None, verdict: Verdict) 
     (charges.charged if is_component and verdict == "none" else charges.doubtful).add(segment.head)
 
 
-def _is_not_drawn(task: Task, evidence: Evidence, name: str, length_mm: float) -> bool:
-    """Return whether a vector of this expected length is missing, though both its ends were read.
+def _why_not_drawn(task: Task, evidence: Evidence, name: str, length_mm: float) -> Reason | None:
+    """Return why a vector of this expected length is surely not drawn rightly; None if it may be.
 
-    The sum of parts of a force can be measured between them.
+    Both its ends were read, or its head is the image of a link's point, and the other nodes of its link were
+    read: it may be drawn elsewhere, wrongly. The sum of parts of a force can be measured between them.
     """
-    vector = task.construction.vectors.get(name)
+    construction, read = task.construction, evidence.nodes.keys()
+    vector = construction.vectors.get(name)
     if vector is None or name not in evidence.blank or length_mm < SHORT_MM:
-        return False
-    is_sum_of_forces = vector.is_sum and group_of(task.construction.figure_of(vector.head))
-    return not is_sum_of_forces and {vector.tail, vector.head} <= evidence.nodes.keys()
+        return None
+    if vector.is_sum and group_of(construction.figure_of(vector.head)):
+        return None
+    step = construction.step(vector.head)
+    if {vector.tail, vector.head} <= read:
+        return Reason("not_drawn")
+    is_placed = isinstance(step, Divide | Similar) and {vector.tail, *step.base} <= read
+    return Reason("no_line") if is_placed else None
 
 
 # Angular quantities --------------------------------------------------------------------------------

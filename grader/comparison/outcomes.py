@@ -172,7 +172,7 @@ def both(first: Outcome, second: Outcome, allowed_mm: float) -> Outcome:
 
 # Components that a right image of a link's point replaces: they need not be drawn ------------------
 
-LEFT_OUT = frozenset({"not_measured", "not_drawn", "unread"})
+LEFT_OUT = frozenset({"not_measured", "not_drawn", "no_line", "unread"})
 """Reasons why a vector was not judged: it was left out, or not found."""
 
 

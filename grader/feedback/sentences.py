@@ -34,7 +34,7 @@ RESIDUALS = frozenset(
     {
         "too_long", "too_short", "turned_left", "turned_right", "reversed", "should_be_zero", "place_off",
         "value_too_large", "value_too_small", "value_reversed", "sense_wrong", "scale_off", "not_drawn",
-        "not_certainly_within",
+        "no_line", "not_certainly_within",
     }
 )  # fmt: skip
 """Used for errors as read: not for a criterion proposed as right."""

@@ -13,6 +13,7 @@ from grader.reading.nodes import NodeFit
 from grader.reading.plans import PlanReading
 from grader.reading.sketch import SketchReading
 from grader.records import (
+    BESIDE_PX,
     Figure,
     FloatArray,
     InkMap,
@@ -172,7 +173,10 @@ def _gap(plan: PlanReading, edge: Edge, where: InkMap) -> Unread | None:
         code, between = ("blank", "no_stroke"), {"start": names[edge.tail], "end": names[edge.head]}
     at = complex(plan.fit.at[edge.tail]), complex(plan.fit.at[edge.head])
     on_it = where.share_inked(*at, ON_IT_PX)
-    if on_it < DASHED if edge.optional else where.share_inked(*at) <= BLANK:
+    # Where similarity alone places an end, the vector may pass that far beside.
+    se_mm = math.sqrt(max(np.diag(plan.fit.cov)[[2 * edge.head, 2 * edge.head + 1]]))
+    beside_px = max(BESIDE_PX, round(2.0 * se_mm * where.px_per_mm))
+    if on_it < DASHED if edge.optional else where.share_inked(*at, beside_px) <= BLANK:
         return Unread(edge.name, Reason(code[0], between), is_blank=True)
     if not edge.optional and on_it < INKED:
         return Unread(edge.name, Reason(code[1], between))

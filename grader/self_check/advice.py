@@ -128,6 +128,7 @@ ON_SHEET = {
     "unread": N_("Draw it clearly, with its arrow and letters, and photograph the sheet again."),
     "doubtful": N_("Draw it clearly, with its arrow and letters, and photograph the sheet again."),
     "not_drawn": N_("Draw it, with its arrow and letters."),
+    "no_line": N_("Draw it, with its arrow and letters."),
     "near_limit": N_("Measure it on the sheet."),
     "scale_assumed": N_("Write the scale that you used on the sheet, with its unit."),
 }

@@ -46,6 +46,7 @@ HINTS: dict[str, str] = {
     "data_misread": N_("The drawing follows another crank angle than the one given."),
     "data_unclear": N_("It is not clear whether the drawing follows your own data: a person must look."),
     "not_drawn": N_("It is not drawn."),
+    "no_line": N_("No line ends where it must: it is not drawn, or drawn elsewhere."),
     "value_alone": N_(
         "A value alone earns no points here: the vector must be drawn, and its length handed in."
     ),

@@ -65,6 +65,19 @@ def test_a_vector_between_two_nodes_that_were_read_is_known_to_be_left_out():
     ]
 
 
+def test_a_vector_is_missing_if_no_line_leads_to_where_similarity_puts_its_point():
+    task = task_for("piston", 7)
+    blank = (Unread("v_C", Reason("blank", {"start": "o", "end": "c"}), is_blank=True),)
+    drawn = replace(without(sheet(task), "v_C"), unread=blank)
+    figures = {key: replace(one, nodes={**one.nodes}) for key, one in drawn.figures.items()}
+    figures["velocity_plan"].nodes.pop("c")
+    found = outcome_of(task, Submission(readings=(replace(drawn, figures=figures),)), "v_C")
+    assert (found.verdict, [reason.code for reason in found.reasons]) == ("none", ["no_line"])
+    figures["velocity_plan"].nodes.pop("b")
+    found = outcome_of(task, Submission(readings=(replace(drawn, figures=figures),)), "v_C")
+    assert (found.verdict, found.proposed_verdict) == ("review", "none")
+
+
 def test_a_scale_of_ones_own_is_open_where_the_vector_that_shows_it_was_not_read():
     own = 0.7 * rule_scales(PUMP)["kv"]
     few = [name for name, one in PUMP.construction.vectors.items() if one.scale == "kv" and name != "v_D"]
