@@ -23,6 +23,7 @@ from grader.web.app import application, first_invitation
 from grader.web.places import batch_of, places_of
 from grader.web.settings import Settings
 from grader.web.store import Link, Publication
+from tests.browser.conftest import entered_class
 from tests.inline import Inline
 
 pytestmark = pytest.mark.slow
@@ -260,8 +261,11 @@ SHOWN = """() => !document.body.dataset.busy && document.body.dataset.ready
     && !document.getElementById("question").hidden"""
 
 
-def test_the_last_answer_leads_to_the_class_with_its_marks_and_the_export(served, visit):
-    key, _ = served.graded_class("en", "s02_1.jpg", "s02_2.jpg")
+def test_the_last_answer_leads_to_the_class_with_its_marks_and_the_export(served, visit, tmp_path):
+    heads, *rows = entered_class().splitlines()
+    entered = tmp_path / "measurements.csv"
+    entered.write_text("\n".join([heads, rows[11].replace("m12", "s02")]), encoding="utf-8")
+    key, _ = served.graded_class("en", str(entered))
     page = joined(visit())
     address = f"{served.address}/publications/{key}"
     page.goto(address)

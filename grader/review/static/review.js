@@ -138,6 +138,10 @@ function fetchQuestion(key) {
 }
 
 async function showQuestion(keepView = false) {
+  // A node that was moved may have settled others.
+  const place = state.list[state.at];
+  state.list = state.list.filter((key) => state.rows.has(key));
+  state.at = state.list.indexOf(place);
   const row = current();
   if (!row) { showMode("done"); return; }
   setReady(false);
