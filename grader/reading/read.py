@@ -220,6 +220,9 @@ def _find_motion(
     for page in filter(_has_no_velocities, pages):
         page.plans.clear()
         acceleration = _find_plan(pages, [drawing], ACCELERATION_PLAN, {}, renamed)
+        _set_apart(pages, acceleration)
+        velocity = _find_plan(pages, [drawing], VELOCITY_PLAN, {}, renamed)
+        velocities = {} if velocity is None else _nodes(velocity)
     return velocities if acceleration is None else {**velocities, **_nodes(acceleration)}
 
 

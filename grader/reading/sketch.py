@@ -30,11 +30,8 @@ from reference.plan import exact_plan
 
 LEAST_LINK_MM = 6.0
 """A sketch is not placed on shorter strokes: they are letters and hatching."""
-HARDLY = 0.4
-TURN = 0.7
-"""A sketch supported over less of its length may be turned on the sheet."""
 SURE = 0.7
-"""A sketch with this much support ends the search among other students' variants."""
+"""A sketch supported over less of its length may be another student's, or turned on the sheet."""
 SHORT_LIST = 8
 """Number of best supported sketches whose strokes are assigned."""
 COST_IN_SUPPORT = 0.05
@@ -122,7 +119,7 @@ def find_sketch(
     if _best_support(cases) < SURE:
         for drawing in others():
             cases.extend(sheet.laid(drawing, upright, COST_IN_SUPPORT))
-    if _best_support(cases) < TURN and own:
+    if _best_support(cases) < SURE and own:
         turned = Search(turns_rad=ANY_TURN, give_rad=float(np.radians(2.5)), sizes=(1.0,))
         cases.extend(sheet.laid(own[0], turned, COST_IN_SUPPORT))
     cases.sort(key=lambda case: -case.support)
