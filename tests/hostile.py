@@ -112,16 +112,15 @@ def jpeg_of_many_scans(scans=2000, side=8000):
 # TIFF ---------------------------------------------------------------------------------------------
 
 
-def tiff_of(tags, data=b"", order="<"):
+def tiff_of(tags, data):
     """TIFF of one page by its tags (number, type, value); strips and tiles at ``DATA`` point to `data`."""
     size = 8 + 2 + 12 * len(tags) + 4
     entries = b"".join(
-        struct.pack(order + "HHI", tag, kind, 1)
-        + (struct.pack(order + "HH", value, 0) if kind == 3 else struct.pack(order + "I", value))
+        struct.pack("<HHI", tag, kind, 1)
+        + (struct.pack("<HH", value, 0) if kind == 3 else struct.pack("<I", value))
         for tag, kind, value in ((tag, kind, size if value == "DATA" else value) for tag, kind, value in tags)
     )
-    mark = b"II*\0" if order == "<" else b"MM\0*"
-    return mark + struct.pack(order + "IH", 8, len(tags)) + entries + struct.pack(order + "I", 0) + data
+    return b"II*\0" + struct.pack("<IH", 8, len(tags)) + entries + struct.pack("<I", 0) + data
 
 
 def tiff_of_many_samples():
@@ -151,10 +150,10 @@ def tiff_whose_pages_go_in_a_circle():
     return bytes(data)
 
 
-def fax(*, damaged=True, options=None, compression="group4"):
+def fax(*, damaged=True, compression="group4"):
     """TIFF of one strip of fax rows; where damaged, a byte in their middle is another."""
     bits = paper(600, 840) >= 128
-    data = bytearray(stored(bits, "TIFF", compression=compression, tiffinfo={278: 600, **(options or {})}))
+    data = bytearray(stored(bits, "TIFF", compression=compression, tiffinfo={278: 600}))
     if damaged:
         with tifffile.TiffFile(io.BytesIO(bytes(data))) as file:
             page = file.pages[0]

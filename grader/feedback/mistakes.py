@@ -309,10 +309,11 @@ _ACROSS_GUIDE: dict[str, Words] = {
            " close the polygon again."),
     ),
 }  # fmt: skip
-_BY_LINE = {ALONG_GUIDE: _ALONG_GUIDE, DRIVING_ACROSS: _DRIVING_ACROSS, DRIVING_ALONG: _DRIVING_ALONG}
-_BY_LINE |= {OF_FORCE: _FORCE, ACROSS_GUIDE: _ACROSS_GUIDE}
-_BY_LINE |= {"driven across": _DRIVING_ACROSS, "driven along": _DRIVING_ALONG}  # earlier versions
-_BY_LINE[RIGHT_TRIANGLE] = _BY_TRIANGLE
+_BY_LINE = {
+    ALONG_GUIDE: _ALONG_GUIDE, DRIVING_ACROSS: _DRIVING_ACROSS, DRIVING_ALONG: _DRIVING_ALONG,
+    OF_FORCE: _FORCE, ACROSS_GUIDE: _ACROSS_GUIDE, RIGHT_TRIANGLE: _BY_TRIANGLE,
+    "driven across": _DRIVING_ACROSS, "driven along": _DRIVING_ALONG,  # earlier versions
+}  # fmt: skip
 
 
 PRECISE: dict[str, tuple[str, ...]] = {

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from markupsafe import Markup, escape
 
-from grader.documents import MistakeDocument, ReportDocument
+from grader.documents import ReportDocument
 from grader.feedback.sentences import mistake_sentences
 from grader.language import N_, Tongue, tongue
 from grader.options import Level
@@ -129,19 +129,25 @@ def with_mistakes_explained(
 ) -> ReportDocument:
     """Return the report with its mistakes explained: `feedback` and, step by step, what to `redo`.
 
+    The steps are those of the right plan at the scales that the student used.
+
     Arguments: `report` is that of the `judgement`, its mistakes in the same order. At level `symbol` nothing
     is explained, at `hint` no number is shown.
     """
     if not judgement.mistakes or level == "symbol":
         return report
     speaker, names = tongue(lang), assignment.names
-    subject = _subject(judgement, assignment, variant, speaker)
+    used = {name: scale.used for name, scale in judgement.scales.items()}
+    plan = exact_plan(assignment, [variant], assignment.scales([variant], **used))
+    subject = Subject(assignment, plan, 0, wording_of(speaker))
     told = []
     for document, mistake in zip(report.mistakes, judgement.mistakes, strict=True):
-        said, *rivals = mistake_sentences(mistake, speaker, level, names)
+        said, *others = mistake_sentences(mistake, speaker, level, names)
         said += _by_triangle(subject, mistake, speaker, level)
-        redrawn = {"redo": _redo(subject, mistake, speaker, level)}
-        told.append(document.model_copy(update={**_told(document, [said, *rivals]), **redrawn}))
+        known = zip(document.rivals, others, strict=True)
+        rivals = [rival.model_copy(update={"feedback": text}) for rival, text in known]
+        redrawn = _redo(subject, mistake, speaker, level)
+        told.append(document.model_copy(update={"feedback": said, "rivals": rivals, "redo": redrawn}))
     return report.model_copy(update={"mistakes": told})
 
 
@@ -155,22 +161,6 @@ def _by_triangle(subject: Subject, mistake: NamedMistake, speaker: Tongue, level
     joint = next((one.joint for one in known if mistake.at in (one.vector.head, one.vector.name)), "")
     reversed_at = joint if mistake.code == "normal_reversed" else ""
     return " " + speaker.gettext(HALF_TURN) % {"joint": reversed_at} if reversed_at else ""
-
-
-def _told(document: MistakeDocument, sentences: Sequence[str]) -> dict[str, object]:
-    """Describe a mistake and its rivals in words."""
-    rivals = [
-        rival.model_copy(update={"feedback": text})
-        for rival, text in zip(document.rivals, sentences[1:], strict=True)
-    ]
-    return {"feedback": sentences[0], "rivals": rivals}
-
-
-def _subject(judgement: Judgement, assignment: Assignment, variant: Variant, speaker: Tongue) -> Subject:
-    """Return the right plan at the scales that the student used."""
-    used = {name: scale.used for name, scale in judgement.scales.items()}
-    plan = exact_plan(assignment, [variant], assignment.scales([variant], **used))
-    return Subject(assignment, plan, 0, wording_of(speaker))
 
 
 def _redo(subject: Subject, mistake: NamedMistake, speaker: Tongue, level: Level) -> list[str]:

@@ -156,7 +156,8 @@ def graded(batch: Batch, progress: Progress, workers: Pool | None = None) -> Gra
     cannot be written, InterruptedRunError for an interrupt; as `only_run` for a folder of results that
     another run, or another class, has.
     """
-    roster = _roster(batch)
+    path = batch.roster_path
+    roster = read_roster(path) if batch.roster is not None or path.is_file() else None
     decisions = class_decisions(batch.decisions_path)
     files = files_of(batch)
     if not files and roster is None:
@@ -250,11 +251,6 @@ def needs_person(results: ResultsDocument) -> bool:
 # What there is ------------------------------------------------------------------------------------
 
 
-def _roster(batch: Batch) -> Roster | None:
-    path = batch.roster_path
-    return read_roster(path) if batch.roster is not None or path.is_file() else None
-
-
 def files_of(batch: Batch) -> list[Path]:
     """The files handed in, or the archive of them. Raises CallError where there is neither."""
     folder = batch.folder
@@ -267,11 +263,9 @@ def files_of(batch: Batch) -> list[Path]:
         raise failure(CallError, "folder_missing", cause, folder=folder, near=folder.parent)
     others = (batch.out, batch.decisions_path, *batch.growing, *batch.assignment.own_files)
     files = submissions(folder, batch.roster, passed_over=others)
-    return (
-        sorted(files, key=lambda path: natural_key(batch.called.get(path, path.name)))
-        if batch.called
-        else files
-    )
+    if batch.called:
+        files.sort(key=lambda path: natural_key(batch.called.get(path, path.name)))
+    return files
 
 
 def _submissions(

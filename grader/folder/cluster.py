@@ -29,7 +29,6 @@ from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from itertools import islice
 from pathlib import Path, PurePath, PurePosixPath
-from types import TracebackType
 from typing import Any, Self, TypeVar
 from urllib.parse import quote, unquote
 
@@ -426,9 +425,7 @@ class Cluster:
             raise
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._client.close()
 
     def _check(self) -> None:

@@ -30,14 +30,12 @@ def arrivals(
         if changed:
             graded = whole
             growing = tuple(path for path in now if path not in whole)
-            yield replace(batch, growing=growing), [_name(path, batch.base) for path in changed]
+            top = batch.base
+            names = [shown_name(one, top) if one.is_relative_to(top) else one.name for one in changed]
+            yield replace(batch, growing=growing), names
 
 
 def _looked_at(batch: Batch) -> dict[Path, Stamp | None]:
     """The files that a run takes in, and by what a change of each shows."""
     others = [path for path in (batch.roster_path, batch.decisions_path) if path.is_file()]
     return {path: stamp_of(path) for path in (*files_of(replace(batch, growing=())), *others)}
-
-
-def _name(path: Path, folder: Path) -> str:
-    return shown_name(path, folder) if path.is_relative_to(folder) else path.name

@@ -15,7 +15,6 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Protocol, Self, TypeVar
 
 import psutil
@@ -123,9 +122,7 @@ class Workers:
         threading.Thread(target=self._watch_memory, daemon=True).start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._closed.set()
         self._end_pool()
 
@@ -277,18 +274,22 @@ def _start(module: str, log: Path | None, is_verbose: bool) -> None:
     elif is_verbose:
         LOG.addHandler(logging.StreamHandler())
     LOG.setLevel(logging.DEBUG)
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    end_with_parent()
     import cv2  # noqa: PLC0415 - only in worker processes
 
     cv2.setNumThreads(1)
     importlib.import_module(module)
 
 
-def _end_with(parent: BaseProcess) -> None:
-    parent.join()
-    os._exit(1)
+def end_with_parent() -> None:
+    """Let this process end with its parent, if it has one."""
+
+    def end() -> None:
+        if (parent := multiprocessing.parent_process()) is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=end, daemon=True).start()
 
 
 def _timed(seconds: float, function: Callable[..., Result], *call: object) -> Result | Reason:

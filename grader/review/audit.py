@@ -12,7 +12,6 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -31,7 +30,7 @@ from grader.marking.trust import (
 )
 from grader.overlay.scene import MARKS
 from grader.review import questions
-from grader.review.records import OPEN, Answer, Points, Said, Student, mark_of
+from grader.review.records import OPEN, Answer, Points, Said, Student, mark_of, seconds_of
 from grader.review.session import Session
 from grader.tables.decision_texts import ANSWERS, AuditAnswer
 from grader.tables.decisions import VERDICTS as MARKED_WITH
@@ -158,7 +157,7 @@ class Decided:
         """True if the two verdicts or their points differ, and nobody has decided since."""
         if self.second is None or not (self.second.points or len({*self.verdicts}) > 1):
             return False
-        return _seconds(self.first.at) <= _seconds(self.second.at)
+        return seconds_of(self.first) <= seconds_of(self.second)
 
     @property
     def verdicts(self) -> tuple[str, str]:
@@ -226,13 +225,6 @@ def agreement(marks: Sequence[tuple[str, str, float | None]], speaker: Tongue) -
 
 def _is_anothers(row: Decision, by: str) -> bool:
     return row.by.strip().casefold() != by.strip().casefold()
-
-
-def _seconds(at: str) -> float:
-    try:
-        return datetime.fromisoformat(at).timestamp()
-    except ValueError:  # people write this file, too
-        return -math.inf
 
 
 def _second_question(session: Session, one: Decided, speaker: Tongue) -> dict[str, Any]:

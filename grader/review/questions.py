@@ -299,18 +299,14 @@ def _numbers(criterion: CriterionDocument, speaker: Tongue) -> Iterator[tuple[st
 
     unit = criterion.expected.unit or criterion.measured.unit or ""
     is_doubtful = criterion.verdict == OPEN and "doubtful" in criterion.reasons
+    given = "–" if criterion.points is None else points_text(criterion.points, speaker)
     shown = (
         (N_("As read") if is_doubtful else N_("Measured"), cells(criterion.measured)),
         (N_("Expected"), cells(criterion.expected)),
         (N_("Tolerance"), " · ".join(tolerance_cells(criterion.tolerance, unit, speaker))),
-        (N_("Points"), _points(criterion, speaker)),
+        (N_("Points"), f"{given} / {points_text(criterion.max_points, speaker)}"),
     )
     return ((speaker.gettext(name), Markup.escape(value)) for name, value in shown if value)
-
-
-def _points(criterion: CriterionDocument, speaker: Tongue) -> str:
-    given = "–" if criterion.points is None else points_text(criterion.points, speaker)
-    return f"{given} / {points_text(criterion.max_points, speaker)}"
 
 
 # Where to look ------------------------------------------------------------------------------------

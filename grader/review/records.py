@@ -1,5 +1,6 @@
 """Records of a review: students and their requests, what people post, and the decisions in force."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -40,10 +41,15 @@ class Request:
 
     def is_answered(self, row: Decision | None) -> bool:
         """Return whether a row was decided after the request."""
-        try:
-            return row is not None and datetime.fromisoformat(row.at).timestamp() > self.at
-        except ValueError:  # people write this file, too
-            return False
+        return row is not None and seconds_of(row) > self.at
+
+
+def seconds_of(row: Decision) -> float:
+    """Return when a row was decided, seconds since 1970; -inf for no time: people write this file, too."""
+    try:
+        return datetime.fromisoformat(row.at).timestamp()
+    except ValueError:
+        return -math.inf
 
 
 @dataclass(slots=True)

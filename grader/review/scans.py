@@ -8,6 +8,7 @@ from grader.overlay.picture import cut
 from grader.records import Box, Page, PageRef, ScannedPage, Sheet
 from grader.scan.decode.pages import decode
 from grader.scan.register.distortion import straighten
+from grader.texts.spoken import RefusedError
 
 KEPT = 6
 """Pages: an A3 sheet at 300 dpi takes 17 MB."""
@@ -56,6 +57,9 @@ class Scans:
         return pixels, straight if bend else sheet
 
 
-def page_of(pages: Sequence[PageRef], file: str, page: int) -> PageRef | None:
-    """Return the page of a file's name and number; None if there is none."""
-    return next((ref for ref in pages if (ref.file, ref.page) == (file, page)), None)
+def page_of(pages: Sequence[PageRef], file: str, page: int) -> PageRef:
+    """Return the page of a file's name and number. Raises RefusedError."""
+    for ref in pages:
+        if (ref.file, ref.page) == (file, page):
+            return ref
+    raise RefusedError(400, "page_missing", "no_page")

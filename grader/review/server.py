@@ -10,7 +10,7 @@ import hmac
 import math
 import threading
 import time
-from collections.abc import Awaitable, Callable, Iterator, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -166,22 +166,18 @@ class Review:
         """Return a part of a registered page."""
         asked = request.query_params
         student, sheet = self.session.student(asked.get("student", "")), _whole(asked.get("sheet", ""))
-        pages = self.session.pages_of(student)
-        if not 0 <= sheet < len(pages):
-            raise RefusedError(400, "page_missing", "no_page")
+        page = self.session.page(student, sheet)
         x, y, w, h, scale = (_number(asked.get(name, "")) for name in ("x", "y", "w", "h", "scale"))
         if not (0.5 <= w <= 2000.0 and 0.5 <= h <= 2000.0 and 0.1 <= scale <= 100.0):
             raise RefusedError(400, "part_refused")
         scale = min(scale, 4000.0 / max(w, h))
-        picture = self.session.scans.part(pages[sheet], (x, y, w, h), scale)
+        picture = self.session.scans.part(page, (x, y, w, h), scale)
         return Response(picture, media_type="image/jpeg", headers={"Cache-Control": "private, max-age=600"})
 
     def page_picture(self, request: Request) -> Response:
         """Return a page as it is stored."""
         asked = request.query_params
         ref = page_of(self.session.pages, asked.get("file", ""), _whole(asked.get("page", "")))
-        if ref is None:
-            raise RefusedError(400, "page_missing", "no_page")
         return Response(self.session.scans.whole(ref, LONGEST_PX), media_type="image/jpeg")
 
     def out(self, request: Request) -> Response:
@@ -227,8 +223,6 @@ class Review:
     def page(self, said: "OnPage") -> None:
         """Set a page's owner, turn and corners."""
         ref = page_of(self.session.pages, said.file, said.page)
-        if ref is None:
-            raise RefusedError(400, "page_missing", "no_page")
         owner = None if said.owner is None else self.session.student(said.owner).report
         student_id = None if owner is None else owner.student_id
         decision = PageDecision(student_id, said.turn, tuple(said.corners))
@@ -491,15 +485,21 @@ class Guarded:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """ASGI."""
+        answer = refusal(Request(scope), self.review) or self.app
+        await answer(scope, receive, with_headers(send, HEADERS))
 
-        async def with_headers(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                headers = MutableHeaders(scope=message)
-                for name, value in HEADERS.items():
-                    headers.setdefault(name, value)
-            await send(message)
 
-        await (refusal(Request(scope), self.review) or self.app)(scope, receive, with_headers)
+def with_headers(send: Send, added: Mapping[str, str]) -> Send:
+    """Return what sends an answer with some headers more; those that it has itself stay."""
+
+    async def sent(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            headers = MutableHeaders(scope=message)
+            for name, value in added.items():
+                headers.setdefault(name, value)
+        await send(message)
+
+    return sent
 
 
 def refusal(request: Request, review: Review) -> Response | None:
@@ -507,7 +507,7 @@ def refusal(request: Request, review: Review) -> Response | None:
     host, token, is_let_in = request.headers.get("host", ""), review.token, review.by is not None
     if not token and not is_let_in and urlsplit(f"//{host}").hostname not in LOOPBACK:
         return _refused(RefusedError(403, "refused", "review_host"), review)
-    if token and not _has_token(request, token):
+    if token and not hmac.compare_digest(request.cookies.get(COOKIE, "").encode(), token.encode()):
         given = request.query_params.get("token", "")
         if request.url.path == "/" and hmac.compare_digest(given.encode(), token.encode()):
             query = request.url.remove_query_params("token").query
@@ -518,10 +518,6 @@ def refusal(request: Request, review: Review) -> Response | None:
     if request.method == "POST" and not _is_own_page(request, host):
         return _refused(RefusedError(403, "refused", "review_form"), review)
     return None
-
-
-def _has_token(request: Request, token: str) -> bool:
-    return hmac.compare_digest(request.cookies.get(COOKIE, "").encode(), token.encode())
 
 
 def _is_own_page(request: Request, host: str) -> bool:

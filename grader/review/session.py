@@ -22,6 +22,7 @@ from grader.documents import (
     StandingDocument,
 )
 from grader.feedback.numbers import shown
+from grader.files import Stamp, stamp_of
 from grader.folder.batch import Batch, Graded, graded, pages_read
 from grader.folder.decisions import basis_of, decided, page_basis
 from grader.folder.workers import Pool
@@ -112,7 +113,7 @@ class Session:
     note: Note = lambda *_: None
     run: Run = field(default_factory=Run)
     _file: DecisionFile = field(init=False)
-    _stamp: tuple[int, int] = (0, 0)
+    _stamp: Stamp | None = None
     _rows: list[Decision] = field(default_factory=list)
     _undo: dict[str, list[Change]] = field(default_factory=dict)
     _lock: threading.RLock = field(default_factory=threading.RLock)
@@ -129,7 +130,7 @@ class Session:
 
         Arguments: `by` is who asks for it.
         """
-        stamp, made, rows = self._file_stamp(), self.made, self._file.all()
+        stamp, made, rows = stamp_of(self._file.path), self.made, self._file.all()
         run = graded(self.batch, progress, self.workers)
         with self._lock:
             self.graded, self.pages = run, run.pages
@@ -234,7 +235,7 @@ class Session:
         """
         with self._lock:
             student, there = self.student(said.student), self.standing()
-            page = self._page(student, said.sheet).ref
+            page = self.page(student, said.sheet).ref
             taken = {
                 row.criterion for row in there.rows.values() if row.student_id == student.report.student_id
             }
@@ -322,7 +323,7 @@ class Session:
     def refresh(self) -> None:
         """Take over what others wrote into the file in the meantime."""
         with self._lock:
-            if self._file_stamp() != self._stamp:
+            if stamp_of(self._file.path) != self._stamp:
                 self._marked_anew(set())
 
     def _row(self, student: Student, criterion: str, verdict: str, by: str, there: Standing) -> Decision:
@@ -370,18 +371,11 @@ class Session:
                 return next((one.verdict for one in student.report.criteria if one.id == key[2]), "")
         return ""
 
-    def _file_stamp(self) -> tuple[int, int]:
-        try:
-            stat = self._file.path.stat()
-        except OSError:
-            return (0, 0)
-        return (stat.st_mtime_ns, stat.st_size)
-
     # Marks ----------------------------------------------------------------------------------------
 
     def _marked_anew(self, keys: Collection[str]) -> list[Student]:
         """Mark these students again, and those with changed rows; return them."""
-        self._stamp = self._file_stamp()
+        self._stamp = stamp_of(self._file.path)
         rows = self._file.all()
         changed = {row.student_id for row in {*rows} ^ {*self._rows}}
         self._rows = rows
@@ -498,10 +492,11 @@ class Session:
 
         Raises RefusedError for a page that there is not.
         """
-        node = snapped(self._page(self.student(key), sheet).ink, *at, figure)
+        node = snapped(self.page(self.student(key), sheet).ink, *at, figure)
         return on_sheet(node.at)
 
-    def _page(self, student: Student, sheet: int) -> ScannedPage:
+    def page(self, student: Student, sheet: int) -> ScannedPage:
+        """Return one of a student's pages as the last run read it. Raises RefusedError."""
         pages = self.pages_of(student)
         if not 0 <= sheet < len(pages):
             raise RefusedError(400, "page_missing", "no_page")

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
@@ -220,7 +220,10 @@ def _columns(plan: Plan) -> _Columns:
         "rate": lists({name: rate for name, rate in plan.rates.items() if name not in told}),
         "conditioning": lists(conditioning(plan)),
     }
-    points = {"mechanism": lists(plan.motion.position), "centres": lists(_centres(plan))}
+    of_plan = (plan.mechanism, plan.construction, plan.motion)
+    poles = acceleration_poles(*of_plan) if plan.motion.acceleration else {}
+    centres = {**instantaneous_centres(*of_plan), **poles}
+    points = {"mechanism": lists(plan.motion.position), "centres": lists(centres)}
     points |= {figure: lists(plan.nodes_mm[figure]) for figure in plan.construction.poles}
     return _Columns(numbers, points)
 
@@ -295,21 +298,13 @@ def _forces(forces: Forces, motion: Motion, index: int) -> ForcesDocument:
     )
 
 
-def _centres(plan: Plan) -> dict[str, ComplexArray]:
-    of_plan = (plan.mechanism, plan.construction, plan.motion)
-    poles = acceleration_poles(*of_plan) if plan.motion.acceleration else {}
-    return {**instantaneous_centres(*of_plan), **poles}
-
-
 def _grouped(values: Mapping[str, float]) -> dict[str, float | dict[str, float]]:
     """Group ``transmission B`` and similar names under ``transmission``."""
     groups: dict[str, float | dict[str, float]] = {}
     for name, value in values.items():
         kind, _, node = name.partition(" ")
-        if not node:
+        if node:
+            cast("dict[str, float]", groups.setdefault(kind, {}))[node] = value
+        else:
             groups[kind] = value
-            continue
-        group = groups.setdefault(kind, {})
-        if isinstance(group, dict):
-            group[node] = value
     return groups

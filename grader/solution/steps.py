@@ -124,20 +124,16 @@ def explain(
         introduction = speaker.say(ON_THE_LEVER, scale=speaker.write(speaker.scale("kv")))
         lines, table = tuple(lever_lines(speaker)), lever_table(speaker)
         sections.append(PlanSection(LEVER, tongue.gettext(TITLES[LEVER]), introduction, (), (), lines, table))
+    on_paper = subject.centres
+    shown = (step for name, step in construction.centres.items() if name in on_paper)
     centres = tuple(
-        ExplainedStep(number + k, step, sentences.sentence(speaker, step))
-        for k, step in enumerate(_centre_steps(speaker), start=1)
+        ExplainedStep(k, step, sentences.sentence(speaker, step))
+        for k, step in enumerate(shown, start=number + 1)
     )
     if centres:
         introduction = speaker.say(INTRODUCTIONS[CENTRES])
         sections.append(PlanSection(CENTRES, tongue.gettext(TITLES[CENTRES]), introduction, centres))
     return sections
-
-
-def _centre_steps(speaker: Speaker) -> list[Step]:
-    """Return the steps of the centres that lie on the paper."""
-    on_paper = speaker.subject.centres
-    return [step for name, step in speaker.subject.plan.construction.centres.items() if name in on_paper]
 
 
 def _explanation(speaker: Speaker, number: int, step: Step, equation: Equation | None) -> ExplainedStep:

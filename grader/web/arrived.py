@@ -29,11 +29,10 @@ def owners(
     if roster is None:
         return {}
     seen = noted_pages(places.results / CACHE_FOLDER)
-    pages = [
-        page
-        for path, name in called.items()
-        for page in seen.get(name) or _pages(name, counted.get(path.name, 1))
-    ]
+    pages: list[PageRef] = []
+    for path, name in called.items():
+        count = counted.get(path.name, 1)
+        pages += seen.get(name) or [PageRef(name, number, count) for number in range(1, count + 1)]
     assignment = ""
     if any(page.identity for page in pages):
         with suppress(PlanmarkError):
@@ -49,10 +48,6 @@ def owners(
         if path.suffix.lower() in MEASUREMENT_TYPES and not known[name]:
             known[name] = dict.fromkeys(one for one in students_in(path) if one in roster.by_student)
     return {name: tuple(students) for name, students in known.items()}
-
-
-def _pages(name: str, count: int) -> list[PageRef]:
-    return [PageRef(name, number, count) for number in range(1, count + 1)]
 
 
 def picture(path: Path, shown: str) -> bytes:

@@ -27,13 +27,14 @@ from limits.storage import MemoryStorage
 from limits.strategies import MovingWindowRateLimiter
 from sqlalchemy import select
 from sqlalchemy.orm import Session
-from starlette.datastructures import Headers, MutableHeaders
+from starlette.datastructures import Headers
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from zxcvbn import zxcvbn
 
 from grader.language import LANGUAGES, tongue
 from grader.review.server import HEADERS as REVIEW_HEADERS
+from grader.review.server import with_headers
 from grader.texts.spoken import RefusedError, told_of
 from grader.web.settings import Settings
 from grader.web.store import Account, Link, Publication, Store, Visit, digest_of
@@ -64,6 +65,7 @@ HEADERS = {
     "Permissions-Policy": "geolocation=(), microphone=()",
     "X-Robots-Tag": "noindex",
 }
+SECURE = {"Strict-Transport-Security": "max-age=31536000"}
 RATES: dict[str, RateLimitItem] = {
     "sign_in": RateLimitItemPerMinute(10),
     "code": RateLimitItemPerHour(20),
@@ -349,18 +351,15 @@ class Rim:
                 until = self._ended(sender)
             return message
 
-        async def with_headers(message: Message) -> None:
-            if refused is not None:  # whatever the application answers to that
-                return
-            if message["type"] == "http.response.start":
-                headers = MutableHeaders(scope=message)
-                for name, value in self._headers().items():
-                    headers.setdefault(name, value)
-            await send(message)
+        answer = with_headers(send, {**HEADERS, **SECURE} if self.settings.is_https else HEADERS)
+
+        async def unless_refused(message: Message) -> None:
+            if refused is None:  # else whatever the application answers to that
+                await answer(message)
 
         try:
             with contextlib.suppress(RefusedError):
-                await self.app(scope, bounded, with_headers)
+                await self.app(scope, bounded, unless_refused)
         finally:
             self._held -= Counter({sender: taken})
             if 0.0 < until < inf:
@@ -379,11 +378,6 @@ class Rim:
         if files is None:
             return self.most
         return 1_000_000 * (self.settings.photo_mb if files["photo"] else self.settings.upload_mb)
-
-    def _headers(self) -> dict[str, str]:
-        if self.settings.is_https:
-            return {**HEADERS, "Strict-Transport-Security": "max-age=31536000"}
-        return HEADERS
 
 
 GRACE_S = 30.0

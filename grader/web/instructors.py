@@ -410,8 +410,6 @@ def thumbnail(call: Called, own: Own, name: FileName) -> Response:
     """A small picture of a file's first page, as JPEG."""
     places = call.places(own)
     path = places.file(name)
-    if path is None:
-        raise missing("file")
     small = places.thumbnail(path)
     if not small.is_file() or small.stat().st_mtime < path.stat().st_mtime:
         write_whole(small, result_of(call.service.queue.workers, picture, path, name))
@@ -422,10 +420,7 @@ def thumbnail(call: Called, own: Own, name: FileName) -> Response:
 def remove_file(call: Called, own: Own, name: FileName) -> dict[str, str]:
     """Delete a file that was handed in."""
     places = call.places(own)
-    path = places.file(name)
-    if path is None:
-        raise missing("file")
-    places.delete(path)
+    places.delete(places.file(name))
     call.note("file removed", f"{own.key} {name}")
     return {"state": "removed"}
 

@@ -1,14 +1,13 @@
 """Processes that judge values while a request waits."""
 
 import multiprocessing
-import os
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
-from grader.folder.workers import guarded
+from grader.folder.workers import end_with_parent, guarded
 from grader.records import Reason
 
 MOST_JUDGES = 4
@@ -57,15 +56,3 @@ class Judges:
     def end(self) -> None:
         """End the processes."""
         self._pool.shutdown(cancel_futures=True)
-
-
-def end_with_parent() -> None:
-    """Let this process end with its parent."""
-    parent = multiprocessing.parent_process()
-
-    def end() -> None:
-        if parent is not None:
-            parent.join()
-            os._exit(1)
-
-    threading.Thread(target=end, daemon=True).start()

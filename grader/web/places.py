@@ -109,9 +109,12 @@ class Places:
         self._note_of(path).unlink(missing_ok=True)
         self.thumbnail(path).unlink(missing_ok=True)
 
-    def file(self, name: str) -> Path | None:
-        """Return a file handed in by what people call it."""
-        return next((path for path, called in self.called().items() if called == name), None)
+    def file(self, name: str) -> Path:
+        """Return a file handed in by what people call it. Raises RefusedError."""
+        for path, called in self.called().items():
+            if called == name:
+                return path
+        raise RefusedError(404, "not_found", "no_file")
 
     def thumbnail(self, path: Path) -> Path:
         """Return the path of a file's picture, whether there is one or not."""

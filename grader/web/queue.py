@@ -21,11 +21,11 @@ from typing import Any
 from sqlalchemy import select, update
 
 from grader.folder.batch import Batch, grade
-from grader.folder.workers import Workers, guarded, result_of
+from grader.folder.workers import Workers, end_with_parent, guarded, result_of
 from grader.records import Reason, as_error
 from grader.review.session import moves
 from grader.texts.spoken import failure, in_english
-from grader.web.judges import MOST_JUDGES, Judges, end_with_parent
+from grader.web.judges import MOST_JUDGES, Judges
 from grader.web.places import batch_of, places_of
 from grader.web.settings import Settings
 from grader.web.store import UNFINISHED, Job, Store

@@ -389,7 +389,11 @@ class Assignment:
         """Return the values of `scales`, and those that its rule may use."""
         known = self.values(variants)
         driver = build_driver(self.mechanism_file, known, len(variants))
-        known |= _speeds(driver if self.is_at_given_scales else self._at_speed(driver))
+        driver = driver if self.is_at_given_scales else self._at_speed(driver)
+        if isinstance(driver, Crank):
+            known |= {"omega": np.abs(driver.omega), "crank_m": driver.length_m}
+        else:
+            known["speed"] = np.abs(driver.speed)
         rule = self.file.scales
         if crank_mm is not None:
             known["crank_mm"] = np.asarray(crank_mm, float)
@@ -414,13 +418,6 @@ class Assignment:
             return driver
         omega, epsilon = self.speed
         return replace(driver, omega=driver.omega * omega, epsilon=driver.epsilon * epsilon)
-
-
-def _speeds(driver: Driver) -> dict[str, Value]:
-    """Return the values of the driving link that the rule for the scales may use."""
-    if isinstance(driver, Crank):
-        return {"omega": np.abs(driver.omega), "crank_m": driver.length_m}
-    return {"speed": np.abs(driver.speed)}
 
 
 # Files ---------------------------------------------------------------------------------------------

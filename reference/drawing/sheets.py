@@ -136,7 +136,10 @@ def lay_out(figures: Sequence[DrawnFigure], room: Bounds, column: Bounds) -> tup
     """
     beside = (room[0], room[1], column[0], room[3])
     found = _in_rows(figures, beside) or _packed_by_size(figures, room, column)
-    return (found, True) if found else (_stacked(figures, room), False)
+    if found:
+        return found, True
+    # All into the top left corner, so that what does not fit is visible.
+    return [(room[0] - box[0], room[1] - box[1]) for box in (figure.bounds for figure in figures)], False
 
 
 def _sizes(figures: Sequence[DrawnFigure]) -> list[tuple[float, float]]:
@@ -252,11 +255,6 @@ def _roomiest(taken: Mask, mask: Mask, corner: tuple[float, float] | None) -> tu
         return (int(row), int(column)), 1e3 * float(depth[row, column] > 0.0)
     row, column = np.unravel_index(int(np.argmax(depth)), depth.shape)
     return (int(row), int(column)), float(depth[row, column])
-
-
-def _stacked(figures: Sequence[DrawnFigure], room: Bounds) -> list[Point]:
-    """Return shifts of all figures into the top left corner, so that what does not fit is visible."""
-    return [(room[0] - box[0], room[1] - box[1]) for box in (figure.bounds for figure in figures)]
 
 
 # A figure after each of its steps ------------------------------------------------------------------

@@ -37,7 +37,6 @@ class Wording:
         }
     )
     variant: Mapping[str, str] = field(default_factory=lambda: {"n": "n", "position": "position"})
-    given: str = "Given"
     columns: tuple[str, str, str, str, str] = ("vector", "on paper", "mm", "real value", "direction")
     too_large: str = "does not fit A3 at these scales"
     units: Mapping[str, str] = field(default_factory=dict)

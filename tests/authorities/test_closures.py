@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from mpmath import mp, mpc
 
-from reference.authored.assembly import build_mechanism
-from reference.authored.mechanism import MechanismFile, check_mechanism
-from reference.authored.toml_file import validate
 from reference.kinematics.motion import move
 from reference.mechanism import Yoke
+from tests.authorities.test_published_results import solved
 from tests.bench.oracle import ExactMotion
 from tests.laws.mechanisms import random_mechanism
 
@@ -21,13 +19,6 @@ DOUBLE_PRECISION = 1e-12
 OMEGA, EPSILON = 3.0, -7.0
 CRANK = {"pivot": "A", "pin": "B", "length": 0.15, "angle_deg": 70, "omega": OMEGA, "epsilon": EPSILON}
 B3 = {"type": "RPR", "node": "B3", "pin": "B", "pivot": "C", "link": "3"}
-
-
-def motion_of(mechanism: dict):
-    table = {"schema_version": 1, "id": "case", "title": {"en": "case"}, "length_unit": "m", **mechanism}
-    file = validate(MechanismFile, table, "case")
-    assert not list(check_mechanism(file))
-    return move(build_mechanism(file, {}, 1))
 
 
 def turn(angle):
@@ -163,7 +154,7 @@ def closed(loops, start):
 )
 def test_loops_closed_by_newtons_method_and_differentiated_give_the_same_motion(case):
     mechanism, start, loops, joint, place = case()
-    motion = motion_of(mechanism)
+    motion = solved(mechanism)
     start = start or start_of_the_third(motion)
     with mp.workdps(DIGITS):
 
@@ -181,7 +172,7 @@ def test_a_scotch_yoke_moves_harmonically():
     """x = r cos phi, x' = -r omega sin phi, x'' = -r omega^2 cos phi - r epsilon sin phi."""
     yoke = {"type": "RPP", "node": "D", "pin": "B", "slot_deg": 90}
     yoke |= {"guide": {"through": [0, 0], "angle_deg": 0}}
-    motion = motion_of({"ground": {"A": [0, 0]}, "crank": CRANK, "group": [yoke]})
+    motion = solved({"ground": {"A": [0, 0]}, "crank": CRANK, "group": [yoke]})
     x, y = 0.15 * math.cos(math.radians(70)), 0.15 * math.sin(math.radians(70))
     for rate, true in (
         (motion.position, x),
@@ -195,7 +186,7 @@ def test_an_oscillating_cylinder_has_the_rates_of_its_triangle():
     """s^2 = r^2 + d^2 + 2 r d sin phi for a pivot d below the crank's; s' and theta' from derivatives."""
     r, d, phi = 0.15, 0.4, math.radians(70)
     mechanism = {"ground": {"A": [0, 0], "C": [0, -d]}, "crank": CRANK, "group": [B3]}
-    motion = motion_of(mechanism)
+    motion = solved(mechanism)
     s = math.sqrt(r * r + d * d + 2 * r * d * math.sin(phi))
     slide = r * d * math.cos(phi) * OMEGA / s
     swing = OMEGA * r * (r + d * math.sin(phi)) / s**2
@@ -227,7 +218,7 @@ def test_the_cross_of_an_oldham_coupling_slides_harmonically_in_both_discs():
     d, phi = 0.06, math.radians(70)
     cross = {"type": "RPP", "node": "C3", "pin": "C", "link": "3"}
     cross |= {"guide": {"joints": ["A", "B"], "coincident": "C1"}}
-    motion = motion_of({"ground": {"A": [0, 0], "C": [d, 0]}, "crank": CRANK, "group": [cross]})
+    motion = solved({"ground": {"A": [0, 0], "C": [d, 0]}, "crank": CRANK, "group": [cross]})
     along = complex(math.cos(phi), math.sin(phi))
     for rate, first, second, coriolis in (
         (motion.velocity, -OMEGA * math.sin(phi), OMEGA * math.cos(phi), 0),
@@ -251,7 +242,7 @@ def test_a_cylinder_of_driven_length_turns_its_crank(side):
     cylinder = {"pivot": "C", "length": length, "speed": speed, "acceleration": growth, "side": side}
     crank = {"pivot": "A", "pin": "B", "link": "2", "length": arm, "cylinder": cylinder}
     mechanism = {"ground": {"A": [0.3, 0.2], "C": [0, 0]}, "crank": crank, "group": [B3]}
-    motion = motion_of(mechanism)
+    motion = solved(mechanism)
     sign = 1 if side == "left" else -1
 
     def pin(time):
@@ -272,7 +263,7 @@ def test_the_equivalent_linkage_of_a_gear_pair_has_the_gears_ratio():
     gear = {"type": "RRR", "node": "D", "pins": ["B", "C"], "links": ["2", "3"], "side": "right"}
     gear["lengths"] = [(first + second) * math.sin(alpha), second * math.cos(alpha)]
     crank = CRANK | {"length": first * math.cos(alpha), "angle_deg": 20}
-    motion = motion_of({"ground": {"A": [0, 0], "C": [first + second, 0]}, "crank": crank, "group": [gear]})
+    motion = solved({"ground": {"A": [0, 0], "C": [first + second, 0]}, "crank": crank, "group": [gear]})
     assert motion.omega["3"][0] == pytest.approx(-OMEGA * first / second, rel=DOUBLE_PRECISION)
     assert motion.epsilon["3"][0] == pytest.approx(-EPSILON * first / second, rel=DOUBLE_PRECISION)
 
@@ -285,7 +276,7 @@ def test_an_elliptic_trammels_rod_turns_as_its_ends_slide_on_crossed_guides():
     rod = {"type": "RRP", "node": "D", "pin": "B", "length": length, "link": "2", "side": "ahead"}
     rod |= {"guide": {"through": [0, 0], "angle_deg": 90}}
     middle = {"type": "point_on_line", "node": "E", "base": ["B", "D"], "link": "2", "ratio": 0.5}
-    motion = motion_of({"ground": {"A": [0, 0]}, "driving_slider": driving, "group": [rod, middle]})
+    motion = solved({"ground": {"A": [0, 0]}, "driving_slider": driving, "group": [rod, middle]})
     y = math.sqrt(length**2 - place**2)
     y_speed = -place * speed / y
     y_growth = -(speed**2 + place * growth + y_speed**2) / y

@@ -14,7 +14,6 @@ from typer.testing import CliRunner
 from grader.cli.app import app
 from grader.cli.exporting import schema
 from reference.authored.assignment import load_assignment
-from reference.errors import AuthoredFileError
 from reference.kinematics.cycle import cycle
 from reference.plan import exact_plan
 from tests.functional.broken_files import Case
@@ -147,19 +146,6 @@ def test_position_0_at_a_dead_point_as_documented(conveyor):
     reach = np.abs(plan.motion.position["B"])
     found = cycle(assignment.mechanism(first[:1]))
     assert reach[0] == pytest.approx(np.abs(found.motion.position["B"]).max(), rel=1e-4)
-
-
-def test_a_fault_in_the_table_stops_every_command_before_anything_is_written(planmark, conveyor, tmp_path):
-    table = tmp_path / "conveyor.csv"
-    table.write_text(table.read_text(encoding="utf-8").replace("95,230", "95 mm,23O"), encoding="utf-8")
-    ran = planmark("plan", conveyor, "--all", "--csv", "all.csv")
-    assert ran.returncode == 2
-    assert "conveyor.csv:\n" in ran.stderr
-    assert "line 4, a: '95 mm' is no number: the unit stands in the heading, as a [mm]" in ran.stderr
-    assert "line 4, b: '23O' is no number" in ran.stderr
-    assert not (tmp_path / "all.csv").exists()
-    with pytest.raises(AuthoredFileError):
-        load_assignment(conveyor)
 
 
 def test_an_assignment_like_it_has_a_table_of_its_own(planmark, conveyor, tmp_path):

@@ -22,8 +22,8 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> tuple[SceneWork, Path]:
     return student, student.sheets[0].save(tmp_path_factory.mktemp("photo") / "sheet")
 
 
-def checked(student: SceneWork, path: Path, lang: str = "en", level: str = "hint") -> SelfCheck:
-    return photo_check(path, student.assignment, student.rubric, student.variant, lang, level)
+def checked(student: SceneWork, path: Path, lang: str = "en") -> SelfCheck:
+    return photo_check(path, student.assignment, student.rubric, student.variant, lang, "hint")
 
 
 def test_what_is_drawn_rightly_is_right_and_nothing_expected_is_shown(drawn: tuple[SceneWork, Path]) -> None:

@@ -90,14 +90,6 @@ def test_the_plan_is_drawn_into_a_file(planmark, tmp_path):
     assert [path.name for path in (tmp_path / "new").iterdir()] == ["plan.svg"]
 
 
-def test_all_faults_of_an_authored_file_are_told_at_once(planmark, tmp_path):
-    (tmp_path / "my.assignment.toml").write_text('schema_version = 2\nid = "my"\ncolour = "red"\n')
-    ran = planmark("plan", "my.assignment.toml")
-    assert ran.returncode == 2
-    for path in ("$.schema_version", "$.colour", "$.title.en"[:7], "$.mechanism", "$.scales", "$.page"):
-        assert path in ran.stderr
-
-
 def test_a_mechanism_that_does_not_assemble_has_its_own_status(planmark, tmp_path):
     own = planmark("plan", "pump", "--n", 1, cwd=tmp_path)
     assert own.returncode == 0

@@ -57,10 +57,6 @@ def test_the_same_problem_many_times_is_told_once_with_its_number():
     assert "×9" in text
 
 
-def test_an_empty_class_has_a_page():
-    assert Page(index_page(results(), "ru")).open == []
-
-
 def in_class(count, **changes):
     return [report(student_id=f"s{k:03d}", **changes) for k in range(count)]
 

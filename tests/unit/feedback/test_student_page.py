@@ -17,8 +17,8 @@ from tests.unit.feedback.parsed import Page
 from tests.unit.feedback.works import criterion, picture, report
 
 
-def page_of(one, pictures=(), level="full", names=None):
-    return StudentPage(one, tuple(pictures), tongue("en"), level, About(names=names or {}))
+def page_of(one, pictures=(), level="full"):
+    return StudentPage(one, tuple(pictures), tongue("en"), level, About(names={}))
 
 
 def mistake(code, at, explains):

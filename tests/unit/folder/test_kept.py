@@ -132,16 +132,6 @@ def wider(rubric):
     return rubric.model_copy(update={"tolerance": table})
 
 
-def test_a_changed_rubric_marks_everybody_again_and_reads_no_scan_again(class_folder, tmp_path, reader):
-    first = run(class_folder, tmp_path / "out")
-    assert sorted(reader.read) == ["s1", "s2"]
-    second = run(class_folder, tmp_path / "out", wider(RUBRIC))
-    assert sorted(reader.read) == ["s1", "s2"]
-    fresh = run(class_folder, tmp_path / "other", wider(RUBRIC))
-    assert second.reports == fresh.reports
-    assert second.reports != first.reports
-
-
 @pytest.mark.usefixtures("reader")
 def test_what_moved_is_told_with_the_standing_before_and_after(class_folder, tmp_path):
     out = tmp_path / "out"

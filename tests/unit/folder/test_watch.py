@@ -1,5 +1,6 @@
 import shutil
 from contextlib import suppress
+from functools import partial
 from itertools import islice
 
 import pytest
@@ -43,13 +44,13 @@ def nothing():
     """Do nothing between two looks."""
 
 
+def more(path):
+    with path.open("ab") as file:
+        file.write(b"more")
+
+
 def test_a_file_is_taken_when_it_has_stopped_growing(batch):
-    new = batch.folder / "s2.jpg"
-
-    def grow():
-        with new.open("ab") as file:
-            file.write(b"more")
-
+    grow = partial(more, batch.folder / "s2.jpg")
     came = watched(batch, nothing, grow, grow, nothing, nothing)
     assert came == [(["s1.jpg"], ["s1.jpg"]), (["s2.jpg"], ["s1.jpg", "s2.jpg"])]
 
@@ -57,15 +58,11 @@ def test_a_file_is_taken_when_it_has_stopped_growing(batch):
 def test_what_still_grows_does_not_keep_the_others_waiting(batch):
     slow, quick = batch.folder / "s2.jpg", batch.folder / "s3.jpg"
 
-    def grow():
-        with slow.open("ab") as file:
-            file.write(b"more")
-
     def both():
         quick.write_bytes(b"whole")
-        grow()
+        more(slow)
 
-    came = watched(batch, both, grow, nothing)
+    came = watched(batch, both, partial(more, slow), nothing)
     assert came[0] == (["s1.jpg"], ["s1.jpg"])
     assert came[1] == (["s3.jpg"], ["s1.jpg", "s3.jpg"])
     assert came[2] == (["s2.jpg"], ["s1.jpg", "s2.jpg", "s3.jpg"])

@@ -99,6 +99,20 @@ def left_out(delivery):
     }
 
 
+NAMES_APART = (
+    "LastName,FirstName,ID,SIS User ID,SIS Login ID,Section,Pump (1)\n"
+    "    Points Possible,,,,,,10\nPopescu,Ion,1,s01,,1,\n"
+)
+"""A gradebook of Canvas with names in two columns."""
+
+
+def form(tmp_path, text):
+    """The file of a platform's own form."""
+    path = tmp_path / "form.csv"
+    path.write_text(text)
+    return path
+
+
 NOW = datetime(2026, 11, 22, 5, 0, tzinfo=UTC)
 
 

@@ -13,7 +13,7 @@ from grader.lms.export import KINDS, export, usual_name
 from grader.lms.grades import Options, Person
 from grader.lms.table import RawTable
 from reference.errors import CallError
-from tests.unit.lms.classroom import a_class, left_out, marked, notes, report, results
+from tests.unit.lms.classroom import NAMES_APART, a_class, form, left_out, marked, notes, report, results
 
 NEEDED = {
     ("moodle", "feedback"): {"people": {"s09": Person(participant=1)}},
@@ -163,10 +163,6 @@ def test_export_writes_one_file_and_says_who_is_in_it(tmp_path):
 # What is rendered is read back, and a difference stops it ------------------------------------------
 ONE = results(marked("s01", 5.0, 2.5))
 WORKSHEET = "Identifier,Grade,Maximum grade,Last modified (grade)\nParticipant 1,,10.00,-\n"
-GRADEBOOK = (
-    "LastName,FirstName,ID,SIS User ID,SIS Login ID,Section,Pump (1)\n"
-    "    Points Possible,,,,,,10\nPopescu,Ion,1,s01,,1,\n"
-)
 
 
 def refused(tmp_path, options, name="out.csv"):
@@ -174,12 +170,6 @@ def refused(tmp_path, options, name="out.csv"):
     with pytest.raises(OutputError, match="would be read back differently"):
         export(ONE, tmp_path / name, options)
     assert set(tmp_path.iterdir()) == before
-
-
-def form(tmp_path, text):
-    path = tmp_path / "form.csv"
-    path.write_text(text)
-    return path
 
 
 def test_a_table_that_reads_otherwise_is_not_written(tmp_path, monkeypatch):
@@ -192,7 +182,7 @@ def test_a_filled_in_file_that_reads_otherwise_is_not_written(tmp_path, monkeypa
     monkeypatch.setattr(RawTable, "text", lambda *rows: whole(*rows).replace("7.5", "5.5"))
     people = {"s01": Person(participant=1)}
     refused(tmp_path, Options(to="moodle", form=form(tmp_path, WORKSHEET), people=people))
-    refused(tmp_path, Options(to="canvas", form=form(tmp_path, GRADEBOOK)))
+    refused(tmp_path, Options(to="canvas", form=form(tmp_path, NAMES_APART)))
 
 
 @pytest.mark.parametrize("broken", ["read", "namelist"])

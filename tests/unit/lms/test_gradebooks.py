@@ -10,7 +10,7 @@ from grader.lms.export import export
 from grader.lms.grades import Options, Person
 from reference.errors import CallError, InputFileError
 from tests.unit.lms import importers
-from tests.unit.lms.classroom import left_out, marked, notes, report, results
+from tests.unit.lms.classroom import NAMES_APART, form, left_out, marked, notes, report, results
 
 EXPORTED = (
     "Student,ID,SIS User ID,SIS Login ID,Section,Quiz (7),Pump (12345),Current Score,Final Score\r\n"
@@ -166,18 +166,6 @@ def test_a_file_that_is_no_exported_gradebook_is_refused(tmp_path, text, message
     with pytest.raises(InputFileError, match=message):
         filled(tmp_path, report("s01", 7.5), text=text)
     assert not (tmp_path / "out.csv").exists()
-
-
-NAMES_APART = (
-    "LastName,FirstName,ID,SIS User ID,SIS Login ID,Section,Pump (1)\n"
-    "    Points Possible,,,,,,10\nPopescu,Ion,1,s01,,1,\n"
-)
-
-
-def form(tmp_path, text):
-    path = tmp_path / "form.csv"
-    path.write_text(text)
-    return path
 
 
 # Brightspace, Blackboard, ILIAS -------------------------------------------------------------------

@@ -1,7 +1,6 @@
 """Sheets of the reference drawing: figures do not overlap, tables are complete, senses are shown."""
 
 import itertools
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -279,11 +278,6 @@ def test_a_table_too_long_for_the_sheet_is_told():
     names = list(subject.plan.nodes_mm)
     assert column(subject, names, (FRAME[2], FRAME[1]), FRAME[3]).fits
     assert not column(subject, names, (FRAME[2], FRAME[1]), FRAME[1] + 60.0).fits
-
-
-def test_an_arc_goes_round_its_centre():
-    bow = symbols.arc(2 + 1j, 5.0, 0.0, math.pi, 0.3)
-    assert all(math.hypot(x - 2.0, -y - 1.0) == pytest.approx(5.0) for x, y in bow.points)
 
 
 def test_a_figure_larger_than_its_room_has_no_place_in_it():

@@ -255,11 +255,6 @@ def test_a_students_file_is_read(entered):
     assert one.values == {"v_D": 1.23, "omega_3": -4.0}
 
 
-def test_a_students_file_need_not_name_its_student(entered):
-    (one,) = entered('{"segments_mm": {"v_A": 60}}', "s07.json")
-    assert one.student_id is None
-
-
 @pytest.mark.parametrize(
     ("change", "where", "entry"),
     [

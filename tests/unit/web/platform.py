@@ -7,10 +7,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from urllib.parse import parse_qs, urlsplit
 
 import jwt
-import requests
 from jwcrypto.jwk import JWK
-
-from tests.waiting import PATIENCE_S
 
 CLAIM = "https://purl.imsglobal.org/spec/lti/claim/"
 ROLE = "http://purl.imsglobal.org/vocab/lis/v2/membership#"
@@ -134,6 +131,3 @@ class Platform:
         asked = self.begun(browser)
         form = {"state": asked["state"], "id_token": self.signed(self.claims(asked, **changed))}
         return browser.post("/lti/launch", data=form, follow_redirects=False)
-
-    def reachable(self):
-        return requests.get(f"{self.address}/jwks", timeout=PATIENCE_S).ok

@@ -74,13 +74,6 @@ def test_ones_own_link_shows_nothing_of_another_student(graded, student, admin):
     assert student.get(f"/api/v1/publications/{other}/feedback").status_code == 401
 
 
-def test_the_photo_of_another_visitor_is_not_shown(graded, student, app):
-    key, _ = graded
-    job = student.act("POST", f"/publications/{key}/photos?n=7", content=b"\xff\xd8\xff junk").json()
-    assert student.get(f"/api/v1/photos/{job['key']}").status_code == 200
-    assert Browser(app).get(f"/api/v1/photos/{job['key']}").status_code == 404
-
-
 # Texts that people send ---------------------------------------------------------------------------
 
 

@@ -36,12 +36,6 @@ def test_values_are_checked_with_decimal_commas_and_the_units_of_the_form(admin,
     assert told.json()["attempts_left"] is None
 
 
-def test_one_value_alone_is_checked(admin, visitor):
-    told = checked(visitor, admin.publish(), {"v_A": "60,0"})
-    assert lines_of(told)["v_A"]["result"] == "right", told.text
-    assert told.json()["problems"] == []
-
-
 def test_no_answer_is_given_away(admin, visitor):
     key = admin.publish()
     far = checked(visitor, key, {"v_B": "12", "v_B_deg": "10"})

@@ -36,13 +36,6 @@ def test_an_invited_account_has_no_password_to_guess(admin, visitor):
 
 
 @pytest.mark.usefixtures("admin")
-def test_passwords_cannot_be_tried_out(visitor):
-    statuses = [visitor.sign_in("Ana", "wrong wrong wrong").status_code for _ in range(12)]
-    assert statuses[:9] == [401] * 9
-    assert statuses[-1] == 429
-
-
-@pytest.mark.usefixtures("admin")
 def test_a_visit_begins_anew_with_the_sign_in(visitor):
     visitor.get("/")
     before = visitor.cookies[COOKIE]
