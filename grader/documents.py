@@ -583,8 +583,10 @@ class LintFindingDocument(Document):
 
     severity: Literal["fault", "warning", "hint"]
     code: str
-    file: Literal["assignment", "mechanism", "rubric"]
+    file: Literal["assignment", "mechanism", "rubric", "table"]
     path: str
+    line: int | None = None
+    """Line of a table, or of a file that is not TOML; null elsewhere."""
     message: str
     parameters: Parameters = {}
     variants: list[VariantDocument]
@@ -639,7 +641,7 @@ class LintWorst(VariantDocument):
 
 
 class LintDocument(Document):
-    """The findings of `planmark lint`."""
+    """The findings of `planmark lint`; without variants and scales if the files have faults."""
 
     schema_version: Version = 1
     assignment: str

@@ -15,8 +15,8 @@ from pydantic import Field, model_validator
 
 from grader.documents import ScaleName
 from grader.records import MECHANISM
-from reference.authored.assignment import Assignment, AssignmentFile, load_assignment, locate
-from reference.authored.toml_file import Authored, Identifier, Text, is_file, load
+from reference.authored.assignment import Assignment, file_kind, load_assignment, locate
+from reference.authored.toml_file import Authored, Identifier, Text, is_file, load, table_of
 from reference.construction.graph import ON_SKETCH, Construction
 from reference.errors import AuthoredFileError, CallError, FaultError, Faults, Finding, look_alikes
 from reference.plan import construction_for
@@ -441,24 +441,27 @@ def rubric_of(assignment: Assignment) -> RubricFile:
 
 def load_both(name: str | Path) -> tuple[Assignment, RubricFile]:
     """Load an assignment and its rubric; raises AuthoredFileError with the faults of all their files."""
-    faults, loaded, rubric = Faults(), None, None
-    path = locate("assignment", str(name))
+    faults, assignment, rubric = Faults(), None, None
+    path = locate("assignment", str(name)).resolve()
     with faults:
-        loaded = load_assignment(name)
-    # Faults of the mechanism or the table leave the assignment's own file as it is.
-    with Faults() as told:
-        rubric = load_rubric(load(AssignmentFile, path).rubric, beside=path)
-    faults.errors += [
-        one for one in told.errors if one.file != str(path) or one.findings[0].path == "$.rubric"
-    ]
+        assignment = load_assignment(name, faults)
+    with faults:
+        # Whatever faults the assignment has, its rubric is read; or the rubric that was named in its place.
+        named = str(path) if file_kind(path) == "rubric" else table_of(path).get("rubric")
+        if isinstance(named, str):
+            rubric = load_rubric(named, beside=path, unknown=faults)
+    if faults.errors and assignment and rubric:
+        file = locate("rubric", assignment.file.rubric, assignment.path).resolve()
+        faults.add(file, check_rubric(rubric, construction_for(assignment)))
     faults.tell()
-    return cast("Assignment", loaded), cast("RubricFile", rubric)
+    return cast("Assignment", assignment), cast("RubricFile", rubric)
 
 
-def load_rubric(name: str | Path, *, beside: Path | None = None) -> RubricFile:
+def load_rubric(name: str | Path, *, beside: Path | None = None, unknown: Faults | None = None) -> RubricFile:
     """Load a rubric by its built-in name, from beside the assignment's file, or by its path.
 
-    Raises CallError for an unknown name, AuthoredFileError with every fault of the file.
+    Raises CallError for an unknown name, AuthoredFileError with every fault of the file. Arguments: `unknown`
+    as for `load_assignment`.
     """
     path = locate("rubric", str(name), beside)
     if not is_file(path) and not str(name).endswith(".toml"):
@@ -466,16 +469,17 @@ def load_rubric(name: str | Path, *, beside: Path | None = None) -> RubricFile:
             raise CallError("unknown_rubric", name=str(name))
         missing = Finding("$.rubric", "no_file_of_name", {"text": str(name), "file": path.name})
         raise AuthoredFileError(str(beside), (missing,))
-    return _load(path.resolve(), path.stat().st_mtime_ns if is_file(path) else 0)
+    rubric, found = _load(path.resolve(), path.stat().st_mtime_ns if is_file(path) else 0)
+    found.pass_to(unknown)
+    return rubric
 
 
 @cache
-def _load(path: Path, _changed_ns: int) -> RubricFile:
-    rubric = load(RubricFile, path)
-    faults = [*_twice(rubric), *_reserved(rubric), *_idle_weights(rubric)]
-    if faults:
-        raise AuthoredFileError(str(path), tuple(faults))
-    return rubric
+def _load(path: Path, _changed_ns: int) -> tuple[RubricFile, Faults]:
+    found = Faults()
+    rubric = load(RubricFile, path, found)
+    found.add(path, [*_twice(rubric), *_reserved(rubric), *_idle_weights(rubric)])
+    return rubric, found
 
 
 def _twice(rubric: RubricFile) -> Iterator[Finding]:

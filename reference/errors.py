@@ -172,11 +172,21 @@ class Faults:
         if found := tuple(findings):
             self.errors.append(AuthoredFileError(str(file), found))
 
+    def pass_to(self, others: "Faults | None") -> None:
+        """Add everything gathered to others; raise it if there are none."""
+        if others is None:
+            self.tell()
+        else:
+            others.errors += self.errors
+
     def tell(self) -> None:
-        """Raise AuthoredFileError with everything gathered; do nothing if there is nothing."""
-        if self.errors:
-            first, *others = self.errors
-            raise AuthoredFileError(first.file, first.findings, others)
+        """Raise AuthoredFileError with everything gathered, by file; do nothing if there is nothing."""
+        found: dict[str, dict[str, Finding]] = {}
+        for error in self.errors:
+            found.setdefault(error.file, {}).update((str(one), one) for one in error.findings)
+        told = [AuthoredFileError(file, tuple(findings.values())) for file, findings in found.items()]
+        if told:
+            raise AuthoredFileError(told[0].file, told[0].findings, told[1:])
 
 
 class MechanismError(PlanmarkError):
@@ -194,7 +204,9 @@ class MechanismError(PlanmarkError):
     def __init__(
         self, code: str, template: str, *, group: str | None = None, gap_m: float | None = None
     ) -> None:
-        super().__init__(code, template if gap_m is None else template.replace("{gap}", f"{gap_m:.6g} m"))
+        gap: dict[str, Parameter] = {} if gap_m is None else {"texts": f"{gap_m:.6g} m"}
+        message = template.replace("{gap}", str(gap.get("texts", "")))
+        super().__init__(code, message, **{} if group is None else {"node": group}, **gap)
         self.template, self.group, self.gap_m = template, group, gap_m
 
 

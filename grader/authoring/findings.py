@@ -18,7 +18,7 @@ Severity = Literal["fault", "warning", "hint"]
 """fault: some student cannot be set or marked; warning: something a teacher should change or accept;
 hint: good to know."""
 SEVERITIES: tuple[Severity, ...] = ("fault", "warning", "hint")
-File = Literal["assignment", "mechanism", "rubric"]
+File = Literal["assignment", "mechanism", "rubric", "table"]
 BoolArray = NDArray[np.bool_]
 NAMED = 6
 """Ranges of numbers named in a message; the rest is only counted."""

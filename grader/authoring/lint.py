@@ -5,6 +5,7 @@ The result has a row of figures for each variant, all findings, and the JSON doc
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -49,13 +50,13 @@ from grader.language import LANGUAGES, Tongue
 from grader.records import Reason
 from grader.rubric import RubricFile, check_accelerations, check_rubric, plans_asked
 from grader.texts.spoken import ENGLISH, as_json, clause
-from reference.authored.assignment import SCALE_NAMES, TRADITIONS, Assignment, Variant
+from reference.authored.assignment import SCALE_NAMES, TRADITIONS, Assignment, Variant, file_kind
 from reference.authored.formula import Formula
 from reference.authored.toml_file import LENGTH_UNITS_M, SideText, Text
 from reference.authored.variant_table import KEYS, LENGTHS, formulas_in
 from reference.construction.derive import image_name
 from reference.construction.graph import Construction, ancestors
-from reference.errors import Parameter
+from reference.errors import AuthoredFileError, Parameter
 from reference.geometry import FloatArray
 from reference.plan import Plan, construction_for, exact_plan
 
@@ -403,6 +404,35 @@ def _unneeded(
 # JSON document ------------------------------------------------------------------------------------
 
 
+def faults_document(error: AuthoredFileError, name: str, speaker: Tongue) -> LintDocument:
+    """Return the document of files that have faults, as errors list them."""
+    findings = [
+        _finding(
+            LintFinding("fault", one.code, file_kind(Path(told.file)), one.path, one.parameters),
+            speaker,
+            one.line,
+        )
+        for told in (error, *error.others)
+        for one in told.findings
+    ]
+    return LintDocument(
+        assignment=name, needs_a_person=True, findings=findings, variants=[], scales=[], worst=None
+    )
+
+
+def _finding(one: LintFinding, speaker: Tongue, line: int = 0) -> LintFindingDocument:
+    return LintFindingDocument(
+        severity=one.severity,
+        code=one.code,
+        file=one.file,
+        path=one.path,
+        line=line or None,
+        message=one.message(speaker),
+        parameters=as_json(one.parameters),
+        variants=[VariantDocument(**_numbers(variant)) for variant in one.variants],
+    )
+
+
 def lint_document(result: Lint, speaker: Tongue = ENGLISH) -> LintDocument:
     """Return the document of `planmark lint --json`, with messages in a language."""
     worst = None
@@ -413,18 +443,7 @@ def lint_document(result: Lint, speaker: Tongue = ENGLISH) -> LintDocument:
     return LintDocument(
         assignment=result.assignment.id,
         needs_a_person=result.needs_a_person,
-        findings=[
-            LintFindingDocument(
-                severity=one.severity,
-                code=one.code,
-                file=one.file,
-                path=one.path,
-                message=one.message(speaker),
-                parameters=as_json(one.parameters),
-                variants=[VariantDocument(**_numbers(variant)) for variant in one.variants],
-            )
-            for one in result.findings
-        ],
+        findings=[_finding(one, speaker) for one in result.findings],
         variants=list(result.rows),
         scales=[proposal.over_all for proposal in result.scales],
         worst=worst,

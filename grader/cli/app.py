@@ -21,7 +21,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from grader import __version__
 from grader.cli import class_folder, terminal
-from grader.language import LANGUAGES, tongue
+from grader.language import LANGUAGES, N_, tongue
 from grader.options import CommonOptions, is_record, offered
 from reference.errors import PlanmarkError
 
@@ -123,8 +123,8 @@ class Commands(_Help, TyperGroup):
         except KeyboardInterrupt:
             # A second Ctrl+C would only break the end of this one.
             signal.signal(signal.SIGINT, signal.SIG_IGN)
-            told = "interrupted; every file that was written is whole; run the same command to continue"
-            self._end(ctx, told, terminal.INTERRUPTED)
+            told = N_("interrupted; every file that was written is whole; run the same command to continue")
+            self._end(ctx, tongue(ctx.obj or "en").gettext(told), terminal.INTERRUPTED)
 
     @staticmethod
     def _end(ctx: Any, message: str, status: int) -> None:  # noqa: ANN401 - as above

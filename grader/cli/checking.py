@@ -17,16 +17,14 @@ from grader.feedback.sentences import mistake_feedback
 from grader.files import shown_text, write_whole
 from grader.language import N_, Tongue, tongue
 from grader.options import CheckOptions, Level, VariantOptions
-from grader.records import of_error
 from grader.rubric import rubric_of
 from grader.self_check.advice import RESULTS, CheckedLine
 from grader.self_check.results import LEVELS, likely_mistakes
 from grader.self_check.values import check_values
 from grader.tables.measurements import Measurements, columns_of, names_of, read_measurements
-from grader.tables.reader import TableError
-from grader.texts.spoken import ENGLISH, failure, message, problem_documents, sentence
-from reference.authored.assignment import Assignment, Variant, built_in, load_assignment
-from reference.errors import CallError, MechanismError
+from grader.texts.spoken import failure, message, problem_documents
+from reference.authored.assignment import Assignment, Variant, load_assignment
+from reference.errors import CallError
 
 STYLES = {"right": "green", "off": "red", "open": "magenta"}
 NOTHING = N_("nothing that this assignment asks for was measured")
@@ -49,37 +47,30 @@ def check_measured(name: str, options: CheckOptions) -> bool:
     lang, file, page = options.lang, options.measured, options.page
     speaker = tongue(lang)
     if page is not None and page.suffix.lower() != ".html":
-        raise failure(CallError, "page_file", "", speaker, file=page)
-    wanted = checked_level(options.level, speaker)
-    assignment = _assignment(name, speaker)
+        raise failure(CallError, "page_file", file=page)
+    wanted = checked_level(options.level)
+    assignment = load_assignment(name)
     rubric = rubric_of(assignment)
     if options.template is not None:
         named = [replace(options, position=one) for one in assignment.positions(options.position)]
-        variants = [_variant(assignment, None, one, speaker) for one in named]
+        variants = [_variant(assignment, None, one) for one in named]
         _write_template(options.template, columns_of(assignment, rubric), variants, speaker)
     if file is None:
         if options.template is None:
-            raise failure(CallError, "measured_needed", "", speaker)
+            raise failure(CallError, "measured_needed")
         return False
     all_right = True
-    try:
-        students = read_measurements(file, names_of(assignment), is_own=True)
-    except TableError as error:
-        raise error.told(speaker) from error
+    students = read_measurements(file, names_of(assignment), is_own=True)
     if page is not None and len(students) != 1:
-        raise failure(CallError, "page_students", "", speaker, file=file, count=len(students))
+        raise failure(CallError, "page_students", file=file, count=len(students))
     # Of a table with a line for each position, those that are still blank wait.
     students = tuple(one for one in students if one.numbers or one.scales or one.problems) or students[:1]
     if not students:
         typer.secho(speaker.gettext(NOTHING), fg="yellow")
     for entered in students:
-        variant = _variant(assignment, entered, options, speaker)
+        variant = _variant(assignment, entered, options)
         _tell_head(entered, variant, speaker)
-        try:
-            check = check_values(entered, assignment, variant, speaker, wanted)
-        except MechanismError as error:
-            known = sentence(of_error(error), speaker) or error.message
-            raise CallError(error.code, f"{variant}: {known}") from error
+        check = check_values(entered, assignment, variant, speaker, wanted)
         _tell(check.lines, wanted, speaker)
         likely = likely_mistakes(check.judgement, wanted)
         mistakes = [mistake_feedback(mistake, lang, "full", assignment.names) for mistake in likely]
@@ -99,10 +90,10 @@ def check_photo(name: str, options: CheckOptions) -> bool:
     lang, file, speaker = options.lang, cast("Path", options.photo), tongue(options.lang)
     if any((options.measured, options.page, options.template)):
         alone = {"option": "--measured, --page, --template", "other": "--photo"}
-        raise failure(CallError, "photo_alone", "unused_beside", speaker, **alone)
-    wanted = checked_level(options.level, speaker)
-    assignment = _assignment(name, speaker)
-    variant = _variant(assignment, None, options, speaker)
+        raise failure(CallError, "photo_alone", "unused_beside", **alone)
+    wanted = checked_level(options.level)
+    assignment = load_assignment(name)
+    variant = _variant(assignment, None, options)
     with Workers(1, Limits(), photo_check.__module__) as workers:
         told = result_of(workers, photo_check, file, assignment, rubric_of(assignment), variant, lang, wanted)
     typer.secho(f"{shown_text(file.name)}, {variant}", bold=True)
@@ -113,18 +104,11 @@ def check_photo(name: str, options: CheckOptions) -> bool:
     return not told.is_all_right
 
 
-def _assignment(name: str, speaker: Tongue) -> Assignment:
-    """An assignment by its name or file; raises CallError for an unknown name."""
-    if name not in built_in() and not name.endswith(".toml"):
-        raise failure(CallError, "unknown_assignment", "", speaker, name=name, names=tuple(built_in()))
-    return load_assignment(name)
-
-
-def checked_level(level: str, speaker: Tongue = ENGLISH) -> Level:
+def checked_level(level: str) -> Level:
     """A level of feedback; raises CallError for another word."""
     wanted = next((known for known in LEVELS if known == level), None)
     if wanted is None:
-        raise failure(CallError, "unknown_level", "", speaker, level=level, names=tuple(LEVELS))
+        raise failure(CallError, "unknown_level", level=level, names=tuple(LEVELS))
     return wanted
 
 
@@ -132,9 +116,9 @@ def _write_template(file: Path, asked: dict[str, str], variants: Sequence[Varian
     """Write the file that a student fills in: columns, a comment with units, a line for each variant."""
     if file.suffix.lower() != ".csv":
         known = {"option": "--template", "file": file, "names": ".csv"}
-        raise failure(CallError, "template_file", "ending", speaker, **known)
+        raise failure(CallError, "template_file", "ending", **known)
     if file.exists():
-        raise failure(CallError, "template_exists", "", speaker, file=file)
+        raise failure(CallError, "template_exists", file=file)
     columns = dict.fromkeys(variants[0].numbers, "") | asked
     units = [speaker.unit(unit) for unit in columns.values()]
     text = io.StringIO()
@@ -173,23 +157,15 @@ def _write_page(
     write_whole(page, check_page(report, painted(options.level), lines, mistakes, lang, about))
 
 
-def _variant(
-    assignment: Assignment, entered: Measurements | None, options: VariantOptions, speaker: Tongue
-) -> Variant:
+def _variant(assignment: Assignment, entered: Measurements | None, options: VariantOptions) -> Variant:
     """The variant of the call or the file; raises CallError where they contradict each other."""
     chosen: dict[str, int | None] = {}
-    spec = assignment.file.variant
-    for what, called, allowed in (("n", options.n, spec.n), ("position", options.position, spec.position)):
+    for what, called in (("n", options.n), ("position", options.position)):
         filed = None if entered is None else getattr(entered, what)
         if entered is not None and called is not None and filed is not None and called != filed:
             known = {"what": what, "called": called, "filed": filed, "file": entered.source}
-            raise failure(CallError, f"{what}_disagrees", "number_disagrees", speaker, **known)
-        value = chosen[what] = filed if called is None else called
-        if allowed is not None and (value is None or value not in allowed.values):
-            limits = {"what": what, "first": allowed.first, "last": allowed.last}
-            if value is None:
-                raise failure(CallError, f"{what}_needed", "number_needed", speaker, **limits)
-            raise failure(CallError, f"{what}_range", "number_range", speaker, value=value, **limits)
+            raise failure(CallError, f"{what}_disagrees", "number_disagrees", **known)
+        chosen[what] = filed if called is None else called
     return assignment.variant(chosen["n"], chosen["position"])
 
 

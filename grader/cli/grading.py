@@ -21,14 +21,14 @@ from grader.cli.terminal import note, tell_next
 from grader.documents import AlikeDocument, MovedDocument, ReadingDocument, ReportDocument, ResultsDocument
 from grader.feedback.class_page import CAUSES, SIGNS, trust_sentences, write_demo_page
 from grader.feedback.class_statistics import waiting
-from grader.feedback.words import STATES
+from grader.feedback.words import STATES, problem_sentence, unmatched_sentence
 from grader.files import make_folder, samples_folder, shown_text
 from grader.folder.archives import is_archive
 from grader.folder.batch import Batch, grade
 from grader.folder.changes import standing_text
 from grader.folder.watch import arrivals
 from grader.folder.workers import Limits, Workers, result_of
-from grader.language import ROOT_LANGUAGE, tongue
+from grader.language import ROOT_LANGUAGE, Tongue, tongue
 from grader.lms.grades import in_a_row
 from grader.marking.report import reading_document
 from grader.options import ClassOptions, GradeOptions, VariantOptions, taken
@@ -247,7 +247,8 @@ def tell_class(results: ResultsDocument, out: Path) -> None:
     """Print states, changes, similar sheets, what waits for a person, and the paths of the results."""
     note(_states(results))
     note(_left(results))
-    for sentence in trust_sentences(results, tongue(ROOT_LANGUAGE)):
+    speaker = tongue(results.lang or ROOT_LANGUAGE)
+    for sentence in trust_sentences(results, speaker):
         note(sentence)
     page = out / "index.html"
     changes = [_change_line(change) for change in results.moved]
@@ -259,7 +260,7 @@ def tell_class(results: ResultsDocument, out: Path) -> None:
         for one in results.stale
     ]
     _list("Decisions that are out of date, and were not applied; decide again or remove them:", stale, page)
-    _list("A person must look at:", list(_waiting(results)), page)
+    _list(speaker.gettext("A person must look at:"), list(_waiting(results, speaker)), page)
     note(f"Open {page}; programs read {out / 'results.json'}")
 
 
@@ -304,23 +305,28 @@ def _list(title: str, lines: Sequence[str], page: Path) -> None:
             terminal.say(f"  ... and {len(lines) - SHOWN} more, all in {page}")
 
 
-def _waiting(results: ResultsDocument) -> Iterator[str]:
+def _waiting(results: ResultsDocument, speaker: Tongue) -> Iterator[str]:
     """Lines on unmatched files, on what waits (most points at stake first), and on missing students."""
     for page in results.unmatched:
-        yield _placed(f"{page.file}{'' if page.page is None else f'#{page.page}'}", page.message)
+        place = f"{page.file}{'' if page.page is None else f'#{page.page}'}"
+        yield _placed(place, unmatched_sentence(page, speaker).text)
     for wait in waiting(results):
         report = wait.report
         count = f"{len(wait.criteria)} {'criterion' if len(wait.criteria) == 1 else 'criteria'}"
         about = f", {count}, {wait.points:.4g} points at stake" if wait.criteria else ""
-        yield f"{_who(report.student_id, report.position)}: {STATES[report.status]}{about}{_first(report)}"
+        yield _standing(report, speaker, about)
     for report in results.reports:
         if report.status == "missing":
-            yield f"{_who(report.student_id, report.position)}: missing{_first(report)}"
+            yield _standing(report, speaker)
 
 
-def _first(report: ReportDocument) -> str:
-    """The first problem of a report, behind its file; empty if there is none."""
-    return "".join(f"; {_placed(one.file or '', one.message)}" for one in report.problems[:1])
+def _standing(report: ReportDocument, speaker: Tongue, about: str = "") -> str:
+    """A student's state, and the first problem of the report, behind its file."""
+    told = [problem_sentence(one, speaker) for one in report.problems[:1]]
+    first = "".join(f"; {_placed(one.file, one.text)}" for one in told)
+    return (
+        f"{_who(report.student_id, report.position)}: {speaker.gettext(STATES[report.status])}{about}{first}"
+    )
 
 
 def _placed(place: str, message: str) -> str:

@@ -5,17 +5,18 @@ from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
 
+import typer
 from rich.console import Console
 from rich.table import Table
 
 from grader.authoring.findings import named
-from grader.authoring.lint import Lint, lint, lint_document
-from grader.authoring.round_scales import WELL_READ_MM, ratio_text
+from grader.authoring.lint import Lint, faults_document, lint, lint_document
+from grader.authoring.round_scales import ratio_text
 from grader.cli import terminal
 from grader.cli.app import new_table
 from grader.documents import LintLeast, LintScales, LintVariant
 from grader.files import write_whole
-from grader.language import Tongue, tongue
+from grader.language import N_, Tongue, tongue
 from grader.records import Reason
 from grader.rubric import load_both
 from grader.texts.spoken import clause
@@ -23,19 +24,26 @@ from reference.authored.assignment import Variant
 from reference.drawing.canvas import Label
 from reference.drawing.canvas import svg as as_svg
 from reference.drawing.sheets import FRAME, reference_drawing
-from reference.errors import counted
+from reference.errors import AuthoredFileError
 
 SHOWN_ROWS = 40
 """More variants than that stand in ranges."""
 REASON_MM, REASON_COLOUR = 4.0, "#a03014"
 """Height and colour of the line under the drawing's frame that says why this variant is drawn."""
+SEVERITIES = {"fault": N_("fault"), "warning": N_("warning"), "hint": N_("hint")}
 COLOURS = {"fault": "bold red", "warning": "yellow", "hint": "cyan"}
 
 
 def lint_assignment(name: str, *, as_json: bool, svg: Path | None, lang: str) -> bool:
     """Print every finding on an assignment and its rubric in a language; whether any needs a person."""
     speaker = tongue(lang)
-    assignment, rubric = load_both(name)
+    try:
+        assignment, rubric = load_both(name)
+    except AuthoredFileError as error:
+        if not as_json:
+            raise
+        terminal.say(faults_document(error, name, speaker).model_dump_json(indent=2))
+        raise typer.Exit(error.exit_status) from error
     result = lint(assignment, rubric)
     if svg is not None and result.plan is not None and result.worst is not None:
         worst = result.worst[0]
@@ -48,29 +56,33 @@ def lint_assignment(name: str, *, as_json: bool, svg: Path | None, lang: str) ->
         terminal.say(lint_document(result, speaker).model_dump_json(indent=2))
         return result.needs_a_person
     console = Console()
-    console.print(f"[bold]{assignment.file.title.en}[/bold]", highlight=False)
-    console.print(_variants_table(result.rows))
+    console.print(f"[bold]{assignment.file.title.in_language(lang)}[/bold]", highlight=False)
+    console.print(_variants_table(result.rows, speaker))
     if result.scales and result.plan is not None:
         console.print()
-        console.print(_scales_table([proposal.over_all for proposal in result.scales]))
+        console.print(_scales_table([proposal.over_all for proposal in result.scales], speaker))
     console.print()
     # A line each, which terminals break and programs can search.
+    wide = max(len(speaker.gettext(word)) for word in SEVERITIES.values())
     for finding in result.findings:
-        console.print(f"[{COLOURS[finding.severity]}]{finding.severity:<8}[/] ", end="")
+        severity = speaker.gettext(SEVERITIES[finding.severity])
+        console.print(f"[{COLOURS[finding.severity]}]{severity:<{wide}}[/] ", end="")
         console.print(finding.told(speaker), markup=False, highlight=False, soft_wrap=True)
     _tell_end(result, svg, speaker)
     return result.needs_a_person
 
 
-def _variants_table(rows: Sequence[LintVariant]) -> Table:
+def _variants_table(rows: Sequence[LintVariant], speaker: Tongue) -> Table:
+    _ = speaker.gettext
     table = new_table(
-        "variant", "assembles", "transmis-\nsion sine", "crossing\ndegrees", "shortest\nasked mm",
-        "under\n8 mm", "fits\ntimes", left=("assembles",),
+        _("variant"), _("assembles"), _("transmis-\nsion sine"), _("crossing\ndegrees"),
+        _("shortest\nasked mm"), _("under\n8 mm"), _("fits\ntimes"), left=(_("assembles"),),
     )  # fmt: skip
     table.columns[0].no_wrap = True
     for group in _ranges(rows):
         broken = [row for row in group if row.problem]
-        assembles = "yes" if not broken else "no" if len(broken) == len(group) else f"{len(broken)} do not"
+        some = _("%(count)s do not") % {"count": len(broken)}
+        assembles = _("yes") if not broken else _("no") if len(broken) == len(group) else some
         table.add_row(
             str(_variant_of(group[0])) if len(group) == 1 else named(map(_variant_of, group)),
             f"[red]{assembles}[/red]" if broken else assembles,
@@ -78,7 +90,7 @@ def _variants_table(rows: Sequence[LintVariant]) -> Table:
             _worst_of([row.crossing_deg for row in group], "{:.1f}"),
             _worst_of([row.shortest_mm for row in group], "{:.2f}"),
             str(sum(row.under_8_mm for row in group)),
-            _room_of([row.room for row in group]),
+            _room_of([row.room for row in group], speaker),
         )
     return table
 
@@ -104,10 +116,10 @@ def _worst_of(figures: Sequence[LintLeast | None], form: str) -> str:
     return "-" if least is None else f"{form.format(least.value)} {least.at}"
 
 
-def _room_of(figures: Sequence[LintLeast | None]) -> str:
+def _room_of(figures: Sequence[LintLeast | None], speaker: Tongue) -> str:
     """Return how the tightest figure fits, and its page if it does not."""
     least = _least(figures)
-    page = f" page {least.page}" if least is not None and least.value < 1.0 else ""
+    page = f" {speaker.gettext('page')} {least.page}" if least is not None and least.value < 1.0 else ""
     return "-" if least is None else f"{least.value:.2f}{page}"
 
 
@@ -116,26 +128,26 @@ def _least(figures: Sequence[LintLeast | None]) -> LintLeast | None:
     return min(known, key=lambda figure: figure.value, default=None)
 
 
-def _scales_table(scales: Sequence[LintScales]) -> Table:
+def _scales_table(scales: Sequence[LintScales], speaker: Tongue) -> Table:
     """Quantities in rows: three columns stay readable in a narrow terminal."""
-    titles = {"proposed": "as proposed", "round": "round", "round_each": "round, each its own"}
-    table = Table("scales", box=None, header_style="bold")
+    _ = speaker.gettext
+    titles = {"proposed": _("as proposed"), "round": _("round"), "round_each": _("round, each its own")}
+    table = Table(_("scales"), box=None, header_style="bold")
     for proposal in scales:
         table.add_column(titles[proposal.name], justify="right", no_wrap=True)
     rows: dict[str, list[str]] = {
         "kL": ["..".join(dict.fromkeys(map(ratio_text, proposal.kL))) for proposal in scales],
-        "kv, (m/s)/mm": [_span(proposal.kv) for proposal in scales],
-        "ka, (m/s^2)/mm": [_span(proposal.ka) for proposal in scales],
-        **({"kF, N/mm": [_span(one.kF) for one in scales if one.kF]} if scales[0].kF else {}),
-        "fits, times": [f"{proposal.room:.2f}" for proposal in scales],
-        "shortest asked, mm": [_worst_of([proposal.shortest_mm], "{:.2f}") for proposal in scales],
-        f"asked under {WELL_READ_MM:g} mm": [
-            f"{proposal.under_8_mm} of {proposal.asked}" for proposal in scales
-        ],
-        "shortest link, mm": [f"{proposal.shortest_link_mm:.1f}" for proposal in scales],
+        f"kv, {speaker.unit('(m/s)/mm')}": [_span(proposal.kv) for proposal in scales],
+        f"ka, {speaker.unit('(m/s^2)/mm')}": [_span(proposal.ka) for proposal in scales],
+        f"kF, {speaker.unit('N/mm')}": [_span(one.kF) for one in scales if one.kF],
+        _("fits, times"): [f"{proposal.room:.2f}" for proposal in scales],
+        _("shortest asked, mm"): [_worst_of([proposal.shortest_mm], "{:.2f}") for proposal in scales],
+        _("asked under 8 mm"): [f"{proposal.under_8_mm} / {proposal.asked}" for proposal in scales],
+        _("shortest link, mm"): [f"{proposal.shortest_link_mm:.1f}" for proposal in scales],
     }
     for name, cells in rows.items():
-        table.add_row(name, *cells)
+        if cells:
+            table.add_row(name, *cells)
     return table
 
 
@@ -150,13 +162,20 @@ def _hardest(worst: tuple[Variant, Reason], speaker: Tongue) -> str:
 
 
 def _tell_end(result: Lint, svg: Path | None, speaker: Tongue) -> None:
+    _ = speaker.gettext
     if result.worst is not None and result.plan is not None:
-        terminal.say(f"hardest to draw: {_hardest(result.worst, speaker)}")
+        terminal.say(_("hardest to draw: %(text)s") % {"text": _hardest(result.worst, speaker)})
         if svg is not None:
-            terminal.say(f"drawn in {svg}")
+            terminal.say(_("drawn in %(file)s") % {"file": svg})
     elif svg is not None:
-        terminal.say("nothing drawn: no variant can be solved")
+        terminal.say(_("nothing drawn: no variant can be solved"))
     counts = Counter[str](finding.severity for finding in result.findings)
-    told = ", ".join(counted(counts[severity], severity) for severity in COLOURS if counts[severity])
-    many = counted(len(result.rows), "variant")
-    terminal.say(f"{result.assignment.id}: {many}, {told or 'no findings'}")
+    faults, warnings, hints = (counts[severity] for severity in COLOURS)
+    told = {
+        speaker.ngettext("%d fault", "%d faults", faults) % faults: faults,
+        speaker.ngettext("%d warning", "%d warnings", warnings) % warnings: warnings,
+        speaker.ngettext("%d hint", "%d hints", hints) % hints: hints,
+    }
+    many = speaker.ngettext("%d variant", "%d variants", len(result.rows)) % len(result.rows)
+    found = ", ".join(text for text, count in told.items() if count) or _("no findings")
+    terminal.say(f"{result.assignment.id}: {many}, {found}")

@@ -259,7 +259,8 @@ def files_of(batch: Batch) -> list[Path]:
             raise CallError("archive_damaged", file=str(folder))
         return [folder]
     if not folder.is_dir():
-        cause = "submissions_in_file" if folder.is_file() else "submissions_missing"
+        cause = "archive_missing" if is_archive(folder) else "submissions_missing"
+        cause = "submissions_in_file" if folder.is_file() else cause
         raise failure(CallError, "folder_missing", cause, folder=folder, near=folder.parent)
     others = (batch.out, batch.decisions_path, *batch.growing, *batch.assignment.own_files)
     files = submissions(folder, batch.roster, passed_over=others)

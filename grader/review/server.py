@@ -49,7 +49,6 @@ from grader.review.scans import page_of
 from grader.review.session import Run, Session
 from grader.tables.decision_texts import PageDecision, place_text
 from grader.tables.decisions import Decision
-from grader.tables.reader import TableError
 from grader.texts.spoken import RefusedError, told_of
 from reference.errors import PlanmarkError
 
@@ -459,7 +458,7 @@ def _refused(error: Exception, review: Review) -> Response:
     if isinstance(error, ChangedError):
         return JSONResponse({"message": _clash(error.there, speaker), "clash": True}, 409)
     assert isinstance(error, PlanmarkError)  # noqa: S101 - these alone are handled here
-    told = error.told(speaker).message if isinstance(error, TableError) else told_of(error, speaker)
+    told = told_of(error, speaker)
     status = error.status if isinstance(error, RefusedError) else 400
     return JSONResponse({"message": told, "code": error.code}, status)
 

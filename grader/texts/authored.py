@@ -18,19 +18,24 @@ REMARKS: dict[str, tuple[str, ...]] = {
 AUTHORED: dict[str, tuple[str, ...]] = {
     # Of a file as a whole, and of values whatever their key
     "no_such_file": (N_("there is no such file"),),
+    "rubric_given": (N_("is a rubric: name the file of an assignment that uses it"),),
+    "mechanism_given": (N_("is a mechanism: name the file of an assignment that uses it, or write one:"
+        " planmark new --mechanism"),),
     "text_not_utf8": (N_("is not UTF-8 text; save it as UTF-8"),),
     "file_large": (N_("is larger than %(most)s kB: nothing that is written by hand is"),),
     "nested": (N_("is nested deeper than %(most)s"),),
     "more_faults": (N_("more faults: %(count)s"),),
     "not_toml": (
         N_("is not TOML: %(text)s (%(error)s; %(advice)s)"),
+        N_("is not TOML: %(text)s (%(advice)s)"),
         N_("is not TOML: %(text)s (%(error)s)"),
         N_("is not TOML: %(error)s"),
     ),
     "decimal_point": (N_("write a decimal point"),),
     "number_alone": (N_("a number stands alone, without its unit, and a formula in quotes"),),
     "quote_unclosed": (N_("a quote is opened and never closed"),),
-    "two_brackets": (N_("a table that stands more than once has two brackets: [[%(name)s]]"),),
+    "two_brackets": (N_("the table stands on line %(other)s, too: write [[%(name)s]] on each where several"
+        " may stand, else keep one"),),
     "key_missing": (N_("is missing"),),
     "side_missing": (N_("is missing: without it two assemblies are possible, and the mechanism is never"
         " guessed"),),

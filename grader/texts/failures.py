@@ -21,6 +21,7 @@ FAILURES: dict[str, str] = {
     ),
     "folder_missing": N_("%(folder)s: there is no such folder"),
     "submissions_missing": N_("%(folder)s: there is no such folder; name the submissions' folder, or a .zip"),
+    "archive_missing": N_("%(folder)s: there is no such archive; check its name, and the folder it is in"),
     "submissions_in_file": N_("%(folder)s: is a file; name the submissions' folder (%(near)s), or a .zip"),
     "nothing_to_grade": N_("%(folder)s: there is nothing to grade in this folder"),
     "nothing_came": N_("%(folder)s: no submission here can be graded"),
@@ -175,8 +176,8 @@ FAILURES: dict[str, str] = {
     "unknown_level": N_("--level %(level)s: known are %(names)s"),
     "unknown_assignment": N_("no assignment '%(name)s'; built in are %(names)s; or give a .toml file's path"),
     "unknown_rubric": N_("no rubric '%(name)s' is built in; give a .toml file's path"),
-    "number_needed": N_("--%(what)s is needed: this assignment has %(what)s from %(first)s to %(last)s"),
-    "number_range": N_("%(what)s = %(value)s: this assignment has %(what)s from %(first)s to %(last)s"),
+    "number_needed": N_("--%(name)s is needed: this assignment has %(name)s = %(texts)s"),
+    "number_range": N_("%(name)s = %(value)s: this assignment has %(name)s = %(texts)s"),
     "number_disagrees": N_("--%(what)s %(called)s, but %(file)s says %(what)s %(filed)s: which is right?"),
     # Files of a platform
     "not_as_meant": N_("the file would be read back differently; nothing was written"),

@@ -13,7 +13,14 @@ from grader.texts.failures import FAILURES
 from grader.texts.faults import FAULTS, WHERE
 from grader.texts.problems import ADVICE, PROBLEMS
 from grader.texts.refusals import REFUSALS
-from reference.errors import MOST_FINDINGS, AuthoredFileError, Finding, PlanmarkError, writable
+from reference.errors import (
+    MOST_FINDINGS,
+    AuthoredFileError,
+    Finding,
+    MechanismError,
+    PlanmarkError,
+    writable,
+)
 from reference.quantities import sort_of, unit_of, vector_of_value
 
 ENGLISH = tongue(ROOT_LANGUAGE)
@@ -297,7 +304,7 @@ Failed = TypeVar("Failed", bound=PlanmarkError)
 
 
 def failure(
-    kind: type[Failed], code: str, cause: str = "", speaker: Tongue = ENGLISH, /,
+    kind: type[Failed], code: str, cause: str = "", /,
     faults: Any = (), **known: object,  # noqa: ANN401 - reasons; mappings of anything are spread behind it
 ) -> Failed:  # fmt: skip
     """Return an error that is told by the sentence of its cause, else of its code: see `FAILURES`.
@@ -307,7 +314,7 @@ def failure(
     told: dict[str, Value] = {"cause": cause} if cause else {}
     for name, one in known.items():
         told[name] = one if isinstance(one, int | float | tuple) else writable(str(one))
-    error = kind(code, refusal(Reason(code, told), speaker, faults), **told)
+    error = kind(code, refusal(Reason(code, told), faults=faults), **told)
     error.faults = tuple(faults)
     return error
 
@@ -329,19 +336,25 @@ def told_of(error: PlanmarkError, speaker: Tongue) -> str:
     """Return the sentence of an error in a language."""
     if isinstance(error, AuthoredFileError):
         return _authored(error, speaker)
+    if isinstance(error, MechanismError) and speaker is not ENGLISH:
+        return clause(of_error(error), speaker)
+    if told_in := getattr(error, "told", None):  # a table's error
+        return str(told_in(speaker).message)
     reason = error.reason if isinstance(error, RefusedError) else of_error(error)
     return refusal(reason, speaker, error.faults)
 
 
 def at_terminal(error: PlanmarkError, speaker: Tongue) -> str:
-    """Return the faults of authored files in the call's language, other errors in English."""
-    return told_of(error, speaker) if isinstance(error, AuthoredFileError) else in_english(error)
+    """Return an error in a language, in English by its own words if it has any, behind its file."""
+    if error.message and speaker is ENGLISH:
+        return error.message
+    file, said = str(error.parameters.get("file", "")), told_of(error, speaker)
+    return said if file in said else f"{file}: {said}"
 
 
 def in_english(error: PlanmarkError) -> str:
-    """Return an error's own words; if it has none, its sentence behind the file that it concerns."""
-    file = of_error(error).file
-    return error.message or (f"{file}: " if file else "") + told_of(error, ENGLISH)
+    """Return an error as a terminal shows it in English."""
+    return at_terminal(error, ENGLISH)
 
 
 # Documents ----------------------------------------------------------------------------------------

@@ -18,7 +18,6 @@ from starlette.exceptions import HTTPException
 from grader import __version__
 from grader.language import tongue
 from grader.review.server import LOOPBACK
-from grader.tables.reader import TableError
 from grader.texts.spoken import RefusedError, told_of
 from grader.web import accounts, claims, instructors, lti, pages, students
 from grader.web.guard import Guard, Rim, language_of
@@ -122,7 +121,7 @@ async def _told(request: Request, error: Exception) -> Response:
     assert isinstance(error, PlanmarkError)  # noqa: S101 - these alone are told here
     status = error.status if isinstance(error, RefusedError) else HTTPStatus.UNPROCESSABLE_ENTITY
     speaker = tongue(language_of(request))
-    told = error.told(speaker).message if isinstance(error, TableError) else told_of(error, speaker)
+    told = told_of(error, speaker)
     return _answer(request, status, error.code, told)
 
 

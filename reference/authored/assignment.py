@@ -319,10 +319,11 @@ class Assignment:
             told: dict[str, Parameter] = {"name": name, "texts": ranges + (f" ({by})" if by else "")}
             said = f"{name} = {ranges}" + (f", by {by}" if by else "")
             if given is None:
-                raise CallError(f"{name}_needed", f"assignment {self.id} needs --{name} ({said})", **told)
+                message = f"assignment {self.id} needs --{name} ({said})"
+                raise CallError(f"{name}_needed", message, cause="number_needed", **told)
             if given not in known:
                 message = f"{name} = {given}: assignment {self.id} has {said}"
-                raise CallError(f"{name}_range", message, value=given, **told)
+                raise CallError(f"{name}_range", message, cause="number_range", value=given, **told)
             variants = [variant for variant in variants if getattr(variant, name) == given]
         return variants[0]
 
@@ -453,29 +454,71 @@ def locate(kind: str, name: str, beside: Path | None = None) -> Path:
     return library() / file
 
 
-def load_assignment(name: str | Path) -> Assignment:
+_KEYS_OF = {"assignment": "scales", "mechanism": "ground", "rubric": "criterion"}
+"""A key of each kind of file that no other kind has."""
+_GIVEN = {"mechanism": "mechanism_given", "rubric": "rubric_given"}
+Kind = Literal["assignment", "mechanism", "rubric", "table"]
+
+
+def file_kind(path: Path) -> Kind:
+    """Return the kind of an authored file, by what it holds, else by its name; a table is no TOML."""
+    if path.suffix != ".toml":
+        return "table"
+    data: dict[str, Any] = {}
+    with Faults():  # whatever faults it has
+        data = toml_file.table_of(path)
+    kinds = [kind for kind, key in _KEYS_OF.items() if key in data]
+    kinds += [kind for kind, suffix in SUFFIXES.items() if path.name.endswith(suffix)]
+    return cast("Kind", next(iter(kinds), "assignment"))
+
+
+def load_assignment(name: str | Path, unknown: Faults | None = None) -> Assignment:
     """Load a built-in assignment by its name, or one from the path of its file.
 
     Raises CallError for an unknown name (naming the known ones), AuthoredFileError with every
     fault of the files.
+
+    Arguments: `unknown` gathers the keys that the files cannot have, where these are their only faults.
     """
     path = locate("assignment", str(name))
     if not toml_file.is_file(path) and not str(name).endswith(".toml"):
         raise CallError("unknown_assignment", name=str(name), names=tuple(built_in()))
-    return _load(path.resolve(), path.stat().st_mtime_ns if toml_file.is_file(path) else 0)
+    assignment, found = _load(path.resolve(), path.stat().st_mtime_ns if toml_file.is_file(path) else 0)
+    found.pass_to(unknown)
+    return assignment
 
 
 @cache
-def _load(path: Path, _changed_ns: int) -> Assignment:
-    file = toml_file.load(AssignmentFile, path)
-    source, mechanism, rows = path, file.mechanism, None
-    faults = Faults()
-    if isinstance(mechanism, str):
-        source = locate("mechanism", mechanism, path)
+def _load(path: Path, _changed_ns: int) -> tuple[Assignment, Faults]:
+    """Return an assignment, and the keys that its files cannot have; raises them with any other faults."""
+    unknown, assignment = Faults(), None
+    with unknown:
+        assignment = _read(path, unknown)
+    if assignment is None:
+        unknown.tell()
+    return cast("Assignment", assignment), unknown
+
+
+def _read(path: Path, unknown: Faults) -> Assignment:
+    data, faults = toml_file.table_of(path), Faults()
+    if (kind := file_kind(path)) in _GIVEN:
+        own = path.with_name(path.name.replace(SUFFIXES[kind], SUFFIXES["assignment"]))
+        known: dict[str, Parameter] = {"near": own.name} if own != path and own.is_file() else {}
+        faults.add(path, [Finding("$", _GIVEN[kind], known)])
         with faults:
-            mechanism = _load_mechanism(mechanism, source, path)
-    if isinstance(mechanism, MechanismFile):
-        faults.add(source, check_mechanism(mechanism))
+            _mechanism_of(str(path) if kind == "mechanism" else None, path, faults)
+        faults.tell()
+    try:
+        file = toml_file.validate(AssignmentFile, data, str(path), unknown)
+    except AuthoredFileError as error:
+        faults.errors.append(error)
+        with faults:
+            _mechanism_of(data.get("mechanism"), path, unknown)
+        faults.tell()
+        raise
+    source, mechanism, rows = path, file.mechanism, None
+    with faults:
+        source, mechanism = _mechanism_of(mechanism, path, unknown)
     if file.variant.table is not None:
         unit = mechanism.length_unit if isinstance(mechanism, MechanismFile) else "m"
         with faults:
@@ -497,13 +540,21 @@ def _load(path: Path, _changed_ns: int) -> Assignment:
     return replace(assignment, signs=by_variant)
 
 
-def _load_mechanism(name: str, source: Path, beside: Path) -> MechanismFile:
-    """Load the mechanism that an assignment names; AuthoredFileError of the assignment if there is none."""
-    if not toml_file.is_file(source):
-        known = (*names_in(beside.parent, "mechanism"), *names_in(library(), "mechanism"))
-        looked = {"text": name, "file": source.name, **nearest(name, known)}
-        raise AuthoredFileError(str(beside), (Finding("$.mechanism", "no_file_of_name", looked),))
-    return toml_file.load(MechanismFile, source)
+def _mechanism_of(named: object, beside: Path, unknown: Faults) -> tuple[Path, Any]:
+    """Return the file of an assignment's mechanism, and the mechanism, checked; of the assignment if none."""
+    source, within, faults = beside, "$.mechanism", Faults()
+    if isinstance(named, str):
+        source, within = locate("mechanism", named, beside), "$"
+        if not toml_file.is_file(source):
+            known = (*names_in(beside.parent, "mechanism"), *names_in(library(), "mechanism"))
+            looked = {"text": named, "file": source.name, **nearest(named, known)}
+            raise AuthoredFileError(str(beside), (Finding("$.mechanism", "no_file_of_name", looked),))
+        named = toml_file.load(MechanismFile, source, unknown)
+    if isinstance(named, MechanismFile):
+        found = check_mechanism(named)
+        faults.add(source, [replace(one, path=one.path.replace("$", within, 1)) for one in found])
+    faults.tell()
+    return source, named
 
 
 def _check_values(file: AssignmentFile) -> Iterator[Finding]:
@@ -575,8 +626,6 @@ def _check_formulas(assignment: Assignment, source: Path) -> Faults:
         else:
             read = partial(numbers.length, what=key) if key in LENGTHS else numbers.number
             of_mechanism += check(path, leaf.names, partial(read, leaf))
-    for index, datum in enumerate(file.given):
-        own += check(f"$.given[{index}].value", datum.value.names, partial(datum.value, known))
     for path, key, formula in file.formulas:
         read = partial(numbers.amount, what=key) if key in NOT_NEGATIVE else numbers.number
         own += check(path, formula.names, partial(read, formula))
@@ -589,6 +638,8 @@ def _check_formulas(assignment: Assignment, source: Path) -> Faults:
         if file.has_forces and not (own or of_mechanism):
             own += check("$.body", frozenset(), partial(assignment.mechanism, variants))
         own += [] if own or of_mechanism else _check_scales(assignment, variants)
+    for index, datum in enumerate(file.given):
+        own += check(f"$.given[{index}].value", datum.value.names, partial(datum.value, known))
     faults.add(assignment.path, own)
     faults.add(source, of_mechanism)
     return faults
@@ -596,7 +647,8 @@ def _check_formulas(assignment: Assignment, source: Path) -> Faults:
 
 def _check_scales(assignment: Assignment, variants: list[Variant]) -> Iterator[Finding]:
     """Report the first scale that cannot be computed, or is not above zero; the others follow from it."""
-    known: dict[str, FloatArray | float] = dict.fromkeys(assignment.file.scales.rules, 1.0)
+    rules = assignment.file.scales.rules
+    known: dict[str, FloatArray | float] = dict.fromkeys(rules, 1.0)
     for name in tuple(known):
         del known[name]
         try:
@@ -604,8 +656,10 @@ def _check_scales(assignment: Assignment, variants: list[Variant]) -> Iterator[F
         except FormulaError as error:
             yield error.at(f"$.scales.{name}", **_failing(variants, error.which))
             return
-        if not np.all((known[name] > 1.0 / LARGEST) & (known[name] < LARGEST)):
-            yield Finding(f"$.scales.{name}", "limit", {"text": name, "limit": "> 0"})
+        if np.any(wrong := np.logical_not((known[name] > 1.0 / LARGEST) & (known[name] < LARGEST))):
+            limit = "> 0" if np.any(known[name] <= 1.0 / LARGEST) else f"< {LARGEST:g}"
+            told = {"text": rules[name].text, "name": name, "limit": limit, **_failing(variants, wrong)}
+            yield Finding(f"$.scales.{name}", "limit", told)
             return
 
 

@@ -2,7 +2,7 @@
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -24,6 +24,7 @@ from reference.errors import (
     MOST_FINDINGS,
     AuthoredFileError,
     FaultError,
+    Faults,
     Finding,
     Parameter,
     look_alikes,
@@ -139,11 +140,18 @@ class Text(Authored):
         return getattr(self, language, None) or self.en
 
 
-def load(model: type[Model], path: Path) -> Model:
+def load(model: type[Model], path: Path, unknown: Faults | None = None) -> Model:
     """Read and validate one authored file.
 
     Raises AuthoredFileError with every fault found, each with its path in the file.
+
+    Arguments: `unknown` gathers the keys that the file cannot have; what is returned is then without them.
     """
+    return validate(model, table_of(path), str(path), unknown)
+
+
+def table_of(path: Path) -> dict[str, Any]:
+    """Return the table that an authored file holds; raises AuthoredFileError if it holds none."""
     text = text_of(path)
     try:
         data = tomllib.loads(text)
@@ -153,7 +161,7 @@ def load(model: type[Model], path: Path) -> Model:
     faults = tuple(_check_tree(data))
     if faults:
         raise AuthoredFileError(str(path), faults)
-    return validate(model, data, str(path))
+    return data
 
 
 def _no_toml(error: Exception, text: str) -> Finding:
@@ -162,7 +170,8 @@ def _no_toml(error: Exception, text: str) -> Finding:
     if found is None:
         return Finding("$", NOT_TOML, {"error": str(error)})
     number = int(found[1])
-    line = text.split("\n")[number - 1].strip()
+    lines = [one.strip() for one in text.split("\n")]
+    line = lines[number - 1]
     known: dict[str, Parameter] = {"text": line[:MAX_NAME], "error": str(error).replace(found[0], "")}
     if re.search(r"=.*\d,\d", line):
         known["advice"] = "decimal_point"
@@ -170,8 +179,14 @@ def _no_toml(error: Exception, text: str) -> Finding:
         known["advice"] = "number_alone"
     elif line.count('"') % 2:
         known["advice"] = "quote_unclosed"
-    elif line.startswith("[") and re.search("twice|overwrite", str(error)):
-        known |= {"advice": "two_brackets", "name": line.strip("[] ")}
+    elif table := re.match(r"\[+([^\[\]]+)\]", line):
+        again = re.compile(rf"\[+\s*{re.escape(table[1].strip())}\s*\]")
+        others = [other for other, one in enumerate(lines[: number - 1], 1) if again.match(one)]
+        # Of [body] and [[body]], the one that is to be changed is at fault.
+        for other in others[-1:]:
+            first, second = (number, other) if not line.startswith("[[") else (other, number)
+            told = {"text": lines[first - 1], "name": table[1].strip(), "other": second}
+            return Finding("", NOT_TOML, {**told, "advice": "two_brackets"}, first)
     return Finding("", NOT_TOML, known, number)
 
 
@@ -229,17 +244,38 @@ def _check_tree(data: dict[str, Any]) -> Iterator[Finding]:
             yield Finding(path, "number_unusable")
 
 
-def validate(model: type[Model], data: dict[str, Any], file: str) -> Model:
-    """Validate a table; raises AuthoredFileError with every fault."""
+def validate(model: type[Model], data: dict[str, Any], file: str, unknown: Faults | None = None) -> Model:
+    """Validate a table; raises AuthoredFileError with every fault. Arguments: `unknown` as for `load`."""
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        raise AuthoredFileError(file, tuple(findings_of(error, model))) from error
+        found, faults = tuple(findings_of(error, model)), _faults_of(error)
+        missing = [fault["loc"] for fault in faults if fault["type"] == "missing"]
+        extra = [fault["loc"] for fault in faults if fault["type"] == "extra_forbidden"]
+        if unknown is None or not extra or len(missing) + len(extra) < len(faults):
+            raise AuthoredFileError(file, found) from error
+        unknown.add(Path(file), found)
+        for place in extra:
+            _leave_out(data, place, [str(loc[-1]) for loc in missing if loc[:-1] == place[:-1]])
+    return validate(model, data, file)
+
+
+def _leave_out(data: Any, place: Sequence[str | int], missing: list[str]) -> None:  # noqa: ANN401 - TOML's
+    """Take an unknown key out of its table, or name it as the missing one whose misspelling it is.
+
+    Arguments: `place` is Pydantic's, which also names kinds of tables.
+    """
+    *above, key = place
+    for part in filter(_path_part, above):
+        data = data[part]
+    value = data.pop(key)
+    for meant in near_names(str(key), missing, most=1):
+        data[meant] = value
 
 
 def findings_of(error: ValidationError, model: type[BaseModel]) -> Iterator[Finding]:
     """Convert Pydantic's errors to findings: the first twenty, and how many more."""
-    faults = error.errors(include_url=False)
+    faults = _faults_of(error)
     told = faults if len(faults) <= MOST_FINDINGS else faults[: MOST_FINDINGS - 1]
     for fault in told:
         *above, last = fault["loc"] or ("",)
@@ -250,6 +286,12 @@ def findings_of(error: ValidationError, model: type[BaseModel]) -> Iterator[Find
         yield _fault_of({**fault}, str(last), model).at(path.removesuffix(".[key]"))
     if len(faults) > len(told):
         yield Finding("$", "more_faults", {"count": len(faults) - len(told)})
+
+
+def _faults_of(error: ValidationError) -> list[Mapping[str, Any]]:
+    """Return Pydantic's errors without those of a name that could stand where a table does."""
+    faults = error.errors(include_url=False)
+    return [one for one in faults if one["loc"][-1:] != ("str",) or not isinstance(one["input"], dict)]
 
 
 _TYPES = {

@@ -8,6 +8,8 @@ import xml.etree.ElementTree as ET
 
 import pytest
 
+from grader.documents import LintDocument
+
 
 @pytest.mark.parametrize("options", [[], ["--mechanism", "shaper"], ["--like", "press"]])
 def test_what_a_new_assignment_says_to_do_next_can_be_done(planmark, tmp_path, options):
@@ -43,6 +45,29 @@ def test_lints_findings_for_programs_have_the_same_exit_status(planmark):
     document = json.loads(ran.stdout)
     assert (ran.returncode, document["needs_a_person"]) == (0, False)
     assert {finding["severity"] for finding in document["findings"]} == {"hint"}
+
+
+def test_lint_names_the_kind_of_a_file_that_is_no_assignment_with_the_faults_of_it(planmark, tmp_path):
+    assert planmark("new", "mine").returncode == 0
+    for kind, old in (("rubric", "points = 1.0"), ("mechanism", 'pin = "A"')):
+        path = tmp_path / f"mine.{kind}.toml"
+        path.write_text(path.read_text(encoding="utf-8").replace(old, f"{old}\nkey = 3", 1), encoding="utf-8")
+        ran = planmark("lint", path.name)
+        assert ran.returncode == 2
+        assert re.search(rf"\$: is a {kind}: .*did you mean mine\.assignment\.toml\?", ran.stderr)
+        assert len(re.findall(r"(?m)^  \$", ran.stderr)) == 2, ran.stderr
+        assert "key: is not known here" in ran.stderr
+
+
+def test_faults_of_files_are_json_too_where_json_is_asked_for(planmark, tmp_path):
+    assert planmark("new", "mine").returncode == 0
+    path = tmp_path / "mine.rubric.toml"
+    path.write_text(path.read_text(encoding="utf-8") + "\n[tolerance]", encoding="utf-8")
+    ran = planmark("lint", "mine.assignment.toml", "--json")
+    (found,) = LintDocument.model_validate_json(ran.stdout).findings
+    assert (ran.returncode, ran.stderr) == (2, "")
+    assert (found.severity, found.file, found.code) == ("fault", "rubric", "not_toml")
+    assert found.line == len(path.read_text(encoding="utf-8").splitlines())
 
 
 def test_an_assignment_that_never_assembles_is_told_and_not_drawn(planmark, tmp_path):
@@ -159,6 +184,10 @@ def test_faults_and_findings_are_told_in_the_language_of_the_call(planmark, tmp_
     english = json.loads(planmark("lint", "mine.assignment.toml", "--json").stdout)["findings"]
     assert [one["parameters"] for one in found] == [one["parameters"] for one in english]
     assert all(one["message"] != other["message"] for one, other in zip(found, english, strict=True))
+    words = re.findall("[a-z]{4,}", planmark("lint", "mine.assignment.toml", "--lang", lang).stdout)
+    assert not {"assembles", "variants", "shortest", "asked", "proposed", "hardest", "hint"}.intersection(
+        words
+    )
     path = tmp_path / "mine.mechanism.toml"
     path.write_text(re.sub(r"(?m)^side = .*$", "", path.read_text(encoding="utf-8")), encoding="utf-8")
     told = planmark("lint", "mine.assignment.toml", "--lang", lang)

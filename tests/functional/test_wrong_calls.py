@@ -1,5 +1,7 @@
 """Calls that cannot be carried out end with their status, one message, and nothing written."""
 
+import re
+
 import pytest
 
 
@@ -50,3 +52,28 @@ def test_a_wrong_call_ends_with_its_status_and_one_message(planmark, tmp_path, c
     assert "Traceback" not in ran.stderr
     assert ran.stdout == ""
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("call", "status"),
+    [
+        ("plan pump", 2),
+        ("plan press --position 8", 2),
+        ("plan mine.assignment.toml --n 3", 3),
+        ("plan mine.assignment.toml --all", 3),
+        ("lint mine.rubric.toml", 2),
+        ("grade missing.zip --assignment pump --out out", 2),
+        ("grade . --assignment pump --roster no.csv --out out", 2),
+        ("plan pump --n 1 --svg /proc/plan.svg", 5),
+    ],
+)
+def test_a_wrong_call_is_told_in_the_language_of_the_call(planmark, tmp_path, call, status):
+    assert planmark("new", "mine").returncode == 0
+    path = tmp_path / "mine.mechanism.toml"
+    path.write_text(path.read_text(encoding="utf-8").replace("[40, 30]", "[4, 3]"), encoding="utf-8")
+    english = planmark(*call.split())
+    for lang in ("ro", "ru"):
+        ran = planmark(*call.split(), "--lang", lang)
+        assert (ran.returncode, english.returncode) == (status, status)
+        words, others = (set(re.findall(r"(?u)[^\W\d_]{4,}", one.stderr)) for one in (ran, english))
+        assert len(words - others) >= 2, ran.stderr

@@ -12,11 +12,11 @@ from grader.authoring.findings import named
 from grader.authoring.lint import lint, lint_document
 from grader.authoring.round_scales import asked_vectors
 from grader.cli.exporting import schema
-from grader.rubric import load_rubric
+from grader.rubric import load_both, load_rubric
 from reference.authored.assignment import Variant, built_in, library, load_assignment
 from reference.errors import AuthoredFileError
 from reference.plan import exact_plan
-from tests.told import tells
+from tests.told import by_path, tells
 
 ROOT = Path(__file__).resolve().parents[3]
 SINE_TOLERANCE = 1e-9
@@ -38,6 +38,34 @@ def edited(tmp_path: Path, name: str, kind: str, old: str, new: str) -> Path:
 def linted(path: Path | str):
     assignment = load_assignment(path)
     return lint(assignment, load_rubric(assignment.file.rubric, beside=assignment.path))
+
+
+def test_faults_behind_unknown_keys_are_told_with_them_in_all_three_files(tmp_path):
+    path = edited(tmp_path, "pump", "assignment", 'mechanism = "pump"', 'mechanism = "pump"\nnote = 1')
+    for name, old, new in (
+        ("mechanism", 'pin = "A"', 'pn = "A"'),
+        ("rubric", 'vector = "v_A"', 'vector = "v_Z"\nkey = 1'),
+    ):
+        file = tmp_path / f"pump.{name}.toml"
+        text = file.read_text(encoding="utf-8")
+        assert old in text
+        file.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+    def told() -> dict[str, list[str]]:
+        with pytest.raises(AuthoredFileError) as error:
+            load_both(path)
+        files = (error.value, *error.value.others)
+        return {Path(one.file).name.split(".")[1]: [*by_path(one.findings)] for one in files}
+
+    index = next(k for k, one in enumerate(load_rubric("pump").criterion) if one.vector == "v_A")
+    asked = f"$.criterion[{index}]"
+    assert told() == {
+        "assignment": ["$.note"],
+        "mechanism": ["$.crank.pin", "$.crank.pn"],
+        "rubric": [f"{asked}.key", f"{asked}.vector"],
+    }
+    path.write_text(path.read_text(encoding="utf-8").replace("omega * kL", "omega * zeta"), encoding="utf-8")
+    assert told()["assignment"] == ["$.note", "$.scales.kv"]
 
 
 def findings_of(path: Path | str, code: str):

@@ -109,6 +109,18 @@ def test_bad_toml_a_missing_file_and_text_of_another_encoding_are_told(tmp_path)
         load(MechanismFile, tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("text", "line", "other"),
+    [("[body]\nm = 1\n[[body]]", 1, 3), ("[[body]]\nm = 1\n[body]", 3, 1), ("[body]\nm = 1\n[body]", 3, 1)],
+)
+def test_of_a_table_that_stands_twice_the_line_to_change_is_named(tmp_path, text, line, other):
+    path = tmp_path / "bad.toml"
+    path.write_text(text, encoding="utf-8")
+    words = rf"line {line}: .*\[body\] .*on line {other}, too: write \[\[body\]\]"
+    with pytest.raises(AuthoredFileError, check=tells(words)):
+        load(MechanismFile, path)
+
+
 def test_an_unknown_assignment_is_told_with_the_built_in_ones():
     built_in = (
         "engine, piston, press, press-all, press-forces, pump, pump-230, pump-collinear, pump-forces, shaper"
@@ -221,10 +233,15 @@ CRANK_MM, LAST = "crank_mm = 60", "to = 30"
             for last in ("10_001", "9223372036854775807", "1" + "0" * 30)
         ),
         ([(LAST, "to = 1000 }\nposition = { from = 1, to = 11")], "$.variant", "has 11000 variants"),
-        ([('kv = "omega * kL"', "kv = 0")], "$.scales.kv", "'kv' must be > 0"),
-        ([('kv = "omega * kL"', 'kv = "1e300*kL"')], "$.scales.kv", "'kv' must be > 0"),
+        ([('kv = "omega * kL"', "kv = 0")], "$.scales.kv", r"'0' \(kv\) must be > 0 "),
+        (
+            [('kv = "omega * kL"', 'kv = "5 - n"')],
+            "$.scales.kv",
+            r"'5 - n' \(kv\) must be > 0 \(for n = 5 and",
+        ),
+        ([('kv = "omega * kL"', 'kv = "1e300*kL"')], "$.scales.kv", r"\(kv\) must be < 1e\+09"),
         ([(CRANK_MM, "crank_mm = 0")], "$.scales.kL", "does not give a finite number"),
-        ([(CRANK_MM, "crank_mm = -60")], "$.scales.kL", "'kL' must be > 0"),
+        ([(CRANK_MM, "crank_mm = -60")], "$.scales.kL", r"'crank_m / crank_mm' \(kL\) must be > 0"),
         ([(CRANK_MM, "crank_mm = 1e400")], "$.scales.crank_mm", None),
         ([(CRANK_MM, "crank_mm = nan")], "$.scales.crank_mm", None),
         ([(CRANK_MM, "crank_mm = 0x" + "f" * 5000)], "$.scales.crank_mm", None),
