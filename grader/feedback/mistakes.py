@@ -6,7 +6,7 @@ guide: a Coriolis component, and the line along the guide.
 
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from grader.documents import MistakeDocument, RivalDocument
 from grader.language import N_
@@ -309,6 +309,15 @@ _ACROSS_GUIDE: dict[str, Words] = {
            " close the polygon again."),
     ),
 }  # fmt: skip
+_GIVEN_REVERSED = N_(
+    "An inertia force points against the acceleration of the centre of mass, a weight downwards, a load as"
+    " the task says: turn it round, then redo what follows from it."
+)
+_CLOSING_REVERSED = N_(
+    "In a closed polygon all arrows follow one another: turn it round, then redo what follows from it."
+)
+_TAKEN_OVER = re.compile(r"R_(?!0)[^_]+")
+"""A reaction between two links, which another group's polygon has the other way round."""
 _BY_LINE = {
     ALONG_GUIDE: _ALONG_GUIDE, DRIVING_ACROSS: _DRIVING_ACROSS, DRIVING_ALONG: _DRIVING_ALONG,
     OF_FORCE: _FORCE, ACROSS_GUIDE: _ACROSS_GUIDE, RIGHT_TRIANGLE: _BY_TRIANGLE,
@@ -414,6 +423,9 @@ def words_of(code: str, at: str = "", line: str = "") -> Words:
         return _UNITS.get(line, usual)
     if code == "sense_reversed" and at.startswith(("omega", "epsilon")):
         return _DRIVING
+    if code == "force_reversed" and not _TAKEN_OVER.fullmatch(at):
+        is_closing = at.startswith("R_") or at == "F_b"
+        return replace(usual, redo=_CLOSING_REVERSED if is_closing else _GIVEN_REVERSED)
     return _BY_LINE.get(line, {}).get(code, usual)
 
 

@@ -23,6 +23,7 @@ from grader.solution.steps import computed
 from reference.authored.assignment import Assignment, Variant
 from reference.construction.elements import Along, Coriolis
 from reference.construction.equations import Equation, equations
+from reference.construction.graph import evaluate
 from reference.construction.mistakes import RIGHT_TRIANGLE
 from reference.construction.steps import Coincide, Divide, Given, Similar, Step, TwoLines
 from reference.drawing.subject import Subject
@@ -45,26 +46,27 @@ RATIO = N_("With your scales kL·ka / kv² = %(ratio)s: it is drawn %(ratio)s ti
 RATIO_WITHIN = 0.02
 """Relative: scales at which the right triangle holds, as students round them."""
 
+SHIFT_MM, UNCHANGED_MM = complex(0.0083, 0.0056), 1e-6
+"""A shift, along no line of a plan, that shows what follows from a node; a smaller change is rounding."""
+
 
 def redo(subject: Subject, tongue: Tongue, node: str, *, with_numbers: bool) -> list[str]:
     """Return the steps from a node on: those of its figure in full, all else that follows by name.
 
-    Of a link's centre, its own step. Empty if it is no node of the construction. Without numbers, steps of
-    the mechanism are left out: they are nothing but given lengths.
+    Of a link's centre, its own step. Empty if it is no node of the construction. A force that only moves
+    along in its plan stays. Without numbers, steps of the mechanism are left out: they are given lengths.
     """
     construction = subject.plan.construction
     speaker = speaker_of(subject, tongue, lambda name: escape(name.plain))
     if node in construction.centres:
         return [_text(speaker, construction.centres[node], with_numbers=with_numbers).unescape()]
-    if all(node != step.node for step in construction.steps):
-        return []
-    touched = _touched(construction.steps, node)
+    ends = [*_following(subject, node)]
+    touched = [*dict.fromkeys(step for step, _ in ends)]
     own = [step for step in touched if construction.figure_of(step.node) == construction.figure_of(node)]
     told = [*_told_steps(speaker, own[:MOST_STEPS], with_numbers=with_numbers)]
     sums = {one.name for one in construction.vectors.values() if one.is_sum}
-    ends = [(step, name) for step in touched for name in construction.drawn_at(step.node)]
     later = [name for step, name in ends if step not in own[:MOST_STEPS] or name in sums]
-    if not speaker.has_letters(touched[-1].node):
+    if touched and not speaker.has_letters(touched[-1].node):
         later += construction.moments
     if later:
         told.append(speaker.say(THEN, nodes=speaker.names(tuple(later))))
@@ -83,14 +85,18 @@ def _told_steps(speaker: Speaker, steps: Sequence[Step], *, with_numbers: bool) 
         yield _text(speaker, step, with_numbers=with_numbers)
 
 
-def _touched(steps: tuple[Step, ...], node: str) -> list[Step]:
-    """Return the step of a node and all that depend on it, in their order."""
-    nodes, touched = {node}, []
-    for step in steps:
-        if step.node in nodes or nodes & set(step.needs):
-            nodes.add(step.node)
-            touched.append(step)
-    return touched
+def _following(subject: Subject, node: str) -> Iterator[tuple[Step, str]]:
+    """Yield each step that follows from a node, with the node or vector that it makes and that changes."""
+    construction, parameters = subject.plan.construction, subject.plan.drawing.parameters
+    right = evaluate(construction, parameters)
+    moved = evaluate(construction, parameters, given={node: np.asarray(right.get(node, 0j) + SHIFT_MM)})
+    for step in construction.steps:
+        for name in construction.drawn_at(step.node):
+            vector, change = construction.vectors.get(name), moved[step.node] - right[step.node]
+            if vector is not None:
+                change = change - moved[vector.tail] + right[vector.tail]
+            if not np.all(abs(change) <= UNCHANGED_MM):
+                yield step, name
 
 
 def _text(speaker: Speaker, step: Step, *, with_numbers: bool) -> Markup:
@@ -165,9 +171,10 @@ def _by_triangle(subject: Subject, mistake: NamedMistake, speaker: Tongue, level
 
 def _redo(subject: Subject, mistake: NamedMistake, speaker: Tongue, level: Level) -> list[str]:
     """Return the steps from the mistake on; none if it was made at no single step."""
-    vectors = subject.plan.construction.vectors
-    if mistake.code == "arithmetic" and mistake.at in vectors and not mistake.line:
-        # Its value is wrong, the drawing can stay.
+    vector = subject.plan.construction.vectors.get(mistake.at)
+    is_value = mistake.code == "arithmetic" and not mistake.line
+    is_arrow = mistake.code == "force_reversed" and len(mistake.explains) == 1
+    if vector and (is_value or is_arrow):
+        # The drawing can stay.
         return []
-    node = vectors[mistake.at].head if mistake.at in vectors else mistake.at
-    return redo(subject, speaker, node, with_numbers=level == "full")
+    return redo(subject, speaker, vector.head if vector else mistake.at, with_numbers=level == "full")

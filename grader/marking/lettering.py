@@ -46,6 +46,22 @@ def with_letters_exchanged(
     )
 
 
+def with_turned(submission: Submission, turned: str) -> Submission:
+    """The submission with the arrow of one vector at its other end, as entered and as read."""
+
+    def changed(reading: Reading) -> Reading:
+        figures = {
+            plan: replace(
+                one, vectors={name: _reversed(v) if name == turned else v for name, v in one.vectors.items()}
+            )
+            for plan, one in reading.figures.items()
+        }
+        return replace(reading, figures=figures)
+
+    measured = submission.measured and changed(submission.measured)
+    return replace(submission, readings=tuple(map(changed, submission.readings)), measured=measured)
+
+
 def _reading(task: Task, reading: Reading, pair: Pair, exact: Mapping[str, complex]) -> Reading:
     plan = task.construction.figure_of(pair[0])
     if plan not in reading.figures:

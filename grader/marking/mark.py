@@ -1,7 +1,7 @@
 """Judge one submission: comparison, diagnosis and points, in this order."""
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TypeVar
@@ -16,7 +16,7 @@ from grader.comparison.task import Task, tasks_at_speed
 from grader.comparison.verdicts import FULL, NONE
 from grader.given_data.owner import Owner, owner_of
 from grader.marking.drawn import case_of, explain
-from grader.marking.lettering import exchanged_pair, letters_charged, with_letters_exchanged
+from grader.marking.lettering import exchanged_pair, letters_charged, with_letters_exchanged, with_turned
 from grader.marking.naming import LEAST_CONFIDENCE, Lost, drawn_instead, named, not_explained, speed_mistake
 from grader.marking.settling import at_stake, is_of, of_another, of_nothing, settled
 from grader.marking.units import EXCHANGED, Undone, slip_of_value, undone, with_scales_exchanged
@@ -123,7 +123,7 @@ def _judged_as_entered(task: Task, submission: Submission) -> Judgement:
     if slips:
         owner = owner_of(task, comparison.evidence, submission.declared)
         comparison = comparison if owner is None else compare(task, submission, partial(explain, owner=owner))
-    judgement = _judged(task, submission, comparison, owner)
+    judgement = _with_arrows_turned(task, submission, comparison, owner)
     return with_slips_charged(task.rubric, judgement, as_entered, slips) if slips else judgement
 
 
@@ -160,6 +160,33 @@ def _is_off(scale: Scale) -> bool:
     return scale.used.refused is not None or (scale.other is not None and not scale.used.assumed)
 
 
+def _with_arrows_turned(
+    task: Task, submission: Submission, comparison: Comparison, owner: Owner | None
+) -> Judgement:
+    """The judgement of a submission; forces that are right but for their arrows are turned, and charged.
+
+    Such a force is credited once it is turned, and nothing else is charged for it. One mistake that explains
+    all and was made in that force itself stays.
+    """
+    judgement, as_entered, slips = _judged(task, submission, comparison, owner), comparison.outcomes, []
+    named_here = [one.at for one in judgement.mistakes]
+    for index, one in enumerate(as_entered):
+        is_force = one.name in task.construction.vectors and kind_of(one.name).name == "force"
+        if not is_force or one.verdict not in CHARGED or named_here == [one.name]:
+            continue
+        turned = with_turned(submission, one.name)
+        meant = compare(task, turned, partial(explain, owner=owner))
+        pairs = zip(meant.outcomes, comparison.outcomes, strict=True)
+        is_new = any(new.verdict in CHARGED and old.verdict not in CHARGED for new, old in pairs)
+        if meant.outcomes[index].verdict in CREDITED and not is_new:
+            submission, comparison = turned, meant
+            slips.append((Mistake("force_reversed", one.name), SLIPPED))
+    if not slips:
+        return judgement
+    judgement = _judged(task, submission, comparison, owner)
+    return with_slips_charged(task.rubric, judgement, as_entered, slips)
+
+
 def _judged(task: Task, submission: Submission, comparison: Comparison, owner: Owner | None) -> Judgement:
     """The judgement of a submission that was compared."""
     search = partial(explain, owner=owner)
@@ -178,7 +205,6 @@ def _judged(task: Task, submission: Submission, comparison: Comparison, owner: O
     read = _swapped_letters(task, submission, mistakes)
     mistakes = (*mistakes, *read)
     mistakes = (*mistakes, *_not_drawn(task, comparison, mistakes))
-    mistakes = (*mistakes, *_pointing_back(task, comparison, mistakes))
     mistakes = (*mistakes, *_slips(task, comparison, mistakes))
     outcomes = letters_charged(
         task,
@@ -271,25 +297,6 @@ def _not_drawn(task: Task, comparison: Comparison, known: Sequence[NamedMistake]
     return found
 
 
-def _pointing_back(
-    task: Task, comparison: Comparison, known: Sequence[NamedMistake]
-) -> Iterator[NamedMistake]:
-    """Yield forces that point the opposite way though all else is right, or all else that ends there."""
-    vectors, explained = task.construction.vectors, {name for one in known for name in one.explains}
-    right = {
-        vectors[one.name].head
-        for one in comparison.outcomes
-        if one.name in vectors and one.verdict in CREDITED
-    }
-    for one in comparison.outcomes:
-        is_back = "reversed" in one.codes and not one.codes & {"too_long", "too_short"}
-        if not is_back or one.verdict not in CHARGED or one.criterion in explained:
-            continue
-        is_force = kind_of(one.name).name == "force"
-        if is_force and (not known or vectors[one.name].head in right):
-            yield NamedMistake(Mistake("force_reversed", one.name), (one.criterion,), SLIPPED)
-
-
 def _left_out(task: Task, outcomes: Sequence[Outcome], known: Sequence[NamedMistake]) -> tuple[Outcome, ...]:
     """Return the outcomes; unread components are lost with the probability that they were left out."""
     sure = {one.at: one.confidence for one in known if one.code == "normal_missing"}
@@ -330,7 +337,9 @@ def _slips(task: Task, comparison: Comparison, known: Sequence[NamedMistake]) ->
         factor = value / right if value and right else 1.0
         at = vector_of_value(one.name) or one.name
         slip = NamedMistake(slip_of_value(at, factor), (one.criterion,), SLIPPED)
-        if one.mistake == "arithmetic" or (one.name in task.construction.moments and is_value_off):
+        is_unit = slip.code == "units" and one.verdict in CHARGED and "value_reversed" in one.codes
+        is_moment_off = one.name in task.construction.moments and (is_value_off or is_unit)
+        if one.mistake == "arithmetic" or is_moment_off:
             of_vectors.append(slip)
         elif one.mistake == "image_mirrored":
             of_vectors.append(replace(slip, mistake=Mistake("image_mirrored", one.name)))
@@ -361,7 +370,7 @@ def with_slips_charged(
     Arguments: `as_entered` are the outcomes of what was entered.
     """
     outcomes, named_slips = list(judgement.outcomes), []
-    asked = {one.angular: index for index, one in enumerate(rubric.criterion)}
+    asked = {one.name: index for index, one in enumerate(rubric.criterion)}
     for slip, probability in slips:
         places = (
             index

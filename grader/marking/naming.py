@@ -139,15 +139,16 @@ def not_explained(explanations: Sequence[Replay]) -> frozenset[str]:
 
 def _is_slight(mistake: Mistake, explanation: Replay) -> bool:
     """Return whether the residual at the mistake's step is small enough for drafting errors."""
-    if mistake.code in OF_THE_WHOLE:
+    if mistake.code in OF_THE_WHOLE or mistake.parameters:
+        # With other data the step of that explanation is right.
         return False
     return SUSPICIOUS < explanation.right.get(mistake.at, 0.0) < GROSS
 
 
 def _is_refuted(mistake: Mistake, construction: Construction, right: frozenset[str]) -> bool:
     """Return whether the forces are right that a mistake in moments or in what acts on a link makes wrong."""
-    vectors = [construction.vectors[name] for name in right]
-    laid = {one.head for one in vectors if construction.laid_off(one.tail, one.head)}
+    steps = [construction.step(construction.vectors[name].head) for name in right]
+    laid = {one.node for one in steps if isinstance(one, Given) and laid_off(one, construction) in right}
     return mistake.code in OF_MOMENTS and made_at(mistake, construction) <= laid
 
 

@@ -82,7 +82,14 @@ def _plan(
             steps[name] = one.length_mm * along / abs(along)
     vectors = [vector for vector in construction.vectors_of(figure) if vector.name in steps]
     steps |= {vector.name: -steps[vector.name] for vector in vectors if vector.reversed}
-    nodes = _nodes(pole, vectors, steps)
+    nodes, end = {pole: 0j}, pole
+    _extend(nodes, vectors, steps)
+    for step in construction.figures[figure] if group_of(figure) else ():
+        if step.node not in nodes and any(vector.tail == step.node for vector in vectors):
+            # Forces that were not entered come between: the chain goes on from where it ended.
+            nodes[step.node] = nodes[end]
+            _extend(nodes, vectors, steps)
+        end = step.node if step.node in nodes else end
     arrows = tuple(_arrows(figure, vectors, steps, nodes, outcomes))
     ghosts = tuple(ghosts_of(arrows, outcomes)) if show_expected else ()
     dots = tuple(
@@ -92,14 +99,12 @@ def _plan(
     return Scene((0.0, 0.0), arrows, ghosts, dots)
 
 
-def _nodes(pole: str, vectors: list[Vector], steps: Mapping[str, complex]) -> dict[str, complex]:
-    """Return the nodes that the vectors lead to, from the pole on."""
-    nodes = {pole: 0j}
+def _extend(nodes: dict[str, complex], vectors: list[Vector], steps: Mapping[str, complex]) -> None:
+    """Add the nodes that the vectors lead to from known ones on."""
     for _ in vectors:
         for vector in vectors:
             if vector.tail in nodes and vector.head not in nodes:
                 nodes[vector.head] = nodes[vector.tail] + steps[vector.name]
-    return nodes
 
 
 def _arrows(

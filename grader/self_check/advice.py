@@ -297,8 +297,8 @@ def law_of(mistake: NamedMistake) -> str:
     if mistake.at.startswith(CORIOLIS_END):
         return _CORIOLIS.get(mistake.code, usual)
     line = line_in(mistake.detail)
-    if mistake.code == SLIP and _kind(mistake.at, "") == "laid off":
-        return usual
+    if _kind(mistake.at, "") == "laid off" and mistake.code in {SLIP, "force_reversed"}:
+        return usual if mistake.code == SLIP else _LAID_OFF
     known = {**_DRIVING, ALONG_GUIDE: _GUIDE, RIGHT_TRIANGLE: _BY_TRIANGLE}
     others = {**known, OF_FORCE: _OF_FORCES, ACROSS_GUIDE: _OF_FORCES}.get(line, {})
     return others.get(mistake.code, usual)

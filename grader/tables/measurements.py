@@ -62,6 +62,8 @@ if TYPE_CHECKING:
 KEYS = ("student_id", "n", "position")
 TABLES = {"segments_mm": "", "directions_deg": "_deg", "values": "_value"}
 """The tables of a JSON file, and what a CSV file's columns add to the names in them."""
+UNITS = {"segments_mm": "mm", "directions_deg": "°"}
+"""The unit of a table's numbers; those of values have the unit of each quantity."""
 MAX_BYTES = 1_000_000
 """A class of a thousand with every length, direction and value writes half of it."""
 CLASS_TABLE = TableKind(
@@ -341,7 +343,8 @@ class _Entries:
         """
         text, beside = " ".join(cells).strip(), turned(cells[1], delimiter)
         is_sense = not cells[1] or (isinstance(beside, tuple) and beside[1])
-        found = turned(text, delimiter) if is_sense else Reason("no_sense", {"text": short(cells[1])})
+        no_sense = Reason("no_sense", {"text": short(cells[1])})
+        found = turned(text, delimiter, unit_of(name)) if is_sense else no_sense
         value, sense = found if isinstance(found, tuple) else (found, 0.0)
         if value is not None:
             self.number(path, f"{name}_value", short(text), value)
@@ -419,7 +422,9 @@ def _line(row: Row, meant: Mapping[str, tuple[str, ...]], entries: _Entries, *, 
             entries.turning(path, name, cells, row.delimiter, asks=f"{name}_sense" in row.text)
     for column, text in row.text.items():
         if text and column in entries.columns and entries.columns[column][1] not in entries.names.rates:
-            entries.number(column, column, short(text), real_number(text, row.delimiter))
+            table, name = entries.columns[column]
+            unit = UNITS.get(table) or unit_of(name)
+            entries.number(column, column, short(text), real_number(text, row.delimiter, unit))
         elif text and column in meant:
             entries.unknown(column, short(text), meant[column])
     for scale in entries.names.scales:

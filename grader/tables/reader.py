@@ -12,11 +12,12 @@ import re
 import stat
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from grader.language import Tongue
 from grader.records import Reason, Value
+from grader.tables.scale_text import number_with_unit
 from grader.texts.spoken import ENGLISH, fault, lines_of
 from reference.authored.variant_table import delimiter_of, number_of, table_lines
 from reference.errors import InputFileError, near_names
@@ -242,18 +243,22 @@ def whole_number(text: str, delimiter: str) -> int | Reason:
     return Reason("no_whole_number", {"text": short(text)}) if digits is None else int(digits[1])
 
 
-def real_number(text: str, delimiter: str) -> float | Reason:
-    """A number, with a decimal comma beside semicolons."""
+def real_number(text: str, delimiter: str, unit: str = "") -> float | Reason:
+    """A number, with a decimal comma beside semicolons; in a unit, also with that or another of its kind."""
     number = number_of(text, decimal_comma=delimiter == ";")
+    if number is None and unit and not ("," in text and delimiter != ";"):
+        number = number_with_unit(text, unit)
     if number is not None:
         return number
-    return Reason(
-        "no_decimal_point" if "," in text and delimiter == "," else "no_number", {"text": short(text)}
-    )
+    if "," in text and delimiter == ",":
+        return Reason("no_decimal_point", {"text": short(text)})
+    # What is behind digits was meant as a unit.
+    known: dict[str, Value] = {"unit": unit} if unit and re.search(r"\d\s*[^\W\d]", text) else {}
+    return Reason("no_number", {"text": short(text), **known})
 
 
 _SENSE = re.compile(
-    r"(?:[îi]n\s+)?(?:\bsens(?:ul)?\s+)?(?:(?P<ccw>\bccw\b|\b(?:counter|anti)[-\s]?clockwise\b|↺|⟲|⥀"
+    r"(?:\b[îi]n\s+)?(?:\bsens(?:ul)?\s+)?(?:(?P<ccw>\bccw\b|\b(?:counter|anti)[-\s]?clockwise\b|↺|⟲|⥀"
     r"|\b(?:anti-?orar|trigonometric)\b|\bпротив\s+(?:хода\s+)?(?:час\w*(?:\s+стрел\w*)?|ч\.\s?с\.))"
     r"|\bcw\b|\bclockwise\b|↻|⟳|⥁|\borar\b|\bпо\s+(?:ходу\s+)?(?:час\w*(?:\s+стрел\w*)?|ч\.\s?с\.))",
     re.IGNORECASE,
@@ -261,16 +266,16 @@ _SENSE = re.compile(
 """A sense of rotation in words of the three languages, or as an arrow."""
 
 
-def turned(text: str, delimiter: str) -> tuple[float | None, float] | Reason:
+def turned(text: str, delimiter: str, unit: str = "") -> tuple[float | None, float] | Reason:
     """An angular quantity, counter-clockwise positive, and the sense told with it in words: 1, -1, or 0.
 
     None for a sense alone. A sign is a sense as well: one that contradicts the words is a fault.
     """
     senses = {1.0 if found["ccw"] else -1.0 for found in _SENSE.finditer(text)}
     plain = _SENSE.sub(" ", text).strip()
-    value = real_number(plain, delimiter) if plain else None
+    value = real_number(plain, delimiter, unit) if plain else None
     if isinstance(value, Reason):
-        return Reason(value.code, {"text": short(text)})
+        return replace(value, parameters={**value.parameters, "text": short(text)})
     signs = {math.copysign(1.0, value)} if value and plain[0] in "+-\N{MINUS SIGN}" else set[float]()
     if len(senses | signs) > 1:
         return Reason("two_senses", {"text": short(text)})

@@ -9,6 +9,7 @@ A declared scale that cannot be understood is a value, `Refused`, with the reaso
 written instead.
 """
 
+import math
 import re
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
@@ -50,6 +51,8 @@ UNITS: Mapping[str, tuple[float, int, int, int]] = {
     "N": (1.0, 0, 0, 1),
     "daN": (10.0, 0, 0, 1),
     "kN": (1000.0, 0, 0, 1),
+    "Nm": (1.0, 1, 0, 1),
+    "kNm": (1000.0, 1, 0, 1),
 }
 """SI factor, powers of the metre, the second and the newton."""
 CYRILLIC: Mapping[str, str] = {
@@ -60,9 +63,12 @@ CYRILLIC: Mapping[str, str] = {
     "км": "km",
     "с": "s",
     "сек": "sec",
+    "мин": "min",
     "Н": "N",
     "даН": "daN",
     "кН": "kN",
+    "Нм": "Nm",
+    "кНм": "kNm",
 }
 
 
@@ -373,6 +379,36 @@ class _Reader:
 def _quantities(text: str) -> list[_Quantity]:
     """Return the quantities in a text: read strictly, then with all after a slash as the denominator."""
     return [_Reader(text, rest_is_divisor=later).read() for later in (False, True)]
+
+
+_ANGLES: Mapping[str, float] = {
+    "rad": 1.0, "рад": 1.0, "°": math.pi / 180.0, "deg": math.pi / 180.0,
+    "rev": math.tau, "rot": math.tau, "об": math.tau,
+}  # fmt: skip
+_WITH_UNIT = re.compile(
+    rf"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*({'|'.join(_ANGLES)})?((?:[^\d]|(?<=[\^\w-])\d)*)"
+)
+"""A number, then an angle's unit, then others, with numbers only as their powers."""
+
+
+def number_with_unit(text: str, unit: str) -> float | None:
+    """Return the number in a text, in `unit`, where that unit or another of its kind follows; else None."""
+    (own,) = _with_unit(f"1 {unit}").items()
+    value = _with_unit(text).get(own[0])
+    return None if value is None else float(f"{value / own[1]:.12g}")
+
+
+def _with_unit(text: str) -> dict[tuple[int, int, int], float]:
+    """Return a number with a unit, SI and radians, by its powers: as each way to read it has them."""
+    parts = _WITH_UNIT.fullmatch(re.sub(r"(?<=[\d ]) 1/", "/", _clean(text)))
+    if parts is None:
+        return {}
+    number = float(parts[1]) * _ANGLES.get(parts[2], 1.0)
+    try:
+        found = _quantities(f"1 {parts[3]}")
+    except (TextError, OverflowError):
+        return {}
+    return {one.powers: number * one.value for one in found if parts[2] or any(one.powers)}
 
 
 def _ratio(name: str, text: str) -> float:

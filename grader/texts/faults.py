@@ -42,7 +42,10 @@ FAULTS: dict[str, tuple[str, ...]] = {
     "cell_empty": (N_("is empty"),),
     "id_refused": (N_("'%(text)s' is refused: %(advice)s"),),
     "no_whole_number": (N_("'%(text)s' is not a whole number"),),
-    "no_number": (N_("'%(text)s' is no number"),),
+    "no_number": (
+        N_("'%(text)s' is no number in %(unit)s or in a unit that converts to it"),
+        N_("'%(text)s' is no number"),
+    ),
     "no_decimal_point": (
         N_("'%(text)s' is no number; write a decimal point, or separate fields by semicolons"),
     ),

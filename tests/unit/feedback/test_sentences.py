@@ -216,6 +216,16 @@ def test_every_mistake_says_what_was_done_and_what_to_redo(lang, code):
     assert "velocity_plan" not in told
 
 
+@pytest.mark.parametrize(
+    ("at", "word"),
+    [("F_i3", "acceleration"), ("F_D", "the task"), ("R_43", "another group"), ("R_13_n", "closed")],
+)
+def test_a_reversed_force_is_told_what_sets_its_own_sense(at, word):
+    told = mistake_feedback(NamedMistake(Mistake("force_reversed", at), (), 0.9), "en")
+    assert word in told
+    assert ("R_34" in told) == (at == "R_43")
+
+
 def test_names_are_those_that_the_students_know():
     told = mistake_feedback(NamedMistake(Mistake("scale_wrong", "kv"), (), 0.9), "ru", names={"kv": "μv"})
     assert "μv" in told

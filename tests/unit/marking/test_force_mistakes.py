@@ -62,8 +62,36 @@ def test_a_mistake_costs_where_it_was_made_and_is_named(mistake):
     assert [(one.code, one.at) for one in judgement.mistakes] == ([(code, at)] if code else [])
 
 
+@pytest.mark.parametrize(
+    ("name", "made", "named_too", "arrow"),
+    [
+        ("pump", ForceMistake("slip", "F_D", factor=2.0), {("arithmetic", "F_D")}, "R_34"),
+        ("pump", ForceMistake("reversed", "R_43"), {("force_reversed", "R_43")}, "R_13"),
+        ("press", ForceMistake("slip", "F_D", factor=2.0), {("arithmetic", "F_D")}, "R_13_t"),
+        ("pump", ForceMistake("turned", "F_D", turn_deg=40.0), set(), "R_13"),
+    ],
+)
+def test_a_reversed_entry_beside_another_mistake_is_told_as_reversed(name, made, named_too, arrow):
+    assignment, rubric = force_task(name)
+    variant, rng = assignment.variants()[4], np.random.default_rng(7)
+    student = StudentForces(assignment, variant, HANDS["typical"], made, rng)
+    length, turn = student.entered[arrow]
+    student.entered[arrow] = length, turn + 180.0
+    judgement = judge(task_of(assignment, rubric, variant), student.submission)
+    assert {(one.code, one.at) for one in judgement.mistakes} == named_too | {("force_reversed", arrow)}
+    assert {one.name for one in judgement.outcomes if one.verdict in CHARGED} == {made.at, arrow}
+
+
+def test_a_force_that_is_laid_off_reversed_is_named_beside_what_closes_its_polygon():
+    assignment, rubric = force_task("shaper")
+    variant, made = assignment.variants()[4], ForceMistake("reversed", "R_A1")
+    student = StudentForces(assignment, variant, HANDS["careful"], made, np.random.default_rng(5))
+    judgement = judge(task_of(assignment, rubric, variant), student.submission)
+    assert [(one.code, one.at) for one in judgement.mistakes] == [("force_reversed", "R_A1")]
+
+
 def test_a_moment_in_another_unit_is_told_with_that_unit():
-    for factor, unit in {0.001: "kN m", 1000.0: "N mm"}.items():
+    for factor, unit in {0.001: "kN m", 1000.0: "N mm", -0.001: "kN m"}.items():
         (named_slip,) = pump(ForceMistake("slip", "M_b", factor=factor))[1].mistakes
         told = mistake_feedback(named_slip, "en", "hint")
         assert told == f"M_b was entered in {unit}, not N m. Enter it in N m."

@@ -21,12 +21,13 @@ def measured(name="pump", n=7, position=None, *, directions=True, left_out=(), l
     """A task, and its exact plan as measured: without some vectors, some longer by a factor."""
     assignment = load_assignment(name)
     task = task_of(assignment, rubric_of(assignment), assignment.variant(n, position))
-    scales = {scale: float(np.ravel(task.parameters[scale])[0]) for scale in ("kL", "kv", "ka")}
+    scales = {scale: float(np.ravel(task.parameters[scale])[0]) for scale in assignment.scale_names}
     figures = {}
     for figure in task.construction.poles:
         vectors = {}
         for vector in task.construction.vectors_of(figure):
-            exact = task.segments[vector.name].drawn(scales)
+            segment = task.segments[vector.name]
+            exact = segment.drawn(scales) * np.exp(1j * segment.turn_rad)
             direction = math.degrees(np.angle(exact)) % 360.0 if directions and abs(exact) > 1e-9 else None
             length = abs(exact) * (longer or {}).get(vector.name, 1.0)
             if vector.name not in left_out:
@@ -53,6 +54,18 @@ def test_an_exact_plan_closes_everywhere(name, n, position):
         vector = task.construction.vectors[arrow.name]
         assert math.dist(arrow.tail, nodes[arrow.figure, vector.tail]) < PEN_WIDTH_MM
         assert math.dist(arrow.tip, nodes[arrow.figure, vector.head]) < PEN_WIDTH_MM
+
+
+def test_every_force_plan_is_drawn_also_where_its_first_force_was_not_entered():
+    task, reading, outcomes = measured("pump-forces", left_out={"R_34_t", "R_02_t"})
+    scene = drawn(task, reading, outcomes).scene
+    entered = {name for figure in reading.figures.values() for name in figure.vectors}
+    assert {arrow.name for arrow in scene.arrows} == entered
+    tips = {arrow.name: arrow.tip for arrow in scene.arrows}
+    tails = {arrow.name: arrow.tail for arrow in scene.arrows}
+    # Head to tail, over what is missing.
+    assert math.dist(tails["F_iD"], tips["F_i4"]) == pytest.approx(0.0)
+    assert math.dist(tips["F_i2"], tails["R_02"]) == pytest.approx(0.0)
 
 
 def test_what_is_off_does_not_close_and_has_its_ghost():

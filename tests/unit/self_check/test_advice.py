@@ -86,6 +86,8 @@ def test_every_mistake_but_a_missing_vector_has_a_law():
         (Mistake("wrong_link", "d"), ALONG_GUIDE, "its own guide"),
         (Mistake("arithmetic", "F_i3"), OF_FORCE, "real value / scale"),
         (Mistake("arithmetic", "R_34_t"), OF_FORCE, "moments"),
+        (Mistake("force_reversed", "F_i3"), "", "m·a"),
+        (Mistake("force_reversed", "R_43"), "", "R_ij"),
         (Mistake("arithmetic", "n_B", other=("right_triangle",)), "", "only where kL·ka = kv²"),
     ],
 )

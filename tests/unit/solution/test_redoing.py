@@ -8,7 +8,7 @@ from grader.feedback.redo_steps import redo
 from grader.language import LANGUAGES, tongue
 from grader.solution.sentences import wording_of
 from reference.authored.assignment import load_assignment
-from reference.construction.graph import ancestors
+from reference.construction.graph import ancestors, evaluate
 from reference.drawing.subject import Subject
 from reference.plan import exact_plan
 from reference.quantities import group_of
@@ -63,14 +63,23 @@ def test_steps_of_force_plans_name_vectors_and_say_no_number(own, lang, tmp_path
 
 
 @pytest.mark.parametrize("own", [False, True])
-def test_every_force_and_moment_that_follows_is_named(own, tmp_path):
+def test_every_force_and_moment_that_changes_is_named_and_no_given_force(own, tmp_path):
     assignment, plan = loaded("slider on a moving link", tmp_path, own=own)
     one, construction = Subject(assignment, plan, 0, wording_of(tongue("en"))), plan.construction
+    right = evaluate(construction, plan.drawing.parameters)
     for node in (step.node for step in construction.steps if group_of(construction.figure_of(step.node))):
-        hanging = {step.node for step in construction.steps if node in ancestors(construction, [step.node])}
-        following = {v.name for v in construction.vectors.values() if v.head in hanging} | {"M_b"}
-        told = " ".join(redo(one, tongue("en"), node, with_numbers=False))
-        assert following <= set(re.findall(r"[FGRM]_\w+", told)), node
+        lines = redo(one, tongue("en"), node, with_numbers=False)
+        told = set(re.findall(r"[FGRM]_\w+", " ".join(lines)))
+        drawn = evaluate(construction, plan.drawing.parameters, given={node: right[node] + complex(2, 3)})
+        vectors = construction.vectors.values()
+        moved = {v.name for v in vectors if abs(v_of(v, drawn) - v_of(v, right)).max() > 0.01}
+        assert moved <= told, node
+        laid_off = {name for line in lines for name in re.findall(r"lay off ([FG]_\w+)", line)}
+        assert laid_off <= {v.name for v in vectors if v.head == node}
+
+
+def v_of(vector, nodes):
+    return nodes[vector.head] - nodes[vector.tail]
 
 
 def test_with_numbers_the_lengths_are_those_of_the_plan():

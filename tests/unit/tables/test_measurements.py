@@ -105,6 +105,28 @@ def test_a_students_own_file_needs_no_student(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("column", "cell", "number"),
+    [
+        ("v_A", "60.2 mm", 60.2), ("v_A", "6.02cm", 60.2),
+        ("v_A_deg", "30°", 30.0), ("v_A_deg", "0.5 rad", 28.6479),
+        ("v_A_value", "1.5 m/s", 1.5), ("v_A_value", "150 cm/s", 1.5), ("a_B_value", "3 м/с²", 3.0),
+        ("omega_2_value", "20 rev/min cw", -2.0944), ("omega_2_value", "2.1 s⁻¹", 2.1),
+    ],
+)  # fmt: skip
+def test_a_number_with_its_unit_or_another_of_its_kind_is_read(entered, column, cell, number):
+    (one,) = entered(f"student_id,{column}\ns01,{cell}\n")
+    assert not one.problems
+    assert one.numbers[column] == pytest.approx(number, abs=1e-4)
+
+
+@pytest.mark.parametrize("cell", ["12 m", "12 m/4 s", "2 3 m/s", "5 m/s^2", "3 N", "1.5 m/s/2"])
+def test_a_number_in_a_unit_of_another_kind_is_refused_with_the_unit_asked_for(entered, cell):
+    (one,) = entered(f"student_id,v_A_value\ns01,{cell}\n")
+    assert one.values == {}
+    assert f"'{cell}' is no number in m/s" in message(one.problems[0])
+
+
+@pytest.mark.parametrize(
     ("lang", "said"), [("ro", "rândul 2, v_A: „x” nu este un număr"), ("ru", "строка 2, v_A: «x»: не число")]
 )
 def test_faults_are_told_in_the_readers_language(entered, lang, said):
