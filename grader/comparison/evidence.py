@@ -53,7 +53,7 @@ class DrawnVector:
     others: tuple[OtherReading, ...] = ()
     """Other readings, the likeliest first, as on the sheet."""
     is_doubted: bool = False
-    """True if it is laid off in a force polygon that was mostly read in doubt."""
+    """True if it is laid off in a force polygon that may be another one than was read."""
 
     def if_others(self) -> Iterator["DrawnVector"]:
         """The vector as each of the others, with the confidence that it is this one or one before it."""
@@ -186,7 +186,7 @@ class _Sheets:
             if figure != MECHANISM:
                 names = [vector.name for vector in self.task.construction.vectors_of(figure)]
                 vectors = _vectors(self.task, read, names, turn, se_turn)
-                self.add_vectors(dict(_doubted(self.task, vectors)) if group_of(figure) else vectors)
+                self.add_vectors(_doubted(self.task, figure, vectors) if group_of(figure) else vectors)
                 self.add_nodes(_plan_nodes(self.task, figure, read, turn), read)
                 if joints:
                     self.sketches.setdefault(figure, joints)
@@ -255,16 +255,37 @@ def _vectors(
 
 
 MOSTLY_DOUBTED = 0.79
-"""Median confidence of a force polygon's vectors below which the polygon was mostly read in doubt."""
+"""Median confidence of a force polygon's sides below which the polygon was mostly read in doubt."""
 
 
-def _doubted(task: Task, drawn: Mapping[str, DrawnVector]) -> Iterator[tuple[str, DrawnVector]]:
-    """Yield the vectors of a force polygon, those laid off `is_doubted` where it was mostly read in doubt."""
-    is_doubtful = statistics.median([one.confidence for one in drawn.values()] or [1.0]) < MOSTLY_DOUBTED
-    for name, one in drawn.items():
-        vector = task.construction.vectors[name]
-        is_laid_off = task.construction.laid_off(vector.tail, vector.head) is not None
-        yield name, replace(one, is_doubted=is_doubtful and is_laid_off)
+def _doubted(task: Task, figure: str, drawn: Mapping[str, DrawnVector]) -> dict[str, DrawnVector]:
+    """Return the vectors of a force polygon, those laid off `is_doubted` where it may be another polygon.
+
+    Not all its sides were found, and it does not close; or it was mostly read in doubt; or its forces do not
+    show its sense, as all of them reversed leave the same lines: only two or more do that all point as the
+    data have them. Sides too short to have a direction show nothing.
+    """
+    sides = task.construction.polygon_of(figure)
+    laid_off = {one.name for one in sides if task.construction.laid_off(one.tail, one.head) is not None}
+    shown = {
+        one.name: at
+        for one in sides
+        if one.name in drawn
+        and (at := drawn[one.name].as_complex)
+        and abs(at) >= task.rubric.tolerance_of(one.name).least_mm
+    }
+    forward = [
+        (at * task.segments[name].real.conjugate()).real > 0.0
+        for name, at in shown.items()
+        if name in laid_off
+    ]
+    is_told = len(forward) > 1 and all(forward)
+    is_closed = all(one.name in drawn for one in sides)
+    is_doubtful = (
+        not (is_told and is_closed)
+        or statistics.median(drawn[name].confidence for name in shown) < MOSTLY_DOUBTED
+    )
+    return {name: replace(one, is_doubted=is_doubtful and name in laid_off) for name, one in drawn.items()}
 
 
 def _own_turn(task: Task, name: str) -> float:

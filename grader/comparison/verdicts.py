@@ -247,7 +247,7 @@ often."""
 
 
 WRONG_DOUBTED = 0.2
-"""The same, by the share of doubt, for what is laid off in a force polygon that was mostly read in doubt:
+"""The same, by the share of doubt, for what is laid off in a force polygon that may be another one:
 the reader looks for the right polygon, where one laid off the wrong way may seem right. Of 61 credited with
 less than 0.9 on 130 simulated sheets 4 were wrong; of 35 closing sides none, of 152 in other polygons one."""
 
@@ -278,8 +278,9 @@ def with_confidence(
     """Return a mark, open between nothing and full marks if the vector may have been misread.
 
     Arguments: `confidence` is the probability that the vector is read rightly, `settle` the least
-    probability of a verdict that stands, `is_doubted` that of `DrawnVector`. One that the reading's own
-    error makes right is even.
+    probability of a verdict that stands, `is_doubted` that of `DrawnVector`. What is likelier another stroke
+    never stands: the reader looks where a vector should be, so that lying there proves nothing. One that the
+    reading's own error makes right is even.
     """
     if not mark.is_certain:
         return mark if confidence == 1.0 else replace(mark, sure=min(mark.sure, confidence))
@@ -293,7 +294,8 @@ def with_confidence(
     else:
         wrong = (WRONG_SHORT if expected_mm < SHORT_MM else WRONG_CREDIT) * misread**2
     sure = min(mark.sure, 1.0 - wrong)
-    if sure >= settle:
+    is_likelier_another = confidence < EVEN and expected_mm >= SHORT_MM
+    if sure >= settle and not is_likelier_another:
         return replace(mark, sure=sure)
     sure = EVEN if any(map(_is_mostly_error, mark.reasons)) else sure
     return open_between(NONE, FULL, mark, Reason("doubtful", {"confidence": confidence}), sure=sure)

@@ -94,12 +94,17 @@ def no_surer_than_turn(reading: Reading, page: ScannedPage) -> Reading:
 
 
 def no_surer(reading: Reading, most: float) -> Reading:
-    """Return the reading with no node or vector of a higher confidence."""
+    """Return the reading with no node, vector or other reading of a higher confidence."""
     figures = {}
     for name, figure in reading.figures.items():
         nodes = {key: replace(one, confidence=min(one.confidence, most)) for key, one in figure.nodes.items()}
         vectors = {
-            key: replace(one, confidence=min(one.confidence, most)) for key, one in figure.vectors.items()
+            key: replace(
+                one,
+                confidence=min(one.confidence, most),
+                others=tuple(replace(other, confidence=min(other.confidence, most)) for other in one.others),
+            )
+            for key, one in figure.vectors.items()
         }
         figures[name] = replace(figure, nodes=nodes, vectors=vectors)
     return replace(reading, figures=figures)

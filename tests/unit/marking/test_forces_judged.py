@@ -266,6 +266,33 @@ def test_a_force_that_may_be_laid_off_the_wrong_way_waits_where_its_polygon_was_
     assert (found["F_D"], found["F_iD"], found["R_0D"]) == ("review", "review", "full")
 
 
+def test_a_force_that_seems_right_waits_where_the_other_sense_of_its_polygon_fits_as_well():
+    # All forces reversed leave the same lines: this load as drawn is F_D reversed, or all others are.
+    def capped(reading):
+        for name in reading.figures["force_plan_D"].vectors:
+            reading = changed(reading, name, confidence=CAPPED)
+        return reading
+
+    assert on_scan(PUMP, capped(sheet(PUMP)))["F_D"] == "full"
+    read = sheet(PUMP)
+    inertia = read.figures["force_plan_D"].vectors["F_iD"]
+    turned = changed(read, "F_iD", direction_deg=(inertia.direction_deg + 180.0) % 360.0)
+    assert on_scan(PUMP, turned)["F_D"] == "full"
+    assert on_scan(PUMP, capped(turned))["F_D"] == "review"
+
+
+def test_a_force_read_in_doubt_waits_where_a_side_of_its_polygon_was_not_found():
+    read = changed(sheet(PUMP), "F_D", confidence=UNSURE)
+    unread = without(read, "R_0D")
+    assert (on_scan(PUMP, read)["F_D"], on_scan(PUMP, unread)["F_D"]) == ("full", "review")
+
+
+def test_sides_too_short_to_have_a_direction_are_no_evidence_for_their_polygon():
+    read = changed(changed(sheet(PRESS), "F_D", confidence=UNSURE), "R_24", confidence=UNSURE)
+    short = changed(changed(read, "G_D", length_mm=1.0), "R_0D", length_mm=1.0)
+    assert (on_scan(PRESS, read)["F_D"], on_scan(PRESS, short)["F_D"]) == ("full", "review")
+
+
 def test_a_sum_that_is_not_drawn_out_waits():
     found = on_scan(PRESS, sheet(PRESS), "R_02", "F_i2")
     assert (found["R_02"], found["F_i2"]) == ("review", "none")

@@ -22,6 +22,7 @@ from grader.records import (
     Figure,
     Ink,
     InkMap,
+    OtherReading,
     PageRef,
     Reading,
     ReadNode,
@@ -187,8 +188,17 @@ def test_what_is_read_on_a_page_that_its_plans_alone_turned_is_not_asserted():
     turned = replace(unsure, ref=replace(unsure.ref, turn_deg=180))
     for sure in (unsure, replace(turned, problems=())):
         assert no_surer_than_turn(reading := drawn(), sure) is reading
-    for figure in no_surer_than_turn(drawn(), turned).figures.values():
-        assert {one.confidence for one in (*figure.nodes.values(), *figure.vectors.values())} == {BY_PLANS}
+    plan = drawn().figures[VELOCITY_PLAN]
+    # Another reading and those before it are likely together, and no surer either.
+    several = {
+        name: replace(one, others=(OtherReading(one.length_mm, 0.0, 0.98),))
+        for name, one in plan.vectors.items()
+    }
+    read = replace(drawn(), figures={**drawn().figures, VELOCITY_PLAN: replace(plan, vectors=several)})
+    for figure in no_surer_than_turn(read, turned).figures.values():
+        others = [other for one in figure.vectors.values() for other in one.others]
+        of_all = (*figure.nodes.values(), *figure.vectors.values(), *others)
+        assert {one.confidence for one in of_all} == {BY_PLANS}
 
 
 def test_only_a_sketch_with_a_link_in_another_direction_looks_like_another_variants():
