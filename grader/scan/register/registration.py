@@ -169,6 +169,13 @@ _FAR_OFF_MM = 1.5
 """A side farther off after the fit was taken for the wrong line."""
 _EDGE_WITHIN_MM = 6.0
 """Without a frame the sheet's place is known no better before its edges are looked for."""
+_TILT_SE = float(np.radians(1.0))
+"""How far a sheet is laid askew on a scanner's glass."""
+_LEVEL_SE, _LEVEL_PEAK = float(np.radians(0.1)), 40.0
+"""How far lines that are ruled level are askew, and how much likelier such a slope is among them than any one
+slope of links and vectors, of which as many lie within 5 degrees of the axes."""
+_LEVEL_WITHIN = 3.0
+"""Standard errors within which a line is one of the level ones."""
 _ASSUMED_PAPER_SE = 0.004
 """Paper that looks like A3 may be a trimmed sheet or another format of nearly its ratio."""
 _SCALE_DOUBTS = frozenset({"paper_assumed", "registration_disagrees"})
@@ -422,7 +429,7 @@ def _from_resolution(
     Where nothing shows that the page is A3 (`doubt` says so), its drawing is to bear the scale out.
     """
     high, wide = page.grey.shape
-    tilt = _tilt(lines)
+    tilt = _tilt(page, lines)
     quarter = 0.0 if wide >= high else np.pi / 2.0
     drawn = drawn_ends(lines)
     tried: list[tuple[float, FloatArray]] = []
@@ -467,8 +474,14 @@ def _placed(matrix: FloatArray, resolution: Resolution, lines: list[LongLine], s
     return replace(fit, mm_to_px=matrix) if np.abs(axes).max() > _EDGE_SE else fit
 
 
-def _tilt(lines: list[LongLine]) -> float:
-    """Weighted median tilt of the long lines from the image's axes, radians."""
+def _tilt(page: Page, lines: list[LongLine]) -> float:
+    """Tilt of the sheet in its image, radians: that of its printed squares, else of lines that agree on one.
+
+    A link may slope by a few degrees, so one line far from the image's axes shows no tilt.
+    """
+    if page.ruling is not None:
+        level, upright = page.ruling.lines_per_px
+        return float(np.arctan2(-level[0], level[1]) + np.arctan2(upright[1], upright[0])) / 2.0
     angles, weights = [], []
     for line in lines:
         d = line.ends[1] - line.ends[0]
@@ -476,11 +489,16 @@ def _tilt(lines: list[LongLine]) -> float:
         if abs(angle) < np.radians(5.0):
             angles.append(float(angle))
             weights.append(line.length * line.inked)
-    if not angles:
+    every = np.array(angles)
+    tried = np.append(every, 0.0)
+    apart = (every - tried[:, None]) / _LEVEL_SE
+    likely = np.log1p(_LEVEL_PEAK * np.exp(-0.5 * apart**2)).sum(axis=1) - 0.5 * (tried / _TILT_SE) ** 2
+    agree = np.abs(apart[likely.argmax()]) < _LEVEL_WITHIN
+    if not agree.any():
         return 0.0
-    order = np.argsort(angles)
-    cumulated = np.cumsum(np.array(weights)[order])
-    return float(np.array(angles)[order][np.searchsorted(cumulated, cumulated[-1] / 2.0)])
+    order = np.argsort(every[agree])
+    cumulated = np.cumsum(np.array(weights)[agree][order])
+    return float(every[agree][order][np.searchsorted(cumulated, cumulated[-1] / 2.0)])
 
 
 # By corners that a person gave -------------------------------------------------------------------
