@@ -30,8 +30,8 @@ SAMPLES = HERE.parent / "samples" / "pump"
 WORKSHEET = HERE / "assets" / "Grades-Pump.csv"
 """As Moodle gives it for the bundled class."""
 WIDTH_PX = 1100
-WAITING, WRONG = "s02", "s05"
-"""A student of whom a part waits for a person, and one with a finished mark and one mistake."""
+SHOWN, WRONG = "s02", "s05"
+"""A student whose scan is shown, and one with a finished mark and one mistake."""
 SHOWN_PX = {"feedback": 960, "class": 860, "worksheet": 360}
 """Height of a page that a picture shows, from its top."""
 SHOWN_COLUMNS = (0, 1, 2, 5, 6, 10)
@@ -52,12 +52,12 @@ def reference_picture() -> None:
 
 def walk_pictures() -> None:
     """The bundled class from scans to the worksheet: a scan, its overlay, pages, the filled-in worksheet."""
-    _small(SAMPLES / f"{WAITING}_1.jpg", "scan")
+    _small(SAMPLES / f"{SHOWN}_1.jpg", "scan")
     # Pages name the folder of results as it was given: here as the walk has it.
     with tempfile.TemporaryDirectory() as work, chdir(work):
         out = Path("marks")
         planmark(["grade", str(SAMPLES), "--assignment", "pump", "--out", str(out)], standalone_mode=False)
-        _small(out / WAITING / "overlay.png", "overlay")
+        _small(out / SHOWN / "overlay.png", "overlay")
         filled, table = Path("filled.csv"), Path("filled.html")
         asked = ["export", str(out), "--to", "moodle", "--worksheet", str(WORKSHEET), "--file", str(filled)]
         planmark(asked, standalone_mode=False)
@@ -105,12 +105,11 @@ def _browser() -> Iterator[Browser]:
 def review_pictures() -> None:
     """The page of the review: a question on a screen and on a phone, and one of eight students at once."""
     rubric = load_rubric("pump")
-    with _reviewed(rubric) as address, _browser() as browser:
-        for name, width, height in (("review", 1280, 760), ("review-phone", 390, 844)):
-            _opened(browser, address, width, height).screenshot(path=PICTURES / f"{name}.png")
-    # An instructor who wants to see what is near a limit has more to look at, also eight of a kind.
+    # In the bundled class nothing waits: this is the review of one who wants to see what is near a limit.
     doubt = rubric.doubt.model_copy(update={"in_doubt": "person", "stake": 0.0})
     with _reviewed(rubric.model_copy(update={"doubt": doubt})) as address, _browser() as browser:
+        for name, width, height in (("review", 1280, 760), ("review-phone", 390, 844)):
+            _opened(browser, address, width, height).screenshot(path=PICTURES / f"{name}.png")
         page = _opened(browser, address, 1280, 760)
         page.click("[data-mode=eight]")
         _settled(page)

@@ -170,10 +170,10 @@ _FAR_OFF_MM = 1.5
 _EDGE_WITHIN_MM = 6.0
 """Without a frame the sheet's place is known no better before its edges are looked for."""
 _TILT_SE = float(np.radians(1.0))
-"""How far a sheet is laid askew on a scanner's glass."""
+"""Standard error of the angle at which a sheet lies on a scanner's glass."""
 _LEVEL_SE, _LEVEL_PEAK = float(np.radians(0.1)), 40.0
-"""How far lines that are ruled level are askew, and how much likelier such a slope is among them than any one
-slope of links and vectors, of which as many lie within 5 degrees of the axes."""
+"""Standard error of lines that are ruled level, and by how much such a slope is likelier among them than any
+one slope of links and vectors, of which as many lie within 5 degrees of the axes."""
 _LEVEL_WITHIN = 3.0
 """Standard errors within which a line is one of the level ones."""
 _ASSUMED_PAPER_SE = 0.004
