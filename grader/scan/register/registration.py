@@ -429,7 +429,7 @@ def _from_resolution(
     Where nothing shows that the page is A3 (`doubt` says so), its drawing is to bear the scale out.
     """
     high, wide = page.grey.shape
-    tilt = _tilt(page, lines)
+    tilt = _tilt(lines)
     quarter = 0.0 if wide >= high else np.pi / 2.0
     drawn = drawn_ends(lines)
     tried: list[tuple[float, FloatArray]] = []
@@ -474,14 +474,11 @@ def _placed(matrix: FloatArray, resolution: Resolution, lines: list[LongLine], s
     return replace(fit, mm_to_px=matrix) if np.abs(axes).max() > _EDGE_SE else fit
 
 
-def _tilt(page: Page, lines: list[LongLine]) -> float:
-    """Tilt of the sheet in its image, radians: that of its printed squares, else of lines that agree on one.
+def _tilt(lines: list[LongLine]) -> float:
+    """Tilt of the sheet in its image, radians: that of lines that agree on one.
 
     A link may slope by a few degrees, so one line far from the image's axes shows no tilt.
     """
-    if page.ruling is not None:
-        level, upright = page.ruling.lines_per_px
-        return float(np.arctan2(-level[0], level[1]) + np.arctan2(upright[1], upright[0])) / 2.0
     angles, weights = [], []
     for line in lines:
         d = line.ends[1] - line.ends[0]
