@@ -8,6 +8,7 @@ import cmath
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,7 +16,9 @@ from grader.records import (
     MECHANISM,
     Figure,
     FloatArray,
+    OtherReading,
     Reading,
+    ReadNode,
     ReadVector,
     Reason,
     ScannedPage,
@@ -25,6 +28,7 @@ from grader.records import (
 from reference.construction.graph import evaluate, pair
 from reference.construction.mistakes import Drawing
 
+Read = TypeVar("Read", ReadNode, ReadVector, OtherReading)
 DRAWN_MM = 0.35
 """Standard error of a length drawn by a student, in addition to that of its reading: its two ends."""
 SAME_DEVICE = 0.002
@@ -95,15 +99,15 @@ def no_surer_than_turn(reading: Reading, page: ScannedPage) -> Reading:
 
 def no_surer(reading: Reading, most: float) -> Reading:
     """Return the reading with no node, vector or other reading of a higher confidence."""
+
+    def bounded(one: Read) -> Read:
+        return replace(one, confidence=min(one.confidence, most))
+
     figures = {}
     for name, figure in reading.figures.items():
-        nodes = {key: replace(one, confidence=min(one.confidence, most)) for key, one in figure.nodes.items()}
+        nodes = {key: bounded(one) for key, one in figure.nodes.items()}
         vectors = {
-            key: replace(
-                one,
-                confidence=min(one.confidence, most),
-                others=tuple(replace(other, confidence=min(other.confidence, most)) for other in one.others),
-            )
+            key: replace(bounded(one), others=tuple(map(bounded, one.others)))
             for key, one in figure.vectors.items()
         }
         figures[name] = replace(figure, nodes=nodes, vectors=vectors)

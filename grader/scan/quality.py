@@ -443,16 +443,10 @@ def _blur(flat: Flat, mm_to_px: FloatArray) -> Iterator[Reason]:
 def _edge_width_px(flat: Flat, mm_to_px: FloatArray, px_per_mm: float) -> float:
     """Return the width of the sharpest edges of ink in the direction where it is largest; 0 without edges."""
     reach = max(4, round(_ACROSS_MM * px_per_mm))
-    angles: list[FloatArray] = []
-    widths: list[FloatArray] = []
-    for tile, paper in _inked_tiles(flat, mm_to_px, reach):
-        angle, width = _edges(tile, paper, reach)
-        angles.append(angle)
-        widths.append(width)
-    if not angles:
+    found = [_edges(tile, paper, reach) for tile, paper in _inked_tiles(flat, mm_to_px, reach)]
+    if not found:
         return 0.0
-    sector = _sectors(np.concatenate(angles))
-    width = np.concatenate(widths)
+    sector, width = map(np.concatenate, zip(*found, strict=True))
     in_sector = [width[sector == k] for k in range(_SECTORS)]
     return max(
         (float(np.quantile(one, _SHARPEST)) for one in in_sector if len(one) >= _LEAST_EDGES), default=0.0
@@ -485,32 +479,29 @@ def _inked_tiles(flat: Flat, mm_to_px: FloatArray, reach: int) -> Iterator[tuple
         yield tile.astype(np.float32), float(np.quantile(tile, 0.9))
 
 
-def _edges(tile: Float32Array, paper: float, reach: int) -> tuple[FloatArray, FloatArray]:
-    """Return (n,) direction across each edge of a piece, radians, and its width in pixels."""
+def _edges(tile: Float32Array, paper: float, reach: int) -> tuple[IntArray, FloatArray]:
+    """Return (n,) sector of the direction across each edge of a piece, and its width in pixels."""
     soft = np.asarray(cv2.GaussianBlur(tile, (0, 0), 0.7), dtype=np.float32)
     gx, gy = (cv2.Sobel(soft, cv2.CV_32F, dx, 1 - dx, scale=0.125) for dx in (1, 0))
     slope = np.asarray(np.hypot(gx, gy), dtype=np.float32)
     inner = slope[reach:-reach, reach:-reach]
     if inner.size == 0:
-        return np.zeros(0), np.zeros(0)
-    # A shake leaves the edges along it sharp: those across it are the steepest of their own direction only.
-    sector = _sectors(np.arctan2(gy, gx)[reach:-reach, reach:-reach])
-    steepest = np.array([inner[sector == k].max(initial=0.0) for k in range(_SECTORS)])
-    steep = np.argwhere(inner > np.maximum(0.03 * paper, 0.35 * steepest[sector])) + reach
+        return np.zeros(0, dtype=int), np.zeros(0)
+    # A shake leaves the edges along it sharp: those across it are the steepest of their own direction only,
+    # of which the reverse is the same.
+    angle = np.arctan2(gy, gx)[reach:-reach, reach:-reach] % np.pi
+    sectors = (angle / np.pi * _SECTORS + 0.5).astype(int) % _SECTORS
+    steepest = np.array([inner[sectors == k].max(initial=0.0) for k in range(_SECTORS)])
+    is_steep = inner > np.maximum(0.03 * paper, 0.35 * steepest[sectors])
+    steep, sector = np.argwhere(is_steep) + reach, sectors[is_steep]
     y, x = steep.T.astype(np.float32)
     at = slope[steep[:, 0], steep[:, 1]]
     ux, uy = gx[steep[:, 0], steep[:, 1]] / at, gy[steep[:, 0], steep[:, 1]] / at
     beside = sampled(slope, x[:, None] + ux[:, None] * [-1.0, 1.0], y[:, None] + uy[:, None] * [-1.0, 1.0])
     top = at >= beside.max(axis=1)
-    x, y, ux, uy, at = x[top], y[top], ux[top], uy[top], at[top]
+    x, y, ux, uy, at, sector = x[top], y[top], ux[top], uy[top], at[top], sector[top]
     along = np.arange(-reach, reach + 1, dtype=np.float32)
     across = sampled(soft, x[:, None] + ux[:, None] * along, y[:, None] + uy[:, None] * along)
     step = across[:, reach:].max(axis=1) - across[:, : reach + 1].min(axis=1)
     enough = step > _LEAST_STEP * paper
-    angle = np.arctan2(uy[enough], ux[enough])
-    return angle.astype(np.float64), (step[enough] / at[enough]).astype(np.float64)
-
-
-def _sectors(angle: FloatArray | Float32Array) -> IntArray:
-    """Return the sector of the direction across an edge by its angle in radians; its reverse has the same."""
-    return (angle % np.pi / np.pi * _SECTORS + 0.5).astype(int) % _SECTORS
+    return sector[enough], (step[enough] / at[enough]).astype(np.float64)
