@@ -37,7 +37,7 @@ from grader.records import PageRef, ScannedPage
 from grader.rubric import Asked, rubric_of
 from grader.scan.decode.pages import count_pages
 from grader.scan.page import open_page
-from grader.texts.spoken import failure
+from grader.texts.spoken import ENGLISH, failure
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError, InputFileError, counted
 
@@ -260,7 +260,7 @@ def tell_class(results: ResultsDocument, out: Path) -> None:
         for one in results.stale
     ]
     _list("Decisions that are out of date, and were not applied; decide again or remove them:", stale, page)
-    _list(speaker.gettext("A person must look at:"), list(_waiting(results, speaker)), page)
+    _list(speaker.gettext("A person must look at:"), list(_waiting(results, speaker)), page, speaker)
     note(f"Open {page}; programs read {out / 'results.json'}")
 
 
@@ -296,13 +296,14 @@ def _left(results: ResultsDocument) -> str:
     return f"Finished: {finished}; waiting: {left}{sure}"
 
 
-def _list(title: str, lines: Sequence[str], page: Path) -> None:
+def _list(title: str, lines: Sequence[str], page: Path, speaker: Tongue = ENGLISH) -> None:
     if lines:
         terminal.say(title)
         for line in lines[:SHOWN]:
             terminal.say(f"  {line}")
         if len(lines) > SHOWN:
-            terminal.say(f"  ... and {len(lines) - SHOWN} more, all in {page}")
+            told = speaker.gettext("... and %(more)s more, all in %(page)s")
+            terminal.say(f"  {told % {'more': len(lines) - SHOWN, 'page': page}}")
 
 
 def _waiting(results: ResultsDocument, speaker: Tongue) -> Iterator[str]:
@@ -312,9 +313,10 @@ def _waiting(results: ResultsDocument, speaker: Tongue) -> Iterator[str]:
         yield _placed(place, unmatched_sentence(page, speaker).text)
     for wait in waiting(results):
         report = wait.report
-        count = f"{len(wait.criteria)} {'criterion' if len(wait.criteria) == 1 else 'criteria'}"
-        about = f", {count}, {wait.points:.4g} points at stake" if wait.criteria else ""
-        yield _standing(report, speaker, about)
+        num = len(wait.criteria)
+        count = speaker.ngettext("%(num)d criterion", "%(num)d criteria", num) % {"num": num}
+        stake = speaker.gettext("%(points)s points at stake") % {"points": f"{wait.points:.4g}"}
+        yield _standing(report, speaker, f", {count}, {stake}" if num else "")
     for report in results.reports:
         if report.status == "missing":
             yield _standing(report, speaker)
