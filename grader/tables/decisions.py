@@ -239,7 +239,7 @@ def _line(
         position=position if isinstance(position, int) else None,
         criterion=given["criterion"],
         verdict=given["verdict"],
-        points=points if isinstance(points, float) else None,
+        points=_rounded(points) if isinstance(points, float) else None,
         comment=unguarded(given["comment"]),
         by=unguarded(given["by"]),
         at=given["at"],
@@ -448,9 +448,13 @@ def _check_unchanged(pairs: Sequence[tuple[Decision | None, Decision | None]]) -
 
 def _clean(row: Decision) -> Decision:
     """A decision as it reads back: without blanks around texts, points to six decimals, no line."""
-    points = None if row.points is None or not math.isfinite(row.points) else round(row.points, 6) + 0.0
     texts = {name: getattr(row, name).strip() for name in COLUMNS if name not in {"position", "points"}}
-    return replace(row, **texts, points=row.points if points is None else points, line=0)
+    return replace(row, **texts, points=None if row.points is None else _rounded(row.points), line=0)
+
+
+def _rounded(points: float) -> float:
+    """Points as the file holds them: to six decimals, and never a zero with a minus."""
+    return round(points, 6) + 0.0 if math.isfinite(points) else points
 
 
 @lru_cache(_REMEMBERED)

@@ -85,7 +85,7 @@ AUTHORED: dict[str, tuple[str, ...]] = {
     # Mechanisms
     "no_joint_name": (N_("'%(text)s' is no joint's name: a capital, then letters or digits (not O or N)"),),
     "no_side": (N_("'%(text)s' is no side here; sides are %(names)s"),),
-    "side_or_formula": (N_("must be one of %(names)s, or a formula: %(why)s"),),
+    "side_or_formula": (N_("must be one of %(sides)s, or a formula: %(why)s"),),
     "side_unknown": (N_("side = '%(text)s' is neither %(first)s nor %(second)s, nor data of a variant"),),
     "side_zero": (N_("side = '%(text)s' is zero: above zero is %(first)s, below %(second)s"),),
     "side_of_plate": (N_("side of %(joint)s is missing: %(joint)s may lie to the left or to the right of"

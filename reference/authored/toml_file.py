@@ -103,7 +103,7 @@ def _side_of(words: tuple[str, str]) -> BeforeValidator:
         try:
             return SideText(words, _read_formula(value))
         except FaultError as error:
-            raise FaultError("side_or_formula", names=words, why=error.code, **error.parameters) from error
+            raise FaultError("side_or_formula", sides=words, why=error.code, **error.parameters) from error
 
     return BeforeValidator(read)
 

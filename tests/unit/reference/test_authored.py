@@ -87,6 +87,13 @@ def test_all_faults_of_a_file_are_told_at_once_each_with_its_path(mechanism):
     assert "a number or a formula" in told["$.ground.O2[1]"]
 
 
+def test_a_side_that_is_no_formula_is_told_with_the_reason(mechanism):
+    mechanism["group"][0]["side"] = "1,5"
+    told = findings(MechanismFile, mechanism)["$.group[0].side"]
+    assert told.startswith("must be one of left, right, or a formula: ")
+    assert "decimal" in told
+
+
 @pytest.mark.parametrize("name", ["O", "N", "b", "1A", "A-B", "", "ABCDE"])
 def test_a_joint_needs_a_name_that_plans_can_carry(mechanism, name):
     mechanism["group"][0]["node"] = name

@@ -266,6 +266,15 @@ def test_a_spreadsheets_form_is_kept(path):
     assert [row.points for row in file.all()] == [1.5, 0.25]
 
 
+@pytest.mark.parametrize(("text", "points"), [("5e-324", 0.0), ("-1e-9", 0.0), ("0.1234567", 0.123457)])
+def test_points_are_read_to_the_decimals_that_are_written(path, text, points):
+    file = DecisionFile(written(path, f"{HEADER}\ns1,,total,,{text},late,,,\n"))
+    before = file.all()
+    file.add(ROW)
+    assert unlined(file.all()[:1]) == unlined(before)
+    assert before[0].points == points
+
+
 def test_a_comment_is_no_formula_in_a_spreadsheet(path):
     file = DecisionFile(path)
     file.add(replace(ROW, comment="=1+1"), replace(ROW, criterion="a_B", comment="'-so"))
