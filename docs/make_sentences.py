@@ -22,7 +22,7 @@ from reference.authored.assignment import library
 ROOT = Path(__file__).resolve().parent.parent
 COUNTS = (1, 3, 20)
 """Numbers that take every form of a plural in all three languages."""
-PLACEHOLDER = re.compile(r"%\((\w+)\)[sd]|\{(\w+)\}")
+PLACEHOLDER = re.compile(r"%\((\w+)\)[+.\d]*[sdfg]|\{(\w+)\}")
 KEYWORDS = {"_": None, "gettext": None, "N_": None, "ngettext": (1, 2)}
 HEAD = """Written from the catalogues ([how to translate](translating.md)). Names and numbers are examples.
 `/` separates the forms for 1, 3 and 20.
@@ -102,6 +102,10 @@ EXAMPLES: Mapping[str, str] = {
     "bias": "-0.05", "difference": "0.21", "equal": "17",
     "force": "R_34_t = 12.3\u00a0mm",
     "carriers": "A: 1, 6; O3: 7", "now": "12", "figures": "the velocity plan", "free": "2", "links": "5",
+    "calls": "3 grade", "command": "planmark plan", "direction_rms_deg": "0.05", "length_mean_mm": "0.02",
+    "length_rms_mm": "0.06", "length_worst_mm": "0.15", "num": "2", "pivot": "O1", "place_rms_mm": "0.07",
+    "scales": "kL = 1:5", "seconds": "30", "sine": "0.15", "site": "https://moodle.example.org",
+    "skew": "0.06", "sure": "1", "travel": "44.05", "unequal": "0.12",
     "rank": "III", "sides": "left, right", "texts": "kL, kv", "types": "RRR, RRP", "variant": "n = 3",
     "waiting": "4", "zone": "EET", "wide": "@90 mm", "zone_high": "@120 mm", "zone_wide": "@180 mm",
 }  # fmt: skip
@@ -175,7 +179,8 @@ def _with_unit(text: str, speaker: Tongue) -> str:
 
 
 def _plural(one: str, many: str, speaker: Tongue) -> str:
-    forms = (speaker.ngettext(one, many, count).replace("%(num)d", str(count)) for count in COUNTS)
+    told = ((count, speaker.ngettext(one, many, count)) for count in COUNTS)
+    forms = (example(text.replace("%(num)d", str(count)), speaker, many) for count, text in told)
     return " / ".join(forms)
 
 

@@ -113,8 +113,9 @@ def _port(default: int) -> Any:  # noqa: ANN401 - as above
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommonOptions:
-    """The options of every command."""
+    """The options of every command; a record of its own may have another `lang`."""
 
+    lang: str = _lang("Language of messages and of what is written: en, ro or ru.")
     quiet: bool = option(
         "Print only results and what needs a person, no progress.", "--quiet", "-q", default=False
     )

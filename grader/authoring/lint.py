@@ -49,7 +49,7 @@ from grader.documents import (
 from grader.language import LANGUAGES, Tongue
 from grader.records import Reason
 from grader.rubric import RubricFile, check_accelerations, check_rubric, plans_asked
-from grader.texts.spoken import ENGLISH, as_json, clause
+from grader.texts.spoken import ENGLISH, as_json, at_terminal, clause
 from reference.authored.assignment import SCALE_NAMES, TRADITIONS, Assignment, Variant, file_kind
 from reference.authored.formula import Formula
 from reference.authored.toml_file import LENGTH_UNITS_M, SideText, Text
@@ -92,11 +92,11 @@ class Lint:
         return any(finding.severity != "hint" for finding in self.findings)
 
 
-def lint(assignment: Assignment, rubric: RubricFile) -> Lint:
+def lint(assignment: Assignment, rubric: RubricFile, speaker: Tongue = ENGLISH) -> Lint:
     """Check an assignment and its rubric against every variant.
 
     Everything is evaluated on arrays over the variants; those that cannot be solved are excluded, and only
-    these are examined one by one.
+    these are examined one by one, and told in the language of `speaker`.
     """
     variants = assignment.variants()
     needed = plans_asked(assignment, rubric)
@@ -105,7 +105,7 @@ def lint(assignment: Assignment, rubric: RubricFile) -> Lint:
     broken = broken_variants(assignment, variants)
     findings = [*broken_findings(assignment, broken), *_odd_sizes(assignment)]
     findings += data_findings(assignment, rubric, construction)
-    rows = {variant: _row(variant, problem=error.message) for variant, error in broken.items()}
+    rows = {variant: _row(variant, problem=at_terminal(error, speaker)) for variant, error in broken.items()}
     sound = [variant for variant in variants if variant not in rows]
     if not sound:
         return Lint(assignment, tuple(rows.values()), _sorted(findings))

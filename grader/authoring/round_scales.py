@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from grader.authoring.findings import BoolArray, LintFinding, Severity, chosen, first_of
 from grader.documents import LintLeast, LintScales
+from grader.language import N_, Tongue
 from grader.printed.layout import (
     FRAME_MM,
     MARGIN_MM,
@@ -407,7 +408,12 @@ def _short_findings(plan: Plan, own: LintScales, each: Proposal) -> Iterator[Lin
     yield LintFinding("hint", "short_at_any_scale", "assignment", "$.scales", known, meant)
 
 
-def suggestions(proposed: Sequence[Proposal], plan: Plan, figures: Collection[str]) -> dict[Variant, str]:
+BETTER = N_("%(scales)s: %(left)s asked vectors under %(least)s mm instead of %(now)s")
+
+
+def suggestions(
+    proposed: Sequence[Proposal], plan: Plan, figures: Collection[str], speaker: Tongue
+) -> dict[Variant, str]:
     """Return, as text, round scales for each variant that leave fewer requested vectors under 8 mm."""
     own, _, each = proposed
     names = [name for name in SCALE_NAMES if name in {*map(scale_of, figures)}]
@@ -415,10 +421,10 @@ def suggestions(proposed: Sequence[Proposal], plan: Plan, figures: Collection[st
     for index, variant in enumerate(plan.variants):
         if each.short[index] < own.short[index] or own.over_all.room < 1.0:
             scales = Scales(**{name: one[index : index + 1] for name, one in each.scales.by_name.items()})
-            texts[variant] = (
-                f"{written(scales, names)}: {each.short[index]} instead of {own.short[index]} asked vectors"
-                f" under {WELL_READ_MM:g} mm"
-            )
+            texts[variant] = speaker.gettext(BETTER) % {
+                "scales": written(scales, names), "left": each.short[index], "now": own.short[index],
+                "least": f"{WELL_READ_MM:g}",
+            }  # fmt: skip
     return texts
 
 

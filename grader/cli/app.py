@@ -21,7 +21,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from grader import __version__
 from grader.cli import class_folder, terminal
-from grader.language import LANGUAGES, N_, tongue
+from grader.language import LANGUAGES, N_
 from grader.options import CommonOptions, is_record, offered
 from reference.errors import PlanmarkError
 
@@ -30,12 +30,15 @@ if TYPE_CHECKING:
 
 
 def new_table(*headings: str, left: Collection[str] = ()) -> "Table":
-    """An empty table: names in the first column and those of `left`, numbers aligned right in the others."""
+    """An empty table: names in the first column and those of `left`, numbers aligned right in the others.
+
+    Headings are told in the language of the call.
+    """
     from rich.table import Table
 
-    table = Table(headings[0], box=None, header_style="bold")
+    table = Table(terminal.gettext(headings[0]), box=None, header_style="bold")
     for heading in headings[1:]:
-        table.add_column(heading, justify="left" if heading in left else "right")
+        table.add_column(terminal.gettext(heading), justify="left" if heading in left else "right")
     return table
 
 
@@ -68,7 +71,7 @@ def progress() -> Iterator[Callable[[str, int, int], None]]:
 
         def tell(what: str, done: int, total: int) -> None:
             if what not in tasks:
-                tasks[what] = bar.add_task(what, total=total, pace="")
+                tasks[what] = bar.add_task(terminal.gettext(terminal.WORK[what]), total=total, pace="")
             bar.update(tasks[what], completed=done, total=total, pace=pace(what, done, total))
 
         yield tell
@@ -102,6 +105,10 @@ class Command(_Help, TyperCommand):
     """A command."""
 
 
+USAGE_ERROR: type[Exception] = typer.BadParameter.__mro__[1]
+"""Base of the parser's errors, which typer does not name."""
+
+
 class Commands(_Help, TyperGroup):
     """The group of commands; errors of planmark end in one message and their exit status."""
 
@@ -111,20 +118,39 @@ class Commands(_Help, TyperGroup):
         with formatter.section("Commands"):
             formatter.write_dl([(name, one.get_short_help_str(LONGEST)) for name, one in commands if one])
 
-    def invoke(self, ctx: Any) -> Any:  # noqa: ANN401 - click's own signature
-        """Run a command, and tell a known error in words instead of a traceback."""
-        try:
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401 - as above
+        """Read the program's own options, and know the language of the call from then on."""
+        terminal.speak(class_folder.language_of(args))
+        ctx.obj = args
+        with self._told(ctx):
+            return super().parse_args(ctx, args)
+
+    def invoke(self, ctx: Any) -> Any:  # noqa: ANN401 - as above
+        """Run a command."""
+        with self._told(ctx):
             return super().invoke(ctx)
+
+    @contextmanager
+    def _told(self, ctx: Any) -> Iterator[None]:  # noqa: ANN401 - as above
+        """Tell a known error in words instead of a traceback."""
+        try:
+            yield
+        except USAGE_ERROR as error:
+            from grader.cli.usage import told_of
+
+            if not (told := told_of(error, ctx)):
+                raise
+            self._end(ctx, told, PlanmarkError.exit_status)
         except PlanmarkError as error:
             from grader.texts.spoken import at_terminal  # pydantic and documents: only for an error
 
             terminal.LOG.debug("%s", error.code, exc_info=error)
-            self._end(ctx, at_terminal(error, tongue(ctx.obj or "en")), error.exit_status)
+            self._end(ctx, at_terminal(error, terminal.speaker()), error.exit_status)
         except KeyboardInterrupt:
             # A second Ctrl+C would only break the end of this one.
             signal.signal(signal.SIGINT, signal.SIG_IGN)
             told = N_("interrupted; every file that was written is whole; run the same command to continue")
-            self._end(ctx, tongue(ctx.obj or "en").gettext(told), terminal.INTERRUPTED)
+            self._end(ctx, terminal.gettext(told), terminal.INTERRUPTED)
 
     @staticmethod
     def _end(ctx: Any, message: str, status: int) -> None:  # noqa: ANN401 - as above
@@ -140,11 +166,6 @@ def _assignments() -> list[str]:
     return built_in()
 
 
-def _languages() -> list[str]:
-    """The languages, for a shell that completes them."""
-    return list(LANGUAGES)
-
-
 def _platforms() -> list[str]:
     """The platforms of exports, for a shell that completes them."""
     from grader.lms.export import TARGETS
@@ -152,7 +173,7 @@ def _platforms() -> list[str]:
     return list(TARGETS)
 
 
-_COMPLETED = {"lang": _languages, "to": _platforms}
+_COMPLETED = {"lang": lambda: list(LANGUAGES), "to": _platforms}
 """Options whose values a shell completes."""
 _KEYWORD = inspect.Parameter.KEYWORD_ONLY
 
@@ -182,17 +203,21 @@ class _Application(typer.Typer):
         register = super().command(name, cls=Command)
 
         def add(function: Callable[..., None]) -> Callable[..., None]:
-            own, common = inspect.signature(function, eval_str=True).parameters, _parameters(CommonOptions)
+            own = inspect.signature(function, eval_str=True).parameters
             annotations = {whole: one.annotation for whole, one in own.items()}
             records = {whole: one for whole, one in annotations.items() if is_record(one)}
+            mine = {one.name for record in records.values() for one in _parameters(record)}
+            common = [one for one in _parameters(CommonOptions) if one.name not in mine]
 
             @wraps(function)
             def run(context: typer.Context, **values: Any) -> None:  # noqa: ANN401 - the commands' options
-                terminal.set_up(**{one.name: values.pop(one.name) for one in common})
+                given = {one.name: values.pop(one.name) for one in common}
+                lang = given.pop("lang", None) or values.get("lang")
+                terminal.set_up(**given)
                 terminal.note_call()
                 class_folder.tell_used(context)
-                if values.get("lang") is not None:
-                    values["lang"] = context.find_root().obj = tongue(values["lang"]).lang
+                code = None if lang is None else terminal.speak(lang)
+                values |= {"lang": code} if "lang" in values else {}
                 for whole, record in records.items():
                     values[whole] = record(**{one.name: values.pop(one.name) for one, _ in offered(record)})
                 start = time.monotonic()
@@ -289,7 +314,4 @@ OutOption = Annotated[Path, typer.Option("--out", "-o", help="The folder for the
 RosterOption = Annotated[Path | None, typer.Option("--roster", help="The class: roster.csv.")]
 JobsOption = Annotated[
     int | None, typer.Option("--jobs", min=1, help="Number of processes (default: all processors).")
-]
-LanguageOption = Annotated[
-    str, typer.Option("--lang", help="Language of feedback: en, ro or ru.", autocompletion=_languages)
 ]

@@ -20,6 +20,7 @@ from rich.console import Console
 from grader.cli import terminal
 from grader.cli.app import new_table, progress
 from grader.files import samples_folder
+from grader.language import N_
 from grader.pipeline import read_pages
 from grader.records import PageRef, Reading
 from grader.rubric import rubric_of
@@ -109,11 +110,13 @@ def _document(solver: Sequence[SolverRow], reading: Sequence[ReadingRow]) -> dic
 
 
 def _print_tables(solver: Sequence[SolverRow], reading: Sequence[ReadingRow]) -> None:
-    solved = new_table("assignment", "variants", "closed form, us", "construction, us", "error")
+    times = N_("closed form, µs"), N_("construction, µs")
+    solved = new_table(N_("assignment"), N_("variants"), *times, N_("error"))
     for one in solver:
-        times = (f"{time_us:.2f}" for time_us in (one.closed_form_us, one.construction_us))
-        solved.add_row(one.assignment, str(one.variants), *times, f"{one.error:.1e}")
-    read = new_table("samples", "pages", "ms a page", "vectors", "right", "believed", "misread")
+        cells = (f"{time_us:.2f}" for time_us in (one.closed_form_us, one.construction_us))
+        solved.add_row(one.assignment, str(one.variants), *cells, f"{one.error:.1e}")
+    heads = N_("samples"), N_("pages"), N_("ms per page"), N_("vectors")
+    read = new_table(*heads, N_("right"), N_("believed"), N_("misread"))
     for row in reading:
         counts = map(str, (row.vectors, row.right, row.believed, row.misread))
         read.add_row(row.samples, str(row.pages), f"{row.ms_per_page:.0f}", *counts)

@@ -96,7 +96,7 @@ def check_photo(name: str, options: CheckOptions) -> bool:
     variant = _variant(assignment, None, options)
     with Workers(1, Limits(), photo_check.__module__) as workers:
         told = result_of(workers, photo_check, file, assignment, rubric_of(assignment), variant, lang, wanted)
-    typer.secho(f"{shown_text(file.name)}, {variant}", bold=True)
+    typer.secho(f"{shown_text(file.name)}, {terminal.named(variant.numbers)}", bold=True)
     for text in (*told.flaws.values(), *told.problems):
         _print(text, "  ", "yellow")
     if told.judgement is not None:
@@ -171,8 +171,8 @@ def _variant(assignment: Assignment, entered: Measurements | None, options: Vari
 
 def _tell_head(entered: Measurements, variant: Variant, speaker: Tongue) -> None:
     who = [entered.student_id] if entered.student_id else []
-    parts = [*who, *(f"{speaker.gettext(name)} = {value}" for name, value in variant.numbers.items())]
-    if parts:
+    numbers = [terminal.named(variant.numbers)] if variant.numbers else []
+    if parts := [*who, *numbers]:
         typer.secho(", ".join(parts), bold=True)
     for problem in (*entered.problems, *entered.reading.problems):
         _print(message(problem, speaker), "  ", "yellow")

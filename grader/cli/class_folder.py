@@ -1,13 +1,16 @@
 """Arguments that name a class's folder, and the options that its `planmark.toml` gives."""
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
-from grader.cli.terminal import note
+from grader.cli.terminal import gettext, note
+from grader.language import LANGUAGES, ROOT_LANGUAGE
+from reference.errors import CallError
 
 if TYPE_CHECKING:
     from grader.tables.class_file import ClassSettings
@@ -22,7 +25,7 @@ def class_folder(context: typer.Context, folder: Path | None) -> Path | None:
         return folder
     settings = _settings(context, (folder or Path(), *_above(folder)))
     if folder is None and settings is None:
-        raise typer.BadParameter("name the folder; there is no planmark.toml in the working folder")
+        raise _unnamed("folder_unnamed")
     return folder or Path()
 
 
@@ -37,17 +40,29 @@ def class_results(context: typer.Context, folder: Path | None) -> Path | None:
     places = [folder or Path(), *_above(folder)]
     if folder is not None and not (folder / "planmark.toml").is_file():
         from grader.folder.changes import noted_run
-        from reference.errors import CallError
 
         with suppress(CallError):  # the command itself says what is missing
             places.append(noted_run(folder).folder)
     settings = _settings(context, places)
     if settings is None and folder is None:
-        raise typer.BadParameter(
-            "name the folder of results; there is no planmark.toml in the working folder"
-        )
+        raise _unnamed("results_unnamed")
     is_class = settings is not None and settings.file.parent.resolve() == (folder or Path()).resolve()
     return settings.out if settings is not None and is_class and settings.out.is_dir() else folder or Path()
+
+
+def _unnamed(cause: str) -> CallError:
+    from grader.texts.spoken import failure
+
+    return failure(CallError, "folder_unnamed", cause)
+
+
+def language_of(arguments: Sequence[str]) -> str:
+    """Return the language that a call or the class of the working folder names, before options are read."""
+    text = " ".join(["", *arguments, "\n"])
+    with suppress(OSError, ValueError):
+        text += Path("planmark.toml").read_text("utf-8")
+    found = re.search(r"""(?: --lang[= ]|^language *= *["'])(\w+)""", text, re.MULTILINE)
+    return found[1] if found and found[1] in LANGUAGES else ROOT_LANGUAGE
 
 
 def _above(folder: Path | None) -> list[Path]:
@@ -83,4 +98,4 @@ def tell_used(context: typer.Context) -> None:
         source = context.get_parameter_source(parameter)
         if source is not None and source.name == "DEFAULT_MAP":
             used.append(f"{key} {settings.values[parameter]}")
-    note(f"{settings.file}: {', '.join(used) or 'nothing is used of it'}")
+    note(f"{settings.file}: " + (", ".join(used) or gettext("no option is taken from it")))

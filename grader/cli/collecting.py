@@ -6,12 +6,12 @@ from pathlib import Path
 
 from grader.cli import terminal
 from grader.cli.app import progress
-from grader.cli.terminal import note
+from grader.cli.terminal import gettext, note
 from grader.folder.batch import graded, noted_batch
 from grader.folder.collect import LOOK, PAGES, check_scans, check_target, collect
+from grader.language import N_
 from grader.lms.export import read_results
 from grader.lms.grades import in_a_row
-from reference.errors import counted
 
 NAMED = 6
 """Pages named of those that wait."""
@@ -25,12 +25,14 @@ def collect_class(folder: Path, file: Path, jobs: int | None) -> bool:
     with progress() as tell:
         done = collect(batch, graded(batch, tell), file)
     if done.given is not None:
-        note(f"{counted(done.given, 'page')} written to {file}; the preview in {done.preview} can be removed")
+        told = N_("pages written to %(file)s: %(count)s; the preview in %(folder)s can be removed")
+        note(gettext(told, count=done.given, file=file, folder=done.preview))
         return False
     if done.left_out:
-        count = counted(done.left_out, "page")
-        note(f"{count} left out: no figure was read, or one lies where the title block is")
-    terminal.say(f"Nothing is written yet. Check {in_a_row(done.waiting, NAMED)}:")
-    terminal.say(f"open {done.preview / LOOK}, answer for each page in {done.preview / PAGES},")
-    terminal.say("then run the same command again.")
+        told = N_("pages left out, since no figure was read or one lies where the title block is: %(count)s")
+        note(gettext(told, count=done.left_out))
+    waiting = in_a_row(done.waiting, NAMED, terminal.speaker())
+    terminal.say(gettext("Nothing is written yet. Check %(names)s:", names=waiting))
+    told = N_("open %(page)s, answer for each page in %(file)s,\nthen run the same command again.")
+    terminal.say(gettext(told, page=done.preview / LOOK, file=done.preview / PAGES))
     return True

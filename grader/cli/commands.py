@@ -12,13 +12,13 @@ from grader.cli.app import (
     AssignmentOption,
     FolderArgument,
     JobsOption,
-    LanguageOption,
     OutOption,
     ResultsArgument,
     RosterOption,
     app,
 )
-from grader.cli.terminal import note, shown_command, tell_next
+from grader.cli.terminal import gettext, note, shown_command, tell_next
+from grader.language import N_
 from grader.options import (
     CheckOptions,
     CycleOptions,
@@ -52,12 +52,11 @@ def lint(
         Path | None,
         typer.Option("--svg", help="Draw the variant that is hardest to draw into this SVG file."),
     ] = None,
-    lang: LanguageOption = "en",
 ) -> None:
     """Check an assignment and its rubric against every variant, and list all findings."""
     from grader.cli.linting import lint_assignment
 
-    if lint_assignment(assignment, as_json=as_json, svg=svg, lang=lang):
+    if lint_assignment(assignment, as_json=as_json, svg=svg):
         raise typer.Exit(1)
     if not as_json:
         tell_next("sheet", assignment, "--roster", "roster.csv", "-o", "sheets.pdf")
@@ -92,9 +91,11 @@ def new(
     first = load_assignment(written.assignment).variants()[0]
     chosen = [f"--{name}={value}" for name, value in asdict(first).items() if value is not None]
     for path in (written.assignment, written.mechanism, written.rubric):
-        note(f"{'kept' if mechanism == str(path) else 'written'}: {path}")
-    note(f"see it: {shown_command('planmark', 'plan', written.assignment, *chosen, '--svg', 'plan.svg')}")
-    tell_next("lint", written.assignment, before="change them, then ")
+        told = N_("kept: %(file)s") if mechanism == str(path) else N_("written: %(file)s")
+        note(gettext(told, file=path))
+    seen = shown_command("planmark", "plan", written.assignment, *chosen, "--svg", "plan.svg")
+    note(gettext("see it: %(command)s", command=seen))
+    tell_next("lint", written.assignment, before=N_("change them, then %(command)s"))
 
 
 @app.command()
@@ -179,12 +180,11 @@ def check(assignment: AssignmentArgument, options: CheckOptions) -> None:
 def demo(
     out: OutOption = Path("planmark-demo"),
     jobs: JobsOption = None,
-    lang: LanguageOption = "en",
 ) -> None:
     """Grade the bundled samples, scans and entered measurements, and say where to look."""
     from grader.cli.grading import demo as run_demo
 
-    run_demo(out, lang, jobs)
+    run_demo(out, jobs)
 
 
 @app.command()
@@ -208,7 +208,6 @@ def sheet(
     layout: Annotated[
         Path | None, typer.Option("--layout", help="Write the positions of everything as JSON.")
     ] = None,
-    lang: LanguageOption = "en",
     calibration: Annotated[
         bool, typer.Option("--calibration", help="Print the page that measures printer and scanner instead.")
     ] = False,
@@ -216,12 +215,13 @@ def sheet(
     """Make printable A3 answer sheets for a class: markers, QR code, data, zones."""
     from grader.cli.sheets import print_sheets
 
-    print_sheets(assignment, roster, out, layout, lang, calibration=calibration)
+    print_sheets(assignment, roster, out, layout, calibration=calibration)
     if calibration:
-        tell_next("calibrate", "SCAN", before="print it, scan it, then ")
+        tell_next("calibrate", "SCAN", before=N_("print it, scan it, then %(command)s"))
     else:
         handed_in = ("--assignment", assignment, "--roster", roster, "-o", "results")
-        tell_next("grade", "SCANS", *handed_in, before="print them, let them be drawn on, scan, then ")
+        before = N_("print the sheets, scan them when they are drawn, then %(command)s")
+        tell_next("grade", "SCANS", *handed_in, before=before)
 
 
 @app.command()
@@ -230,7 +230,6 @@ def handout(
     out: Annotated[Path, typer.Option("--out", "-o", help="The PDF file to write.")],
     variant: VariantOptions,
     roster: RosterOption = None,
-    lang: LanguageOption = "en",
     example: Annotated[
         int | None,
         typer.Option(
@@ -241,7 +240,7 @@ def handout(
     """Make A4 task sheets for a class or for one --n: scheme, data, empty tables, no solution."""
     from grader.cli.sheets import print_handout
 
-    print_handout(assignment, roster, variant, out, lang, example)
+    print_handout(assignment, roster, variant, out, example)
 
 
 @app.command()
@@ -266,14 +265,13 @@ def match(
     roster: Annotated[Path, typer.Option("--roster", help="The class: roster.csv.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="The draft of the roster to write, a CSV file.")],
     pages_per_student: Annotated[int | None, typer.Option("--pages-per-student")] = None,
-    lang: LanguageOption = "en",
 ) -> None:
     """Suggest owners of pages: a draft of the roster's `scans`, and a contact sheet to check it."""
     from grader.cli.sheets import draft_matches
 
-    open_ends = draft_matches(folder, assignment, roster, out, pages_per_student, lang)
+    open_ends = draft_matches(folder, assignment, roster, out, pages_per_student)
     known = ("--assignment", assignment, "--roster", out, "-o", "results")
-    tell_next("grade", folder, *known, before="correct the column `scans`, then ")
+    tell_next("grade", folder, *known, before=N_("correct the column `scans`, then %(command)s"))
     raise typer.Exit(1 if open_ends else 0)
 
 
@@ -297,9 +295,10 @@ def export(results: ResultsArgument, options: ExportCall) -> None:
     if options.assignment_id or options.cmid or options.criteria:
         tell_next("send", path)  # calls, which alone have a place
     elif options.to in {"csv", "json"}:
-        note(f"next: open {path}")
+        note(gettext("next: open %(file)s", file=path))
     else:
-        note(f"next: upload {path} to {options.to}; the documentation of exports says how")
+        told = N_("next: upload %(file)s to %(to)s; the documentation of exports says how")
+        note(gettext(told, file=path, to=options.to))
     raise typer.Exit(1 if is_open else 0)
 
 

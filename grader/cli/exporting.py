@@ -9,6 +9,7 @@ from pydantic import BaseModel
 
 from grader import lms
 from grader.cli import terminal
+from grader.cli.terminal import gettext
 from grader.documents import (
     SCHEMA_VERSION,
     CalibrationDocument,
@@ -18,7 +19,7 @@ from grader.documents import (
     ReportDocument,
     ResultsDocument,
 )
-from grader.language import N_, tongue
+from grader.language import N_
 from grader.lms.export import export as deliver
 from grader.lms.export import read_results, usual_name
 from grader.lms.grades import Delivery, Options, people_of
@@ -30,7 +31,7 @@ from grader.solution.document import PlanDocument
 from grader.texts.spoken import clause, failure
 from reference.authored.assignment import AssignmentFile
 from reference.authored.mechanism import MechanismFile
-from reference.errors import CallError, counted
+from reference.errors import CallError
 
 MODELS: dict[str, tuple[type[BaseModel], Literal["validation", "serialization"]]] = {
     "measurements": (MeasurementsDocument, "validation"),
@@ -81,7 +82,8 @@ def export_results(folder: Path, call: ExportCall) -> tuple[bool, Path]:
     if call.ids is not None:
         people = with_ids(people, call.ids)
     delivery = deliver(results, path, replace(options, people=people))
-    _report(delivery, path, options.lang or results.lang or "en")
+    terminal.speak(options.lang or results.lang or "en")
+    _report(delivery, path)
     return not delivery.is_complete, path
 
 
@@ -90,12 +92,16 @@ LABELS = {
 }  # fmt: skip
 
 
-def _report(delivery: Delivery, path: Path, lang: str) -> None:
-    speaker = tongue(lang)
-    words = {name: speaker.gettext(text) for name, text in LABELS.items()}
+def _report(delivery: Delivery, path: Path) -> None:
+    speaker = terminal.speaker()
+    ngettext = speaker.ngettext
+    words = {name: gettext(text) for name, text in LABELS.items()}
     is_of_students = delivery.written or delivery.withheld or delivery.unplaced
-    who = f"{counted(len(delivery.written), 'student')} " if is_of_students else ""
-    terminal.note(f"{who}written to {path}")
+    num, told = len(delivery.written), gettext("written to %(file)s", file=path)
+    if is_of_students:
+        many = ngettext("%(num)d student written to %(file)s", "%(num)d students written to %(file)s", num)
+        told = many % {"num": num, "file": path}
+    terminal.note(told)
     for student, label, reasons in delivery.left_out():
         why = ", ".join(clause(reason, speaker) for reason in reasons)
         terminal.say(f"  {student}: {words[label]}: {why}")

@@ -17,29 +17,28 @@ from types import ModuleType
 from grader.cli import terminal
 from grader.cli.app import new_table, progress
 from grader.cli.checking import checked_level
-from grader.cli.terminal import note, tell_next
-from grader.documents import AlikeDocument, MovedDocument, ReadingDocument, ReportDocument, ResultsDocument
-from grader.feedback.class_page import CAUSES, SIGNS, trust_sentences, write_demo_page
+from grader.cli.terminal import gettext, note, tell_next
+from grader.documents import AlikeDocument, ReadingDocument, ReportDocument, ResultsDocument
+from grader.feedback.class_page import SIGNS, change_lines, trust_sentences, write_demo_page
 from grader.feedback.class_statistics import waiting
 from grader.feedback.words import STATES, problem_sentence, unmatched_sentence
 from grader.files import make_folder, samples_folder, shown_text
 from grader.folder.archives import is_archive
 from grader.folder.batch import Batch, grade
-from grader.folder.changes import standing_text
 from grader.folder.watch import arrivals
 from grader.folder.workers import Limits, Workers, result_of
-from grader.language import ROOT_LANGUAGE, Tongue, tongue
+from grader.language import N_, ROOT_LANGUAGE, Tongue
 from grader.lms.grades import in_a_row
 from grader.marking.report import reading_document
 from grader.options import ClassOptions, GradeOptions, VariantOptions, taken
 from grader.pipeline import read_pages
-from grader.records import PageRef, ScannedPage
+from grader.records import PageRef, Reason, ScannedPage
 from grader.rubric import Asked, rubric_of
 from grader.scan.decode.pages import count_pages
 from grader.scan.page import open_page
-from grader.texts.spoken import ENGLISH, failure
+from grader.texts.spoken import at_terminal, clause, failure, place
 from reference.authored.assignment import Assignment, Variant, load_assignment
-from reference.errors import CallError, InputFileError, counted
+from reference.errors import CallError, InputFileError
 
 
 def grade_folder(folder: Path, name: str, out: Path, options: GradeOptions) -> ResultsDocument:
@@ -89,7 +88,7 @@ NAMED = 4
 def _watch(batch: Batch, seconds: float) -> ResultsDocument:
     """Grade what comes into a folder until Ctrl+C; the class as it then is, told as after any run."""
     results = None
-    note(f"Watching {batch.folder}; Ctrl+C ends it")
+    note(gettext("Watching %(folder)s; Ctrl+C ends it", folder=batch.folder))
     with Workers(batch.jobs, batch.limits, "grader.folder.batch") as workers:
         for now, names in _until_interrupted(arrivals(batch, seconds)):
             try:
@@ -98,9 +97,10 @@ def _watch(batch: Batch, seconds: float) -> ResultsDocument:
             except CallError as error:
                 if error.code not in {"nothing_to_grade", "results_in_use"}:
                     raise
-                note(f"{time.strftime('%H:%M:%S')} {error.message}")
+                note(f"{time.strftime('%H:%M:%S')} {at_terminal(error, terminal.speaker())}")
                 continue
-            note(f"{time.strftime('%H:%M:%S')} {in_a_row(names, NAMED)}; {_states(results)}")
+            came = in_a_row(names, NAMED, terminal.speaker())
+            note(f"{time.strftime('%H:%M:%S')} {came}; {_states(results)}")
     if results is None:
         raise failure(CallError, "nothing_to_grade", "nothing_came", folder=batch.folder)
     tell_class(results, batch.out)
@@ -143,11 +143,11 @@ def _cluster_module() -> ModuleType:
         raise failure(CallError, "extra_missing", extra="cluster", error=error) from error
 
 
-def demo(out: Path, lang: str, jobs: int | None) -> None:
+def demo(out: Path, jobs: int | None) -> None:
     """Grade the bundled samples, and write the page that leads to their classes."""
-    classes = {}
+    classes, lang = {}, terminal.speaker().lang
     for name in ("pump", "press"):
-        note(f"Grading the {name} class of the samples")
+        note(gettext("Grading the sample class %(name)s", name=name))
         # A copy: what is decided on it lies beside it.
         folder = out / "handed-in" / name
         shutil.copytree(samples_folder() / name, folder, dirs_exist_ok=True)
@@ -155,8 +155,8 @@ def demo(out: Path, lang: str, jobs: int | None) -> None:
         title = load_assignment(name).file.title.in_language(lang)
         classes[name] = (title, results)
     write_demo_page(classes, out, lang)
-    note(f"Open {out / 'index.html'}")
-    tell_next("review", out / "pump", before="settle or change marks with ")
+    note(gettext("Open %(page)s", page=out / "index.html"))
+    tell_next("review", out / "pump", before=N_("settle or change marks with %(command)s"))
 
 
 def read_scans(scans: Sequence[Path], name: str, options: VariantOptions, *, as_json: bool) -> bool:
@@ -220,11 +220,14 @@ def _print_reading(document: ReadingDocument) -> None:
     from rich.console import Console
 
     console = Console()
-    console.print(f"[bold]{document.source}[/bold], page {document.page}", highlight=False)
+    page = gettext("page %(page)s", page=document.page)
+    console.print(f"[bold]{document.source}[/bold], {page}", highlight=False)
     for problem in document.problems:
-        console.print(f"  {problem.code}: {problem.message}", highlight=False, markup=False)
+        text = problem_sentence(problem, terminal.speaker()).text
+        console.print(f"  {problem.code}: {text}", highlight=False, markup=False)
     for name, figure in document.figures.items():
-        table = new_table(name.replace("_", " "), "length mm", "±", "direction deg", "±", "confidence")
+        head = N_("length, mm"), "±", N_("direction, °"), "±", N_("confidence")
+        table = new_table(place(name, terminal.speaker()), *head)
         for vector, one in figure.vectors.items():
             length = "-" if one.length_mm is None else f"{one.length_mm:.2f}"
             direction = "-" if one.direction_deg is None else f"{one.direction_deg:.2f}"
@@ -233,41 +236,45 @@ def _print_reading(document: ReadingDocument) -> None:
         if figure.vectors:
             console.print(table)
     for gap in document.unread:
-        console.print(f"  {gap.name}: unread, {gap.reason}", highlight=False, markup=False)
+        told = gettext("%(name)s: not read: %(why)s", name=gap.name, why=clause(gap, terminal.speaker()))
+        console.print(f"  {told}", highlight=False, markup=False)
 
 
 # A graded class on the terminal ----------------------------------------------------------
 
 SHOWN = 12
-CRITERIA = 4
-"""Criteria named of each student whose marks moved."""
 
 
 def tell_class(results: ResultsDocument, out: Path) -> None:
     """Print states, changes, similar sheets, what waits for a person, and the paths of the results."""
+    terminal.speak(results.lang or ROOT_LANGUAGE)
     note(_states(results))
     note(_left(results))
-    speaker = tongue(results.lang or ROOT_LANGUAGE)
+    speaker = terminal.speaker()
     for sentence in trust_sentences(results, speaker):
         note(sentence)
     page = out / "index.html"
-    changes = [_change_line(change) for change in results.moved]
-    _list(f"Changed since the last run: {len(results.moved)}", changes, page)
+    changes = list(change_lines(results, speaker))
+    _list(gettext("Changed since the last run: %(count)s", count=len(results.moved)), changes, page)
     pairs = [_similar_line(pair) for pair in results.alike]
-    _list("Similar sheets (no accusation; compare them side by side):", pairs, page)
+    _list(gettext("Similar sheets (no accusation; compare them side by side):"), pairs, page)
     stale = [
-        f"line {one.line}, {_who(one.student_id, one.position)} {one.criterion} {one.verdict}: {one.reason}"
+        gettext("line %(line)s, ", line=one.line) + f"{_who(one.student_id, one.position)} {one.criterion}"
+        f" {one.verdict}: {clause(Reason(one.code), speaker) or one.reason}"
         for one in results.stale
     ]
-    _list("Decisions that are out of date, and were not applied; decide again or remove them:", stale, page)
-    _list(speaker.gettext("A person must look at:"), list(_waiting(results, speaker)), page, speaker)
-    note(f"Open {page}; programs read {out / 'results.json'}")
+    outdated = N_("Decisions that are out of date, and were not applied; decide again or remove them:")
+    _list(gettext(outdated), stale, page)
+    _list(gettext("A person must look at:"), list(_waiting(results, speaker)), page)
+    note(gettext("Open %(page)s; programs read %(file)s", page=page, file=out / "results.json"))
 
 
 def _states(results: ResultsDocument) -> str:
     states = Counter(report.status for report in results.reports)
-    told = ", ".join(f"{STATES[state]} {count}" for state, count in states.most_common())
-    return f"{counted(len(results.reports), 'submission')}: {told or 'none'}"
+    told = ", ".join(f"{gettext(STATES[state])} {count}" for state, count in states.most_common())
+    num = len(results.reports)
+    many = terminal.speaker().ngettext("%(num)d submission", "%(num)d submissions", num) % {"num": num}
+    return f"{many}: {told}" if told else many
 
 
 def tell_next_of_class(results: ResultsDocument, out: Path, platform: str | None = None) -> None:
@@ -290,20 +297,23 @@ def _left(results: ResultsDocument) -> str:
     waits = waiting(results)
     looks = sum(len(wait.criteria) or LOOKS_A_PAGE for wait in waits) + LOOKS_A_PAGE * len(results.unmatched)
     minutes = math.ceil(looks * SECONDS_A_LOOK / 60.0)
-    left = f"{len(waits) + len(results.unmatched)}, about {minutes} min of review" if looks else "nothing"
-    wrong = results.expected_wrong
-    sure = "" if wrong is None else f"; settled verdicts expected to be wrong: {wrong:.1f}"
-    return f"Finished: {finished}; waiting: {left}{sure}"
+    count = len(waits) + len(results.unmatched)
+    review = gettext("%(count)s, about %(minutes)s min of review", count=count, minutes=minutes)
+    left = review if looks else gettext("nothing")
+    text = gettext("Finished: %(count)s; waiting: %(left)s", count=finished, left=left)
+    if (wrong := results.expected_wrong) is None:
+        return text
+    return text + gettext("; settled verdicts expected to be wrong: %(count).1f", count=wrong)
 
 
-def _list(title: str, lines: Sequence[str], page: Path, speaker: Tongue = ENGLISH) -> None:
+def _list(title: str, lines: Sequence[str], page: Path) -> None:
     if lines:
         terminal.say(title)
         for line in lines[:SHOWN]:
             terminal.say(f"  {line}")
         if len(lines) > SHOWN:
-            told = speaker.gettext("... and %(more)s more, all in %(page)s")
-            terminal.say(f"  {told % {'more': len(lines) - SHOWN, 'page': page}}")
+            told = gettext("... and %(more)s more, all in %(page)s", more=len(lines) - SHOWN, page=page)
+            terminal.say(f"  {told}")
 
 
 def _waiting(results: ResultsDocument, speaker: Tongue) -> Iterator[str]:
@@ -336,25 +346,11 @@ def _placed(place: str, message: str) -> str:
     return message if not place or message.startswith(f"{place}:") else f"{place}: {message}"
 
 
-def _change_line(change: MovedDocument) -> str:
-    """A student's standing before and now, why, and the criteria."""
-    parts = [f"{standing_text(change.before)} -> {standing_text(change.after)}"]
-    if change.before is not None and change.after is not None:
-        parts += [", ".join(CAUSES[cause] for cause in change.why)]
-    criteria = [
-        f"{each.id} {(each.before or '-').replace('_', ' ')} -> {(each.after or '-').replace('_', ' ')}"
-        for each in change.criteria[:CRITERIA]
-    ]
-    more = len(change.criteria) - CRITERIA
-    parts += [", ".join([*criteria, *([f"{more} more"] if more > 0 else [])])]
-    return f"{_who(change.student_id, change.position)}: {'; '.join(part for part in parts if part)}"
-
-
 def _similar_line(pair: AlikeDocument) -> str:
     who = ", ".join(_who(*key) for key in zip(pair.students, pair.positions, strict=True))
-    chance = "" if pair.measure is None else f" ({pair.measure:.1g} such pairs by chance)"
-    return f"{who}: {'; '.join(SIGNS[sign] for sign in pair.why)}{chance}"
+    chance = pair.measure and gettext(" (%(count).1g such pairs by chance)", count=pair.measure)
+    return f"{who}: {'; '.join(gettext(SIGNS[sign]) for sign in pair.why)}{chance or ''}"
 
 
 def _who(student: str, position: int | None) -> str:
-    return student if position is None else f"{student}, position {position}"
+    return student if position is None else f"{student}, {gettext('position')} {position}"

@@ -16,7 +16,7 @@ from grader.cli import terminal
 from grader.cli.app import new_table
 from grader.documents import LintLeast, LintScales, LintVariant
 from grader.files import write_whole
-from grader.language import N_, Tongue, tongue
+from grader.language import N_, Tongue
 from grader.records import Reason
 from grader.rubric import load_both
 from grader.texts.spoken import clause
@@ -34,9 +34,9 @@ SEVERITIES = {"fault": N_("fault"), "warning": N_("warning"), "hint": N_("hint")
 COLOURS = {"fault": "bold red", "warning": "yellow", "hint": "cyan"}
 
 
-def lint_assignment(name: str, *, as_json: bool, svg: Path | None, lang: str) -> bool:
-    """Print every finding on an assignment and its rubric in a language; whether any needs a person."""
-    speaker = tongue(lang)
+def lint_assignment(name: str, *, as_json: bool, svg: Path | None) -> bool:
+    """Print every finding on an assignment and its rubric; whether any needs a person."""
+    speaker = terminal.speaker()
     try:
         assignment, rubric = load_both(name)
     except AuthoredFileError as error:
@@ -44,7 +44,7 @@ def lint_assignment(name: str, *, as_json: bool, svg: Path | None, lang: str) ->
             raise
         terminal.say(faults_document(error, name, speaker).model_dump_json(indent=2))
         raise typer.Exit(error.exit_status) from error
-    result = lint(assignment, rubric)
+    result = lint(assignment, rubric, speaker)
     if svg is not None and result.plan is not None and result.worst is not None:
         worst = result.worst[0]
         why = _hardest(result.worst, speaker)
@@ -56,7 +56,7 @@ def lint_assignment(name: str, *, as_json: bool, svg: Path | None, lang: str) ->
         terminal.say(lint_document(result, speaker).model_dump_json(indent=2))
         return result.needs_a_person
     console = Console()
-    console.print(f"[bold]{assignment.file.title.in_language(lang)}[/bold]", highlight=False)
+    console.print(f"[bold]{assignment.file.title.in_language(speaker.lang)}[/bold]", highlight=False)
     console.print(_variants_table(result.rows, speaker))
     if result.scales and result.plan is not None:
         console.print()
@@ -84,7 +84,9 @@ def _variants_table(rows: Sequence[LintVariant], speaker: Tongue) -> Table:
         some = _("%(count)s do not") % {"count": len(broken)}
         assembles = _("yes") if not broken else _("no") if len(broken) == len(group) else some
         table.add_row(
-            str(_variant_of(group[0])) if len(group) == 1 else named(map(_variant_of, group)),
+            terminal.named(_variant_of(group[0]).numbers)
+            if len(group) == 1
+            else named(map(_variant_of, group)),
             f"[red]{assembles}[/red]" if broken else assembles,
             _worst_of([row.transmission for row in group], "{:.2f}"),
             _worst_of([row.crossing_deg for row in group], "{:.1f}"),
@@ -158,7 +160,7 @@ def _span(ends: tuple[float, float]) -> str:
 
 def _hardest(worst: tuple[Variant, Reason], speaker: Tongue) -> str:
     """Return the variant that is hardest to draw, and why."""
-    return f"{worst[0]}: {clause(worst[1], speaker)}"
+    return f"{terminal.named(worst[0].numbers)}: {clause(worst[1], speaker)}"
 
 
 def _tell_end(result: Lint, svg: Path | None, speaker: Tongue) -> None:

@@ -8,8 +8,9 @@ import numpy as np
 
 from grader.cli import terminal
 from grader.cli.app import new_table
+from grader.cli.terminal import gettext, unit
 from grader.files import write_whole
-from grader.language import Tongue, tongue
+from grader.language import N_, Tongue
 from grader.options import PlanOptions
 from grader.solution.document import ForceDocument, ForcesDocument, GuideDocument, plan_document
 from reference.authored.assignment import Assignment, load_assignment
@@ -45,7 +46,7 @@ def show_plan(name: str, options: PlanOptions) -> None:
         return
     _print_table(assignment, plan)
     for file in (one for one in options.drawn if one != TERMINAL):
-        terminal.say(f"Drawn in {file}")
+        terminal.say(gettext("drawn in %(file)s", file=file))
 
 
 def _refused(code: str, cause: str = "", **known: object) -> CallError:
@@ -70,7 +71,7 @@ def _draw(assignment: Assignment, plan: Plan, options: PlanOptions) -> None:
     from reference.drawing.sheets import reference_drawing
     from reference.drawing.subject import Subject
 
-    speaker = tongue(options.lang)
+    speaker = terminal.speaker()
     subject = Subject(assignment, plan, 0, wording_of(speaker))
     written: dict[Path, str | bytes] = {}
     if options.svg is not None or options.pdf is not None:
@@ -101,29 +102,31 @@ def _print_table(assignment: Assignment, plan: Plan) -> None:
     document = plan_document(assignment, plan)
     scales = document.scales
     console = Console()
-    console.print(f"[bold]{assignment.file.title.en}[/bold], {plan.variants[0]}", highlight=False)
-    told = [f"{name} = {scale:.6g} {unit_of(name)}" for name, scale in scales.items()]
+    title = assignment.file.title.in_language(terminal.speaker().lang)
+    console.print(f"[bold]{title}[/bold], {terminal.named(plan.variants[0].numbers)}", highlight=False)
+    told = [f"{name} = {scale:.6g} {unit(unit_of(name))}" for name, scale in scales.items()]
     console.print("   ".join(told), highlight=False)
-    table = new_table("vector, point", "drawn mm", "value", "unit", "direction deg", left=("unit",))
+    head = N_("vector, point"), N_("drawn, mm"), N_("value"), N_("unit"), N_("direction, °")
+    table = new_table(*head, left=("unit",))
     for vector, row in document.vectors.items():
         direction = "-" if row.direction_deg is None else f"{row.direction_deg:.2f}"
-        table.add_row(vector, f"{row.drawn_mm:.2f}", f"{row.value:.4f}", row.unit, direction)
+        table.add_row(vector, f"{row.drawn_mm:.2f}", f"{row.value:.4f}", unit(row.unit), direction)
     for rate, value in document.angular.items():
-        table.add_row(rate, "", f"{value:z.4f}", unit_of(rate), "")
+        table.add_row(rate, "", f"{value:z.4f}", unit(unit_of(rate)), "")
     pivot = plan.construction.pivot
     for name in plan.construction.centres:
         if (point := document.centres_m[name]) is not None:
             at = complex(*point) - complex(*document.points_m[pivot])
             real, mm, angle = abs(at), abs(at) / scales["kL"], np.degrees(np.angle(at)) % 360.0
-            table.add_row(f"{name} from {pivot}", f"{mm:.2f}", f"{real:.4f}", "m", f"{angle:.2f}")
+            place = gettext("%(name)s from %(pivot)s", name=name, pivot=pivot)
+            table.add_row(place, f"{mm:.2f}", f"{real:.4f}", unit("m"), f"{angle:.2f}")
     console.print(table)
     if document.forces is not None:
         console.print(_table_of_forces(document.forces))
     worst = min((float(np.min(sine)) for sine in plan.motion.transmission.values()), default=1.0)
     if worst < 0.2:
-        console.print(
-            f"near a singular position: the sine of a transmission angle is {worst:.3f}", style="yellow"
-        )
+        near = N_("near a singular position: the sine of a transmission angle is %(sine).3f")
+        console.print(gettext(near, sine=worst), style="yellow")
 
 
 def _table_of_forces(forces: ForcesDocument) -> "Table":
@@ -133,20 +136,20 @@ def _table_of_forces(forces: ForcesDocument) -> "Table":
     def direction(degrees: float | None) -> str:
         return "-" if degrees is None else f"{degrees:.2f}"
 
-    table = new_table("force", "at", "N", "direction deg", "N m", left=("at",))
+    table = new_table(N_("force"), N_("at"), "N", N_("direction, °"), "N m", left=("at",))
     for link, one in forces.inertia.items():
         row = (four_digits(one.force_N), direction(one.direction_deg), four_digits(one.moment_Nm))
-        table.add_row(f"inertia of {link}", one.at, *row)
+        table.add_row(gettext("inertia of %(link)s", link=link), one.at, *row)
     # A further hinge at a joint has the link in its name, too: B_4.
     joints = ((name.partition("_")[0], joint) for name, joint in forces.joints.items())
     for name, joint in (*joints, *forces.guides.items()):
         moment = four_digits(joint.moment_Nm) if isinstance(joint, GuideDocument) else ""
         row = (four_digits(joint.value_N), direction(joint.direction_deg), moment)
-        table.add_row(f"{joint.by} on {joint.on}", name, *row)
+        table.add_row(gettext("%(by)s on %(link)s", by=joint.by, link=joint.on), name, *row)
     last = forces.balancing
     if isinstance(last, ForceDocument):
         row = (four_digits(last.value_N), direction(last.direction_deg), "")
     else:
         row = ("", "", four_digits(last.moment_Nm))
-    table.add_row(f"balancing on {last.on}", "", *row)
+    table.add_row(gettext("balancing on %(link)s", link=last.on), "", *row)
     return table

@@ -12,6 +12,7 @@ import uvicorn
 from grader.cli import terminal
 from grader.cli.app import progress
 from grader.cli.grading import fill_image, tell_class, tell_next_of_class
+from grader.cli.terminal import gettext
 from grader.folder.batch import noted_batch
 from grader.options import ReviewOptions
 from grader.review.server import LOOPBACK, application
@@ -34,6 +35,7 @@ def review_class(folder: Path, options: ReviewOptions) -> None:
     if token and len(token) < LEAST_TOKEN:
         raise failure(CallError, "token_short", "secret_short", option="--token", least=LEAST_TOKEN)
     batch = replace(noted_batch(folder), jobs=options.jobs or os.cpu_count() or 1)
+    lang = terminal.speak(options.lang or batch.lang)
     fill_image(batch.folder)
     listener = listener_on(host, options.port)
     session = Session(batch)
@@ -41,10 +43,10 @@ def review_class(folder: Path, options: ReviewOptions) -> None:
         session.bring_up_to_date(tell)
     shown = f"[{host}]" if ":" in host else host
     address = f"http://{shown}:{listener.getsockname()[1]}/"
-    terminal.say(f"Review: {address}{f'?token={token}' if token else ''}")
-    terminal.say(f"Decisions go to {batch.decisions_path}; Ctrl+C ends the review.")
-    app = application(session, options.lang or batch.lang, token)
-    answer(app, listener, "The review has ended.", lifespan="off")
+    terminal.say(gettext("Review: %(address)s", address=f"{address}{f'?token={token}' if token else ''}"))
+    terminal.say(gettext("Decisions go to %(file)s; Ctrl+C ends the review.", file=batch.decisions_path))
+    app = application(session, lang, token)
+    answer(app, listener, gettext("The review has ended."), lifespan="off")
     if session.made:
         with progress() as tell:
             results = session.bring_up_to_date(tell).results

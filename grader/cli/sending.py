@@ -7,14 +7,15 @@ from pathlib import Path
 
 from grader.cli import terminal
 from grader.cli.app import progress
+from grader.cli.terminal import gettext
 from grader.files import write_whole
+from grader.language import N_
 from grader.lms.api.connection import Connection
 from grader.lms.marks import json_text
 from grader.lms.send import TOKEN, Sender, checked_site, checked_token, read_plan
 from grader.options import SendOptions
 from grader.tables.decisions import held
 from grader.texts.spoken import fault
-from reference.errors import counted
 
 
 def send_export(file: Path, options: SendOptions) -> bool:
@@ -27,16 +28,17 @@ def send_export(file: Path, options: SendOptions) -> bool:
     with held(record), progress() as tell:
         sender = Sender(plan, connection, record)
         sender.send(tell)
-    recorded = f"; recorded in {record}" if sender.count else ""
-    terminal.note(f"{counted(sender.count, 'call')} made at {site}{recorded}")
+    told = gettext("calls made at %(site)s: %(count)s", site=site, count=sender.count)
+    recorded = gettext("; recorded in %(file)s", file=record) if sender.count else ""
+    terminal.note(told + recorded)
     for why in sender.failed:
-        terminal.say(f"  {fault(why)}")
+        terminal.say(f"  {fault(why, terminal.speaker())}")
     if sender.left:
-        terminal.say(f"  not tried: {', '.join(sender.left)}")
+        terminal.say("  " + gettext("not tried: %(names)s", names=", ".join(sender.left)))
     if sender.rubric is not None and not any(call.student_id for call in plan.calls):
         path = record.with_name(f"{(file.parent if file.name == 'plan.json' else file).stem}-answer.json")
         write_whole(path, json_text(sender.rubric))
-        terminal.note(f"next: export the marks with --criteria {path}")
+        terminal.note(gettext("next: export the marks with --criteria %(file)s", file=path))
     return bool(sender.failed or sender.left)
 
 
@@ -45,19 +47,22 @@ def _tell_open(sender: Sender, file: Path, options: SendOptions) -> bool:
     groups = sender.pending()
     kinds = Counter(call.what for group in groups for call in group)
     calls = ", ".join(f"{count} {what}" for what, count in kinds.items())
-    terminal.say(f"to send to {sender.plan.platform} at {sender.site}: {calls or 'nothing'}")
+    known = {"platform": sender.plan.platform, "site": sender.site, "calls": calls or gettext("nothing")}
+    terminal.say(gettext("to send to %(platform)s at %(site)s: %(calls)s", **known))
     if students := [group[0].student_id for group in groups if group[0].student_id]:
-        terminal.say(f"  {counted(len(students), 'student')}: {', '.join(students)}")
-    if known := len(sender.plan.calls) - kinds.total():
-        terminal.say(f"  sent before and unchanged: {counted(known, 'call')}")
+        told = N_("students (%(count)s): %(names)s")
+        terminal.say("  " + gettext(told, count=len(students), names=", ".join(students)))
+    if same := len(sender.plan.calls) - kinds.total():
+        terminal.say("  " + gettext("calls sent before and unchanged: %(count)s", count=same))
     if groups:
         site = ["--site", options.site] if options.site else []
         flags = [*site, *["--allow-http"] * options.allow_http, "--yes"]
-        terminal.say("nothing was sent")
-        terminal.tell_next("send", file, *flags, before=f"put the token into {TOKEN}, then ")
+        terminal.say(gettext("nothing was sent"))
+        before = gettext("put the token into %(name)s, then", name=TOKEN)
+        terminal.tell_next("send", file, *flags, before=f"{before} %(command)s")
     return bool(groups)
 
 
 def _wait(seconds: float) -> None:
-    terminal.note(f"waiting {seconds:.0f} s for the platform")
+    terminal.note(gettext("waiting %(seconds).0f s for the platform", seconds=seconds))
     time.sleep(seconds)

@@ -15,6 +15,8 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from grader.cli import terminal
 from grader.cli.reviewing import answer, listener_on
+from grader.cli.terminal import gettext
+from grader.language import N_
 from grader.options import ServeOptions
 from grader.review.server import LOOPBACK
 from grader.texts.spoken import failure
@@ -104,13 +106,13 @@ def serve(data: Path, options: ServeOptions) -> None:
         )
         app = application(settings)
         invitation = first_invitation(settings)
-        terminal.say(f"planmark serves {settings.address}/ from {data}; Ctrl+C ends it.")
+        told = N_("planmark serves %(address)s/ from %(folder)s; Ctrl+C ends it.")
+        terminal.say(gettext(told, address=settings.address, folder=data))
         if invitation:
-            terminal.say(f"next: make your account at {invitation}")
+            terminal.say(gettext("next: make your account at %(address)s", address=invitation))
         if urlsplit(settings.address).scheme == "http" and host not in LOOPBACK:
-            typer.secho(
-                "Passwords travel unencrypted: put it behind a proxy with https.", fg="yellow", err=True
-            )
+            told = gettext("Passwords travel unencrypted: put it behind a proxy with https.")
+            typer.secho(told, fg="yellow", err=True)
         _run(app, listener)
 
 
@@ -121,6 +123,6 @@ def _run(app: object, listener: socket.socket) -> None:
         soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
         wanted = MOST_FILES if hard == resource.RLIM_INFINITY else min(MOST_FILES, hard)
         resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, wanted), hard))
-    farewell = "The server has ended; what was queued goes on with the next start."
+    farewell = gettext("The server has ended; queued work continues at the next start.")
     bounds = {"limit_concurrency": MOST_CONNECTIONS, "timeout_keep_alive": 20, "http": Bounded}
     answer(app, listener, farewell, **bounds)

@@ -12,13 +12,13 @@ from grader.authoring.lint import lint
 from grader.authoring.round_scales import suggestions
 from grader.cli import terminal
 from grader.cli.app import progress
-from grader.cli.terminal import note
+from grader.cli.terminal import gettext, named, note
 from grader.documents import CalibrationDocument
 from grader.files import write_whole
 from grader.folder.cache import PageCache
 from grader.folder.inventory import submissions, take_inventory
 from grader.folder.workers import Limits, Workers, result_of
-from grader.language import tongue
+from grader.language import N_
 from grader.options import VariantOptions
 from grader.owners.draft_roster import SURE, contact_sheet, draft_csv, suggest, thumbnail
 from grader.printed.answer_sheet import make_calibration, make_sheets
@@ -26,15 +26,15 @@ from grader.printed.handout import make_handout
 from grader.records import FloatArray, PageRef, Reason, Unread, as_error
 from grader.rubric import rubric_of
 from grader.scan.decode.pages import count_pages
-from grader.scan.register.calibration import ALL_IS_WELL, calibrate, residual_map
+from grader.scan.register.calibration import ALL_IS_WELL, advice_of, calibrate, residual_map
 from grader.solution.pages import EXAMPLE, printed_steps
 from grader.solution.sentences import wording_of
 from grader.tables.measurements import names_of
 from grader.tables.roster import RosterRow, read_roster
-from grader.texts.spoken import failure, message
+from grader.texts.spoken import MORE_LINES, failure, message
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.drawing.subject import Subject
-from reference.errors import CallError, counted
+from reference.errors import CallError
 from reference.plan import exact_plan
 
 # calibrate ----------------------------------------------------------------------------------------
@@ -50,7 +50,8 @@ def calibrate_scans(scans: Sequence[Path], svg: Path | None, *, as_json: bool) -
             document = result_of(workers, calibrate, path, page)
             if isinstance(document, Unread):
                 unread = True
-                terminal.say(f"{path.name}, page {page}: {message(document.reason)}", err=True)
+                at = gettext("%(file)s, page %(page)s", file=path.name, page=page)
+                terminal.say(f"{at}: {message(document.reason, terminal.speaker())}", err=True)
                 continue
             documents.append(document)
             if not as_json:
@@ -59,31 +60,28 @@ def calibrate_scans(scans: Sequence[Path], svg: Path | None, *, as_json: bool) -
         terminal.say(json.dumps([document.model_dump(mode="json") for document in documents], indent=2))
     if svg is not None and documents:
         write_whole(svg, residual_map(documents[0]))
-        terminal.say(f"{svg}: where the page is off, magnified", err=True)
+        terminal.say(gettext("%(file)s: where the page is off, magnified", file=svg), err=True)
     return unread or any(document.advice != [ALL_IS_WELL] for document in documents)
 
 
 def _print_page(page: CalibrationDocument) -> None:
-    terminal.say(f"{page.source}, page {page.page}")
+    terminal.say(gettext("%(file)s, page %(page)s", file=page.source, page=page.page))
+    parts, told = page.segments, []
     if page.scale_x is not None and page.scale_y is not None and page.scale_se is not None:
-        se = f"\N{PLUS-MINUS SIGN} {100.0 * page.scale_se:.3f}"
-        along, across = 100.0 * page.scale_x, 100.0 * page.scale_y
-        terminal.say(f"  scale along the sheet {along:.3f} %, across it {across:.3f} % ({se})")
+        along, across, se = (100.0 * one for one in (page.scale_x, page.scale_y, page.scale_se))
+        text = N_("scale along the sheet %(along).3f %%, across it %(across).3f %% (± %(se).3f)")
+        told.append(gettext(text, along=along, across=across, se=se))
     if page.unequal is not None:
-        terminal.say(
-            f"  unequal scale {100.0 * page.unequal:+.3f} %, right angles off by {page.skew_deg:+.3f} degrees"
-        )
-    terminal.say(f"  markers off an even map by {page.residual_mm:.3f} mm")
-    segments = page.segments
-    terminal.say(f"  {segments.read} of {segments.printed} segments read")
-    if segments.length_rms_mm is not None:
-        mean, rms, worst = segments.length_mean_mm, segments.length_rms_mm, segments.length_worst_mm
-        terminal.say(
-            f"  their lengths are off by {mean:+.3f} mm on the mean, {rms:.3f} rms, {worst:.3f} at worst"
-        )
-        turn, place = segments.direction_rms_deg, segments.place_rms_mm
-        terminal.say(f"  directions {turn:.3f} degrees rms, places {place:.3f} mm rms")
-    for line in page.advice:
+        text = N_("unequal scale %(unequal)+.3f %%, right angles off by %(skew)+.3f°")
+        told.append(gettext(text, unequal=100.0 * page.unequal, skew=page.skew_deg))
+    told.append(gettext("markers off an even map by %(off).3f mm", off=page.residual_mm))
+    told.append(gettext("segments read: %(count)s of %(total)s", count=parts.read, total=parts.printed))
+    if parts.length_rms_mm is not None:
+        text = N_("lengths off by %(length_mean_mm)+.3f mm on average, %(length_rms_mm).3f mm rms,"
+            " %(length_worst_mm).3f mm at most; directions %(direction_rms_deg).3f° rms,"
+            " places %(place_rms_mm).3f mm rms")  # fmt: skip
+        told.append(gettext(text, **parts.model_dump()))
+    for line in (*told, *advice_of(page, terminal.speaker())):
         terminal.say(f"  {line}")
 
 
@@ -93,9 +91,10 @@ SHOWN_VARIANTS = 12
 
 
 def print_sheets(
-    name: str, roster: Path | None, out: Path, layout: Path | None, lang: str, *, calibration: bool
+    name: str, roster: Path | None, out: Path, layout: Path | None, *, calibration: bool
 ) -> None:
     """Write the PDF of a class's answer sheets, and where everything is on them."""
+    lang = terminal.speaker().lang
     if calibration:
         sheets = make_calibration(lang)
     elif roster is None:
@@ -106,12 +105,12 @@ def print_sheets(
         rubric = rubric_of(assignment)
         sheets = make_sheets(assignment, students.rows, lang, roster=students.file, asked=rubric.entries)
     write_whole(out, sheets.pdf)
-    note(f"{out}: to be printed on A3 at 100 %, not fitted to the page")
+    note(gettext("%(file)s: print it on A3 at 100 %%, not fitted to the page", file=out))
     if layout is not None:
         write_whole(layout, sheets.layout.model_dump_json(indent=2))
-        note(f"{layout}: where markers, zones and boxes are")
+        note(gettext("%(file)s: where markers, zones and boxes are", file=layout))
     for problem in sheets.problems:
-        terminal.say(f"note: {message(problem)}", err=True)
+        terminal.say(gettext("note: %(text)s", text=message(problem, terminal.speaker())), err=True)
     if not calibration and roster is not None:
         _suggest_scales(name, roster)
 
@@ -123,7 +122,7 @@ def _suggest_scales(name: str, roster: Path) -> None:
     if result.plan is None:
         return
     drawn = {figure for page in assignment.file.page for figure in page.figures}
-    texts = suggestions(result.scales, result.plan, drawn)
+    texts = suggestions(result.scales, result.plan, drawn, terminal.speaker())
     lines: dict[Variant, str] = {}
     for row in read_roster(roster).rows:
         variant = assignment.variant(row.n, row.position)
@@ -131,24 +130,21 @@ def _suggest_scales(name: str, roster: Path) -> None:
             lines.setdefault(variant, texts[variant])
     if not lines:
         return
-    terminal.say(
-        "note: easier to read than at the assignment's scales, and fitting the zones, would be", err=True
-    )
+    told = N_("note: these scales fit the zones too, and are easier to read than the assignment's:")
+    terminal.say(gettext(told), err=True)
     for variant, line in list(lines.items())[:SHOWN_VARIANTS]:
-        terminal.say(f"  {variant}: {line}", err=True)
+        terminal.say(f"  {named(variant.numbers)}: {line}", err=True)
     if len(lines) > SHOWN_VARIANTS:
-        terminal.say(f"  ... and {counted(len(lines) - SHOWN_VARIANTS, 'more variant')}", err=True)
-    names = ", ".join(assignment.scale_names)
-    terminal.say(
-        f"  to be written into the scale boxes by the student, or into the roster ({names})", err=True
-    )
+        terminal.say("  " + gettext(MORE_LINES, more=len(lines) - SHOWN_VARIANTS), err=True)
+    told = N_("students write them into the scale boxes, or you write them into the roster (%(names)s)")
+    terminal.say("  " + gettext(told, names=", ".join(assignment.scale_names)), err=True)
 
 
 # handout ------------------------------------------------------------------------------------------
 
 
 def print_handout(
-    name: str, roster: Path | None, variant: VariantOptions, out: Path, lang: str, example: int | None = None
+    name: str, roster: Path | None, variant: VariantOptions, out: Path, example: int | None = None
 ) -> None:
     """Write the PDF of task sheets, of a class or of one variant, and a worked example.
 
@@ -165,20 +161,21 @@ def print_handout(
     else:
         rows = read_roster(roster).rows
     file = "" if roster is None else roster.name
-    worked = [] if example is None else _example(assignment, rows, example, lang)
-    sheets = make_handout(assignment, rubric_of(assignment), rows, lang, roster=file, example=worked)
+    worked = [] if example is None else _example(assignment, rows, example)
+    rubric, lang = rubric_of(assignment), terminal.speaker().lang
+    sheets = make_handout(assignment, rubric, rows, lang, roster=file, example=worked)
     write_whole(out, sheets)
-    note(f"{out}: {counted(len(rows), 'task sheet')} on A4, without the solution")
+    note(gettext("%(file)s: task sheets on A4, without the solution: %(count)s", file=out, count=len(rows)))
 
 
-def _example(assignment: Assignment, rows: Sequence[RosterRow], number: int, lang: str) -> list[Flowable]:
+def _example(assignment: Assignment, rows: Sequence[RosterRow], number: int) -> list[Flowable]:
     """Return the steps of a variant that no row has; `number` is its n, or its position if there is no n."""
     by = "position" if assignment.numbers("n") is None else "n"
     if number in {getattr(row, by) for row in rows}:
         raise failure(CallError, "example_taken", option="--example", what=by, value=number)
     position = next(iter(assignment.numbers("position") or ()), None) if by == "n" else number
     variant = assignment.variant(number if by == "n" else None, position)
-    plan, speaker = exact_plan(assignment, [variant]), tongue(lang)
+    plan, speaker = exact_plan(assignment, [variant]), terminal.speaker()
     subject = Subject(assignment, plan, 0, wording_of(speaker))
     title = speaker.gettext(EXAMPLE) % {"title": subject.title}
     return [*printed_steps(subject, speaker, title)]
@@ -188,7 +185,7 @@ def _example(assignment: Assignment, rows: Sequence[RosterRow], number: int, lan
 
 
 def draft_matches(
-    folder: Path, name: str, roster_file: Path, out: Path, pages_per_student: int | None, lang: str
+    folder: Path, name: str, roster_file: Path, out: Path, pages_per_student: int | None
 ) -> bool:
     """Write the draft of the roster and its contact sheet; whether anything needs to be checked."""
     if not folder.is_dir():
@@ -221,17 +218,16 @@ def draft_matches(
     for index, suggestion in enumerate(draft.suggestions):
         picture = thumbnails[index]
         if isinstance(picture, Reason):
-            terminal.say(f"{suggestion.source}: {message(picture)}", err=True)
+            terminal.say(f"{suggestion.source}: {message(picture, terminal.speaker())}", err=True)
         else:
             entries.append((suggestion, picture))
     sheet = out.with_suffix(".html")
     write_whole(out, draft_csv(roster, draft))
-    write_whole(sheet, contact_sheet(entries, lang))
+    write_whole(sheet, contact_sheet(entries, terminal.speaker().lang))
     open_ends = sum(not suggestion.sure for suggestion in draft.suggestions)
-    terminal.say(
-        f"{out}: a draft, {open_ends} of {len(draft.suggestions)} pages to be checked ({SURE} = certain)"
-    )
-    note(f"Check {sheet}")
+    told = N_("%(file)s: a draft; pages to check: %(count)s of %(total)s (%(sure)s = certain)")
+    terminal.say(gettext(told, file=out, count=open_ends, total=len(draft.suggestions), sure=SURE))
+    note(gettext("Check %(page)s", page=sheet))
     return open_ends > 0
 
 

@@ -7,16 +7,47 @@ import shlex
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
 from pathlib import Path
 
 import typer
 
 from grader import __version__
 from grader.files import in_one_line, log_to
+from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
 
 LOG = logging.getLogger("planmark")
 INTERRUPTED = 130
 """The exit status of a program that Ctrl+C ended, as shells count: 128 and the signal's number."""
+
+
+_SPEAKERS = [tongue(ROOT_LANGUAGE)]
+
+
+def speak(lang: str) -> str:
+    """Print in a language from now on, and return its code; raises CallError for one that is not known."""
+    _SPEAKERS[:] = [tongue(lang)]
+    return _SPEAKERS[0].lang
+
+
+def speaker() -> Tongue:
+    """Return the language of this call."""
+    return _SPEAKERS[0]
+
+
+def gettext(text: str, /, **said: object) -> str:
+    """Return a text in the language of this call, filled in."""
+    return speaker().gettext(text) % said
+
+
+def unit(name: str) -> str:
+    """Return a unit in the letters of the language of this call."""
+    return speaker().unit(name)
+
+
+def named(numbers: Mapping[str, int]) -> str:
+    """Name the variant with these numbers in the language of this call: ``n = 7, position = 2``."""
+    return ", ".join(f"{gettext(key)} = {one}" for key, one in numbers.items()) or gettext("the only variant")
 
 
 class _Screen(logging.Handler):
@@ -74,9 +105,9 @@ def note_call() -> None:
     LOG.debug("%s", shown_command("planmark", *sys.argv[1:]))
 
 
-def tell_next(*command: object, before: str = "") -> None:
-    """Print the command that comes next, and what is to be done before it."""
-    note(f"next: {before}{shown_command('planmark', *command)}")
+def tell_next(*command: object, before: str = "%(command)s") -> None:
+    """Print the command that comes next, in the text of what is to be done before it."""
+    note(gettext("next: %(text)s", text=gettext(before, command=shown_command("planmark", *command))))
 
 
 def shown_command(*words: object) -> str:
@@ -100,6 +131,13 @@ def set_encoding() -> None:
             reconfigure(encoding="utf-8", errors="replace")
 
 
+WORK = {
+    "solver": N_("solver"), "reading": N_("reading"), "drawings": N_("drawings"), "opening": N_("opening"),
+    "looking": N_("looking"), "marking": N_("marking"), "sent": N_("sent"),
+}  # fmt: skip
+"""Kinds of work, as progress names them."""
+
+
 class Pace:
     """The pace of each kind of work, and the time left; work that a run finds done does not count."""
 
@@ -116,7 +154,7 @@ class Pace:
         minutes, seconds = divmod(round((total - done) / a_second), 60)
         hours, minutes = divmod(minutes, 60)
         left = f"{hours} h {minutes:02d} min" if hours else f"{minutes} min" if minutes else f"{seconds} s"
-        return f"{60.0 * a_second:.0f} a minute, {left} left"
+        return gettext("%(count).0f a minute, %(left)s left", count=60.0 * a_second, left=left)
 
 
 _LEAST_S = 1.0
@@ -139,4 +177,4 @@ class StepLines:
         if is_end or time.monotonic() - self._last >= self._seconds:
             self._last = time.monotonic()
             if not is_quiet():
-                typer.echo(f"{what}: {done} of {total}{', ' if pace else ''}{pace}", err=True)
+                typer.echo(f"{gettext(WORK[what])}: {done} / {total}{', ' if pace else ''}{pace}", err=True)

@@ -16,14 +16,15 @@ from grader.authoring.variant_table import class_csv
 from grader.cli import terminal
 from grader.cli.app import new_table, progress
 from grader.cli.plans import check_crank
+from grader.cli.terminal import gettext, named, unit
 from grader.cycle.quantities import CycleSubject, Extreme, Selection, cycle_csv, extremes, strokes_of
 from grader.files import write_whole
-from grader.language import Tongue, tongue
+from grader.language import N_, Tongue, tongue
 from grader.options import CycleOptions, PlanOptions
 from grader.solution.document import plan_documents
 from grader.texts.spoken import failure
 from reference.authored.assignment import Assignment, Variant, load_assignment
-from reference.errors import CallError, MechanismError, counted
+from reference.errors import CallError, MechanismError
 from reference.kinematics.cycle import cycle
 from reference.plan import Plan, exact_plan
 from reference.quantities import unit_of
@@ -74,7 +75,7 @@ def show_class(name: str, options: PlanOptions) -> bool:
         _show_table(assignment, plan)
     for file in (csv, pdf):
         if file is not None:
-            terminal.say(f"{counted(len(variants), 'variant')} written to {file}")
+            terminal.say(gettext("variants written to %(file)s: %(count)s", file=file, count=len(variants)))
     return is_open
 
 
@@ -83,11 +84,14 @@ def _sound(assignment: Assignment) -> list[Variant]:
     variants = assignment.variants()
     broken = broken_variants(assignment, variants)
     if len(broken) == len(variants):
-        error = broken[variants[0]]
-        told = f"no variant can be solved; {variants[0]}: {error.template}"
-        raise MechanismError(error.code, told, group=error.group, gap_m=error.gap_m)
+        first = broken[variants[0]]
+        told = f"no variant can be solved; {variants[0]}: {first.template}"
+        error = MechanismError(first.code, told, group=first.group, gap_m=first.gap_m)
+        error.parameters |= {"variant": named(variants[0].numbers), "more": len(variants) - 1}
+        raise error
     for finding in broken_findings(assignment, broken):
-        typer.secho(f"left out: {finding.told()}", err=True, fg="red")
+        text = finding.told(terminal.speaker())
+        typer.secho(gettext("left out: %(text)s", text=text), err=True, fg="red")
     return [variant for variant in variants if variant not in broken]
 
 
@@ -110,18 +114,20 @@ def _show_table(assignment: Assignment, plan: Plan) -> None:
     from rich.console import Console
 
     console = Console()
-    console.print(f"[bold]{assignment.file.title.en}[/bold], drawn lengths in mm", highlight=False)
+    title = f"[bold]{assignment.file.title.in_language(terminal.speaker().lang)}[/bold]"
+    console.print(gettext("%(title)s, drawn lengths in mm", title=title), highlight=False)
     joints = {joint for joint in plan.motion.position if not plan.mechanism.is_ground(joint)}
     wholes = (name for name in plan.vectors_si if name.count("_") == 1)
     names = [name for name in wholes if name.startswith("R_") or name.removeprefix(name[:2]) in joints]
     scale_names = assignment.scale_names
-    table = new_table("variant", *(f"{name}\n{unit_of(name)}" for name in scale_names), *names)
+    table = new_table(N_("variant"), *(f"{name}\n{unit(unit_of(name))}" for name in scale_names), *names)
     lengths = {name: abs(plan.drawn_mm(name)) for name in names}
     for index, variant in enumerate(plan.variants):
         scales = [f"{getattr(plan.scales, name)[index]:.4g}" for name in scale_names]
-        table.add_row(str(variant), *scales, *(f"{lengths[name][index]:.2f}" for name in names))
+        table.add_row(named(variant.numbers), *scales, *(f"{lengths[name][index]:.2f}" for name in names))
     console.print(table)
-    console.print("all vectors, values and directions: --csv FILE, --pdf FILE or --json", style="dim")
+    told = gettext("all vectors, values and directions: --csv FILE, --pdf FILE or --json")
+    console.print(told, style="dim")
 
 
 # A cycle ------------------------------------------------------------------------------------------
@@ -146,10 +152,10 @@ def show_cycle(name: str, options: CycleOptions) -> None:
     diagrams = _diagrams(assignment, variant, subject, selection, words, list(drawn_in))
     if csv is not None:
         write_whole(csv, cycle_csv(subject, selection, decimal_comma=words.decimal_mark == ","))
-        terminal.say(f"Written to {csv}")
+        terminal.say(gettext("written to %(file)s", file=csv))
     for file, diagram in zip(drawn_in.values(), diagrams, strict=True):
         write_whole(file, diagram)
-        terminal.say(f"Drawn in {file}")
+        terminal.say(gettext("drawn in %(file)s", file=file))
     if csv is None and not drawn_in:
         _print(assignment, variant, subject, selection)
 
@@ -179,25 +185,28 @@ def _print(assignment: Assignment, variant: Variant, subject: CycleSubject, sele
     from rich.console import Console
 
     console = Console()
-    console.print(f"[bold]{assignment.file.title.en}[/bold], {variant}", highlight=False)
+    title = assignment.file.title.in_language(terminal.speaker().lang)
+    console.print(f"[bold]{title}[/bold], {named(variant.numbers)}", highlight=False)
     for line in (*_range(subject), *_strokes(subject)):
         console.print(line, highlight=False, soft_wrap=True)
-    where = "at deg" if subject.cycle.is_turned else "at mm"
-    table = new_table("", "unit", "least", where, "largest", where, "here", left=("unit",))
+    where = N_("at °") if subject.cycle.is_turned else N_("at mm")
+    head = "", N_("unit"), N_("least"), where, N_("largest"), where, N_("here")
+    table = new_table(*head, left=("unit",))
     for quantity in selection.quantities:
         least, largest = extremes(subject, quantity)
         here = float(subject.values_at(quantity, np.array([subject.cycle.start]))[0])
-        unit, size = quantity.unit, subject.size(quantity)
+        in_unit, size = unit(quantity.unit), subject.size(quantity)
         if largest.value - least.value <= CONSTANT * size:
             told = here if abs(here) > ZERO * size else 0.0
-            table.add_row(quantity.name, unit, "constant", "", "", "", f"{told:.6g}")
+            table.add_row(quantity.name, in_unit, gettext("constant"), "", "", "", f"{told:.6g}")
             continue
         ends = [cell for end in (least, largest) for cell in _extreme_cells(subject, end, size)]
-        table.add_row(quantity.name, unit, *ends, f"{here + 0.0:.6g}")
+        table.add_row(quantity.name, in_unit, *ends, f"{here + 0.0:.6g}")
     for point in selection.points:
         _path_rows(subject, point, table)
     console.print(table)
-    console.print("every position: --csv FILE; as a diagram: --svg FILE, --pdf FILE", style="dim")
+    files = gettext("every position: --csv FILE; as a diagram: --svg FILE, --pdf FILE")
+    console.print(files, style="dim")
 
 
 def _path_rows(subject: CycleSubject, point: str, table: "Table") -> None:
@@ -211,7 +220,7 @@ def _path_rows(subject: CycleSubject, point: str, table: "Table") -> None:
             for end in ends
             for cell in (f"{values[end] + 0.0:.6g}", _number(subject, float(subject.cycle.driving[end])))
         ]
-        table.add_row(f"{axis}_{point}", "m", *cells, f"{own + 0.0:.6g}")
+        table.add_row(f"{axis}_{point}", unit("m"), *cells, f"{own + 0.0:.6g}")
 
 
 def _extreme_cells(subject: CycleSubject, extreme: Extreme, size: float) -> tuple[str, str]:
@@ -225,7 +234,7 @@ def _extreme_cells(subject: CycleSubject, extreme: Extreme, size: float) -> tupl
 
 def _at(subject: CycleSubject, driving: float) -> str:
     """A driving coordinate with its unit."""
-    return f"{_number(subject, driving)} {'deg' if subject.cycle.is_turned else 'mm'}"
+    return _number(subject, driving) + ("°" if subject.cycle.is_turned else f" {unit('mm')}")
 
 
 def _number(subject: CycleSubject, driving: float) -> str:
@@ -235,38 +244,51 @@ def _number(subject: CycleSubject, driving: float) -> str:
     return f"{round(1e3 * driving, 3) + 0.0:.3f}"
 
 
+IN_LINE = (
+    N_("its links are in line"), N_("its rod is perpendicular to the guide"), N_("its guides are parallel"),
+    N_("the pin is at the link's pivot, or as near to it as the offset lets it"),
+    N_("slot and guide are parallel"), N_("its base has no length"),
+)  # fmt: skip
+"""Texts of `reference.kinematics` on a flat position, for the catalogues."""
+
+
 def _range(subject: CycleSubject) -> Iterator[str]:
     """Yield lines on the range of the driving link, what stops it, and what it passes."""
     cycle = subject.cycle
-    what = "crank" if cycle.is_turned else "driving slider"
-    here = f"this variant: {_at(subject, cycle.start)}"
+    here = _at(subject, cycle.start)
     if cycle.turns:
-        yield f"the crank turns fully; {here}"
+        yield gettext("the crank turns fully; this variant: %(here)s", here=here)
     else:
-        ends = [_at(subject, float(end)) for end in (cycle.driving[0], cycle.driving[-1])]
-        yield f"the {what} moves from {ends[0]} to {ends[1]}; {here}"
+        first, last = (_at(subject, float(cycle.driving[end])) for end in (0, -1))
+        told = N_("the driving link moves from %(first)s to %(last)s; this variant: %(here)s")
+        yield gettext(told, first=first, last=last, here=here)
         for stop in cycle.following.stops:
-            where = "" if stop is None else f"{_at(subject, stop.at)}: {stop.node}, {stop.why}"
-            yield f"  {where or 'nothing stops it on one side'}"
+            where = "" if stop is None else f"{_at(subject, stop.at)}: {stop.node}, {gettext(stop.why)}"
+            yield "  " + (where or gettext("nothing stops it on one side"))
     if cycle.turns > 1:
-        yield "after a turn it is in its other assembly: the cycle is two turns"
+        yield gettext("after a turn it is in its other assembly: the cycle is two turns")
     for low, high in cycle.elsewhere:
-        yield f"it assembles from {_at(subject, low)} to {_at(subject, high)} as well, out of reach from here"
+        told = N_("it also assembles from %(first)s to %(last)s, out of reach from here")
+        yield gettext(told, first=_at(subject, low), last=_at(subject, high))
     flat: dict[str, list[str]] = {}
     for event in cycle.passed:
         flat.setdefault(event.node, []).append(_at(subject, event.at))
     for node, places in flat.items():
-        yield f"flat position of {node} at {' and '.join(places)}: passed smoothly, nothing is told in it"
+        told = N_("flat position of %(node)s at %(places)s: passed smoothly, no values there")
+        yield gettext(told, node=node, places=", ".join(places))
 
 
 def _strokes(subject: CycleSubject) -> Iterator[str]:
     """Yield a line on each point or link that goes to and fro."""
     for stroke in strokes_of(subject):
-        whose = f"link {stroke.name}" if stroke.is_angle else stroke.name
-        places = " and ".join(_at(subject, at) for at in stroke.dead_points)
-        text = f"{whose}: dead point{'s' if len(stroke.dead_points) > 1 else ''} at {places}"
+        name = gettext("link %(name)s", name=stroke.name) if stroke.is_angle else stroke.name
+        places = ", ".join(_at(subject, at) for at in stroke.dead_points)
+        text = gettext("%(name)s: dead points at %(places)s", name=name, places=places)
         if stroke.travel is not None and stroke.time_ratio is not None:
-            factor, unit = (math.degrees(1.0), "deg") if stroke.is_angle else (1e3, "mm")
-            text += f", travel {factor * stroke.travel:.3f} {unit}"
-            text += f", time ratio of the strokes {stroke.time_ratio:.4f}"
+            factor, sign = (math.degrees(1.0), "°") if stroke.is_angle else (1e3, f" {unit('mm')}")
+            travel, told = (
+                factor * stroke.travel,
+                N_(", travel %(travel).3f%(unit)s, time ratio of the strokes %(ratio).4f"),
+            )
+            text += gettext(told, travel=travel, unit=sign, ratio=stroke.time_ratio)
         yield text

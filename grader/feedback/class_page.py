@@ -316,10 +316,12 @@ def _scale(results: ResultsDocument, criterion: CriterionDocument, speaker: Tong
 
 
 def change_lines(results: ResultsDocument, speaker: Tongue) -> Iterator[str]:
-    """Yield a line for each mark that the last run changed: the student, before and now."""
+    """Yield a line for each mark that the last run changed: the student, before and now, and why."""
     for one in results.moved:
         who = one.student_id if one.position is None else f"{one.student_id}, {one.position}"
-        yield f"{who}: {_standing(one.before, speaker)} → {_standing(one.after, speaker)}"
+        now = " → ".join(_standing(each, speaker) for each in (one.before, one.after))
+        why = ", ".join(speaker.gettext(CAUSES[cause]) for cause in one.why)
+        yield f"{who}: {now}" + (f" ({why})" if why else "")
 
 
 def _standing(standing: StandingDocument | None, speaker: Tongue) -> str:

@@ -22,7 +22,6 @@ from grader.documents import (
     Status,
     Verdict,
 )
-from grader.feedback.numbers import shown
 from grader.files import Stamp, stamp_of, write_whole
 from grader.options import ClassOptions
 from grader.tables.measurements import StudentSubmission
@@ -300,17 +299,3 @@ def _why(
         return ["gone"]
     last, this = ({**one.common, **one.own.get(folder, {})} for one in inputs)
     return [cause for cause in get_args(Cause) if last.get(cause) and last[cause] != this.get(cause)]
-
-
-def standing_text(standing: StandingDocument | None) -> str:
-    """A standing in a few words: ``17.5``, ``12..18 needs review``, ``missing``."""
-    if standing is None:
-        return "-"
-    words = standing.status.replace("_", " ")
-    if standing.score is not None:
-        score = f"{shown(standing.score):g}"
-        return score if standing.status == "graded" else f"{score} {words}"
-    if standing.score_range is not None:
-        low, high = map(shown, standing.score_range)
-        return f"{low:g}..{high:g} {words}"
-    return words

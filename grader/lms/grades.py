@@ -9,11 +9,12 @@ from typing import Literal
 
 from grader.documents import ReportDocument, ResultsDocument
 from grader.files import result_folders
+from grader.language import Tongue
 from grader.options import ExportOptions
 from grader.records import Reason, Value
 from grader.tables.reader import refused_id
 from grader.tables.roster import read_roster
-from grader.texts.spoken import failure
+from grader.texts.spoken import AND_MORE, ENGLISH, failure
 from reference.errors import CallError, InputFileError
 
 Content = Mapping[str, bytes | Path]
@@ -166,10 +167,10 @@ def ready(grades: Sequence[Grade]) -> list[Grade]:
     return [grade for grade in grades if grade.score is not None]
 
 
-def in_a_row(names: Sequence[str], most: int = 20) -> str:
+def in_a_row(names: Sequence[str], most: int = 20, speaker: Tongue = ENGLISH) -> str:
     """Names in one line, of many only the first."""
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
+    told, more = ", ".join(names[:most]), len(names) - most
+    return told if more <= 0 else speaker.gettext(AND_MORE) % {"names": told, "more": more}
 
 
 def grades_of(results: ResultsDocument, options: Options) -> list[Grade]:

@@ -1,15 +1,15 @@
 """`planmark.toml` in a class's folder: options that are the same for every command on that class."""
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel
+from pydantic import AfterValidator
 
 from grader.options import GradeOptions, model_of, offered
 from reference.authored.assignment import built_in, locate
-from reference.authored.toml_file import NOT_TOML, Authored, is_file, load
+from reference.authored.toml_file import Authored, is_file, load
 from reference.errors import AuthoredFileError, FaultError, Finding
 
 
@@ -62,7 +62,7 @@ def read_class_file(path: Path, platforms: Collection[str]) -> ClassSettings:
 
     Arguments: `platforms` that there are exports for.
     """
-    written = _loaded(path).model_dump(exclude_none=True)
+    written = load(ClassFile, path).model_dump(exclude_none=True)
     # Windows writes backslashes, and takes slashes as well.
     texts = {key: written[key].replace("\\", "/") for key in ("assignment", *_PATHS) if key in written}
     resolved = {
@@ -75,18 +75,6 @@ def read_class_file(path: Path, platforms: Collection[str]) -> ClassSettings:
     keys = {key: _PARAMETERS.get(key, key) for key in written}
     values = {**written, **resolved}
     return ClassSettings(path, {keys[key]: values[key] for key in written}, keys)
-
-
-def _loaded(path: Path) -> BaseModel:
-    """The file as it is written; of a path in double quotes with backslashes the fault says what to do."""
-    try:
-        return load(ClassFile, path)  # type: ignore[no-any-return]
-    except AuthoredFileError as error:
-        (first, *_) = error.findings
-        if first.code != NOT_TOML or b"\\" not in path.read_bytes():
-            raise
-        told = replace(first, parameters={"advice": "path_quotes", **first.parameters})
-        raise AuthoredFileError(error.file, (told,)) from error
 
 
 def _faults(values: dict[str, Any], platforms: Collection[str]) -> Iterator[Finding]:

@@ -25,12 +25,12 @@ AUTHORED: dict[str, tuple[str, ...]] = {
     "file_large": (N_("is larger than %(most)s kB: nothing that is written by hand is"),),
     "nested": (N_("is nested deeper than %(most)s"),),
     "more_faults": (N_("more faults: %(count)s"),),
-    "not_toml": (
-        N_("is not TOML: %(text)s (%(error)s; %(advice)s)"),
-        N_("is not TOML: %(text)s (%(advice)s)"),
-        N_("is not TOML: %(text)s (%(error)s)"),
-        N_("is not TOML: %(error)s"),
-    ),
+    "not_toml": (N_("is not TOML: %(text)s (%(advice)s)"),),
+    "line_form": (N_("write KEY = VALUE or [TABLE], the key of A-Z a-z, digits, _ and -; or a bracket"
+        " above is not closed"),),
+    "key_twice": (N_("this key stands above already"),),
+    "value_missing": (N_("the value behind the equals sign is missing"),),
+    "text_unquoted": (N_("a text stands in straight quotes"),),
     "decimal_point": (N_("write a decimal point"),),
     "number_alone": (N_("a number stands alone, without its unit, and a formula in quotes"),),
     "quote_unclosed": (N_("a quote is opened and never closed"),),
@@ -273,7 +273,7 @@ AUTHORED: dict[str, tuple[str, ...]] = {
         " %(least)s"),),
     "crossing": (N_("the construction lines of %(nodes)s meet at only %(angle)s; a line 1 mm off moves the"
         " node by %(off)s mm"),),
-    "recomputed": (N_("would lose a digit or two in double precision, and was computed with more"),),
+    "recomputed": (N_("double precision would lose a digit or two: it was computed with more digits"),),
     "predicted_error": (N_("the computed plan may be off by %(text)s of its size"),),
     "ties": (N_("the same drawing within %(least)s mm: %(text)s"),),
     "near_ties": (N_("pairs of variants that differ by less than the rubric's tolerance: %(count)s; a copied"

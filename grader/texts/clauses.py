@@ -14,10 +14,10 @@ READING: dict[str, str] = {
     "no_acceleration_plan": N_("no acceleration plan was found on the sheets"),
     "no_force_plan": N_("no force plan was found on the sheets"),
     "not_found": N_("%(name)s was not found on the sheets"),
-    "by_similarity": N_("not drawn: %(node)s found by similarity"),
+    "by_similarity": N_("not drawn: the point %(node)s was found by similarity"),
     "normal_left_out": N_("not drawn: normal component left out"),
     "coriolis_left_out": N_("not drawn: Coriolis component left out"),
-    "not_of_assignment": N_("it is no vector or node of this assignment"),
+    "not_of_assignment": N_("it is not a vector or node of this assignment"),
     "entry": "%(entries)s",
 }
 """Reasons why a vector or node was not read."""
@@ -25,10 +25,10 @@ READING: dict[str, str] = {
 PLACING: dict[str, str] = {
     "too_few_pixels": N_("%(long_side)s pixels along the long side are too few for an A3 drawing"),
     "nothing_found": N_("no drawing frame, no paper edges and no resolution that fits A3 were found"),
-    "no_one_sheet": N_("the long lines found do not make one sheet"),
-    "scale_open": N_("the long lines found do not settle the scale"),
-    "other_scale": N_("what could be a frame has another scale than the resolution"),
-    "edges_disagree": N_("what could be frame and paper's edges disagree by %(off)s, as on no A3 drawing"),
+    "no_one_sheet": N_("the long lines do not form one sheet"),
+    "scale_open": N_("the long lines do not determine the scale"),
+    "other_scale": N_("the likely frame gives another scale than the resolution"),
+    "edges_disagree": N_("the likely frame and paper edges disagree by %(off)s, which no A3 drawing has"),
     "nothing_shows_a3": N_(
         "neither a title block nor frame and paper together show that it is an A3 drawing"
     ),
@@ -40,8 +40,8 @@ PLACING: dict[str, str] = {
     ),
     "as_large_as_a4": N_("no resolution is stated, and the page is as large as A4"),
     "odd_squares": N_(
-        "by the scale that was found its printed squares would be %(pitch)s, and no paper has such ones;"
-        " scan it again with the stated resolution kept"
+        "at the scale that was found its printed squares would be %(pitch)s, which no paper has; scan it"
+        " again and keep the resolution in the file"
     ),
     "part_in_picture": N_("only %(share)s of the sheet is in the picture"),
     "corners": N_("the corners that were given span no sheet"),
@@ -59,7 +59,7 @@ PLACING: dict[str, str] = {
         "an A3 drawing scanned in two halves on A4 cannot be put together: scan it on an A3 scanner or"
         " photograph it whole"
     ),
-    "not_by_drawing": N_("nor does the drawing show the scale, by the declared ones"),
+    "not_by_drawing": N_("the drawing and the declared scales do not show the page's scale either"),
 }
 """Reasons why a page could not be placed or is no such drawing, and what to do."""
 
@@ -68,7 +68,7 @@ FILES: dict[str, str] = {
     "no_pixels": N_("it has no pixels"),
     "no_header": N_("its header cannot be read"),
     "parts_missing": N_("some of its parts are missing"),
-    "wrong_amount": N_("it holds more or fewer data than its size asks for"),
+    "wrong_amount": N_("the amount of its data does not match its size"),
     "undecodable": N_("it cannot be decoded"),
     "pdf_cut_off": N_("it is cut off before its end"),
     "pdf_without_pages": N_("it cannot be opened, or has no pages"),
@@ -78,13 +78,13 @@ FILES: dict[str, str] = {
 SCALES: dict[str, str] = {
     "nothing_written": N_("nothing is written"),
     "too_many_characters": N_("it has more than %(most)s characters"),
-    "beside_equals": N_("nothing stands beside an equals sign"),
+    "beside_equals": N_("a side of an equals sign is empty"),
     "too_large_number": N_("it is too large a number"),
     "no_rule": N_("“%(said)s” is no rule for %(scale)s"),
     "no_omega": N_("a slider drives this mechanism, so that there is no omega of a crank"),
     "not_positive": N_("“%(said)s” is no positive number"),
-    "undrawable": N_("“%(said)s” is no scale that anything could be drawn at"),
-    "no_unit": N_("“%(said)s” has no unit, and a unit is never guessed: write it after the number"),
+    "undrawable": N_("nothing can be drawn at the scale “%(said)s”"),
+    "no_unit": N_("“%(said)s” has no unit: write it after the number; units are never guessed"),
     "no_length": N_("“%(said)s” is not a length per length on paper"),
     "no_velocity": N_("“%(said)s” is not a velocity per length on paper"),
     "no_acceleration": N_("“%(said)s” is not an acceleration per length on paper"),
@@ -126,7 +126,7 @@ OWNERS: dict[str, str] = {
     "data_changed": N_(
         "the student's number or position, the scales or the assignment's data have changed since"
     ),
-    "asked_changed": N_("the criterion asks for something else since, or the page was placed anew"),
+    "asked_changed": N_("the criterion now asks for something else, or the page was placed again"),
     "page_gone": N_("the page is not in the folder any more"),
     "nothing_judged": N_("nothing was judged; decide the verdicts of criteria first"),
 }

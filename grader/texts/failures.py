@@ -34,7 +34,7 @@ FAILURES: dict[str, str] = {
         " command to continue"
     ),
     "held": N_("%(file)s: another program has locked it for more than %(limit)s s; close that program"),
-    "no_lock": N_("%(file)s: cannot be written: its folder takes no lock file (%(error)s)"),
+    "no_lock": N_("%(file)s: cannot be written: no lock file can be made in its folder (%(error)s)"),
     "file_taken": N_("%(file)s: already exists; name another file, or remove it first"),
     "submissions_moved": N_("%(folder)s: its submissions are no longer in %(was)s; grade them again"),
     "results_in_use": N_(
@@ -88,6 +88,8 @@ FAILURES: dict[str, str] = {
         "--cluster %(address)s: the scheduler has ended, or has no worker for %(limit)s s; finished marks"
         " are kept; run the same command to continue"
     ),
+    "folder_unnamed": N_("name the folder; there is no planmark.toml in the working folder"),
+    "results_unnamed": N_("name the folder of results; there is no planmark.toml in the working folder"),
     # Calls of other commands
     "ending": N_("%(option)s %(file)s: the name must end in %(names)s"),
     "extra_missing": N_("a package is missing (%(error)s): pip install 'planmark[%(extra)s]'"),
@@ -122,7 +124,7 @@ FAILURES: dict[str, str] = {
     ),
     "secret_short": N_("%(option)s must have at least %(least)s characters"),
     "data_base": N_("--database: the data base cannot be opened (%(error)s)"),
-    "publication_key": N_("this publication's key is no name of a folder"),
+    "publication_key": N_("this publication's key cannot name a folder"),
     # Calls of an export
     "unknown_target": N_("'%(to)s' is no export target: known are %(names)s"),
     "unknown_thing": N_("%(to)s is given no '%(what)s': known are %(names)s"),
@@ -133,10 +135,10 @@ FAILURES: dict[str, str] = {
     "option_unused": N_("%(option)s has no meaning for %(what)s: leave it out"),
     "form_unused": N_("a file to fill in has no meaning for %(what)s: leave it out"),
     "unused_beside": N_("%(option)s has no meaning beside %(other)s: leave it out"),
-    "maximum_stated": N_("--maximum has no meaning beside %(other)s: it states its own"),
+    "maximum_stated": N_("leave out --maximum: %(other)s already states the maximum"),
     "worksheet_of_moodle": N_("--worksheet is Moodle's: give it with --to moodle alone"),
     "read_for_export": N_("%(file)s: is read for this export; name another file (--file)"),
-    "number": N_("%(option)s: '%(text)s' is no number, as %(to)s has it in addresses"),
+    "number": N_("%(option)s: '%(text)s' is not a number; %(to)s shows the number in its addresses"),
     "maximum": N_("a grade's maximum is a positive number, not %(maximum)s"),
     "maximum_differs": N_(
         "the grade's maximum there is %(there)s, the rubric's is %(here)s: set the same maximum there, or"
@@ -151,7 +153,7 @@ FAILURES: dict[str, str] = {
         " (--maximum and --rescale, where the platform is given grades)\n%(faults)s"
     ),
     "maximum_unknown": N_("%(file)s: no maximum grade; look it up in %(platform)s, then give it (--maximum)"),
-    "combine": N_("'%(combine)s' is no way to combine positions: choose sum or mean"),
+    "combine": N_("positions cannot be combined by '%(combine)s': choose sum or mean"),
     "position_or_combine": N_("either one position or a way to combine them, not both"),
     "several_positions": N_(
         "%(student)s has %(count)s positions and the file has room for one grade: choose a position, or"
@@ -257,3 +259,15 @@ FAILURES: dict[str, str] = {
         " would get the page, so export grades with comments (--worksheet without --what)"
     ),
 }
+
+USAGE: dict[str, str] = {
+    "NoSuchCommand": N_("there is no command %(name)s"),
+    "NoSuchOption": N_("there is no option %(name)s"),
+    "MissingParameter": N_("%(name)s is missing"),
+    "BadOptionUsage": N_("%(name)s needs a value"),
+    "BadParameter": N_("%(name)s: this value cannot be used"),
+    "UsageError": N_("there are more words than the command takes; put a name with spaces in quotes"),
+    "flag": N_("%(name)s takes no value"),
+}
+"""Errors of the parser of options, by their classes."""
+SEE_HELP = N_("%(text)s; %(command)s -h shows how to call it")

@@ -16,7 +16,7 @@ FAULTS: dict[str, tuple[str, ...]] = {
     "not_readable": (N_("cannot be read: %(error)s"),),
     "too_large": (N_("is larger than %(most)s MB, and no such table is; check which file it is"),),
     "not_utf8": (N_("is not UTF-8 text; save it as CSV in UTF-8"),),
-    "too_many_lines": (N_("more than %(most)s lines are no table"),),
+    "too_many_lines": (N_("has more than %(most)s lines, too many for a class's table"),),
     "no_csv": (N_("from here on it is no CSV; check its quotes: one is not closed, or text follows one"),),
     "table_empty": (N_("the file is empty; its first line must name the columns"),),
     "column_missing": (N_("column %(name)s is missing; the columns are %(names)s"),),

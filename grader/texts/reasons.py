@@ -97,7 +97,7 @@ FULL: dict[str, str] = {
     "doubtful": N_("It was read with too little certainty (%(confidence)s)."),
     UNSURE: N_("It was read with too little certainty (%(why)s)."),
     MISREAD: N_("It was probably misread; the dotted stroke may be the one meant."),
-    "scale_seems_off": N_("%(declared)s is declared, %(expected)s was probably drawn with: %(factor)s."),
+    "scale_seems_off": N_("%(declared)s is declared, but %(expected)s was probably used: %(factor)s."),
     "near_limit": N_(
         "It is too close to the limit of the tolerance to decide from the scan (standard error %(se)s)."
     ),
@@ -122,11 +122,11 @@ FULL: dict[str, str] = {
     ),
     "not_explained": N_("These vectors do not belong together: %(unfit)s of %(of)s fit nothing."),
     "readings_disagree": N_("The drawing gives %(first)s, the entered measurement %(second)s."),
-    "written_disagrees": N_("Drawn are %(drawn)s, written on the sheet %(written)s: a person must look."),
+    "written_disagrees": N_("The drawing gives %(drawn)s, the sheet says %(written)s: a person must look."),
     "scale_refused": N_(
         "The declared scale “%(text)s” could not be understood: %(why)s. Write for example %(examples)s."
     ),
-    "scale_off": N_("%(declared)s is declared, %(expected)s was drawn with: %(factor)s."),
+    "scale_off": N_("%(declared)s is declared, but the drawing was made with %(expected)s: %(factor)s."),
     "scale_assumed": N_("The scale was not declared; %(used)s was assumed."),
 }
 """Sentences at level `full` that differ from those at level `hint`."""

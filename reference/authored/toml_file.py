@@ -37,8 +37,6 @@ MAX_BYTES = 200_000
 """Twenty times the largest file that comes with the program."""
 MAX_DEPTH = 12
 """Three times as deep as the tables of the formats go."""
-NOT_TOML = "not_toml"
-"""The code of a file whose syntax is wrong."""
 MAX_NAME = 64
 _ENDLESS_KEY = re.compile(rb"(?:\.[ \t]*[\w\"'-]+[ \t]*){100}")
 """The parser's time grows with the square of a dotted key's parts: 20,000 of them take 20 s."""
@@ -164,30 +162,43 @@ def table_of(path: Path) -> dict[str, Any]:
     return data
 
 
+_REMEDIES = {
+    r"[^=]*=\s*[-+]?\d+,\d": "decimal_point",
+    r"[^=]*=\s*[\d.+-]+\s*[^\d\s#]": "number_alone",
+    r'[^"]*"([^"]*"[^"]*")*[^"]*$': "quote_unclosed",
+    r"[^=]*=\s*($|#)": "value_missing",
+    r'.*"[^"]*\\': "path_quotes",
+    r"[^=]*=\s*(?!true\b|false\b)[^\W\d]|.*[“”„«]": "text_unquoted",
+    r"\[|[^=]*=\s*[\[{]": "bracket_unclosed",
+}
+"""The most likely remedy for a line that is not TOML, by its pattern."""
+
+
 def _no_toml(error: Exception, text: str) -> Finding:
-    """Report invalid TOML with the faulty line and the most likely remedy."""
+    """Report invalid TOML with the faulty line and the most likely remedy: the parser's words are English."""
+    if isinstance(error, RecursionError):
+        return Finding("$", "nested", {"most": MAX_DEPTH})
+    if not isinstance(error, tomllib.TOMLDecodeError):
+        return Finding("$", "number_unusable")
+    lines = [one.strip() for one in text.rstrip().split("\n")]
     found = re.search(r" \(at line (\d+), column \d+\)", str(error))
-    if found is None:
-        return Finding("$", NOT_TOML, {"error": str(error)})
-    number = int(found[1])
-    lines = [one.strip() for one in text.split("\n")]
-    line = lines[number - 1]
-    known: dict[str, Parameter] = {"text": line[:MAX_NAME], "error": str(error).replace(found[0], "")}
-    if re.search(r"=.*\d,\d", line):
-        known["advice"] = "decimal_point"
-    elif re.search(r"=\s*[\d.+-]+\s*[^\d\s#]", line):
-        known["advice"] = "number_alone"
-    elif line.count('"') % 2:
-        known["advice"] = "quote_unclosed"
-    elif table := re.match(r"\[+([^\[\]]+)\]", line):
+    number = int(found[1]) if found else len(lines)
+    line, above = lines[number - 1], lines[: number - 1]
+    if table := re.match(r"\[+([^\[\]]+)\]", line):
         again = re.compile(rf"\[+\s*{re.escape(table[1].strip())}\s*\]")
-        others = [other for other, one in enumerate(lines[: number - 1], 1) if again.match(one)]
         # Of [body] and [[body]], the one that is to be changed is at fault.
-        for other in others[-1:]:
+        for other in [other for other, one in enumerate(above, 1) if again.match(one)][-1:]:
             first, second = (number, other) if not line.startswith("[[") else (other, number)
             told = {"text": lines[first - 1], "name": table[1].strip(), "other": second}
-            return Finding("", NOT_TOML, {**told, "advice": "two_brackets"}, first)
-    return Finding("", NOT_TOML, known, number)
+            return Finding("", "not_toml", {**told, "advice": "two_brackets"}, first)
+    key, sign, _ = line.partition("=")
+    start = max((at for at, one in enumerate(above) if one.startswith("[")), default=0)
+    if sign and key.strip() in {one.partition("=")[0].strip() for one in above[start:]}:
+        remedy = "key_twice"
+    else:
+        remedies = (code for pattern, code in _REMEDIES.items() if re.match(pattern, line))
+        remedy = next(remedies, "line_form")
+    return Finding("", "not_toml", {"text": line[:MAX_NAME], "advice": remedy}, number)
 
 
 def text_of(path: Path) -> str:

@@ -45,7 +45,7 @@ def test_variants_that_cannot_be_solved_are_told_and_the_others_written(planmark
         (tmp_path / f"own.{kind}.toml").write_text(text.replace("to = 30", "to = 70"), encoding="utf-8")
     ran = planmark("plan", "own.assignment.toml", "--all", "--csv", "own.csv")
     assert ran.returncode == 1
-    assert ran.stdout.startswith("65 variants written")
+    assert ran.stdout.startswith("variants written to own.csv: 65")
     assert "the group of B does not assemble" in ran.stderr
     assert "n = 66..70" in ran.stderr
     with (tmp_path / "own.csv").open(encoding="utf-8", newline="") as file:

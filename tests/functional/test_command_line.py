@@ -64,7 +64,7 @@ def test_a_class_is_graded_and_exported_without_options(course):
     status, out, err = told(course, "export")
     assert status in {0, 1}, err
     assert (course / "results" / "export-csv.csv").is_file()
-    assert "next: open results/export-csv.csv" in out
+    assert "urmează: deschideți results/export-csv.csv" in out
     # The results know whose they are, wherever the command is given.
     elsewhere = course.parent
     (course / "results" / "export-csv.csv").unlink()
@@ -176,7 +176,7 @@ def test_each_command_tells_the_one_that_comes_next(tmp_path, course):
     def following(*arguments):
         status, out, err = told(tmp_path, *arguments)
         assert status in {0, 1}, err
-        lines = [line for line in out.splitlines() if line.startswith("next: ")]
+        lines = [line for line in out.splitlines() if line.startswith(("next: ", "urmează: "))]
         return lines[0].partition("planmark ")[2] if lines else None
 
     assert following("new", "mine") == "lint mine.assignment.toml"
@@ -216,7 +216,7 @@ def test_progress_in_a_pipe_is_lines(course):
     _, _, err = told(course, "grade", "--jobs", "1")
     assert "\r" not in err
     assert "\x1b" not in err
-    assert "marking: 2 of 2" in err.splitlines()
+    assert "notare: 2 / 2" in err.splitlines()
     assert len(err.splitlines()) < 10
 
 

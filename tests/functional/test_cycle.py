@@ -8,6 +8,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
+from grader.language import tongue
 from reference.authored.assignment import library, load_assignment
 from reference.kinematics.motion import move
 from tests.examples import slow
@@ -67,10 +68,10 @@ def test_the_printed_table_tells_extremes_between_the_samples(planmark):
     omega = float(engine.mechanism([engine.variant(24)]).crank.omega[0])
     assert ran.returncode == 0
     _, unit, _, _, largest, at, _ = row_of(ran, "a_B")
-    assert unit == "m/s^2"
+    assert unit == "m/s²"
     assert float(largest) == pytest.approx(0.150 * omega**2 * (1 + 150 / 600), rel=PRINTED)
     assert float(at) in {0.0, 360.0}
-    assert "B: dead points at 0.00 deg and 180.00 deg, travel 300.000 mm" in ran.stdout
+    assert "B: dead points at 0.00°, 180.00°, travel 300.000 mm" in ran.stdout
     assert row_of(ran, "v_A")[2] == "constant"
 
 
@@ -88,7 +89,7 @@ def test_the_quick_return_of_the_shaper_is_that_of_its_crank_and_ground(planmark
 def test_a_crank_that_cannot_turn_fully_has_its_range_told(planmark, tmp_path):
     ran = planmark("cycle", "pump", "--n", 7)
     limit = np.degrees(2.0 * np.arccos(1.0 / 6.0))
-    assert f"moves from -{limit:.2f} deg to {limit:.2f} deg; this variant: 44.00 deg" in ran.stdout
+    assert f"moves from -{limit:.2f}° to {limit:.2f}°; this variant: 44.00°" in ran.stdout
     assert "B, its links are in line" in ran.stdout
     assert "∞" in row_of(ran, "v_D")
     planmark("cycle", "pump", "--n", 7, "--csv", "pump.csv", "--of", "v_D")
@@ -121,7 +122,8 @@ def test_in_russian_fields_are_told_apart_by_semicolons(planmark, tmp_path):
 def test_the_diagram_is_drawn_on_a_page_of_its_size(planmark, tmp_path, call, page, lang):
     ran = planmark("cycle", *call.split(), "--svg", "c.svg", "--pdf", "c.pdf", "--lang", lang)
     assert ran.returncode == 0
-    assert ran.stdout.splitlines() == ["Drawn in c.svg", "Drawn in c.pdf"]
+    told = tongue(lang).gettext("drawn in %(file)s")
+    assert ran.stdout.splitlines() == [told % {"file": file} for file in ("c.svg", "c.pdf")]
     root = ET.parse(tmp_path / "c.svg").getroot()
     size = [float(root.get(side).removesuffix("pt")) / 72 * 25.4 for side in ("width", "height")]
     assert size == pytest.approx([float(edge) for edge in page.split("x")], abs=0.01)
@@ -164,7 +166,7 @@ side = "left"
 def test_a_kite_is_followed_over_two_turns_and_silent_where_it_is_flat(planmark, tmp_path):
     ran = planmark("cycle", "kite.assignment.toml", "--position", 1)
     assert "the cycle is two turns" in ran.stdout
-    assert "flat position of B at 0.00 deg and 360.00 deg" in ran.stdout
+    assert "flat position of B at 0.00°, 360.00°" in ran.stdout
     planmark(
         "cycle", "kite.assignment.toml", "--position", 1, "--csv", "k.csv", "--samples", 9, "--of", "omega_2"
     )

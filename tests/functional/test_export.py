@@ -185,7 +185,7 @@ def test_every_option_is_documented():
         ("export marks --to moodle --what results", "moodle is given no 'results'"),
         ("export marks --to canvas --what marks", "known are grades, rubric (or --to canvas-api)"),
         ("export marks --to canvas-api", "canvas-api needs --course-id, --assignment-id"),
-        ("export marks --to canvas-api --course-id x --assignment-id 1", "'x' is no number"),
+        ("export marks --to canvas-api --course-id x --assignment-id 1", "'x' is not a number"),
         ("export marks --to openedx --submissions rubric.json", "no submissions are in this answer"),
         ("export marks --to openedx --submissions none.json", "none.json: cannot be read"),
         ("export marks --to blackboard", "Blackboard takes only its own file"),

@@ -29,7 +29,7 @@ def test_drawing_steps_and_table_speak_the_language_asked_for(planmark, tmp_path
     steps = (tmp_path / "steps.html").read_text(encoding="utf-8")
     assert "Marcați polul" in steps
     assert "planmark:" not in ran.stderr
-    assert ran.stdout.count("Drawn in") == 2
+    assert ran.stdout.count("desenul este în") == 2
 
 
 def test_a_drawing_is_the_same_in_every_run(tmp_path):

@@ -250,7 +250,7 @@ def test_everything_else_arrives_and_running_it_again_changes_nothing(tmp_path, 
     assert [line for line in ran.stdout.splitlines() if line.startswith("  ")] == [
         '  s02 (grade): the platform answered 404: {"errors": [{"message": "trouble with Bearer (token)"}]}'
     ]
-    assert "sent: 7 of 7" in ran.stderr
+    assert "sent: 7 / 7" in ran.stderr
     assert set(canvas.grades) == {f"sis_user_id:{each}" for each in STUDENTS if each != "s02"}
     assert canvas.points["sis_user_id:s07"] == {"c1": 5.0, "c2": 2.5}
     assert waits[:4] == [7.0, 1.0, 1.0, 1.0]
@@ -280,7 +280,9 @@ def test_after_a_regrade_the_changed_alone_are_sent_and_the_rubric_stays(tmp_pat
     path = exported(tmp_path, points=4.0)
     ran = send(path, canvas, "-q")
     assert ran.returncode == 1
-    assert "1 grade\n  1 student: s07\n  sent before and unchanged: 7 calls\nnothing was sent" in ran.stdout
+    assert (
+        "1 grade\n  students (1): s07\n  calls sent before and unchanged: 7\nnothing was sent" in ran.stdout
+    )
     assert canvas.asked == []
     assert send(path, canvas).returncode == 0
     assert canvas.asked == ["GET 345", "PUT sis_user_id:s07"]

@@ -136,7 +136,7 @@ for module in pkgutil.walk_packages(grader.scan.__path__, "grader.scan."):
     importlib.import_module(module.name)
 print(*sys.modules)
 """
-SCANNED = "documents files printed.layout records scan tables.scale_text"
+SCANNED = "documents files language printed.layout records scan tables.scale_text"
 """Modules that a scan may import: of the printed sheets their layout alone, not the code that prints them."""
 
 

@@ -15,8 +15,8 @@ import pytest
         ("plan nowhere.toml --n 1", 2, "no such file"),
         ("plan pump --n 1 --crank-mm 0", 2, "above 0"),
         ("plan pump --n 1 --crank-mm nan", 2, "above 0"),
-        ("plan pump --n one", 2, "'--n'"),
-        ("plan pump --m 1", 2, "No such option"),
+        ("plan pump --n one", 2, "--n: this value cannot be used"),
+        ("plan pump --m 1", 2, "there is no option --m (did you mean --n?)"),
         ("schema rapport", 2, "known are"),
         ("plan pump --n 1 --svg /proc/plan.svg", 5, "cannot be written"),
         ("plan press --position 1 --altitude --svg plan.svg", 2, "kL ka / kv^2 = 0.555556"),
@@ -40,7 +40,7 @@ import pytest
         ("cycle press --position 1 --of omega_9 --csv c.csv", 2, "did you mean omega_"),
         ("cycle press --position 1 --samples 2 --csv c.csv", 2, "a whole number from 3 to 100001"),
         ("cycle press --position 1 --samples -5 --csv c.csv", 2, "a whole number from 3 to 100001"),
-        ("cycle press --position 1 --samples many --csv c.csv", 2, "'--samples'"),
+        ("cycle press --position 1 --samples many --csv c.csv", 2, "--samples: this value cannot be used"),
         ("cycle press --position 1 --lang de --csv c.csv", 2, "en, ro, ru"),
         ("cycle press --csv c.csv", 2, "needs --position"),
     ],
@@ -59,6 +59,14 @@ def test_a_wrong_call_ends_with_its_status_and_one_message(planmark, tmp_path, c
     [
         ("plan pump", 2),
         ("plan press --position 8", 2),
+        ("plan", 2),
+        ("plan pump --m 1", 2),
+        ("plan pump --n one", 2),
+        ("plan pump --n 1 --json=x", 2),
+        ("plan pump extra --n 1", 2),
+        ("plann pump", 2),
+        ("grade --out out", 2),
+        ("schema rapport", 2),
         ("plan mine.assignment.toml --n 3", 3),
         ("plan mine.assignment.toml --all", 3),
         ("lint mine.rubric.toml", 2),
@@ -77,3 +85,33 @@ def test_a_wrong_call_is_told_in_the_language_of_the_call(planmark, tmp_path, ca
         assert (ran.returncode, english.returncode) == (status, status)
         words, others = (set(re.findall(r"(?u)[^\W\d_]{4,}", one.stderr)) for one in (ran, english))
         assert len(words - others) >= 2, ran.stderr
+
+
+def test_what_assembles_for_no_variant_is_told_with_the_variant_in_every_language(planmark, tmp_path):
+    assert planmark("new", "mine").returncode == 0
+    path = tmp_path / "mine.mechanism.toml"
+    path.write_text(path.read_text(encoding="utf-8").replace("[40, 30]", "[4, 3]"), encoding="utf-8")
+    for lang in ("en", "ro", "ru"):
+        ran = planmark("plan", "mine.assignment.toml", "--all", "--lang", lang)
+        assert ran.returncode == 3
+        assert "n = 1" in ran.stderr
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        (("plan", "pump", "--n", "7"), "vector, punct"),
+        (("cycle", "press", "--position", "1"), "manivela se rotește complet"),
+        (("new", "own.assignment.toml"), "urmează:"),
+        (("handout", "pump", "--n", "3", "-o", "h.pdf"), "foi cu teme"),
+        (("plan", "pump", "--all"), "lungime desenată"),
+    ],
+)
+def test_what_a_command_prints_is_in_the_language_of_the_call(planmark, call, told):
+    assert told in planmark(*call, "--lang", "ro").stdout
+
+
+def test_a_class_s_language_holds_for_a_call_that_cannot_be_read(planmark, tmp_path):
+    (tmp_path / "planmark.toml").write_text('assignment = "pump"\nlanguage = "ru"\n', encoding="utf-8")
+    assert "нет параметра --bogus" in planmark("grade", "--bogus").stderr
+    assert "there is no option --bogus" in planmark("grade", "--bogus", "--lang", "en").stderr

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from grader.documents import CalibrationDocument, CalibrationPoint, CalibrationSegments
+from grader.language import N_, ROOT_LANGUAGE, Tongue, tongue
 from grader.printed.layout import calibration_segments
 from grader.records import FloatArray, Page, Reason, Unread
 from grader.scan.decode.pages import page_of
@@ -30,7 +31,7 @@ _SCALE_REPORTED, _UNEQUAL_REPORTED, _SKEW_REPORTED_DEG = 0.003, 0.001, 0.05
 _RESIDUAL_REPORTED_MM = 0.12
 """Markers on a flat page stay below this."""
 _LENGTH_REPORTED_MM = 0.15
-ALL_IS_WELL = "printer and scanner are fit for grading"
+ALL_IS_WELL = N_("printer and scanner are fit for grading")
 _PHOTO_MM = 0.4
 """Markers farther off a linear map than this are a camera's view, not a scanner's."""
 _NEAR_MM, _NEAR_RAD = 1.5, 0.03
@@ -90,7 +91,7 @@ def calibrate(path: Path, number: int = 1) -> CalibrationDocument | Unread:
         residual_mm=straight_sheet.residual_mm if not scanned else linear.rms_mm,
         segments=segments, points=points, advice=[], **scales,
     )  # fmt: skip
-    return document.model_copy(update={"advice": _advice(document)})
+    return document.model_copy(update={"advice": advice_of(document, tongue(ROOT_LANGUAGE))})
 
 
 def _linear(mm: FloatArray, px: FloatArray) -> _Linear:
@@ -182,41 +183,44 @@ def _point(kind: Literal["marker", "segment"], at: FloatArray, off: FloatArray) 
     )
 
 
-def _advice(document: CalibrationDocument) -> list[str]:
-    """Return advice in words; a single sentence if all is well."""
+def advice_of(document: CalibrationDocument, speaker: Tongue) -> list[str]:
+    """Return advice in words of a language; a single sentence if all is well."""
     advice: list[str] = []
+    _ = speaker.gettext
     if document.camera:
-        advice.append(
-            "a photo: scale and skew are the camera's; scan the page to measure printer and scanner"
-        )
+        told = _("a photo: scale and skew are the camera's; scan the page to measure printer and scanner")
+        advice.append(told)
     scale = (
         None
         if document.scale_x is None or document.scale_y is None
         else (document.scale_x + document.scale_y) / 2.0
     )
     if scale is not None and abs(scale - 1.0) > _SCALE_REPORTED:
-        advice.append(
-            f"lengths come out at {100.0 * scale:.2f} % of their size: print at 100 % without fitting to the"
-            " page, and scan without scaling; printed sheets stay right, plain ones are as much off"
+        told = _(
+            "lengths come out at %(share).2f %% of their size: print at 100 %% without fitting to the page,"
+            " and scan without scaling; printed sheets stay right, plain ones are off by as much"
         )
+        advice.append(told % {"share": 100.0 * scale})
     elif scale is None and not document.camera:
-        advice.append("the file states no resolution: only the ratio of the scales is known")
+        advice.append(_("the file states no resolution: only the ratio of the scales is known"))
     if document.unequal is not None and abs(document.unequal) > _UNEQUAL_REPORTED:
-        advice.append(
-            f"lengths along the sheet come out {100.0 * document.unequal:+.2f} % against those across it: use"
-            " printed sheets, whose markers undo it, or rule the frame with care"
+        told = _(
+            "lengths along the sheet differ by %(share)+.2f %% from those across it: use printed sheets,"
+            " whose markers undo it, or rule the frame with care"
         )
+        advice.append(told % {"share": 100.0 * document.unequal})
     if document.skew_deg is not None and abs(document.skew_deg) > _SKEW_REPORTED_DEG:
-        advice.append(f"right angles come out {document.skew_deg:+.2f} degrees off: the paper is fed askew")
+        told = _("right angles are off by %(skew)+.2f°: the paper is fed askew")
+        advice.append(told % {"skew": document.skew_deg})
     if document.residual_mm > _RESIDUAL_REPORTED_MM:
-        advice.append("markers are off any even map: the page was not flat, or its feed is uneven")
+        advice.append(_("markers are off any even map: the page was not flat, or its feed is uneven"))
     segments = document.segments
     if segments.read < 0.9 * segments.printed:
-        few = f"only {segments.read} of {segments.printed} segments are read"
-        advice.append(f"{few}: scan sharper and darker, at 300 dpi")
+        few = _("only %(count)s of %(total)s segments are read: scan sharper and darker, at 300 dpi")
+        advice.append(few % {"count": segments.read, "total": segments.printed})
     elif segments.length_rms_mm is not None and segments.length_rms_mm > _LENGTH_REPORTED_MM:
-        advice.append("lengths of the segments scatter: scan at 300 dpi, grey, not black and white")
-    return advice or [ALL_IS_WELL]
+        advice.append(_("lengths of the segments scatter: scan at 300 dpi, grey, not black and white"))
+    return advice or [_(ALL_IS_WELL)]
 
 
 def residual_map(document: CalibrationDocument, magnified: float = 200.0) -> str:

@@ -17,6 +17,7 @@ from grader.authoring.round_scales import (
     round_up,
     suggestions,
 )
+from grader.language import tongue
 from grader.printed.layout import FRAME_MM, MARGIN_MM, best_template
 from grader.rubric import load_rubric
 from reference.authored.assignment import built_in, library, load_assignment
@@ -109,7 +110,8 @@ def test_scales_of_a_variants_own_are_suggested_where_fewer_vectors_are_short_an
     assignment = load_assignment(name)
     found = lint(assignment, load_rubric(assignment.file.rubric, beside=assignment.path))
     own, _, each = found.scales
-    told = suggestions(found.scales, found.plan, ("mechanism", "velocity_plan", "acceleration_plan"))
+    figures = ("mechanism", "velocity_plan", "acceleration_plan")
+    told = suggestions(found.scales, found.plan, figures, tongue("en"))
     assert each.over_all.room >= 1.0
     for index, variant in enumerate(found.plan.variants):
         better = each.short[index] < own.short[index] or own.over_all.room < 1.0

@@ -48,12 +48,12 @@ def test_copied_values_are_told_in_results_on_the_page_and_in_the_terminal(resul
     assert "s3, position 1" in said
 
 
-def test_a_regrade_tells_criteria_and_why_in_the_terminal(results, tmp_path, capsys):
+def test_a_regrade_tells_marks_and_why_in_the_terminal(results, tmp_path, capsys):
     tolerance = RUBRIC.tolerance.model_copy(update={"length_mm": 0.1, "length_relative": 0.0})
     strict = RUBRIC.model_copy(update={"tolerance": tolerance})
     again = grade(Batch(PRESS, strict, tmp_path / "in", tmp_path / "out"), lambda *_: None, Inline())
     assert again.alike == results.alike
     tell_class(again, tmp_path / "out")
     said = capsys.readouterr().out
-    assert "the rubric was changed" in said
-    assert " full -> " in said
+    assert "→" in said
+    assert "(the rubric was changed)" in said

@@ -342,3 +342,29 @@ def test_texts_fall_back_to_english():
     assert load_assignment("pump").file.title.in_language("de").startswith("Pump")
     assert load_assignment("pump").file.title.in_language("ro").startswith("Mecanism")
     assert isinstance(load_assignment("pump").file, AssignmentFile)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "remedy"),
+    [
+        ("a = \nb = 1\n", 1, "value_missing"),
+        ("a = 0,5\n", 1, "decimal_point"),
+        ("a = 5 mm\n", 1, "number_alone"),
+        ("a = left\n", 1, "text_unquoted"),
+        ('a = "left\n', 1, "quote_unclosed"),
+        ('a = "C:\\Users"\n', 1, "path_quotes"),
+        ("a = 1\na = 2\n", 2, "key_twice"),
+        ("[t]\na = 1\n[u]\na = 2\na = 3", 5, "key_twice"),
+        ("a = [1, 2\n", 1, "bracket_unclosed"),
+        ("a 1\n", 1, "line_form"),
+    ],
+)
+def test_what_is_no_toml_is_told_with_its_line_and_a_remedy_and_none_of_the_parsers_words(
+    tmp_path, text, line, remedy
+):
+    (path := tmp_path / "bad.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(AuthoredFileError) as error:
+        load(MechanismFile, path)
+    (found,) = error.value.findings
+    assert (found.code, found.line, found.parameters["advice"]) == ("not_toml", line, remedy)
+    assert set(found.parameters) == {"text", "advice"}

@@ -67,7 +67,7 @@ def test_an_absolute_path_stays(tmp_path):
         ("pages = 0", "$.pages", "must be >= 1"),
         ('pages = "2"', "$.pages", "without quotes"),
         ('platform = "canva"', "$.platform", "csv, moodle"),
-        ("roster = ", "line 1", "is not TOML"),
+        ("roster = ", "line 1", "is not TOML: roster = (the value behind the equals sign is missing)"),
     ],
 )
 def test_a_fault_is_told_with_file_key_and_what_to_do(tmp_path, text, path, advice):

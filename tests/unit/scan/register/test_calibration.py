@@ -57,7 +57,7 @@ def test_scales_and_skew_of_printer_and_scanner_come_back(tmp_path, turns):
     assert found.segments.read == found.segments.printed
     assert found.segments.length_worst_mm < 2 * LENGTH_MM
     assert found.segments.place_rms_mm < PLACE_MM
-    assert any("against those across" in line for line in found.advice)
+    assert any("from those across" in line for line in found.advice)
     assert residual_map(found).count("<circle") == len(found.points)
 
 
