@@ -184,7 +184,7 @@ def _detail(mistake: Mistake) -> dict[str, float | str]:
             whose = (("n", n), ("position", position), ("part", at if at.endswith("_plan") else None))
             return {key: value for key, value in whose if value is not None}
         case Mistake(code="data_misread", parameters={"angle crank": angle}):
-            return {"crank_deg": round(math.degrees(float(angle)) % 360.0, 1)}
+            return {"crank_deg": round(math.degrees(float(angle)), 1) % 360.0}
         case Mistake(code="figure_rotated", quarters=quarters) if quarters:
             return {"degrees": 90.0 * quarters}
         case Mistake(other=other) if other:

@@ -5,6 +5,7 @@ Where a record holds a *complex* position it is x - i y: y points up, so that th
 difference is the direction counter-clockwise from the sheet's +x, as in `reference`.
 """
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -68,6 +69,11 @@ def as_error(problem: Reason) -> InputFileError:
 def on_sheet(at: complex) -> tuple[float, float]:
     """Return a complex position as x and y in sheet millimetres, y down."""
     return at.real, -at.imag
+
+
+def degrees(angle_rad: float) -> float:
+    """Return an angle in degrees from 0 up to, not including, 360; a little below 0 is 0."""
+    return math.degrees(angle_rad) % 360.0 % 360.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,7 +255,6 @@ class Strokes:
     se_offset : (n,) standard error of the line's position across, at the stroke's middle
     se_angle : (n,) standard error of its direction, radians
     se_end : (n, 2) standard error along the line of each end
-    coverage : (n,) share of the length that is inked, 1 for a solid stroke
     darkness : (n,) mean contrast to the paper, 0..1
     """
 
@@ -258,7 +263,6 @@ class Strokes:
     se_offset: FloatArray
     se_angle: FloatArray
     se_end: FloatArray
-    coverage: FloatArray
     darkness: FloatArray
 
     def __len__(self) -> int:

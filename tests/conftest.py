@@ -51,6 +51,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.no_cover)
 
 
+@pytest.fixture(scope="session", autouse=True)
+def no_waiting_for_the_disk() -> None:
+    """Write without waiting for the disk: no test cuts the power, and a busy disk takes long."""
+    os.fsync = lambda _file: None
+
+
 @pytest.fixture(scope="session")
 def shared() -> Path:
     """The folder of material kept beside the project; tests that need it are skipped without."""

@@ -11,5 +11,5 @@ def until(told):
     end = time.monotonic() + PATIENCE_S
     while not (answer := told()):
         assert time.monotonic() < end, "it does not come"
-        time.sleep(0.05)
+        time.sleep(0.01)
     return answer

@@ -7,8 +7,6 @@ units per millimetre on paper) and the points of the mechanism, ``x_A`` and ``y_
 Pages are in millimetres from the top left corner, x right, y down.
 """
 
-import csv
-import io
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -18,6 +16,7 @@ import numpy as np
 
 from grader.files import guarded
 from grader.language import Tongue
+from grader.tables.reader import written
 from reference.authored.assignment import SCALE_NAMES, Assignment, Variant
 from reference.authored.variant_table import KEYS
 from reference.drawing.canvas import (
@@ -152,13 +151,11 @@ def class_csv(plan: Plan, *, decimal_comma: bool = False) -> str:
     """
     columns = [column for section in sections_of(plan) for block in section.blocks for column in block]
     known = identity(plan.variants)
-    buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\r\n", delimiter=";" if decimal_comma else ",")
-    writer.writerow([*(name for name, _ in known), *(guarded(column.key) for column in columns)])
+    rows = [[*(name for name, _ in known), *(guarded(column.key) for column in columns)]]
     for row in range(len(plan.variants)):
         figures = [_written(float(column.values[row]), decimal_comma) for column in columns]
-        writer.writerow([*(numbers[row] for _, numbers in known), *figures])
-    return buffer.getvalue()
+        rows.append([*(str(numbers[row]) for _, numbers in known), *figures])
+    return written(rows, ";" if decimal_comma else ",")
 
 
 def _written(value: float, decimal_comma: bool) -> str:

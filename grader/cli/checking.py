@@ -1,7 +1,5 @@
 """``planmark check``."""
 
-import csv
-import io
 import shutil
 import textwrap
 from collections.abc import Sequence
@@ -22,6 +20,7 @@ from grader.self_check.advice import RESULTS, CheckedLine
 from grader.self_check.results import LEVELS, likely_mistakes
 from grader.self_check.values import check_values
 from grader.tables.measurements import Measurements, columns_of, names_of, read_measurements
+from grader.tables.reader import written
 from grader.texts.spoken import failure, message, problem_documents
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from reference.errors import CallError
@@ -121,15 +120,12 @@ def _write_template(file: Path, asked: dict[str, str], variants: Sequence[Varian
         raise failure(CallError, "template_exists", file=file)
     columns = dict.fromkeys(variants[0].numbers, "") | asked
     units = [speaker.unit(unit) for unit in columns.values()]
-    text = io.StringIO()
+    head = [list(columns), [f"# {units[0]}".strip(), *units[1:]], [speaker.gettext(HOW_TO_FILL_IN)]]
+    lines = [[str(one.numbers.get(name, "")) for name in columns] for one in variants]
     # Spreadsheets of languages with decimal commas separate fields by semicolons.
-    writer = csv.writer(text, delimiter="," if speaker.decimal_mark == "." else ";", lineterminator="\r\n")
-    writer.writerows(
-        [list(columns), [f"# {units[0]}".strip(), *units[1:]], [speaker.gettext(HOW_TO_FILL_IN)]]
-    )
-    writer.writerows([one.numbers.get(name, "") for name in columns] for one in variants)
+    text = written([*head, *lines], "," if speaker.decimal_mark == "." else ";")
     # With a byte order mark: spreadsheets take the file for UTF-8.
-    write_whole(file, text.getvalue().encode("utf-8-sig"))
+    write_whole(file, text.encode("utf-8-sig"))
     terminal.say(speaker.gettext(WRITTEN) % {"file": file})
 
 

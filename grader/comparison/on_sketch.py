@@ -22,7 +22,6 @@ from grader.comparison.verdicts import (
     Limit,
     MarkRange,
     by_rule,
-    degrees,
     mark,
     open_between,
     the_better,
@@ -30,7 +29,7 @@ from grader.comparison.verdicts import (
 )
 from grader.documents import Quantity, Tolerance
 from grader.outcomes import Outcome
-from grader.records import MECHANISM, Reason
+from grader.records import MECHANISM, Reason, degrees
 from grader.rubric import CriterionTable, RubricFile
 from reference.construction.elements import View
 from reference.construction.steps import Similar

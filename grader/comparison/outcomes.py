@@ -5,10 +5,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from grader.comparison.task import Task
-from grader.comparison.verdicts import FULL, NONE, MarkRange, degrees
+from grader.comparison.verdicts import FULL, NONE, MarkRange
 from grader.documents import Quantity, Tolerance, Verdict
 from grader.outcomes import CREDITED, EVEN, Outcome
-from grader.records import Reason
+from grader.records import Reason, degrees
 from grader.rubric import CriterionTable
 from reference.construction.elements import Line
 from reference.construction.graph import Construction

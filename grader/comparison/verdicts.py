@@ -9,7 +9,7 @@ from typing import cast
 from grader.comparison.evidence import DrawnVector
 from grader.documents import Tolerance
 from grader.outcomes import EVEN
-from grader.records import Reason
+from grader.records import Reason, degrees
 from grader.rubric import CriterionTable, RubricFile, ToleranceTable
 from reference.construction.uncertainty import EndSpread
 from reference.quantities import unit_of
@@ -516,8 +516,3 @@ def _direction_reason(
     if abs(residual_deg) >= 180.0 - REVERSED_WITHIN_DEG:
         return Reason("reversed", params)
     return Reason("turned_left" if residual_deg > 0.0 else "turned_right", params)
-
-
-def degrees(angle_rad: float) -> float:
-    """Degrees from 0 up to, not including, 360."""
-    return math.degrees(angle_rad) % 360.0 % 360.0

@@ -1,8 +1,6 @@
 """Strokes of reciprocating and rocking members: dead points, travel, time ratio; extremes of quantities."""
 
-import csv
 import difflib
-import io
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from grader.files import guarded
+from grader.tables.reader import written
 from grader.texts.spoken import failure
 from reference.construction.derive import construction_of
 from reference.construction.graph import Construction
@@ -195,13 +194,11 @@ def cycle_csv(subject: CycleSubject, selection: Selection, *, decimal_comma: boo
     for point in selection.points:
         place = np.broadcast_to(cycle.motion.position[point], cycle.driving.shape)
         columns += [(f"x_{point} [m]", place.real), (f"y_{point} [m]", place.imag)]
-    buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\r\n", delimiter=";" if decimal_comma else ",")
-    writer.writerow([*(guarded(heading) for heading, _ in columns), "note"])
+    rows = [[*(guarded(heading) for heading, _ in columns), "note"]]
     for row in range(cycle.driving.size):
         numbers = [_written(float(values[row]), decimal_comma) for _, values in columns]
-        writer.writerow([*numbers, guarded(cycle.undetermined.get(row, ""))])
-    return buffer.getvalue()
+        rows.append([*numbers, guarded(cycle.undetermined.get(row, ""))])
+    return written(rows, ";" if decimal_comma else ",")
 
 
 def _written(value: float, decimal_comma: bool) -> str:

@@ -50,7 +50,7 @@ def rubric_document(assignment: Assignment, rubric: RubricFile) -> RubricDocumen
                 titles=_titles(one.title),
                 section=one.section,
                 max_points=points[one.id],
-                levels=[*_levels(rubric, one)],
+                levels=[*_levels(rubric, one, points[one.id])],
             )
             for one in rubric.criterion
         ],
@@ -62,12 +62,12 @@ def _titles(text: Text) -> dict[str, str]:
     return {lang: " ".join(text.in_language(lang).split()) for lang in LANGUAGES}
 
 
-def _levels(rubric: RubricFile, criterion: CriterionTable) -> Iterator[LevelDocument]:
+def _levels(rubric: RubricFile, criterion: CriterionTable, most: float) -> Iterator[LevelDocument]:
     """All verdicts that the program or a person may give; a partial one for each band of the tolerance."""
     bands = rubric.tolerance_of(criterion).all_bands or ((1.0, 0.0),)
     shares: list[tuple[Verdict, float]] = [("full", 1.0), ("follow_through", 1.0)]
     for verdict, share in [*shares, *(("partial", share) for _, share in bands), ("none", 0.0)]:
-        yield LevelDocument(verdict=verdict, points=round(share * rubric.points[criterion.id], DECIMALS))
+        yield LevelDocument(verdict=verdict, points=round(share * most, DECIMALS))
     yield LevelDocument(verdict="not_judged", points=None)
 
 

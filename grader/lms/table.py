@@ -21,7 +21,7 @@ from grader.documents import CriterionDocument, ReportDocument, ResultsDocument
 from grader.files import OutputError, guarded
 from grader.lms.grades import Delivery, Grade, Options, Person, ready
 from grader.records import Reason, Value
-from grader.tables.reader import Row, TableKind, check_rows, short
+from grader.tables.reader import Row, TableKind, check_rows, short, written
 from grader.texts.spoken import failure
 from reference.authored.variant_table import delimiter_of
 from reference.errors import CallError, InputFileError
@@ -40,9 +40,7 @@ def csv_text(header: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
     Raises OutputError where the text does not read back as the same table.
     """
     table = [[_cell_text(cell) for cell in row] for row in (header, *rows)]
-    buffer = io.StringIO()
-    csv.writer(buffer, lineterminator="\r\n").writerows(table)
-    text = buffer.getvalue()
+    text = written(table)
     if list(csv.reader(io.StringIO(text, newline=""), strict=True)) != table:
         raise not_as_meant()
     return text

@@ -14,7 +14,7 @@ from grader.comparison.task import Task
 from grader.comparison.verdicts import FULL, NONE, OPENING
 from grader.marking.settling import settled
 from grader.outcomes import CREDITED, NamedMistake, Outcome
-from grader.records import Figure, Reading, ReadNode, ReadVector, Reason
+from grader.records import Figure, Reading, ReadNode, ReadVector, Reason, degrees
 from reference.construction.graph import Vector
 from reference.construction.mistakes import Mistake
 
@@ -103,7 +103,7 @@ def _between(tail: ReadNode, head: ReadNode) -> ReadVector:
     drawn, se_mm = head.at - tail.at, math.hypot(tail.se_mm, head.se_mm)
     if not drawn:
         return ReadVector(0.0, se_mm, None, None, min(tail.confidence, head.confidence))
-    turn = math.degrees(cmath.phase(drawn)) % 360.0
+    turn = degrees(cmath.phase(drawn))
     se_deg = min(math.degrees(se_mm / abs(drawn)), 90.0)
     return ReadVector(abs(drawn), se_mm, turn, se_deg, min(tail.confidence, head.confidence))
 

@@ -18,7 +18,7 @@ from grader.comparison.evidence import DrawnVector, Submission
 from grader.comparison.scales import Scale
 from grader.comparison.task import Task
 from grader.outcomes import UsedScale
-from grader.records import Reading, ReadVector
+from grader.records import Reading, ReadVector, degrees
 from reference.construction.elements import Scaled
 from reference.construction.mistakes import RPM_FACTOR, Mistake
 from reference.geometry import FloatArray
@@ -294,7 +294,7 @@ def _directions(entries: _Entries) -> _Found | None:
         angle = convention.undone(np.array([math.radians(vector.direction_deg)]))[0]
         if not math.isfinite(angle):
             return vector
-        return replace(vector, direction_deg=math.degrees(angle) % 360.0)
+        return replace(vector, direction_deg=degrees(angle))
 
     return _Found(tuple(convention.mistakes), change, probability)
 

@@ -1,7 +1,6 @@
 """Open questions as the page gets them: their list, and one question with its choices."""
 
 import cmath
-import math
 from collections.abc import Iterator, Mapping
 
 from markupsafe import Markup
@@ -13,7 +12,7 @@ from grader.language import N_, Tongue, symbols
 from grader.overlay.closeup import LEAST_LOOK_MM, LOOK_MARGIN_MM, box_around
 from grader.overlay.scene import MARKS
 from grader.printed.layout import SCALE_BOXES
-from grader.records import MECHANISM
+from grader.records import MECHANISM, degrees
 from grader.review.doubts import SURE, Choice, Doubt
 from grader.review.questions import (
     UNSURE,
@@ -198,7 +197,7 @@ def _doubt_numbers(
         for choice in doubt.choices:
             along = choice.along
             if along is not None:
-                turn = math.degrees(cmath.phase(along)) % 360.0
+                turn = degrees(cmath.phase(along))
                 cells = quantity_cells(Quantity(length_mm=abs(along), direction_deg=turn), speaker)
                 yield choice.key.upper(), Markup.escape(" · ".join(cells))
         of_stroke = next((one.vector for one in doubt.choices if one.vector), first.vector)

@@ -9,6 +9,7 @@ from typing import Any, Literal, cast
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
+from grader.records import degrees
 from reference.authored.assignment import Assignment, Variant
 from reference.construction.graph import Construction
 from reference.geometry import ComplexArray, FloatArray
@@ -268,7 +269,7 @@ def _forces(forces: Forces, motion: Motion, index: int) -> ForcesDocument:
     least = NO_TURN * max(abs(complex(force[index])) for force in acting)
 
     def directed(force: ComplexArray) -> tuple[float, float | None]:
-        size, angle = abs(force[index]), math.degrees(np.angle(force[index])) % 360.0 % 360.0
+        size, angle = abs(force[index]), degrees(np.angle(force[index]))
         return float(size), float(angle) if size > least else None
 
     def reaction(one: Reaction) -> dict[str, Any]:

@@ -42,7 +42,7 @@ from reference.construction.steps import (
 from reference.drawing.canvas import pieces_of, scale_pieces
 from reference.drawing.subject import Subject, Wording
 from reference.mechanism import hinged_at
-from reference.quantities import group_of, unit_of
+from reference.quantities import group_of
 
 PERPENDICULAR = N_("perpendicular to %(link)s")
 PARALLEL = N_("parallel to %(link)s")
@@ -211,11 +211,6 @@ class Speaker:
     def scale_value(self, scale: str) -> float:
         """Return a scale, real units per millimetre."""
         return self.subject.number(getattr(self.subject.plan.scales, scale))
-
-    def scale_with_value(self, scale: str) -> Markup:
-        """Return a scale with its value."""
-        value = self.real(self.scale_value(scale), unit_of(scale))
-        return Markup("{} = {}").format(self.write(self.scale(scale)), value)
 
     def line_direction(self, along: Direction) -> Markup:
         """Describe the direction of a line, without a sense."""

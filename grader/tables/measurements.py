@@ -53,7 +53,7 @@ from reference.authored.assignment import SCALE_NAMES, USUAL_SCALES, Assignment,
 from reference.authored.variant_table import delimiter_of
 from reference.construction.derive import construction_of
 from reference.construction.graph import Construction, coincident
-from reference.errors import MOST_FINDINGS
+from reference.errors import MOST_FINDINGS, writable
 from reference.quantities import kind_of, unit_of, value_name
 
 if TYPE_CHECKING:
@@ -501,15 +501,11 @@ def _object(pairs: Sequence[tuple[str, object]]) -> dict[str, object]:
     table: dict[str, object] = {}
     for key, value in pairs:
         # A half of a surrogate pair can be written in JSON, and in no file of ours.
-        name, read = _encodable(key), _encodable(value) if isinstance(value, str) else value
+        name, read = writable(key), writable(value) if isinstance(value, str) else value
         if name in table:
             read = Reason("there_twice", {"text": f"{_shown(table[name])} / {_shown(read)}"})
         table[name] = read
     return table
-
-
-def _encodable(text: str) -> str:
-    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def _shown(value: object) -> str:

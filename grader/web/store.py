@@ -406,13 +406,13 @@ class Store:
             own = update(Job).where(Job.id == job_id, Job.state.in_(before))
             return bool(session.execute(own.values(**values)).rowcount)  # type: ignore[attr-defined]
 
-    def forget(self, *, days: float, now: float | None = None) -> None:
+    def forget(self, *, days: float) -> None:
         """Delete visits and audit entries older than so many days, and what photos gave a day ago."""
-        moment = time.time() if now is None else now
-        before = moment - days * 86400.0
+        now = time.time()
+        before = now - days * 86400.0
         with self.session() as session:
             session.execute(delete(Visit).where(Visit.used < before, Visit.title == ""))
-            session.execute(delete(Job).where(Job.created < moment - 86400.0, Job.kind != "grade"))
+            session.execute(delete(Job).where(Job.created < now - 86400.0, Job.kind != "grade"))
             session.execute(delete(Audit).where(Audit.at < before))
 
 

@@ -16,7 +16,6 @@ from reference.construction.elements import Along
 from reference.construction.steps import ArcAndLine, Given, Similar, Step, TwoArcs, TwoLines
 from reference.drawing import symbols
 from reference.drawing.canvas import (
-    INK,
     PAPER,
     Area,
     Bounds,
@@ -31,14 +30,13 @@ from reference.drawing.canvas import (
 from reference.drawing.forces import with_scheme
 from reference.drawing.labels import segments_of
 from reference.drawing.sketch import LETTER_MM, PLATE_FILL, polygon, sketch
-from reference.drawing.subject import PLAN_COLOURS, DrawnFigure, Subject, Wording
+from reference.drawing.subject import DrawnFigure, Subject, Wording
 from reference.drawing.symbols import point, unit
 from reference.drawing.tables import column
 from reference.plan import Plan
 from reference.quantities import group_of
 
 FRAME: Bounds = (20.0, 10.0, 410.0, 287.0)
-COLOURS = {"mechanism": INK, **PLAN_COLOURS}
 WARNING_COLOUR, WARNING_MM = "#c00000", 5.0
 ENGLISH = Wording()
 

@@ -130,7 +130,7 @@ class SimulatedSheet:
         return target
 
 
-def simulate(
+def simulate(  # noqa: PLR0913 - the last only spares what nobody looks at
     assignment: Assignment,
     variant: Variant,
     seed: int,
@@ -138,15 +138,16 @@ def simulate(
     *,
     student_id: str = "s01",
     printed: Printed | None = None,
+    most: int | None = None,
 ) -> list[SimulatedSheet]:
     """Simulate a student's sheets, in the order of drawing.
 
     Arguments: `printed` gives answer sheets by kind of page (``all``, ``velocity``,
-    ``acceleration``), drawn on instead of plain paper. Raises ValueError where a mistake asked for
-    cannot be made.
+    ``acceleration``), drawn on instead of plain paper; of more sheets than `most` only the first are
+    scanned. Raises ValueError where a mistake asked for cannot be made.
     """
     desk, drawn = drawn_by(assignment, variant, seed, settings, student_id=student_id, printed=printed)
-    return [scanned(desk, sheet, (number, len(drawn))) for number, sheet in enumerate(drawn, start=1)]
+    return [scanned(desk, sheet, (number, len(drawn))) for number, sheet in enumerate(drawn[:most], start=1)]
 
 
 def drawn_by(

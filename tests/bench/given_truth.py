@@ -107,7 +107,7 @@ def with_strokes(true: TruePage) -> ScannedPage:
     kept = ink.strokes
     sure = np.hypot(*(kept.ends[:, 1] - kept.ends[:, 0]).T) > LONG_MM
     drawn = true.vectors[np.hypot(*(true.vectors[:, 1] - true.vectors[:, 0]).T) >= LEAST_MM]
-    good = {"darkness": 1.0 - GOOD, "width": 1.0 - GOOD, "coverage": 1.0}
+    good = {"darkness": 1.0 - GOOD, "width": 1.0 - GOOD}
     like = {
         field.name: np.full(
             (len(drawn), *getattr(kept, field.name).shape[1:]),

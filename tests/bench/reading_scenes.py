@@ -219,14 +219,14 @@ def works(scene: ReadingScene, students: int, first_seed: int = 1) -> Iterator[S
         yield work(scene, seed)
 
 
-def work(scene: ReadingScene, seed: int) -> SceneWork:
-    """One student of a scene."""
+def work(scene: ReadingScene, seed: int, most: int | None = None) -> SceneWork:
+    """One student of a scene; of more sheets than `most` only the first."""
     assignment, rubric = task_named(scene.assignment)
     variants = assignment.variants()
     variant = variants[seed % len(variants)]
     settings = _settings(scene, assignment, variant, seed)
     printed = answer_sheets(assignment, variant) if scene.printed else None
-    sheets = simulate(assignment, variant, seed, settings, printed=printed)
+    sheets = simulate(assignment, variant, seed, settings, printed=printed, most=most)
     return SceneWork(scene, seed, assignment, variant, rubric, sheets)
 
 

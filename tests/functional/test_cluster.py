@@ -140,7 +140,7 @@ def test_a_killed_worker_changes_nothing(address, handed_in, local, tmp_path):
 def test_a_folder_elsewhere(address, handed_in, local, tmp_path, planmark):
     handler = functools.partial(_Quiet, directory=str(handed_in))
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
+        threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
         elsewhere = f"http://127.0.0.1:{server.server_address[1]}"
         call = ("grade", elsewhere, "--assignment", "pump", "--out", tmp_path / "out", "--time-limit", "300")
         ran = planmark(*call, "--cluster", address)

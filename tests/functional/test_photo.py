@@ -18,7 +18,7 @@ PHOTO = ReadingScene("photo", "", device="phone", dpi=None, printed=True, hardsh
 @pytest.fixture(scope="module")
 def drawn(tmp_path_factory: pytest.TempPathFactory) -> tuple[SceneWork, Path]:
     """A student's velocities on a printed sheet, photographed."""
-    student = work(PHOTO, 1)
+    student = work(PHOTO, 1, most=1)
     return student, student.sheets[0].save(tmp_path_factory.mktemp("photo") / "sheet")
 
 

@@ -58,7 +58,7 @@ def sheet_of(kind):
         made = make_sheets(assignment, [RosterRow("s07", "Ana", N)])
         printed = printed_sheets(made.pdf, made.layout)
     settings = Settings(hand=CAREFUL, scan=KINDS[kind].scan)
-    return simulate(assignment, assignment.variant(N), SEED, settings, printed=printed)[0]
+    return simulate(assignment, assignment.variant(N), SEED, settings, printed=printed, most=1)[0]
 
 
 def reading_of(kind, turns, folder):

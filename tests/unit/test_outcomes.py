@@ -3,6 +3,7 @@
 import pytest
 
 from grader.outcomes import NamedMistake
+from grader.records import degrees
 from reference.construction.mistakes import Mistake
 
 
@@ -16,9 +17,15 @@ from reference.construction.mistakes import Mistake
         (Mistake("wrong_link", "b", other=("A", "B")), {"other": "AB"}),
         (Mistake("arithmetic", "b", factor=2.0), {"factor": 2.0}),
         (Mistake("arithmetic", "n_B", other=("right_triangle",)), {"slip": "right_triangle"}),
+        (Mistake("data_misread", "all", parameters={"angle crank": 6.2825}), {"crank_deg": 0.0}),
         (Mistake("normal_reversed", "n_BA"), {}),
     ],
 )
 def test_a_mistake_tells_what_its_sentence_needs(mistake, detail):
     assert NamedMistake(mistake, (), 1.0).detail == detail
     assert NamedMistake(mistake, (), 1.0, {"from": "b"}).detail == {**detail, "from": "b"}
+
+
+def test_a_direction_is_never_a_full_turn():
+    assert degrees(-1e-17) == 0.0
+    assert degrees(7.0) == pytest.approx(41.0705, abs=1e-4)

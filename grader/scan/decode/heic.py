@@ -6,7 +6,7 @@ The library turns and mirrors a picture as the file says. Its EXIF tag says so o
 import numpy as np
 
 from grader.records import Page
-from grader.scan.decode.limits import Door, InputFile, check_memory, check_size, truncated
+from grader.scan.decode.limits import Door, InputFile, check_size, truncated
 from grader.scan.decode.pictures import to_grey
 from reference.errors import InputFileError
 
@@ -25,8 +25,7 @@ def _page(file: InputFile, number: int) -> Page | None:
     try:
         picture = open_heif(file.data)
         wide, high = picture.size
-        check_memory(file, wide * high, _PIXEL_BYTES * wide * high)
-        check_size(file, wide, high)
+        check_size(file, wide, high, _PIXEL_BYTES)
         # A copy: the decoder takes its memory back. Its rows may be longer than the picture.
         pixels = np.array(picture)[:, :wide]
     except (EOFError, ValueError) as error:

@@ -153,9 +153,12 @@ def kind_of(file: InputFile) -> str:
     raise InputFileError("file_type_unsupported", file=file.name, **known)
 
 
-def check_size(file: InputFile, width: int, height: int) -> None:
-    """Raise InputFileError for a page that cannot be a drawing by its width and height in pixels."""
-    check_memory(file, width * height, 0)
+def check_size(file: InputFile, width: int, height: int, pixel_bytes: int = 0) -> None:
+    """Raise InputFileError for a page that cannot be a drawing by its width and height in pixels.
+
+    Arguments: decoding a pixel needs so many bytes besides the file and its grey; see `check_memory`.
+    """
+    check_memory(file, width * height, width * height * pixel_bytes)
     if min(width, height) < max(_LEAST_SIDE_PX, _LEAST_SHARE * max(width, height)):
         raise InputFileError("image_too_small", wide=width, high=height, file=file.name)
 

@@ -94,8 +94,7 @@ def _rendered(file: InputFile, page: pypdfium2.PdfPage) -> _Taken:
     width_pt, height_pt = page.get_size()
     scale = RENDER_DPI / _POINTS_PER_INCH
     wide, high = int(width_pt * scale), int(height_pt * scale)
-    check_memory(file, wide * high, _PIXEL_BYTES * wide * high)
-    check_size(file, wide, high)
+    check_size(file, wide, high, _PIXEL_BYTES)
     grey = page.render(scale=scale, grayscale=True).to_numpy()
     plane = np.ascontiguousarray(grey.reshape(grey.shape[0], grey.shape[1], -1)[..., 0]).copy()
     return plane, *_resolved(plane, width_pt, height_pt, 0)

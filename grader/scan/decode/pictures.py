@@ -261,8 +261,7 @@ def _png_page(file: InputFile, number: int) -> Page | None:
     wide, high, bits, colour = _HEADER.unpack_from(file.data, _HEADER_AT)
     if colour not in _CHANNELS:
         raise damaged(file, "no_header")
-    check_memory(file, wide * high, wide * high * _CHANNELS[colour] * max(bits // 8, 1))
-    check_size(file, wide, high)
+    check_size(file, wide, high, _CHANNELS[colour] * max(bits // 8, 1))
     with PngImagePlugin.PngImageFile(io.BytesIO(file.data)) as image:
         tags = tags_within(image)
         image.verify()

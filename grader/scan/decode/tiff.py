@@ -15,7 +15,6 @@ from grader.scan.decode.limits import (
     MAX_PAGES,
     Door,
     InputFile,
-    check_memory,
     check_pages,
     check_size,
     damaged,
@@ -53,8 +52,7 @@ def _page(file: InputFile, number: int) -> Page | None:
         return None
     known = image.tag_v2
     wide, high = known[Tag.ImageWidth], known[Tag.ImageLength]
-    check_memory(file, wide * high, _PIXEL_BYTES * wide * high)
-    check_size(file, wide, high)
+    check_size(file, wide, high, _PIXEL_BYTES)
     x, y = (known.get(tag, 0) for tag in (Tag.XResolution, Tag.YResolution))
     about = tags_of(from_unit(x, y, known.get(Tag.ResolutionUnit, 2)), known.get(Tag.Orientation, 1))
     parts = _parts(file, image)

@@ -164,13 +164,6 @@ def _beside_another(
     return result
 
 
-def coverage(flat: Flat, fitted: Fitted, count: int = 100) -> FloatArray:
-    """(k,) share of each stroke's length that is inked within 0.4 of its width."""
-    share = (np.arange(count) + 0.5) / count
-    span = fitted.ends[:, 1] - fitted.ends[:, 0]
-    return np.asarray(_inked_on(flat, fitted.ends[:, 0], span, share, fitted).mean(axis=1), dtype=np.float64)
-
-
 def _inked_on(
     flat: Flat, start: FloatArray, way: FloatArray, steps: FloatArray, strokes: Fitted
 ) -> BoolArray:

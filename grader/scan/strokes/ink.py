@@ -21,7 +21,7 @@ from grader.scan.pixels import (
     reduction,
 )
 from grader.scan.strokes.centreline import Fitted, Pen, fit_centre, refined, rejoined
-from grader.scan.strokes.ends import coverage, find_ends, find_tips, split_by_darkness, through_bands
+from grader.scan.strokes.ends import find_ends, find_tips, split_by_darkness, through_bands
 from grader.scan.strokes.regions import (
     PROBES,
     Components,
@@ -143,7 +143,7 @@ def find_strokes(flat: Flat, seeds: Seeds, components: Components, field: Field)
     if len(pieces.width) > _MOST_STROKES:
         return _too_many(len(pieces.width))
     fitted, merged = _settled(flat, pieces, field.sheet.px_per_mm, seeds.pen_px / field.scale)
-    return _records(flat, fitted, merged, field)
+    return _records(fitted, merged, field)
 
 
 def _too_many(count: int) -> Unread:
@@ -236,7 +236,7 @@ def distinct(fitted: Fitted, unit: float, covered_share: float = 1.0) -> BoolArr
     return keep
 
 
-def _records(flat: Flat, fitted: Fitted, merged: BoolArray, field: Field) -> Strokes:
+def _records(fitted: Fitted, merged: BoolArray, field: Field) -> Strokes:
     unit = field.sheet.px_per_mm
     return Strokes(
         ends=field.to_mm(fitted.ends),
@@ -244,7 +244,6 @@ def _records(flat: Flat, fitted: Fitted, merged: BoolArray, field: Field) -> Str
         se_offset=fitted.se_across / unit,
         se_angle=fitted.se_turn,
         se_end=np.where(merged, _SE_MERGED_MM, _SE_END_MM),
-        coverage=coverage(flat, fitted),
         darkness=fitted.darkness,
     )
 

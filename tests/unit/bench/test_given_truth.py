@@ -36,7 +36,7 @@ def test_a_vector_lies_along_a_stroke_in_either_sense_and_not_beside_it():
 def page():
     """A page with two strokes, on the first of which a vector was drawn."""
     same = np.full(2, 0.3)
-    strokes = Strokes(np.stack([STROKE, OTHER]), same, same, same, np.full((2, 2), 0.8), same, same)
+    strokes = Strokes(np.stack([STROKE, OTHER]), same, same, same, np.full((2, 2), 0.8), same)
     where = InkMap(np.zeros((9, 9), np.uint8), 6.0)
     ink = Ink(strokes, np.zeros((0, 3)), np.zeros((0, 4)), where, tips=NO_TIPS)
     return TruePage(ScannedPage(PageRef("sheet", path=Path("sheet.png")), ink=ink), {}, VECTOR[None])

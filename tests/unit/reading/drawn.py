@@ -117,7 +117,6 @@ def _ink(lines: list[tuple[complex, complex]], circles: list[complex], pen: Pen)
         se_offset=np.full(count, 0.02),
         se_angle=0.02 / np.maximum(np.abs(span), 1.0),
         se_end=np.full((count, 2), 0.2),
-        coverage=np.ones(count),
         darkness=np.full(count, 0.7),
     )
     round_ones: FloatArray = np.array([[at.real, -at.imag, JOINT_MM] for at in circles]).reshape(-1, 3)

@@ -39,7 +39,7 @@ ALL = ("kL", "kv", "ka")
 PUMP = load_assignment("pump")
 (RIGHT,) = drawings(PUMP, [PUMP.variant(7)], None)
 NO_STROKES = Strokes(
-    np.array([[[100.0, 50.0], [120.0, 50.0]]]), *(np.full(shape, 0.3) for shape in (1, 1, 1, (1, 2), 1, 1))
+    np.array([[[100.0, 50.0], [120.0, 50.0]]]), *(np.full(shape, 0.3) for shape in (1, 1, 1, (1, 2), 1))
 )
 
 

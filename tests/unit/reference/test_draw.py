@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from reference.authored.assignment import load_assignment
-from reference.drawing.canvas import A3_MM, Label, svg
+from reference.drawing.canvas import A3_MM, INK, Label, svg
 from reference.drawing.forces import acting_on
-from reference.drawing.sheets import COLOURS, reference_drawing
+from reference.drawing.sheets import reference_drawing
 from reference.drawing.sketch import polygon
-from reference.drawing.subject import Subject
+from reference.drawing.subject import PLAN_COLOURS, Subject
 from reference.plan import exact_plan
 from tests.drawn import WITH_FORCES, loaded
 
+COLOURS = {"mechanism": INK, **PLAN_COLOURS}
 PRINTED_MM = 0.0015
 """The SVG tells thousandths of a millimetre: two ends, half a unit each in x and y."""
 SVG = "{http://www.w3.org/2000/svg}"

@@ -31,7 +31,7 @@ PLAIN = ReadingScene("photo", "", device="phone", dpi=None, hardship=0.0)
 @cache
 def photo(scene: ReadingScene, seed: int) -> tuple[Page, float]:
     """A photo, as the camera stored it, and its pixels per mm."""
-    sheet = work(scene, seed).sheets[0]
+    (sheet,) = work(scene, seed, most=1).sheets
     grey = sheet.image if sheet.image.ndim == 2 else cv2.cvtColor(sheet.image, cv2.COLOR_RGB2GRAY)
     turn = round(-sheet.truth["rotation_deg"] / 90.0) * 90 % 360
     return Page("photo.jpg", 1, np.asarray(grey, dtype=np.uint8), turn_deg=turn), sheet.truth["px_per_mm"]

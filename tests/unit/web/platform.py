@@ -65,7 +65,7 @@ class Platform:
 
         self.server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
         self.address = f"http://127.0.0.1:{self.server.server_port}"
-        threading.Thread(target=self.server.serve_forever, daemon=True).start()
+        threading.Thread(target=self.server.serve_forever, args=(0.01,), daemon=True).start()
 
     def stop(self):
         self.server.shutdown()
@@ -123,8 +123,8 @@ class Platform:
         return {name: value for name, value in made.items() if value is not None}
 
     def signed(self, claims, key=None, algorithm="RS256"):
-        pem = (key or self.key).export_to_pem(private_key=True, password=None)
-        return jwt.encode(claims, None if algorithm == "none" else pem, algorithm, {"kid": "platform-key"})
+        own = None if algorithm == "none" else (key or self.key).get_op_key("sign")
+        return jwt.encode(claims, own, algorithm, {"kid": "platform-key"})
 
     def launch(self, browser, **changed):
         """A whole launch."""
