@@ -75,7 +75,7 @@ def choose(
                 better = the_better(mark, chosen.mark, *charges.why(one))
                 if following.is_trivial(segment, one.vector):
                     by_hand = mark.best == FULL and any(why.code == "hand_may_miss" for why in mark.reasons)
-                    chosen = replace(chosen, is_trivial=chosen.is_trivial or better.is_full or by_hand)
+                    chosen = replace(chosen, is_trivial=chosen.is_trivial or by_hand or better.share > NONE)
                 else:
                     is_trivial = chosen.is_trivial and not better.is_full
                     chosen = Choice(better, one, is_followed=True, is_trivial=is_trivial)
@@ -179,11 +179,11 @@ class Charges:
         """The causes of what an expectation relies on, charged or not."""
         right = self.cleared - self.by_length
         nodes = {step.node for step in self.task.construction.steps}
-        found: set[str] = set()
+        wrong, found = frozenset(self.charged | self.doubtful), set[str]()
         for name in one.relies_on - right:
             # Of a vector whose length was judged right only its sense is open.
-            only_sense = name in self.by_length & self.cleared
-            found |= self.following.causes_at(name, only_sense=only_sense) if name in nodes else {name}
+            sense = name in self.by_length & self.cleared
+            found |= self.following.causes_at(name, wrong, only_sense=sense) if name in nodes else {name}
         # A wrong step may have left one vector within its tolerance and show in another.
         return frozenset(found - right) | one.causes | (one.relies_on & self.charged)
 
@@ -199,6 +199,9 @@ class Charges:
         """
         causes = self.causes(one)
         unpaid = causes - self.charged - self.either - self.inherited
+        if unpaid:  # of a mistake made at several nodes one charge is enough
+            found = self.following.explanation.repeated
+            unpaid -= {node for nodes in found if nodes & self.charged for node in nodes}
         if not unpaid and not causes & self.doubtful & self.settled.keys():
             return mark, frozenset()
         if not unpaid or causes & (self.doubtful - self.either):

@@ -189,7 +189,7 @@ def _rank(following: FollowThrough, segment: TaskSegment) -> int:
     """
     task, evidence, head = following.task, following.evidence, segment.head
     is_known = head in evidence.nodes or head in known(following.own(following.used))
-    if segment.scale == "kL" or not is_known or head not in following.causes_at(head):
+    if segment.scale == "kL" or not is_known or head not in following.causes_at(head, frozenset()):
         return 0
     if line_of(task.construction.vectors[segment.name], task.construction) is None:
         return 2

@@ -59,6 +59,7 @@ class ReplayResult:
     blamed : vectors in which a mistake was made, nearly certainly
     explained : nodes at which it was made
     left_out : those of them that are the ends of components left out
+    repeated : the nodes of each mistake that was made at several: all forces of inertia reversed
     """
 
     explanations: tuple[Replay, ...] = ()
@@ -66,6 +67,7 @@ class ReplayResult:
     blamed: frozenset[str] = frozenset()
     explained: frozenset[str] = frozenset()
     left_out: frozenset[str] = frozenset()
+    repeated: tuple[frozenset[str], ...] = ()
 
 
 Explain = Callable[[Task, Evidence, Mapping[str, Scale]], ReplayResult]
@@ -471,23 +473,24 @@ class FollowThrough:
             return laid_off(step, construction) != segment.name
         return line_of(construction.vectors[segment.name], construction) is None
 
-    def causes_at(self, node: str, *, only_sense: bool = False) -> frozenset[str]:
+    def causes_at(self, node: str, wrong: frozenset[str], *, only_sense: bool = False) -> frozenset[str]:
         """The causes of an own node's position beside the student's own earlier nodes.
 
-        None where its step leads there; wrong scales, the first node of a turned plan, or wrong steps that
-        lead there; the node itself where no known way does.
+        None where its step leads there; wrong scales, the first node of a turned plan, or wrong steps or
+        forces that lead there; the node itself where no known way does.
 
-        Arguments: with `only_sense` a step leads there that lays the node off to the same side.
+        Arguments: `wrong` as in `own_forces`; with `only_sense` a step lays the node off to the same side.
         """
-        makes = self._lays_off if only_sense else self._makes
+        makes, own = self._lays_off if only_sense else self._makes, self.own_forces(node, wrong)
 
         def found() -> frozenset[str]:
             for causes, scales, basis, by_similarity in self._ways(node):
                 if makes(node, self.traced(scales, basis, by_similarity=by_similarity)):
                     return causes
-            return frozenset({node})
+            is_of_forces = own is not None and makes(node, self.traced(self.followed, own))
+            return own.wrong | self.wrong_scales if own and is_of_forces else frozenset({node})
 
-        return self._cached(("causes", node, only_sense), found)
+        return self._cached(("causes", node, only_sense, own and own.name), found)
 
     def _ways(
         self, node: str

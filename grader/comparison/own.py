@@ -125,7 +125,7 @@ def nodes_from_lengths(task: Task, evidence: Evidence, sketch: PlanBasis) -> dic
             if ends:
                 tracking.settle(step, made, ends)
             elif _is_component(step) and step.node not in poles:
-                tracking.guessed.add(step.node)
+                tracking.guessed[step.node] = step.start
                 tracking.part(step.node, [tracking.nodes[step.start]], made, [], [])
             else:
                 tracking.nodes[step.node] = made[0]
@@ -142,7 +142,7 @@ class _LengthBranches:
     cost : as in `reference.replay.explanations`
     sources : by node, the vectors from which its position was taken
     is_known : by node, whether its position was taken from vectors
-    guessed : components that were not entered: left out of the drawing, or drawn rightly
+    guessed : components that were not entered, left out of the drawing or drawn rightly, and their starts
     """
 
     task: Task
@@ -152,7 +152,7 @@ class _LengthBranches:
     cost: FloatArray = field(default_factory=lambda: np.zeros(1))
     sources: dict[str, Sequence[_Measured]] = field(default_factory=dict)
     is_known: dict[str, BoolArray] = field(default_factory=dict)
-    guessed: set[str] = field(default_factory=set)
+    guessed: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         vectors = self.task.construction.vectors
@@ -270,8 +270,9 @@ class _LengthBranches:
         }
         for name, sources in self.sources.items():
             place = complex(self.nodes[name][0])
-            if self.is_known[name][0] and all(one.vector.tail in shifts for one in sources):
-                shifts[name] = self._shifts(place, sources, columns, shifts)
+            tails = [one.vector.tail for one in sources] or [self.guessed[name]]
+            if self.is_known[name][0] and shifts.keys() >= set(tails):
+                shifts[name] = self._shifts(place, sources, columns, shifts) if sources else shifts[tails[0]]
                 found[name] = OwnNode(place, shifts[name])
         return found
 
@@ -292,8 +293,6 @@ class _LengthBranches:
             column = columns[one.vector.name]
             row[column] += hand.ruler_mm * along
             rows.append((along, row, column, step_vector))
-        if not rows:
-            return np.zeros(2 * len(columns), np.complex128)
         if len(rows) == 1:
             along, row, column, step_vector = rows[0]
             # Across: the error of the direction, measured or drawn.

@@ -154,12 +154,14 @@ def _telling(task: Task, evidence: Evidence, name: str) -> str:
     least = task.rubric.least_confidence
     drawn = {one: own for one in sizes if (own := evidence.vector(one)) and own.confidence >= least}
 
-    def alike(one: str) -> int:
+    def alike(one: str) -> list[str]:
         per_size = drawn[one].length_mm / sizes[one]
-        expected = {other: per_size * sizes[other] for other in drawn}
-        return sum(_fits(drawn[each], mm, task.rubric.tolerance_of(each)) for each, mm in expected.items())
+        due = {other: per_size * sizes[other] for other in drawn}
+        return [each for each, mm in due.items() if _fits(drawn[each], mm, task.rubric.tolerance_of(each))]
 
-    return max(drawn, key=lambda one: (alike(one), one == largest, sizes[one]), default=largest)
+    # A short one fits the scale of many, but does not tell it: of those alike the largest does.
+    most = max(map(alike, drawn), key=lambda one: (len(one), largest in one), default=[])
+    return largest if largest in most else max(most, key=sizes.__getitem__, default=largest)
 
 
 def _contradiction(task: Task, evidence: Evidence, name: str, used: float) -> float | None:

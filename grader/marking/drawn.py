@@ -54,8 +54,10 @@ def explain(
     basis = PlanBasis("instead", drawn.construction, drawn.parameters, wrong, lines) if is_needed else None
     nearly = sure_of(explanations, NEARLY_CERTAIN)
     left_out = frozenset(one.at for one in nearly if one.code == "normal_missing")
-    at = frozenset(node for one in nearly for node in made_at(one, construction))
-    return ReplayResult(explanations, basis, _blamed(nearly, construction), at, left_out)
+    made = [made_at(one, construction) for one in nearly]
+    repeated = tuple(nodes for nodes in made if len(nodes) > 1)
+    at = frozenset[str]().union(*made)
+    return ReplayResult(explanations, basis, _blamed(nearly, construction), at, left_out, repeated)
 
 
 def _on_wrong_lines(mistakes: Iterable[Mistake], construction: Construction) -> frozenset[str]:

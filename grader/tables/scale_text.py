@@ -408,6 +408,8 @@ def _with_unit(text: str) -> dict[tuple[int, int, int], float]:
         found = _quantities(f"1 {parts[3]}")
     except (TextError, OverflowError):
         return {}
+    if parts[2]:
+        found = [one for one in found if not any(one.powers[::2])]  # "5 rev m/s" is no velocity
     return {one.powers: number * one.value for one in found if parts[2] or any(one.powers)}
 
 

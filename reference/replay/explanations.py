@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from reference import geometry
-from reference.construction.elements import Along, Direction, Errors, Line, View, is_computed
+from reference.construction.elements import Along, Direction, Errors, Line, View, is_computed, is_force
 from reference.construction.graph import Construction
 from reference.construction.mistakes import (
     RIGHT_TRIANGLE,
@@ -487,19 +487,20 @@ class StepContext:
         place, shifts = self._placed(step, [changed for _, changed in steps])
         misfit, cost = self.observed.misfit_and_cost(place, shifts, self.nodes)
         for row, mistake in enumerate(mistakes):
-            cost[row] += 0.0 if mistake is None else self._rarity(mistake)
+            cost[row] += 0.0 if mistake is None else self._rarity(step, mistake)
         return StepAlternatives(place, cost, misfit, mistakes)
 
-    def _rarity(self, mistake: Mistake) -> float | FloatArray:
-        """Return the cost of a mistake; less for a component left out if it is not there.
+    def _rarity(self, step: Step, mistake: Mistake) -> float | FloatArray:
+        """Return the cost of a mistake; less for what was left out if it is not there, more for its slip.
 
         By the right triangle it is infinite in branches where the scales allow that.
         """
         if mistake.other == (RIGHT_TRIANGLE,):
             ratio = self.known["kL"] * self.known["ka"] / self.known["kv"] ** 2
             return np.where(np.abs(np.log(ratio)) < LEAST_RATIO, np.inf, rarity_of(mistake))
-        is_blank = mistake.code in {"normal_missing", "force_missing"} and mistake.at in self.blank
-        return rarity_of(mistake) - (NOT_THERE if is_blank else 0.0)
+        is_laid_off = isinstance(step, Given) and is_force(step.length)
+        less = {"normal_missing": 1, "force_missing": 1, SLIP: -is_laid_off}.get(mistake.code, 0)
+        return rarity_of(mistake) - (NOT_THERE * less if mistake.at in self.blank else 0.0)
 
     def _placed(self, step: Step, steps: Sequence[Step]) -> tuple[ComplexArray, ComplexArray | None]:
         """Return positions that steps give, and shifts by usual errors (steps, errors, branches)."""

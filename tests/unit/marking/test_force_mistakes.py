@@ -197,6 +197,8 @@ def test_the_bench_judges_right_sheets_right():
         pytest.param("press", 98404, "known", ("missing", "F_D"), id="a reaction beside the one it equals"),
         pytest.param("pump", 98052, "known", ("missing", "F_i"), id="a reaction that closes a triangle"),
         pytest.param("pump", 98101, "known", ("reversed", "F_i"), id="what follows is too short to judge"),
+        pytest.param("shaper", 133501, "known", ("reversed", "F_i"), id="one of many is too short to judge"),
+        pytest.param("pump", 166004, "others", ("turned", "F_i2"), id="a part that its moment makes short"),
     ],
 )
 def test_what_was_drawn_rightly_after_a_mistake_is_not_charged(name, seed, kinds, made):
@@ -209,6 +211,19 @@ def test_what_was_drawn_rightly_after_a_mistake_is_not_charged(name, seed, kinds
     count(tally, *found, judge(task_of(task, rubric, found[1].variant), found[1].submission))
     assert tally.clear > 10
     assert tally.wrong == []
+
+
+@pytest.mark.parametrize(
+    ("name", "seed", "at"), [("pump", 165014, "F_i"), ("pump", 165004, "F_i"), ("press", 165105, "F_i2")]
+)
+def test_what_follows_without_forces_is_not_charged_and_a_blank_is_no_slip(name, seed, at):
+    (task, rubric), made = force_task(name), ForceMistake("missing", at)
+    variant = task.variants()[int(np.random.default_rng(seed).integers(len(task.variants())))]
+    hand, rng = HANDS["typical" if seed == 165004 else "careful"], np.random.default_rng((seed, 1))
+    student, tally = StudentForces(task, variant, hand, made, rng), Tally()
+    judgement = judge(task_of(task, rubric, variant), student.submission)
+    count(tally, "", student, judgement)
+    assert (tally.wrong, [one for one in judgement.mistakes if one.code == "arithmetic"]) == ([], [])
 
 
 @pytest.mark.parametrize(
@@ -387,6 +402,13 @@ def test_a_scale_is_shown_by_most_given_forces_and_not_by_a_wrong_one(declared, 
     entered = replace(student.submission, declared={"kF": f"{declared} N/mm"})
     judgement = judge(task_of(*force_task("pump"), student.variant), entered)
     assert {one.name for one in judgement.outcomes if one.verdict in CHARGED} == charged
+
+
+def test_a_scale_is_shown_by_no_force_that_is_too_short_to_tell_it():
+    (task, rubric), made = force_task("shaper"), ForceMistake("scale", "kF", factor=2.0)
+    (student,) = (one for _, one in sheets("shaper", "typical", 166102, "known") if one.mistake == made)
+    judgement = judge(task_of(task, rubric, student.variant), student.submission)
+    assert {one.name for one in judgement.outcomes if one.verdict in CHARGED} == {"kF"}
 
 
 def test_of_two_vectors_that_end_where_a_force_was_laid_off_only_that_force_is_blamed():

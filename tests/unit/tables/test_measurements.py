@@ -119,7 +119,7 @@ def test_a_number_with_its_unit_or_another_of_its_kind_is_read(entered, column, 
     assert one.numbers[column] == pytest.approx(number, abs=1e-4)
 
 
-@pytest.mark.parametrize("cell", ["12 m", "12 m/4 s", "2 3 m/s", "5 m/s^2", "3 N", "1.5 m/s/2"])
+@pytest.mark.parametrize("cell", ["12 m", "12 m/4 s", "2 3 m/s", "5 m/s^2", "3 N", "1.5 m/s/2", "5 rev m/s"])
 def test_a_number_in_a_unit_of_another_kind_is_refused_with_the_unit_asked_for(entered, cell):
     (one,) = entered(f"student_id,v_A_value\ns01,{cell}\n")
     assert one.values == {}
