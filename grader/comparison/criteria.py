@@ -238,7 +238,7 @@ def _segment(charges: Charges, criterion: CriterionTable, drawn: DrawnVector) ->
     one, rubric, evidence = charges.task.segments[criterion.name], charges.task.rubric, charges.evidence
     is_read = drawn is evidence.drawn.get(one.name)
     right_mm = abs(one.drawn(charges.following.used))
-    held = HeldVector(rubric, criterion, drawn, evidence.remarks[one.name] if is_read else (), right_mm)
+    held = HeldVector(rubric, criterion, drawn, right_mm)
     choice = _chosen(charges, criterion, held)
     mark, scale = choice.mark, charges.following.used[one.scale]
     if choice.is_trivial:

@@ -12,6 +12,7 @@ import numpy as np
 from grader.comparison.task import Task
 from grader.records import MECHANISM, Figure, OtherReading, Reading, ReadNode, Reason
 from grader.rubric import ToleranceTable
+from reference.construction.graph import Construction
 from reference.quantities import group_of, value_name
 
 
@@ -54,6 +55,8 @@ class DrawnVector:
     """Other readings, the likeliest first, as on the sheet."""
     is_doubted: bool = False
     """True if it is laid off in a force polygon that may be another one than was read."""
+    remarks: tuple[Reason, ...] = ()
+    """A reason to give where the length in the sheets' cells is another."""
 
     def if_others(self) -> Iterator["DrawnVector"]:
         """The vector as each of the others, with the confidence that it is this one or one before it."""
@@ -87,7 +90,6 @@ class Evidence:
     has_sheets : whether any sheet was handed in
     has_sketch : whether the mechanism was read on any
     refused : what was entered by hand for a vector, angular quantity or scale and cannot be used, by name
-    remarks : what to say where the length in the sheets' cells is another, by vector
     verdicts : what a person decided of what waited, by name
     sure : the probability that a value was read rightly in a sheet's cells, by name; others were entered
     """
@@ -99,7 +101,6 @@ class Evidence:
     unread: Mapping[str, Reason]
     has_sheets: bool
     values: Mapping[str, float]
-    remarks: Mapping[str, tuple[Reason, ...]] = field(default_factory=dict)
     se_mm: Mapping[str, float] = field(default_factory=dict)
     sketches: Mapping[str, Mapping[str, complex]] = field(default_factory=dict)
     has_sketch: bool = False
@@ -115,25 +116,18 @@ class Evidence:
 
 def gather(task: Task, submission: Submission) -> Evidence:
     """All readings of a submission in the assignment's frame."""
-    sheets = _Sheets(task, turn=_turn_of_sketches(task, submission.readings))
+    written = {name: one for reading in submission.readings for name, one in reading.lengths.items()}
+    sheets = _Sheets(task, _turn_of_sketches(task, submission.readings), written)
     for reading in submission.readings:
         sheets.take(reading)
     measured = _measured(task, submission.measured)
     own = sheets.nodes if submission.readings else _nodes_from(task, measured)
-    written = {name: one for reading in submission.readings for name, one in reading.lengths.items()}
-    entered, least = submission.values, task.rubric.least_confidence
+    entered = submission.values
     columns = {value_name(name): name for name in (*task.rubric.values, *task.rubric.moments)}
     columns |= {(sense := f"{name}_sense"): sense for name in task.rubric.moments if name not in entered}
     values = {name: written[column] for column, name in columns.items() if column in written}
-    drawn, remarks = {}, {}
-    for name, one in sheets.drawn.items():
-        table = task.rubric.tolerance_of(name)
-        sure, remarks[name] = held_against_cells(one, written.get(name), table, least)
-        others = one.others if sure >= one.confidence else ()
-        is_doubted = one.is_doubted and sure <= one.confidence
-        drawn[name] = replace(one, confidence=sure, others=others, is_doubted=is_doubted)
     return Evidence(
-        drawn=drawn,
+        drawn=sheets.drawn,
         measured=measured,
         nodes=own,
         yardstick_mm=min(sheets.lengths, key=lambda one: one[1], default=None),
@@ -142,7 +136,6 @@ def gather(task: Task, submission: Submission) -> Evidence:
         values={name: value for name, (value, _) in values.items()} | dict(entered),
         sure={name: sure for name, (_, sure) in values.items() if name not in entered},
         verdicts=submission.verdicts,
-        remarks=remarks,
         se_mm=sheets.se_mm,
         sketches=sheets.sketches,
         has_sketch=any(MECHANISM in reading.figures for reading in submission.readings),
@@ -151,7 +144,7 @@ def gather(task: Task, submission: Submission) -> Evidence:
             gap.name
             for reading in submission.readings
             for gap in reading.unread
-            if gap.is_blank or (submission.verdicts.get(gap.name) == "none" and gap.name not in drawn)
+            if gap.is_blank or (submission.verdicts.get(gap.name) == "none" and gap.name not in sheets.drawn)
         ),
     )
 
@@ -162,6 +155,7 @@ class _Sheets:
 
     task: Task
     turn: tuple[float, float]
+    written: Mapping[str, tuple[float, float]]
     drawn: dict[str, DrawnVector] = field(default_factory=dict)
     nodes: dict[str, complex] = field(default_factory=dict)
     se_mm: dict[str, float] = field(default_factory=dict)
@@ -186,10 +180,30 @@ class _Sheets:
             if figure != MECHANISM:
                 names = [vector.name for vector in self.task.construction.vectors_of(figure)]
                 vectors = _vectors(self.task, read, names, turn, se_turn)
-                self.add_vectors(_doubted(self.task, figure, vectors) if group_of(figure) else vectors)
+                vectors = _doubted(self.task, figure, vectors) if group_of(figure) else vectors
+                held = self.held_against_cells(vectors)
+                self.add_vectors(held)
+                surer = {
+                    name: one.confidence
+                    for name, one in held.items()
+                    if one.confidence > vectors[name].confidence and not group_of(figure)
+                }
+                read = at_least(read, surer, self.task.construction)  # noqa: PLW2901 - the same figure
                 self.add_nodes(_plan_nodes(self.task, figure, read, turn), read)
                 if joints:
                     self.sketches.setdefault(figure, joints)
+
+    def held_against_cells(self, drawn: Mapping[str, DrawnVector]) -> dict[str, DrawnVector]:
+        """Weigh vectors by the lengths in the cells, by name."""
+        rubric = self.task.rubric
+        return {
+            name: held_against_cells(
+                one, *self.written[name], rubric.tolerance_of(name), rubric.least_confidence
+            )
+            if name in self.written
+            else one
+            for name, one in drawn.items()
+        }
 
     def add_vectors(self, vectors: Mapping[str, DrawnVector]) -> None:
         """Add vectors; of one on two sheets the more certain reading counts."""
@@ -208,30 +222,59 @@ class _Sheets:
 # The lengths written beside the drawing -------------------------------------------------------------
 
 MISWRITTEN, BY_CHANCE = 0.1, 0.05
-"""Probabilities that a length in the cells is not that of the vector drawn (misread, measured to another
-node), and that it agrees with what was read although that is another stroke."""
+"""Probabilities that a length in the cells is not that of the vector drawn (measured to another node, or a
+slip), and that it agrees with what was read although that is another stroke."""
 
 
 def held_against_cells(
-    drawn: DrawnVector, written: tuple[float, float] | None, tolerance: ToleranceTable, least: float
-) -> tuple[float, tuple[Reason, ...]]:
-    """The confidence in a drawn vector beside the length written into the sheet's cells, and what to say.
+    drawn: DrawnVector, length_mm: float, certain: float, tolerance: ToleranceTable, least: float
+) -> DrawnVector:
+    """Return the drawn vector, as sure as the length in the sheet's cells leaves it.
 
-    A ruler's error is no more than the tolerance of a length.
+    The length speaks for each reading of the vector that has it, and against the rest. Another reading of
+    that length stays as likely beside this one: a length shows no direction. One that ends within the
+    tolerance of this one is no other vector, and counts with the rest. Digits that are less sure say
+    less, and nothing against this one: where they differ, they were misread more often than the vector. A
+    ruler's error is below the tolerance of a short length; up to that of the length nothing is said.
 
-    Arguments: `written` is a length in mm and the probability that it is what stands in the cells,
-    `least` the probability from which it counts.
+    Arguments: `certain` is the probability that the length is what stands in the cells, `least` that from
+    which digits are sure.
     """
-    if written is None or written[1] < least:
-        return drawn.confidence, ()
-    length_mm = written[0]
-    allowed = tolerance.length_at(length_mm) + tolerance.certain_errors * drawn.se_mm
-    agrees = abs(drawn.length_mm - length_mm) <= allowed
-    if_right, if_misread = (1.0 - MISWRITTEN, BY_CHANCE) if agrees else (MISWRITTEN, 1.0 - BY_CHANCE)
-    right = drawn.confidence * if_right
-    confidence = right / (right + (1.0 - drawn.confidence) * if_misread)
+    lengths = np.array([drawn.length_mm, *(one.length_mm for one in drawn.others)])
+    beyond_mm = np.abs(lengths - length_mm) - tolerance.certain_errors * drawn.se_mm
+    agree, differ = beyond_mm <= tolerance.length_mm, beyond_mm > tolerance.length_at(length_mm)
+    if certain < least and not agree[0]:
+        return drawn
+    told = certain * (1.0 - MISWRITTEN)
+    slip = (1.0 - told) * BY_CHANCE
+    weight = np.select([agree, differ], [told + slip, slip], BY_CHANCE)
+    apart = [abs((one.as_complex or 0j) - (drawn.as_complex or 0j)) for one in drawn.if_others()]
+    weight[1:][np.array(apart) <= tolerance.length_mm] = BY_CHANCE
+    prior = np.maximum.accumulate([drawn.confidence, *(one.confidence for one in drawn.others)])
+    together = np.cumsum(np.diff(prior, prepend=0.0) * weight)
+    sure = (together / (together[-1] + (1.0 - prior[-1]) * BY_CHANCE)).tolist()
+    others = tuple(replace(one, confidence=p) for one, p in zip(drawn.others, sure[1:], strict=True))
+    is_doubted = drawn.is_doubted and sure[0] <= drawn.confidence
     params: dict[str, float | str] = {"drawn": drawn.length_mm, "written": length_mm, "unit": "mm"}
-    return confidence, () if agrees else (Reason("written_disagrees", params),)
+    remarks = (Reason("written_disagrees", params),) if differ[0] else ()
+    return replace(drawn, confidence=sure[0], others=others, is_doubted=is_doubted, remarks=remarks)
+
+
+def at_least(read: Figure, sure: Mapping[str, float], construction: Construction) -> Figure:
+    """Return the figure with vectors at least as sure as given, and nodes as the surest of these there."""
+    ends: dict[str, float] = {}
+    for name in sure:
+        for node in (construction.vectors[name].tail, construction.vectors[name].head):
+            ends[node] = max(ends.get(node, 0.0), sure[name])
+    nodes = {
+        name: replace(one, confidence=max(one.confidence, ends.get(name, 0.0)))
+        for name, one in read.nodes.items()
+    }
+    vectors = {
+        name: replace(one, confidence=max(one.confidence, sure.get(name, 0.0)))
+        for name, one in read.vectors.items()
+    }
+    return replace(read, nodes=nodes, vectors=vectors)
 
 
 # Vectors and nodes --------------------------------------------------------------------------------

@@ -138,7 +138,7 @@ def _evidence_of(
     least = task.rubric.least_confidence
     if drawn.confidence >= least or however_doubtful:
         return shown
-    if evidence.remarks.get(vector):
+    if drawn.remarks:
         return None  # the length in its cells is another
     # Where others that were surely read are right at its scale, it was read rightly.
     return shown if _fitting(task, evidence, name, shown[0] / shown[1], least) >= TELLING else None
@@ -239,7 +239,7 @@ def _hold_declared(task: Task, evidence: Evidence, name: str, scale: UsedScale, 
     limit = Limit(
         what="scale",
         residual=abs(real / scale.used - drawn_mm),
-        tolerance=_allowed_mm(task, evidence, name, drawn_mm),
+        tolerance=_allowed_mm(task, evidence, tolerance, _ends(task, evidence, name), drawn_mm),
         plain=tolerance.length_at(drawn_mm),
         se=se_mm,
         table=tolerance,
@@ -282,9 +282,19 @@ def _is_off(task: Task, evidence: Evidence, name: str, declared: float, other: f
 
 
 def _is_unseen(task: Task, evidence: Evidence, name: str, scale: float) -> bool:
-    """Return whether a plan was read without its crank's vector, and nothing else confirms its scale."""
-    plan = [v.name for v in task.construction.vectors.values() if v.scale == name]
-    return any(one in evidence.drawn for one in plan) and _fitting(task, evidence, name, scale) < TELLING
+    """Return whether a plan was read without its crank's vector, and nothing else confirms its scale.
+
+    Vectors confirm it that have the right length within the tolerance by which they are marked, unless that
+    is so large a share of it that they would fit many scales.
+    """
+    telling, fitting = _telling(task, evidence, name), 0
+    plan = [v for v in task.construction.vectors.values() if v.scale == name and v.name in evidence.drawn]
+    for one in plan:
+        expected_mm, table = abs(task.real.get(one.name, 0.0)) / scale, task.rubric.tolerance_of(one.name)
+        allowed = _allowed_mm(task, evidence, table, (one.tail, one.head), expected_mm)
+        residual = abs(evidence.drawn[one.name].length_mm - expected_mm)
+        fitting += one.name != telling and residual <= allowed <= FITS_BY_CHANCE * expected_mm
+    return bool(plan) and fitting < TELLING
 
 
 def _followed_instead(
@@ -315,14 +325,16 @@ def _is_confirmed(
     """
     expected_mm = shown[0] / scale
     residual = abs(expected_mm - shown[1])
-    plain = task.rubric.tolerance_of(name).length_at(expected_mm)
-    return residual <= plain or residual <= _allowed_mm(task, evidence, name, expected_mm)
+    table, ends = task.rubric.tolerance_of(name), _ends(task, evidence, name)
+    plain = table.length_at(expected_mm)
+    return residual <= plain or residual <= _allowed_mm(task, evidence, table, ends, expected_mm)
 
 
-def _allowed_mm(task: Task, evidence: Evidence, name: str, expected_mm: float) -> float:
-    """The tolerance (mm) of the length that shows a scale, widened by its propagated drafting error."""
-    table, hand = task.rubric.tolerance_of(name), task.rubric.hand
-    plain, ends = table.length_at(expected_mm), _ends(task, evidence, name)
+def _allowed_mm(
+    task: Task, evidence: Evidence, table: ToleranceTable, ends: tuple[str, str], expected_mm: float
+) -> float:
+    """The tolerance (mm) of the length between two nodes, widened by its propagated drafting error."""
+    plain, hand = table.length_at(expected_mm), task.rubric.hand
     drawn = task.traced(task.rule_scales)
     uncertainty = hand.sigmas * spread(drawn.shifts(*ends), drawn.vector(*ends)).along
     if not evidence.has_sheets:

@@ -322,7 +322,7 @@ longer holds, and the error may be anything."""
 
 @dataclass(frozen=True, slots=True)
 class HeldVector:
-    """A drawn vector judged by the rubric; `remarks` are added to its reasons unless it is right.
+    """A drawn vector judged by the rubric; its remarks are added to its reasons unless it is right.
 
     `right_mm` is the length by the data. Where that is long enough to have a direction, what follows from
     own values has one down to half of it: none is excused because its own length is a little less.
@@ -331,7 +331,6 @@ class HeldVector:
     rubric: RubricFile
     criterion: CriterionTable
     drawn: DrawnVector
-    remarks: tuple[Reason, ...] = ()
     right_mm: float = 0.0
 
     def allowed(self, one: Expectation, at_most: float | None = None) -> Tolerance:
@@ -357,7 +356,7 @@ class HeldVector:
             confidence = max(confidence, other.confidence)
         settle, is_doubted = self.rubric.doubt.settle, self.drawn.is_doubted
         mark = with_confidence(mark, confidence, settle, abs(one.vector), is_doubted=is_doubted)
-        return mark if mark.is_full else replace(mark, reasons=(*self.remarks, *mark.reasons))
+        return mark if mark.is_full else replace(mark, reasons=(*self.drawn.remarks, *mark.reasons))
 
     def _mark_of(self, drawn: DrawnVector, one: Expectation) -> MarkRange:
         """The mark as if this were drawn; open where drafting errors beyond `at_most` explain the loss."""

@@ -4,12 +4,11 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
 
 from grader.comparison.criteria import NOT_DRAWN, Comparison, compare
-from grader.comparison.evidence import DrawnVector, Submission, gather
+from grader.comparison.evidence import DrawnVector, Submission, at_least, gather
 from grader.comparison.outcomes import settled_as
 from grader.comparison.scales import Scale
 from grader.comparison.task import Task, tasks_at_speed
@@ -21,7 +20,7 @@ from grader.marking.naming import LEAST_CONFIDENCE, Lost, drawn_instead, named, 
 from grader.marking.settling import at_stake, is_of, of_another, of_nothing, settled
 from grader.marking.units import EXCHANGED, Undone, slip_of_value, undone, with_scales_exchanged
 from grader.outcomes import CHARGED, CREDITED, Judgement, NamedMistake, Outcome, Score
-from grader.records import FloatArray, ReadNode, ReadVector, Reason
+from grader.records import FloatArray, Reason
 from grader.rubric import CriterionTable, RubricFile
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.graph import evaluate
@@ -29,7 +28,6 @@ from reference.construction.mistakes import Mistake
 from reference.quantities import OF_MOTION, kind_of, vector_of_value
 from reference.replay.replay import Replay
 
-Read = TypeVar("Read", ReadNode, ReadVector)
 LOST = CHARGED | {"follow_through", "review"}
 """Verdicts for which the diagnosis seeks a cause, also where a person has still to decide."""
 AGREES, BY_CHANCE = 0.95, 0.03
@@ -495,19 +493,11 @@ def _confirmed(task: Task, submission: Submission, comparison: Comparison) -> Su
                 surer[name] = right / (right + (1.0 - drawn.confidence) * BY_CHANCE)
     if not surer:
         return None
-    ends: dict[str, float] = defaultdict(float)
-    for name, sure in surer.items():
-        vector = task.construction.vectors[name]
-        for node in (vector.tail, vector.head):
-            ends[node] = max(ends[node], sure)
     readings = tuple(
         replace(
             one,
             figures={
-                plan: replace(
-                    figure, nodes=_at_least(figure.nodes, ends), vectors=_at_least(figure.vectors, surer)
-                )
-                for plan, figure in one.figures.items()
+                plan: at_least(figure, surer, task.construction) for plan, figure in one.figures.items()
             },
         )
         for one in submission.readings
@@ -520,10 +510,3 @@ def _lies_there(task: Task, name: str, drawn: DrawnVector, predicted: complex) -
     at, tolerance = drawn.as_complex, task.rubric.tolerance_of(name)
     is_long = abs(predicted) >= tolerance.least_mm
     return at is not None and is_long and abs(at - predicted) <= 2.0 * tolerance.length_at(abs(predicted))
-
-
-def _at_least(read: Mapping[str, Read], sure: Mapping[str, float]) -> dict[str, Read]:
-    """Nodes or vectors with at least these confidences."""
-    return {
-        name: replace(one, confidence=max(one.confidence, sure.get(name, 0.0))) for name, one in read.items()
-    }

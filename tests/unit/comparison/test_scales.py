@@ -181,6 +181,18 @@ def test_while_the_scale_of_a_plan_was_not_read_nothing_is_charged_at_it():
     assert set(velocities) == {"review"}
 
 
+@pytest.mark.parametrize(("scale_share", "verdict"), [(1.0, "full"), (1.25, "review")])
+def test_vectors_that_miss_by_no_more_than_drafting_errors_show_a_scale_without_the_cranks(
+    scale_share, verdict
+):
+    reading = without(sheet(TASK, {**RULE, "kv": scale_share * RULE["kv"]}), "v_A")
+    for name in VELOCITIES:
+        drawn = reading.figures["velocity_plan"].vectors[name]
+        reading = changed(reading, name, length_mm=drawn.length_mm + 1.2)
+    comparison = compare(TASK, Submission(readings=(reading,), declared=declared()))
+    assert outcome_of(comparison, "kv").verdict == verdict
+
+
 def test_links_are_not_judged_where_no_sketch_was_read():
     comparison = compare(TASK, Submission(measured=measured(TASK)))
     assert {one.verdict for one in comparison.outcomes if one.name in TASK.construction.links} == {

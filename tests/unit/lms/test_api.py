@@ -119,7 +119,7 @@ def test_the_place_of_a_rubric_must_be_told(tmp_path, to):
 
 
 def test_a_number_of_canvas_is_one(tmp_path):
-    with pytest.raises(CallError, match="--course-id: 'a/b' is no number"):
+    with pytest.raises(CallError, match="--course-id: 'a/b' is not a number"):
         planned(tmp_path, "canvas-api", course_id="a/b", assignment_id="1")
 
 
