@@ -223,7 +223,7 @@ class Charges:
         return replace(mark, best=FULL, reasons=(*mark.reasons, unread), sure=min(mark.sure, EVEN))
 
     def _unknown_upstream(self, segment: TaskSegment) -> tuple[str, ...]:
-        """Return the unknown sources of a vector: nodes, of figures that were read or force plans, its scale.
+        """Return the unknown sources of a vector: its scale; nodes in doubt, of figures read, of forces.
 
         Known are nodes that were read, those from which a vector was made that is right, and those at which
         it is nearly certain what was done.
@@ -236,7 +236,8 @@ class Charges:
         unread = [
             need
             for need in dict.fromkeys(construction.step(segment.head).needs)
-            if need not in {*nodes, *self.charged, *self.cleared} and construction.figure_of(need) in read
+            if need not in {*nodes, *self.charged, *self.cleared}
+            and (need in self.doubtful or construction.figure_of(need) in read)
         ]
         if unread:
             right = self.cleared - self.by_length - self.charged - self.doubtful

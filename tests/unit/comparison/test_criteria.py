@@ -651,6 +651,18 @@ def test_a_loss_is_open_while_what_it_may_follow_from_is_not_known():
     assert outcome_of(certain, "v_D").verdict == "follow_through"
 
 
+def test_a_loss_is_open_while_nothing_of_the_plan_that_it_follows_from_was_read_for_certain():
+    reading = sheet(PUMP, moved={"n_BA": 9.0 + 0j})
+    assert outcome_of(compare(PUMP, Submission(readings=(reading,))), "a_BA_n").verdict == "none"
+    for name, one in reading.figures["velocity_plan"].vectors.items():
+        reading = changed(reading, name, confidence=0.4, length_mm=one.length_mm + 30.0)
+    plan = reading.figures["velocity_plan"]
+    unsure = {name: replace(node, confidence=0.4) for name, node in plan.nodes.items()}
+    figures = {**reading.figures, "velocity_plan": Figure(unsure, plan.vectors)}
+    outcome = outcome_of(compare(PUMP, Submission(readings=(replace(reading, figures=figures),))), "a_BA_n")
+    assert (outcome.verdict, set(outcome.reasons[-1].parameters["nodes"])) == ("review", {"a", "b"})
+
+
 def test_what_an_earlier_answer_makes_trivial_is_neither_credited_nor_charged():
     reading = measured(PUMP, directions=False)
     reading = changed(reading, "v_BA", length_mm=2.0)
