@@ -58,8 +58,8 @@ LETTERED_MM = 2.0
 """Standard error of the nodes of such a hypothesis along x and y before strokes are assigned."""
 COST_OF_ODD_NODE = 4.0
 """Nats for a node that is not where the construction puts it from the student's own nodes: one in fifty."""
-EXPLAINED = 0.85
-"""A regular plan supported over more of its length is taken as drawn."""
+EXPLAINED, NO_CHANCE = 0.85, 12.0
+"""A regular plan supported over more of its length is taken as drawn, and with more nats by no chance."""
 ODD_NODE_NATS = 1.5
 """Nats of letters that each such node needs: without letters, others would fit as well."""
 FOREIGN_PRIMES = 2
@@ -259,8 +259,9 @@ def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) 
         everything.extend(_with_mistakes(problem, plans[0], bases.values()))
     is_lettered = not group_of(problem.figure)
     if is_lettered and (not plans or plans[0].pose.score < EXPLAINED or _suspects(plans[0])):
-        for base in regular(drawing, problem.figure):
-            everything.extend(_by_letters(problem, base))
+        lettered = [one for base in regular(drawing, problem.figure) for one in _by_letters(problem, base)]
+        here = bool(plans) and plans[0].pose.score > EXPLAINED and plans[0].score > NO_CHANCE
+        everything += [one for one in lettered if not here or np.isin(one.members, plans[0].members).any()]
     if not everything:
         return None
     best, *rivals = _with_letters(problem, everything)

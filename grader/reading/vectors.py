@@ -145,7 +145,8 @@ def _vectors(
         signs = Signs(within(cov), named, off_mm=0.0)
         if row >= 0:
             off_mm = float(np.abs(fit.residual_mm[index]).max())
-            signs = replace(signs, off_mm=off_mm, marked=_marked(plan, fit, edge, row))
+            least = UNMARKED if abs(span) > SHORT_MM and not is_polygon else 0.0
+            signs = replace(signs, off_mm=off_mm, marked=max(_marked(plan, fit, edge, row), least))
         # A long vector is never more certain than the sheet's scale.
         most = math.erf(NEAR_MM / max(math.sqrt(2.0) * scale_se * abs(span), 1e-9))
         sure = signs.confidence()
@@ -265,8 +266,8 @@ def _degrees(span: complex) -> float:
 
 # Confidence ----------------------------------------------------------------------------------------
 
-MARKED_MM = 0.5
-"""A tip within this of a node marks it."""
+MARKED_MM, UNMARKED, SHORT_MM = 0.5, 0.15, 5.0
+"""A tip within the first marks a node; vectors longer than the last count as marked so well without tips."""
 NEAR_MM = 0.5
 """Largest error of a right node: a pencil stroke's width."""
 EITHER_MM = 1.5

@@ -10,7 +10,7 @@ from grader.reading.read import read_figures
 from grader.records import VELOCITY_PLAN, Ink, Letters
 from reference.authored.assignment import Assignment
 from tests.examples import slow
-from tests.unit.reading.drawn import blank_sheet, ink_of, task
+from tests.unit.reading.drawn import Pen, blank_sheet, draw, ink_of, task
 
 SIGNS = {sign: column for column, sign in enumerate([*"oabcdnpπABCD'"])} | {"": 13}
 PLAN_MM, APART_MM, POLE = 60.0, 18.0, 200 - 120j
@@ -94,3 +94,16 @@ def test_without_letters_such_a_plan_is_not_believed(seed):
 def test_nodes_with_primes_are_no_velocity_plan(seed):
     drawn, read, sure = drawn_and_read(task("pump")[0], seed, letters=True, primes=True)
     assert not [name for name in read if sure[name] > SURE and abs(read[name] - drawn[name]) < NEAR_MM]
+
+
+def test_letters_elsewhere_name_no_plan_that_is_drawn_as_constructed():
+    assignment, variant, drawing = task("pump")
+    drawn = draw(drawing, {VELOCITY_PLAN: 90 - 200j}, Pen(left_out=frozenset({"v_CB"})))
+    names = tuple(step.node for step in drawing.construction.figures[VELOCITY_PLAN])
+    nodes = scattered(names, seed=0)
+    others = [(nodes[v.tail], nodes[v.head]) for v in drawing.construction.vectors_of(VELOCITY_PLAN)]
+    pen = Pen(left_out=frozenset({"v_CB"}), extra=others)
+    ink = lettered_ink(draw(drawing, {VELOCITY_PLAN: 90 - 200j}, pen).ink, nodes)
+    reading = read_figures([(ink, blank_sheet())], assignment, variant, None, tuple(drawn.vectors))[0]
+    read = reading.figures[VELOCITY_PLAN].nodes
+    assert abs(read["o"].at - drawn.nodes["o"]) < NEAR_MM

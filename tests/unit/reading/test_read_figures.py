@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from grader.reading.read import read_figures
-from grader.reading.vectors import INKED, ON_IT_PX
+from grader.reading.vectors import INKED, ON_IT_PX, SHORT_MM
 from grader.records import ACCELERATION_PLAN, HEAD_AHEAD, MECHANISM, VELOCITY_PLAN, InkMap, Reading, Tips
 from reference.authored.assignment import Assignment, Variant, built_in, load_assignment
 from reference.construction.elements import View
@@ -95,6 +95,12 @@ def test_most_of_a_careful_drawing_is_read_with_confidence():
     found = vectors_read(read(draw(drawing, pen=Pen(redraw_mm=0.05)), assignment, variant))
     sure = [name for name, (_, confidence) in found.items() if confidence >= SURE]
     assert len(sure) > 0.6 * len(found)
+
+
+def test_long_vectors_of_a_careful_drawing_need_no_arrowheads():
+    assignment, variant, drawing = task("shaper")
+    found = vectors_read(read(draw(drawing, pen=Pen(redraw_mm=0.05)), assignment, variant)).values()
+    assert min(confidence for vector, confidence in found if abs(vector) > SHORT_MM) >= SURE
 
 
 @pytest.mark.parametrize(
