@@ -5,7 +5,6 @@ Where a record holds a *complex* position it is x - i y: y points up, so that th
 difference is the direction counter-clockwise from the sheet's +x, as in `reference`.
 """
 
-import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -69,11 +68,6 @@ def as_error(problem: Reason) -> InputFileError:
 def on_sheet(at: complex) -> tuple[float, float]:
     """Return a complex position as x and y in sheet millimetres, y down."""
     return at.real, -at.imag
-
-
-def degrees(angle_rad: float) -> float:
-    """Return an angle in degrees from 0 up to, not including, 360; a little below 0 is 0."""
-    return math.degrees(angle_rad) % 360.0 % 360.0
 
 
 @dataclass(frozen=True, slots=True)

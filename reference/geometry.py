@@ -4,6 +4,8 @@ No inverse trigonometry, no absolute thresholds: each formula keeps its relative
 scale, up to the conditioning of the figure itself.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,6 +34,11 @@ def unit(u: ComplexArray) -> ComplexArray:
 def direction(angle_rad: FloatArray) -> ComplexArray:
     """The unit vector at an angle counter-clockwise from +x."""
     return np.asarray(np.cos(angle_rad) + 1j * np.sin(angle_rad))
+
+
+def degrees(angle_rad: float) -> float:
+    """Return an angle in degrees from 0 up to, not including, 360; a little below 0 is 0."""
+    return math.degrees(angle_rad) % 360.0 % 360.0
 
 
 def meet(p: ComplexArray, u: ComplexArray, q: ComplexArray, v: ComplexArray) -> ComplexArray:

@@ -1,5 +1,6 @@
 """``planmark plan``: one variant."""
 
+import cmath
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +16,7 @@ from grader.options import PlanOptions
 from grader.solution.document import ForceDocument, ForcesDocument, GuideDocument, plan_document
 from reference.authored.assignment import Assignment, load_assignment
 from reference.errors import CallError
+from reference.geometry import degrees
 from reference.plan import Plan, exact_plan
 from reference.quantities import unit_of
 
@@ -117,7 +119,7 @@ def _print_table(assignment: Assignment, plan: Plan) -> None:
     for name in plan.construction.centres:
         if (point := document.centres_m[name]) is not None:
             at = complex(*point) - complex(*document.points_m[pivot])
-            real, mm, angle = abs(at), abs(at) / scales["kL"], np.degrees(np.angle(at)) % 360.0
+            real, mm, angle = abs(at), abs(at) / scales["kL"], degrees(cmath.phase(at))
             place = gettext("%(name)s from %(pivot)s", name=name, pivot=pivot)
             table.add_row(place, f"{mm:.2f}", f"{real:.4f}", unit("m"), f"{angle:.2f}")
     console.print(table)

@@ -29,11 +29,12 @@ from grader.comparison.verdicts import (
 )
 from grader.documents import Quantity, Tolerance
 from grader.outcomes import Outcome
-from grader.records import MECHANISM, Reason, degrees
+from grader.records import MECHANISM, Reason
 from grader.rubric import CriterionTable, RubricFile
 from reference.construction.elements import View
 from reference.construction.steps import Similar
 from reference.construction.uncertainty import SMALL
+from reference.geometry import degrees
 
 ON_PAPER_MM = 297.0
 """Short side of an A3 sheet: a centre farther from the driving link's pivot is not asked for."""

@@ -8,11 +8,12 @@ from grader.comparison.task import Task
 from grader.comparison.verdicts import FULL, NONE, MarkRange
 from grader.documents import Quantity, Tolerance, Verdict
 from grader.outcomes import CREDITED, EVEN, Outcome
-from grader.records import Reason, degrees
+from grader.records import Reason
 from grader.rubric import CriterionTable
 from reference.construction.elements import Line
 from reference.construction.graph import Construction
 from reference.construction.steps import Divide, Given, Similar, TwoLines
+from reference.geometry import degrees
 from reference.quantities import unit_of
 
 RANKS: dict[Verdict, int] = {"none": 0, "partial": 1, "follow_through": 2, "full": 2}

@@ -9,9 +9,10 @@ from typing import cast
 from grader.comparison.evidence import DrawnVector
 from grader.documents import Tolerance
 from grader.outcomes import EVEN
-from grader.records import Reason, degrees
+from grader.records import Reason
 from grader.rubric import CriterionTable, RubricFile, ToleranceTable
 from reference.construction.uncertainty import EndSpread
+from reference.geometry import degrees
 from reference.quantities import unit_of
 
 FULL, NONE = 1.0, 0.0

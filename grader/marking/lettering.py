@@ -14,9 +14,10 @@ from grader.comparison.task import Task
 from grader.comparison.verdicts import FULL, NONE, OPENING
 from grader.marking.settling import settled
 from grader.outcomes import CREDITED, NamedMistake, Outcome
-from grader.records import Figure, Reading, ReadNode, ReadVector, Reason, degrees
+from grader.records import Figure, Reading, ReadNode, ReadVector, Reason
 from reference.construction.graph import Vector
 from reference.construction.mistakes import Mistake
+from reference.geometry import degrees
 
 CERTAIN = 0.9
 """From this confidence on lines are judged under the right letters; below it each vector as it is named."""

@@ -18,10 +18,10 @@ from grader.comparison.evidence import DrawnVector, Submission
 from grader.comparison.scales import Scale
 from grader.comparison.task import Task
 from grader.outcomes import UsedScale
-from grader.records import Reading, ReadVector, degrees
+from grader.records import Reading, ReadVector
 from reference.construction.elements import Scaled
 from reference.construction.mistakes import RPM_FACTOR, Mistake
-from reference.geometry import FloatArray
+from reference.geometry import FloatArray, degrees
 from reference.quantities import OF_MOTION, KindName, kind_of
 from reference.replay.explanations import AREA_MM
 from reference.replay.nothing import NOTHING_FITS

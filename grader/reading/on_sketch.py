@@ -18,7 +18,7 @@ from grader.records import MECHANISM, Figure, IntArray, Reading, ReadVector
 from reference.construction.elements import View
 from reference.construction.graph import ON_SKETCH, evaluate
 from reference.construction.mistakes import Drawing
-from reference.geometry import ComplexArray
+from reference.geometry import ComplexArray, degrees
 
 NEAR_MM = 1.5
 """A line leads to a joint if it passes it within this."""
@@ -135,7 +135,7 @@ def _additions(
         sure, at = max(clear, default=(0.0, 0j), key=itemgetter(0))
         if sure:
             along = at - start.at
-            direction, se_deg = math.degrees(cmath.phase(along)) % 360.0, math.degrees(SE_MM / abs(along))
+            direction, se_deg = degrees(cmath.phase(along)), math.degrees(SE_MM / abs(along))
             yield name, ReadVector(abs(along), SE_MM, direction, se_deg, sure * start.confidence)
 
 

@@ -24,7 +24,7 @@ from grader.records import (
     Unread,
     Value,
 )
-from reference.geometry import ComplexArray
+from reference.geometry import ComplexArray, degrees
 from reference.quantities import group_of
 
 BLANK = 0.25
@@ -158,7 +158,7 @@ def _vectors(
                 sure = min(sure, MOST_OPEN)
         read = vector_of(span, cov, min(sure, most, HIGHEST))
         rivals = (
-            OtherReading(abs(other), _degrees(other), replace(signs, named=together).confidence())
+            OtherReading(abs(other), degrees(cmath.phase(other)), replace(signs, named=together).confidence())
             for other, together in others
         )
         vectors[edge.name] = replace(read, others=tuple(rivals))
@@ -256,12 +256,8 @@ def vector_of(span: complex, cov: FloatArray, confidence: float) -> ReadVector:
     across = np.array([-along[1], along[0]])
     se_along, se_across = (math.sqrt(max(float(axis @ cov @ axis), 0.0)) for axis in (along, across))
     se_deg = math.degrees(math.atan2(se_across, max(length, 1e-9)))
-    direction = _degrees(span) if length > se_across else None
+    direction = degrees(cmath.phase(span)) if length > se_across else None
     return ReadVector(length, se_along, direction, se_deg, confidence)
-
-
-def _degrees(span: complex) -> float:
-    return math.degrees(cmath.phase(span)) % 360.0
 
 
 # Confidence ----------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from grader.language import N_, Tongue, symbols
 from grader.overlay.closeup import LEAST_LOOK_MM, LOOK_MARGIN_MM, box_around
 from grader.overlay.scene import MARKS
 from grader.printed.layout import SCALE_BOXES
-from grader.records import MECHANISM, degrees
+from grader.records import MECHANISM
 from grader.review.doubts import SURE, Choice, Doubt
 from grader.review.questions import (
     UNSURE,
@@ -31,6 +31,7 @@ from grader.review.questions import (
 )
 from grader.review.records import OPEN, Standing, Student, mark_of
 from grader.review.session import Session
+from reference.geometry import degrees
 from reference.quantities import scale_of
 
 WHOSE = N_("Whose data were drawn?")

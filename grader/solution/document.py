@@ -9,10 +9,9 @@ from typing import Any, Literal, cast
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from grader.records import degrees
 from reference.authored.assignment import Assignment, Variant
 from reference.construction.graph import Construction
-from reference.geometry import ComplexArray, FloatArray
+from reference.geometry import ComplexArray, FloatArray, degrees
 from reference.kinematics.motion import Motion
 from reference.kinetics import Forces, Given, Reaction
 from reference.mechanism import Crank, Mechanism

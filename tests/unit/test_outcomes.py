@@ -3,8 +3,8 @@
 import pytest
 
 from grader.outcomes import NamedMistake
-from grader.records import degrees
 from reference.construction.mistakes import Mistake
+from reference.geometry import degrees
 
 
 @pytest.mark.parametrize(

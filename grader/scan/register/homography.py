@@ -9,6 +9,7 @@ from grader.records import Box, FloatArray, Page
 from grader.scan.pixels import TITLE_BLOCK_MM, inverted, local_axes, mapped
 from grader.scan.register.lines import RIDGE, LongLine
 from reference.drawing.canvas import MM_PER_INCH
+from reference.geometry import degrees
 
 _MARGIN_MM = 10.0
 """Around a drawing without a frame: the least that ISO 5457 leaves."""
@@ -104,7 +105,7 @@ def rotation_deg(mm_to_px: FloatArray) -> float:
     Seen with y down, the sheet's x axis points at this angle; turning back by it is counter-clockwise.
     """
     (right,), _ = local_axes(mm_to_px, np.array([PAGE_MM]) / 2.0, 10.0)
-    return float(np.degrees(np.arctan2(right[1], right[0]))) % 360.0 % 360.0
+    return degrees(np.arctan2(right[1], right[0]))
 
 
 def off_turn_deg(mm_to_px: FloatArray, turn_deg: int) -> float:
