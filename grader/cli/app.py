@@ -26,6 +26,7 @@ from grader.options import CommonOptions, is_record, offered
 from reference.errors import PlanmarkError
 
 if TYPE_CHECKING:
+    from rich.console import Console
     from rich.table import Table
 
 
@@ -42,6 +43,15 @@ def new_table(*headings: str, left: Collection[str] = ()) -> "Table":
     return table
 
 
+def show_table(console: "Console", table: "Table") -> None:
+    """Print a table as wide as it is: a narrower terminal breaks its lines, and no number is cut."""
+    whole = console.measure(table, options=console.options.update(width=WHOLE))
+    console.width = max(console.width, whole.maximum)
+    console.print(table)
+
+
+WHOLE = 10_000
+"""Columns, more than any table takes."""
 STEP_S = 5.0
 """A file or a pipe gets a line of progress at most so often, besides the last one of each kind of work."""
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from grader.cli import terminal
-from grader.cli.app import new_table
+from grader.cli.app import new_table, show_table
 from grader.cli.terminal import gettext, unit
 from grader.files import write_whole
 from grader.language import N_, Tongue
@@ -122,7 +122,7 @@ def _print_table(assignment: Assignment, plan: Plan) -> None:
             real, mm, angle = abs(at), abs(at) / scales["kL"], degrees(cmath.phase(at))
             place = gettext("%(name)s from %(pivot)s", name=name, pivot=pivot)
             table.add_row(place, f"{mm:.2f}", f"{real:.4f}", unit("m"), f"{angle:.2f}")
-    console.print(table)
+    show_table(console, table)
     if document.forces is not None:
         console.print(_table_of_forces(document.forces))
     worst = min((float(np.min(sine)) for sine in plan.motion.transmission.values()), default=1.0)

@@ -22,7 +22,10 @@ def told_of(error: Any, root: Any) -> str:  # noqa: ANN401 - click's error and c
         kind = "flag"
     elif param is not None:
         name = param.opts[0] if param.param_type_name == "option" else param.metavar or param.name
+    value: dict[str, Any] = error.__cause__.errors()[0] if hasattr(error.__cause__, "errors") else {}
+    kind = value["type"] if value.get("type") in USAGE else kind
     if kind not in USAGE:
         return ""
     hint = f" ({gettext(REMARKS['near'][0], near=', '.join(near))})" if near else ""
-    return gettext(SEE_HELP, text=gettext(USAGE[kind], name=name) + hint, command=context.command_path)
+    text = gettext(USAGE[kind], name=name, **value.get("ctx", {})) + hint
+    return gettext(SEE_HELP, text=text, command=context.command_path)

@@ -14,7 +14,7 @@ import typer
 from grader.authoring.variant_checks import broken_findings, broken_variants
 from grader.authoring.variant_table import class_csv
 from grader.cli import terminal
-from grader.cli.app import new_table, progress
+from grader.cli.app import new_table, progress, show_table
 from grader.cli.plans import check_crank
 from grader.cli.terminal import gettext, named, unit
 from grader.cycle.quantities import CycleSubject, Extreme, Selection, cycle_csv, extremes, strokes_of
@@ -125,7 +125,7 @@ def _show_table(assignment: Assignment, plan: Plan) -> None:
     for index, variant in enumerate(plan.variants):
         scales = [f"{getattr(plan.scales, name)[index]:.4g}" for name in scale_names]
         table.add_row(named(variant.numbers), *scales, *(f"{lengths[name][index]:.2f}" for name in names))
-    console.print(table)
+    show_table(console, table)
     told = gettext("all vectors, values and directions: --csv FILE, --pdf FILE or --json")
     console.print(told, style="dim")
 
@@ -204,7 +204,7 @@ def _print(assignment: Assignment, variant: Variant, subject: CycleSubject, sele
         table.add_row(quantity.name, in_unit, *ends, f"{here + 0.0:.6g}")
     for point in selection.points:
         _path_rows(subject, point, table)
-    console.print(table)
+    show_table(console, table)
     files = gettext("every position: --csv FILE; as a diagram: --svg FILE, --pdf FILE")
     console.print(files, style="dim")
 

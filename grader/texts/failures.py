@@ -266,8 +266,12 @@ USAGE: dict[str, str] = {
     "MissingParameter": N_("%(name)s is missing"),
     "BadOptionUsage": N_("%(name)s needs a value"),
     "BadParameter": N_("%(name)s: this value cannot be used"),
+    "int_parsing": N_("%(name)s must be a whole number"),
+    "float_parsing": N_("%(name)s must be a number"),
+    "greater_than_equal": N_("%(name)s must be at least %(ge)s"),
+    "less_than_equal": N_("%(name)s must be at most %(le)s"),
     "UsageError": N_("there are more words than the command takes; put a name with spaces in quotes"),
     "flag": N_("%(name)s takes no value"),
 }
-"""Errors of the parser of options, by their classes."""
+"""Errors of the parser of options, by their classes; of values that cannot be used, by pydantic's types."""
 SEE_HELP = N_("%(text)s; %(command)s -h shows how to call it")
