@@ -124,7 +124,7 @@ def _print_table(assignment: Assignment, plan: Plan) -> None:
             table.add_row(place, f"{mm:.2f}", f"{real:.4f}", unit("m"), f"{angle:.2f}")
     show_table(console, table)
     if document.forces is not None:
-        console.print(_table_of_forces(document.forces))
+        show_table(console, _table_of_forces(document.forces))
     worst = min((float(np.min(sine)) for sine in plan.motion.transmission.values()), default=1.0)
     if worst < 0.2:
         near = N_("near a singular position: the sine of a transmission angle is %(sine).3f")
