@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -55,6 +56,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def no_waiting_for_the_disk() -> None:
     """Write without waiting for the disk: no test cuts the power, and a busy disk takes long."""
     os.fsync = lambda _file: None
+
+
+@pytest.fixture(autouse=True)
+def in_english() -> Iterator[None]:
+    """Leave the language of commands called in this process as it was."""
+    yield
+    if (terminal := sys.modules.get("grader.cli.terminal")) is not None:
+        terminal.speak("en")
 
 
 @pytest.fixture(scope="session")
