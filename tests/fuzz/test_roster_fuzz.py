@@ -29,10 +29,13 @@ def test_any_table_is_a_roster_or_its_faults(header, rows, delimiter):
     assert all(set(row.student_id) <= set("s1.-7") for row in roster.rows)
 
 
-@given(st.text(max_size=30))
-def test_any_text_is_a_scan_or_a_sentence(text):
+@given(st.text(max_size=30) | st.text(alphabet="a#.1", max_size=6))
+def test_any_text_is_a_scan_or_a_page_written_wrongly(text):
     found = parse_scan(text)
-    assert isinstance(found, str) or str(found) == shown_text(text) or found.page is not None
+    if isinstance(found, Reason):
+        assert (found.code, "#" in text) == ("no_scan", True)
+    else:
+        assert str(found) == shown_text(text) or found.page is not None
 
 
 names = st.text(alphabet=st.characters(exclude_categories=["Cs", "Cc"]), max_size=12).map(str.strip)
