@@ -180,9 +180,9 @@ def _no_toml(error: Exception, text: str) -> Finding:
         return Finding("$", "nested", {"most": MAX_DEPTH})
     if not isinstance(error, tomllib.TOMLDecodeError):
         return Finding("$", "number_unusable")
-    lines = [one.strip() for one in text.rstrip().split("\n")]
+    lines = [one.strip() for one in text.split("\n")]
     found = re.search(r" \(at line (\d+), column \d+\)", str(error))
-    number = int(found[1]) if found else len(lines)
+    number = int(found[1]) if found else text.rstrip().count("\n") + 1
     line, above = lines[number - 1], lines[: number - 1]
     if table := re.match(r"\[+([^\[\]]+)\]", line):
         again = re.compile(rf"\[+\s*{re.escape(table[1].strip())}\s*\]")
