@@ -105,11 +105,12 @@ def _browser() -> Iterator[Browser]:
 def review_pictures() -> None:
     """The page of the review: a question on a screen and on a phone, and one of eight students at once."""
     rubric = load_rubric("pump")
-    # In the bundled class nothing waits: this is the review of one who wants to see what is near a limit.
-    doubt = rubric.doubt.model_copy(update={"in_doubt": "person", "stake": 0.0})
-    with _reviewed(rubric.model_copy(update={"doubt": doubt})) as address, _browser() as browser:
+    with _reviewed(rubric) as address, _browser() as browser:
         for name, width, height in (("review", 1280, 760), ("review-phone", 390, 844)):
             _opened(browser, address, width, height).screenshot(path=PICTURES / f"{name}.png")
+    # In the bundled class one student waits: this is the review of one who wants to see what is near a limit.
+    doubt = rubric.doubt.model_copy(update={"in_doubt": "person", "stake": 0.0})
+    with _reviewed(rubric.model_copy(update={"doubt": doubt})) as address, _browser() as browser:
         page = _opened(browser, address, 1280, 760)
         page.click("[data-mode=eight]")
         _settled(page)

@@ -27,7 +27,9 @@ from reference.quantities import unit_of
 from samples.simulation import (
     CAREFUL,
     PENS,
+    SLOPPY,
     TYPICAL,
+    HandStyle,
     PageStyle,
     Scan,
     Settings,
@@ -88,11 +90,10 @@ def settings_of(
     student: Student | None = None,
     scan: Scan = QUIET,
     page: PageStyle = ROMANIAN,
-    *,
-    careful: bool = True,
+    hand: HandStyle = CAREFUL,
 ) -> Settings:
     """A student's settings in one line."""
-    return Settings(CAREFUL if careful else TYPICAL, student or Student(), PENS[pen], page, scan)
+    return Settings(hand, student or Student(), PENS[pen], page, scan)
 
 
 SCANS, PDF, SHEET = frozenset({"scans"}), frozenset({"class pdf"}), frozenset({"answer sheet"})
@@ -102,7 +103,10 @@ TWO = Student(sheets=2)
 PUMP = [
     Pupil(1, 7, settings_of("fine pencil", TWO, replace(QUIET, dpi=200.0, dpi_tag=200.0)), 11, SCANS | CSV),
     Pupil(
-        2, 12, settings_of("soft pencil", Student(sheets=2, mistakes=("normal_reversed",)), careful=False), 12
+        2,
+        12,
+        settings_of("soft pencil", Student(sheets=2, mistakes=("normal_reversed",)), hand=TYPICAL),
+        12,
     ),
     Pupil(3, 3, settings_of("ink", Student(sheets=2, ka_ratio=1.25), COPY, PRINTED_FRAME), 13),
     Pupil(4, 18, settings_of("fine pencil"), 14, PDF),
@@ -112,6 +116,7 @@ PUMP = [
     Pupil(8, 21, settings_of("fine pencil", TWO, WRITTEN_ONLY), 18, JSON),
     Pupil(9, 27, settings_of("fine pencil", Student(mistakes=("normal_missing",)), WRITTEN_ONLY), 19, CSV),
     Pupil(10, 30, settings_of("fine pencil"), 20, NOTHING),
+    Pupil(11, 6, settings_of("soft pencil", TWO, hand=SLOPPY), 25, SCANS),
 ]
 PRESS = [
     Pupil(1, 1, settings_of("fine pencil", TWO, QUIET, RUSSIAN), 31, SCANS | CSV),
@@ -204,7 +209,7 @@ def write_class_pdf(path: Path, sheets: list[SimulatedSheet]) -> None:
 def scales_of(sheets: list[SimulatedSheet]) -> dict[str, str]:
     """The scales as declared, with their units."""
     declared = sheets[0].truth["scales"]["declared"]
-    return {name: f"{declared[name]:.6g} {unit}" for name, unit in SCALE_UNITS.items()}
+    return {name: f"{value:.6g} {SCALE_UNITS[name]}" for name, value in declared.items()}
 
 
 def variant_columns(sheets: list[SimulatedSheet]) -> dict[str, Any]:
@@ -215,7 +220,7 @@ def variant_columns(sheets: list[SimulatedSheet]) -> dict[str, Any]:
 
 def roster_line(pupil: Pupil, sheets: list[SimulatedSheet]) -> dict[str, Any]:
     """The student's line of the roster."""
-    scales = scales_of(sheets) if pupil.hands_in else dict.fromkeys(SCALE_UNITS, "")
+    scales = scales_of(sheets) if pupil.hands_in else {}
     return {
         "student_id": pupil.student_id,
         "name": f"Student {pupil.number}",
@@ -252,7 +257,7 @@ def write_json(path: Path, line: dict[str, Any]) -> None:
     document: dict[str, Any] = {
         "student_id": line["student_id"],
         "n": line["n"],
-        "scales": {name: line[name] for name in SCALE_UNITS},
+        "scales": {name: line[name] for name in SCALE_UNITS if name in line},
         "segments_mm": lengths,
         "directions_deg": directions,
         "values": {},

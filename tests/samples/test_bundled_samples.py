@@ -4,6 +4,7 @@ A floor is the number of vectors of 5 mm or more that must be read within 0.5 mm
 vectors reported with confidence but wrong by more than 1 mm is separate, and zero.
 """
 
+import csv
 import importlib.util
 import json
 from collections import defaultdict
@@ -70,7 +71,14 @@ def test_roster_truth_and_measurements_agree_on_who_is_who(name):
 def test_the_script_makes_the_same_task_scales_and_scan_again(script, name, student):
     """The drawings differ: those of the bundled files were made with an earlier model of a hand."""
     pupil = next(p for p in {"pump": script.PUMP, "press": script.PRESS}[name] if p.student_id == student)
-    made = [sheet.truth for sheet in script.sheets_of(load_assignment(name), pupil)]
+    sheets = script.sheets_of(load_assignment(name), pupil)
+    made = [sheet.truth for sheet in sheets]
+    told = {**script.roster_line(pupil, sheets), **script.measured_line(pupil, sheets)}
+    with (SAMPLES / name / "roster.csv").open(encoding="utf-8", newline="") as file:
+        bundled_line = next(line for line in csv.DictReader(file) if line["student_id"] == student)
+    assert {key: str(told[key]) for key in bundled_line if key != "scans"} == {
+        key: value for key, value in bundled_line.items() if key != "scans"
+    }
     for again, bundled in zip(made, truths_of(name)[student], strict=True):
         assert again["scales"]["declared"] == bundled["scales"]["declared"]
         assert np.allclose(again["homography"], bundled["homography"], atol=1e-6)
