@@ -183,6 +183,12 @@ class _Sheets:
                 vectors = _doubted(self.task, figure, vectors) if group_of(figure) else vectors
                 held = self.held_against_cells(vectors)
                 self.add_vectors(held)
+                if group_of(figure):
+                    blank = frozenset(gap.name for gap in reading.unread if gap.is_blank)
+                    sums = _between_parts(self.task, figure, read, blank, turn)
+                    for name, one in self.held_against_cells(sums).items():
+                        sure = min(one.confidence, sums[name].confidence)
+                        self.add_vectors({name: replace(one, confidence=sure)})
                 surer = {
                     name: one.confidence
                     for name, one in held.items()
@@ -329,6 +335,22 @@ def _doubted(task: Task, figure: str, drawn: Mapping[str, DrawnVector]) -> dict[
         or statistics.median(drawn[name].confidence for name in shown) < MOSTLY_DOUBTED
     )
     return {name: replace(one, is_doubted=is_doubtful and name in laid_off) for name, one in drawn.items()}
+
+
+def _between_parts(
+    task: Task, figure: str, read: Figure, blank: frozenset[str], turn: float
+) -> dict[str, DrawnVector]:
+    """Return the sums of forces that are asked for but not drawn out: their ends on the polygon show them."""
+    asked = blank & {one.name for one in task.rubric.criterion if not one.optional}
+    found = {}
+    for vector in task.construction.vectors_of(figure):
+        tail, head = (read.nodes.get(node) for node in (vector.tail, vector.head))
+        if vector.is_sum and vector.name in asked and tail is not None and head is not None:
+            span, se_mm = head.at - tail.at, math.hypot(tail.se_mm, head.se_mm)
+            se_deg = math.degrees(math.atan2(se_mm, abs(span)))
+            sure, whole = min(tail.confidence, head.confidence), turn + vector.turn_rad
+            found[vector.name] = DrawnVector(abs(span), se_mm, cmath.phase(span) - turn, se_deg, sure, whole)
+    return found
 
 
 def _own_turn(task: Task, name: str) -> float:

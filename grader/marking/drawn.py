@@ -15,7 +15,7 @@ from grader.given_data.owner import Owner
 from grader.marking.diagnosis import Case, explained
 from grader.marking.naming import CERTAIN, LINE_MISTAKES, drawn_instead, sure_of
 from grader.records import MECHANISM
-from reference.construction.elements import Balance, Coriolis, Normal, Parameters, is_force
+from reference.construction.elements import Balance, Coriolis, Normal, Parameters, View, is_force
 from reference.construction.graph import Construction, Vector
 from reference.construction.mistakes import Drawing, Mistake, laid_off, line_of, made_at
 from reference.construction.steps import Given, TwoLines
@@ -227,8 +227,8 @@ def _with_computing(task: Task, evidence: Evidence, node: str, read: Covariance 
     drawn = None if vector is None else evidence.vector(vector.name)
     along = None if drawn is None else drawn.as_complex
     rows, step = NO_ERRORS, task.construction.step(node)
-    if isinstance(step, Given) and isinstance(step.length, Balance) and not evidence.has_sketch:
-        rows = _arms_measured(task, step)
+    if isinstance(step, Given) and isinstance(step.length, Balance):
+        rows = _arms_measured(task, evidence, step)
     elif along:
         each_mm = LEAST_ERROR_MM if evidence.has_sheets else task.rubric.hand.ruler_mm
         rows = np.array([along * _computed_within(task, evidence, node, math.sqrt(2.0) * each_mm)])
@@ -236,12 +236,26 @@ def _with_computing(task: Task, evidence: Evidence, node: str, read: Covariance 
     return (xx, xy, yy) if read is None else (xx + read[0], xy + read[1], yy + read[2])
 
 
-def _arms_measured(task: Task, step: Given) -> ComplexArray:
-    """The shifts of a force that is computed from moments, by the errors of the sketch on which arms are."""
+def _arms_measured(task: Task, evidence: Evidence, step: Given) -> ComplexArray:
+    """The shifts of a force that is computed from moments, by the errors of what it is made of.
+
+    They are those of the sketch's points that were not read, and of reading the others and earlier forces.
+    """
     traced = task.traced(task.rule_scales)
-    of_sketch = [task.construction.figure_of(node) == MECHANISM for node, *_ in acts(task.construction)]
+    of_sketch = [
+        task.construction.figure_of(node) == MECHANISM and node not in evidence.nodes
+        for node, *_ in acts(task.construction)
+    ]
     shifts = traced.made[step.node].shifts - traced.nodes[step.start].shifts
-    return np.asarray(shifts[: traced.drafting_count] * of_sketch)
+    at = {name: np.asarray(one.at) for name, one in traced.nodes.items()}
+    known = task.at(task.rule_scales)
+    read = [
+        complex(step.place(View({**at, name: at[name] + axis}, known)) - at[step.node]) * evidence.se_mm[name]
+        for name in dict.fromkeys(step.needs)
+        if name in evidence.se_mm and name != step.start
+        for axis in (1.0, 1.0j)
+    ]
+    return np.concatenate([shifts[: traced.drafting_count] * of_sketch, read])
 
 
 # Measured vectors that close polygons --------------------------------------------------------------

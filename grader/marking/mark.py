@@ -168,17 +168,22 @@ def _with_arrows_turned(
     """
     judgement, as_entered, slips = _judged(task, submission, comparison, owner), comparison.outcomes, []
     named_here = [one.at for one in judgement.mistakes]
+    is_reversed = any(one.code == "inertia_reversed" for one in judgement.mistakes)
     for index, one in enumerate(as_entered):
         is_force = one.name in task.construction.vectors and kind_of(one.name).name == "force"
         if not is_force or one.verdict not in CHARGED or named_here == [one.name]:
             continue
+        if any(one.name.startswith(at) and one.name != at for at in named_here):
+            continue  # All of its kind are.
         turned = with_turned(submission, one.name)
         meant = compare(task, turned, partial(explain, owner=owner))
         pairs = zip(meant.outcomes, comparison.outcomes, strict=True)
         is_new = any(new.verdict in CHARGED and old.verdict not in CHARGED for new, old in pairs)
         if meant.outcomes[index].verdict in CREDITED and not is_new:
             submission, comparison = turned, meant
-            slips.append((Mistake("force_reversed", one.name), SLIPPED))
+            is_alike = is_reversed and one.name.startswith("F_i")
+            code = "inertia_reversed" if is_alike else "force_reversed"
+            slips.append((Mistake(code, one.name), SLIPPED))
     if not slips:
         return judgement
     judgement = _judged(task, submission, comparison, owner)
@@ -471,10 +476,11 @@ def _confirmed(task: Task, submission: Submission, comparison: Comparison) -> Su
     explanations = () if comparison.explanation is None else comparison.explanation.explanations
     least, evidence = task.rubric.least_confidence, comparison.evidence
     waiting = {one.name for one in comparison.outcomes if one.verdict == "review"}
+    read = {name for one in submission.readings for figure in one.figures.values() for name in figure.vectors}
     doubtful = {
         name: one
         for name, one in evidence.drawn.items()
-        if (one.confidence < least or name in waiting) and not one.is_doubted
+        if (one.confidence < least or name in waiting) and not one.is_doubted and name in read
     }
     if not doubtful or not explanations:
         return None

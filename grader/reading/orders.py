@@ -170,7 +170,10 @@ def orders_by_ink(expected: Expected, ring: Ring, lines: Lines) -> list[Order]:
             found[whole] = share
     best = max(found.values(), default=0.0)
     likely = sorted(found, key=lambda order: -found[order])
-    return [order for order in likely if found[order] > best - WORSE][:KEPT]
+    kept = [order for order in likely if found[order] > best - WORSE][:KEPT]
+    # Of the two orders of the closing sides only the better one was kept at each place.
+    swapped = [(*order[:-2], order[-1], order[-2]) for order in kept[:1] if ring.closing == 2]
+    return list(dict.fromkeys([*kept, *swapped]))
 
 
 def _items(spans: ComplexArray, ring: Ring) -> Iterator[tuple[Order, ...]]:
@@ -204,8 +207,9 @@ def _whole(order: Order, spans: ComplexArray, ring: Ring) -> Order:
 def _neighbour(side: int, placed: Sequence[int], ring: Ring) -> int:
     """Return the side beside which a tiny one stands: of two parts the other one, else that before it."""
     one, count = ring.vectors[side], len(ring.vectors)
-    if side >= count - ring.closing and ring.closing == 2:
-        return 2 * count - 3 - side
+    other = 2 * count - 3 - side
+    if side >= count - ring.closing and ring.closing == 2 and other in placed:
+        return other
     parts = [other for other in placed if one.part and ring.vectors[other].name[:-1] == one.name[:-1]]
     before = ((side - back) % count for back in range(1, count))
     return parts[0] if parts else next(other for other in before if other in placed)

@@ -1,7 +1,7 @@
 """Read a velocity or acceleration plan by comparing each hypothesis of how it was drawn with the strokes."""
 
 import math
-from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
@@ -10,7 +10,6 @@ import numpy as np
 from grader.reading.by_ink import Look, held_against_ink
 from grader.reading.expected import (
     LEFT_OUT,
-    REGULAR,
     DraftingErrors,
     Expected,
     PlanHypothesis,
@@ -78,6 +77,8 @@ SAME_SIZE = 0.06
 """Tolerance of a size's logarithm: a drawn crank and a ruler agree no better."""
 POOR = 0.7
 """A plan supported over less of its length may be another one, drawn with a mistake."""
+MOVING = OF_FORCES | {"wrong_arm", "sense_reversed"}
+"""Mistakes that move many sides of a force polygon: it lies elsewhere than the right one, in other orders."""
 BEAM_OF_MISTAKES = 4
 """Beam of the search if all vectors that the mistake does not affect are fixed."""
 SMALLEST_MM, LARGEST_MM = 20.0, 280.0
@@ -93,6 +94,8 @@ VAGUE_MM = 500.0
 """Nodes with a larger standard error cannot be found: their lines are nearly parallel."""
 WORSE = 0.3
 """Poses supported by this much less of the plan's length are not examined."""
+WORSE_WRONG = 0.12
+"""The same for force polygons with a mistake, of which there are many: true ones are within 0.07."""
 LEAST_VISIBLE_MM = 2.5
 """A shorter vector may have no stroke of its own."""
 RIVALS = 25
@@ -231,18 +234,23 @@ def regular_plans(problem: PlanProblem, drawing: Drawing, count: int = 2) -> lis
 
 def _regular(problem: PlanProblem, drawing: Drawing) -> list[PlanHypothesis]:
     """Return the right hypotheses, a force polygon in every order of its sides that the strokes support."""
-    hypotheses = regular(drawing, problem.figure)
-    ring = ring_of(drawing.construction, problem.figure) if group_of(problem.figure) else None
-    expected = None if ring is None else problem.expected(hypotheses[0])
+    usual, *others = regular(drawing, problem.figure)
+    return [usual, *others, *_in_other_orders(problem, usual)]
+
+
+def _in_other_orders(problem: PlanProblem, usual: PlanHypothesis) -> Iterator[PlanHypothesis]:
+    """Yield a force polygon in every other order of its sides that the strokes support."""
+    drawing, figure = usual.drawing, problem.figure
+    ring = ring_of(drawing.construction, figure) if group_of(figure) else None
+    expected = None if ring is None else problem.expected(usual)
     if ring is None or expected is None:
-        return hypotheses
+        return
     long = problem.lines.take(problem.lines.length > LEAST_LAID_MM)
     for order in orders_by_ink(expected, ring, long):
         if order != ring.usual:
-            construction = reordered(drawing.construction, problem.figure, ring, order)
-            drawn = Drawing(construction, drawing.parameters)
-            hypotheses.append(PlanHypothesis(REGULAR[0], drawn, {}, COST_OF_ORDER, order))
-    return hypotheses
+            construction = reordered(drawing.construction, figure, ring, order)
+            drawn, cost = Drawing(construction, drawing.parameters), usual.cost + COST_OF_ORDER
+            yield replace(usual, drawing=drawn, cost=cost, order=order)
 
 
 def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) -> PlanReading | None:
@@ -257,6 +265,8 @@ def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) 
     if plans:
         bases = {plan.hypothesis.label: plan.hypothesis for plan in reversed(plans)}
         everything.extend(_with_mistakes(problem, plans[0], bases.values()))
+    if group_of(problem.figure) and (not plans or plans[0].pose.score < EXPLAINED or _suspects(plans[0])):
+        everything.extend(_mistaken_polygons(problem, drawing))
     is_lettered = not group_of(problem.figure)
     if is_lettered and (not plans or plans[0].pose.score < EXPLAINED or _suspects(plans[0])):
         lettered = [one for base in regular(drawing, problem.figure) for one in _by_letters(problem, base)]
@@ -279,14 +289,18 @@ def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) 
 
 def _anywhere(problem: PlanProblem, hypotheses: Sequence[PlanHypothesis], count: int) -> list[PlanReading]:
     """Return readings of some hypotheses in any position, best first."""
-    cases: list[_PlanCase] = []
+    cases = [*_posed(problem, hypotheses, count)]
+    return sorted(_read(cases, problem.lines, problem.prior), key=lambda plan: -plan.score)
+
+
+def _posed(problem: PlanProblem, hypotheses: Iterable[PlanHypothesis], count: int) -> Iterator["_PlanCase"]:
+    """Yield each hypothesis at its likely poses."""
     for hypothesis in hypotheses:
         expected = problem.expected(hypothesis)
         if expected is not None:
             is_turnable = not group_of(problem.figure)
             found = _poses(expected, problem.lines, count, is_turnable=is_turnable)
-            cases.extend(_PlanCase(hypothesis, expected, pose) for pose in found)
-    return sorted(_read(cases, problem.lines, problem.prior), key=lambda plan: -plan.score)
+            yield from (_PlanCase(hypothesis, expected, pose) for pose in found)
 
 
 def _poses(expected: Expected, lines: Lines, count: int, *, is_turnable: bool) -> list[Pose]:
@@ -334,6 +348,17 @@ def _with_mistakes(
         if expected is not None:
             cases.append(_PlanCase(hypothesis, expected, here, touched))
     return _read(cases, problem.lines, problem.prior, best)
+
+
+def _mistaken_polygons(problem: PlanProblem, drawing: Drawing) -> list[PlanReading]:
+    """Return readings of a force polygon with a mistake in what acts, wherever it lies, in any order."""
+    usual, *_ = regular(drawing, problem.figure)
+    wrong = [one for one, mistake in mistaken(usual, problem.figure) if mistake.code in MOVING]
+    every = (hypothesis for one in wrong for hypothesis in (one, *_in_other_orders(problem, one)))
+    cases = [*_posed(problem, every, count=1)]
+    best = max((case.pose.score for case in cases), default=0.0)
+    likely = [case for case in cases if case.pose.score > best - WORSE_WRONG]
+    return _read(likely, problem.lines, problem.prior)
 
 
 def _suspects(plan: PlanReading) -> frozenset[str]:

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from grader.reading.arrowheads import is_double
-from grader.reading.expected import Edge, xy
+from grader.reading.expected import REGULAR, Edge, xy
 from grader.reading.nodes import NodeFit
 from grader.reading.plans import PlanReading
 from grader.reading.sketch import SketchReading
@@ -152,6 +152,8 @@ def _vectors(
         sure = signs.confidence()
         if is_polygon:
             sure = _weighed(sure, plan, edge, span, cov, scale_se)
+            # What a mistake that was sought predicts is no evidence against the other explanations.
+            sure = sure if plan.hypothesis.label in REGULAR else min(sure, named)
             is_tiny = min(abs(span), abs(_predicted(plan, edge))) < LEAST_VECTOR_MM
             is_inferred = not of_two and _is_inferred(plan, index)
             if is_tiny or is_inferred or (of_two and _goes_on(where, complex(fit.at[edge.tail]), span)):

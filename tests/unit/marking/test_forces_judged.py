@@ -7,14 +7,16 @@ from dataclasses import replace
 import pytest
 
 from grader.comparison.criteria import compare
-from grader.comparison.evidence import Submission
+from grader.comparison.evidence import Submission, gather
+from grader.comparison.scales import settle
 from grader.comparison.task import task_of
+from grader.marking.drawn import case_of
 from grader.marking.mark import judge
 from grader.records import Figure, Reading, Reason, Unread
 from grader.rubric import rubric_of
 from grader.tables.measurements import columns_of, measurements_in, names_of
 from reference.authored.assignment import Variant, library, load_assignment
-from reference.construction.mistakes import Mistake
+from reference.construction.mistakes import Drawing, Mistake, mistakes_of_forces
 from reference.errors import AuthoredFileError
 from reference.numbers import cross
 from tests.hands import changed, rule_scales, sheet, task_for, without
@@ -293,9 +295,43 @@ def test_sides_too_short_to_have_a_direction_are_no_evidence_for_their_polygon()
     assert (on_scan(PRESS, read)["F_D"], on_scan(PRESS, short)["F_D"]) == ("full", "review")
 
 
-def test_a_sum_that_is_not_drawn_out_waits():
-    found = on_scan(PRESS, sheet(PRESS), "R_02", "F_i2")
-    assert (found["R_02"], found["F_i2"]) == ("review", "none")
+def test_a_sum_that_is_not_drawn_out_is_measured_between_its_parts():
+    read = sheet(PRESS)
+    found = on_scan(PRESS, read, "R_02", "F_i2")
+    assert (found["R_02"], found["F_i2"]) == ("full", "none")
+    plan, end = read.figures["force_plan_B"], PRESS.construction.vectors["R_02"].tail
+    nodes = {**plan.nodes, end: replace(plan.nodes[end], confidence=UNSURE)}
+    unsure = replace(read, figures={**read.figures, "force_plan_B": Figure(nodes, plan.vectors)})
+    shifted = {**plan.nodes, end: replace(plan.nodes[end], at=plan.nodes[end].at + 9.0)}
+    astray = replace(read, figures={**read.figures, "force_plan_B": Figure(shifted, plan.vectors)})
+    assert on_scan(PRESS, unsure, "R_02")["R_02"] == "full"
+    assert on_scan(PRESS, astray, "R_02")["R_02"] != "full"
+    # One that need not be drawn is none.
+    assert on_scan(PRESS, read, "R_23")["R_23"] == "not_judged"
+
+
+def test_inertia_forces_that_are_all_reversed_are_one_mistake_where_the_first_waits():
+    right = Drawing(PRESS.construction, PRESS.at(PRESS.rule_scales))
+    every = next(
+        one for one in mistakes_of_forces(right) if (one.code, one.at) == ("inertia_reversed", "F_i")
+    )
+    read = changed(sheet(PRESS, mistakes=(every,)), "F_iD", confidence=CAPPED)
+    judgement = judge(PRESS, Submission(readings=(read,)))
+    assert [(one.code, one.at) for one in judgement.mistakes] == [("inertia_reversed", "F_i")]
+
+
+def test_the_length_from_moments_is_known_as_well_as_what_it_is_made_of():
+    def spread(reading):
+        evidence = gather(PUMP, Submission(readings=(reading,)))
+        entries = case_of(PUMP, evidence, settle(PUMP, evidence, {})).observations.entries
+        head = PUMP.construction.vectors["R_13_t"].head
+        return next(one.spread[2] for one in entries if one.node == head)
+
+    read = sheet(PUMP)
+    plans = Reading({name: one for name, one in read.figures.items() if name != "mechanism"})
+    rough = replace(read, figures={**read.figures, "mechanism": sheet(PUMP, se_mm=0.3).figures["mechanism"]})
+    assert spread(read) < spread(rough)
+    assert spread(read) < spread(plans)
 
 
 def test_the_start_of_a_polygon_is_not_known_unless_it_was_read():

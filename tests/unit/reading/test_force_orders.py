@@ -10,16 +10,20 @@ import pytest
 
 from grader.reading.arrowheads import TOLD_MM, forward_mm
 from grader.reading.corrected import corrected
-from grader.reading.expected import Edge
-from grader.reading.orders import ends_on_sheet, reordered, ring_of, to_usual
+from grader.reading.expected import Edge, Expected
+from grader.reading.lines import lines_of
+from grader.reading.orders import ends_on_sheet, orders_by_ink, reordered, ring_of, to_usual
+from grader.reading.read import read_figures
 from grader.reading.vectors import vector_of
 from grader.records import Figure, InkMap, PageRef, Reading, ReadNode, ScannedPage
 from reference.construction.graph import evaluate
+from reference.construction.mistakes import commit, mistakes_of_forces
 from reference.plan import exact_plan
 from tests.bench.force_sheets import MASSES, judged, read, task_with_forces, work, work_with_mistake
+from tests.unit.reading.drawn import draw, ink_of
 
 ROUNDING_MM = 1e-9
-WIDTH_MM = 0.5
+WIDTH_MM, LONG_MM = 0.5, 5.0
 
 
 def an_order(ring, lot):
@@ -52,6 +56,21 @@ def test_vectors_and_usual_corners_are_those_of_the_exact_plan_in_any_order(name
             usual = to_usual(order) @ np.array([complex(np.ravel(nodes[node])[0]) for node in names])
             for node, at in zip(names, usual, strict=True):
                 assert abs(at - complex(np.ravel(right[node])[0])) < ROUNDING_MM, (node, order)
+
+
+def test_sides_too_short_for_a_stroke_stand_beside_their_neighbours():
+    plan = exact_plan(task_with_forces("pump"), task_with_forces("pump").variants()[:1])
+    ring = ring_of(plan.construction, "force_plan_B")
+    long, closing = np.arange(len(ring.vectors) - 2), np.arange(len(ring.vectors) - 2, len(ring.vectors))
+    spans = np.exp(2j * np.pi * np.arange(len(ring.vectors)) / len(long)) * 20.0
+    spans[closing] = 0.1
+    at = np.concatenate([[0j], np.cumsum(spans)[:-1]])
+    ends = np.stack([at, at + spans], axis=1)[long]
+    expected = Expected(tuple(map(str, range(len(at)))), at, np.eye(2 * len(at)), ())
+    lines = lines_of(ink_of([tuple(pair) for pair in ends]))
+    orders = orders_by_ink(expected, ring, lines)
+    # Both orders of the closing sides are told: strokes elsewhere may fit the wrong one better.
+    assert {order[-2:] for order in orders} == {tuple(closing), tuple(closing[::-1])}
 
 
 def test_the_usual_order_changes_nothing():
@@ -95,6 +114,21 @@ def test_what_the_ink_does_not_tell_is_not_asserted(name, seed):
     with tempfile.TemporaryDirectory() as folder:
         pages = read(one, Path(folder))
     assert not any(vector.misread for vector in judged(one, pages))
+
+
+def test_a_polygon_that_a_mistake_moves_is_read_where_it_lies():
+    assignment = task_with_forces("pump")
+    variant = assignment.variants()[1]
+    right = exact_plan(assignment, [variant]).drawing
+    load = right.construction.vectors["F_D"].head
+    mistake = next(one for one in mistakes_of_forces(right) if (one.code, one.at) == ("force_reversed", load))
+    places = {"mechanism": 120.0 - 190.0j, "force_plan_D": 300.0 - 150.0j}
+    drawn = draw(commit(mistake, right), places)
+    (reading,) = read_figures([(drawn.ink, drawn.sheet)], assignment, variant, None, ())
+    read_as = reading.figures["force_plan_D"].vectors
+    for name, vector in drawn.vectors.items():
+        if abs(vector) > LONG_MM:
+            assert read_as[name].length_mm == pytest.approx(abs(vector), abs=WIDTH_MM), name
 
 
 @pytest.mark.parametrize("tip", [1.0, 0.55], ids=["at the end", "in the middle"])
