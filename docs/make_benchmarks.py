@@ -18,7 +18,6 @@ SHOWN = (
     "Solver: median microseconds per variant (pump; positions",
     "Solver: largest error",
     "Stability: largest error",
-    "Stability: branches",
     "Reading: sheets and vectors",
     "Reading: confidence against",
     "Lines: time and error",

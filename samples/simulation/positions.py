@@ -36,7 +36,7 @@ class PositionsSheet:
     truths: Mapping[int, dict[str, Any]]
 
 
-def simulate_positions(  # noqa: PLR0913 - as `simulate`, and mistakes by position
+def simulate_positions(
     assignment: Assignment,
     n: int | None,
     seed: int,
@@ -44,21 +44,13 @@ def simulate_positions(  # noqa: PLR0913 - as `simulate`, and mistakes by positi
     *,
     student_id: str = "s01",
     printed: Printed | None = None,
-    mistakes: Mapping[int, tuple[str, ...]] | None = None,
 ) -> list[PositionsSheet]:
-    """Draw and scan the pages of an assignment whose pages have all positions.
-
-    Arguments: `mistakes` to be made, by position. Raises ValueError for one that cannot be made.
-    """
+    """Draw and scan the pages of an assignment whose pages have all positions, without mistakes."""
     rng = np.random.default_rng([seed, 1])
-    variants = [Variant(n, position) for position in assignment.shared_positions]
-    students = [
-        replace(settings.student, mistakes=(mistakes or {}).get(variant.position or 0, ()))
-        for variant in variants
-    ]
+    student = replace(settings.student, mistakes=())
     tasks = [
-        task_of(assignment, variant, student, np.random.default_rng([seed, 0, index]))
-        for index, (variant, student) in enumerate(zip(variants, students, strict=True))
+        task_of(assignment, Variant(n, position), student, np.random.default_rng([seed, 0, index]))
+        for index, position in enumerate(assignment.shared_positions)
     ]
     drawn: list[Mapping[str, complex]] = []
     for task in tasks:

@@ -1,34 +1,26 @@
 """Read all positions from two sheets, compared with a sheet for each position.
 
     OMP_NUM_THREADS=1 python -m tests.bench.positions --students 6
-    OMP_NUM_THREADS=1 python -m tests.bench.positions --class 20
 
 Students with careful and typical hands draw the press in eight positions: each on an answer sheet of its own
 (`press`), all on two answer sheets, and all on two plain sheets (`press-all`); flatbed scans at 300 dpi.
-Counts are those of `tests.bench.reading_truth`, of the velocities. With `--class` such students' printed
-sheets, every fourth plan with a mistake, are graded as a folder.
+Counts are those of `tests.bench.reading_truth`, of the velocities.
 """
 
 import argparse
-import csv
-import json
-import re
-import subprocess
 import sys
 import tempfile
 import time
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import cv2
-import numpy as np
 
 from grader.pipeline import read_submission
 from grader.printed.answer_sheet import make_sheets
-from grader.records import VELOCITY_PLAN, PageRef
+from grader.records import PageRef
 from grader.rubric import asked_of
 from grader.scan.page import open_page
 from grader.tables.measurements import StudentSubmission
@@ -37,7 +29,6 @@ from reference.authored.assignment import Assignment, Variant
 from reference.construction.derive import construction_of
 from samples.simulation import CAREFUL, TYPICAL, Settings, any_settings
 from samples.simulation.desk import Printed
-from samples.simulation.hand import possible_mistakes
 from samples.simulation.positions import simulate_positions
 from samples.simulation.printing import printed_sheets
 from samples.simulation.student import drawn_by, scanned
@@ -114,89 +105,12 @@ def _add(
             tally.add_sheet(truth, figures_of(truth, construction), wanted, page, page.reading)
 
 
-def grade_class(count: int, folder: Path) -> str:
-    """Grade a class of students whose every fourth plan has a mistake; what became of it."""
-    assignment, _ = task_named(ALL)
-    made: dict[tuple[str, int], tuple[str, ...]] = {}
-    scans = folder / "scans"
-    scans.mkdir(parents=True)
-    with (folder / "roster.csv").open("w", newline="", encoding="utf-8") as file:
-        rows = csv.writer(file)
-        rows.writerow(["student_id", "name", "position"])
-        for seed in range(1, count + 1):
-            student, settings = f"s{seed:02d}", settings_of(seed)
-            rows.writerows([student, f"Student {seed}", position] for position in assignment.shared_positions)
-            wrong = _mistakes(assignment, settings, seed)
-            printed = sheets_of(assignment, student)
-            pages = simulate_positions(
-                assignment, None, seed, settings, student_id=student, printed=printed, mistakes=wrong
-            )
-            for k, page in enumerate(pages):
-                page.sheet.save(scans / f"scan{seed:02d}_{k}")
-            for position, truth in pages[-1].truths.items():
-                nodes = truth["figures"][VELOCITY_PLAN]["nodes"]
-                codes = tuple(one["code"] for one in truth["mistakes"] if one["at"] in nodes)
-                made |= {(student, position): codes} if codes else {}
-    start = time.perf_counter()
-    out = folder / "out"
-    call = ["grade", scans, "--assignment", ALL, "--roster", folder / "roster.csv", "--out", out, "--jobs", 1]
-    program = [sys.executable, "-m", "grader", *map(str, call)]
-    subprocess.run(program, check=False, stdout=subprocess.DEVNULL)  # noqa: S603 - our own program
-    results = json.loads((out / "results.json").read_text(encoding="utf-8"))
-    return _told(results, made, time.perf_counter() - start)
-
-
-def _mistakes(assignment: Assignment, settings: Settings, seed: int) -> dict[int, tuple[str, ...]]:
-    """One mistake in every fourth plan of the velocities."""
-    rng = np.random.default_rng([seed, 30])
-    chosen: dict[int, tuple[str, ...]] = {}
-    for position in assignment.shared_positions[seed % 4 :: 4]:
-        able = possible_mistakes(assignment, Variant(None, position), settings.student, VELOCITY_CODES)
-        if able:
-            chosen[position] = (str(rng.choice(able)),)
-    return chosen
-
-
-VELOCITY_CODES = ("parallel_for_perpendicular", "sense_reversed", "wrong_link")
-
-
-def _told(results: dict[str, Any], made: dict[tuple[str, int], tuple[str, ...]], seconds: float) -> str:
-    """Return the counts of a graded class."""
-    status = Counter(report["status"] for report in results["reports"])
-    drawn = re.compile("[va]_")
-    verdicts = Counter(
-        criterion["verdict"]
-        for report in results["reports"]
-        for criterion in report["criteria"]
-        if drawn.match(criterion["vector"] or "")
-    )
-    accused, found = 0, Counter[str]()
-    for report in results["reports"]:
-        codes = made.get((report["student_id"], report["position"]), ())
-        named = {mistake["code"] for mistake in report["mistakes"]}
-        accused += bool(named) and not codes
-        found["named" if named & set(codes) else "not named"] += bool(codes)
-    lines = [
-        f"{len(results['reports'])} positions in {seconds:.0f} s, unmatched: {len(results['unmatched'])}",
-        f"status: {dict(status)}",
-        f"verdicts on vectors: {dict(verdicts)}",
-        f"mistakes: {dict(found)}; right plans accused: {accused}",
-    ]
-    return "\n".join(lines)
-
-
 def main() -> None:
-    """Print the tables, or the counts of a class."""
+    """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--students", type=int, default=6)
-    parser.add_argument("--class", dest="count", type=int)
-    parser.add_argument("--folder", type=Path, help="where the class is kept, else a temporary folder")
     asked = parser.parse_args()
     cv2.setNumThreads(1)
-    if asked.count:
-        with tempfile.TemporaryDirectory() as folder:
-            print(grade_class(asked.count, asked.folder or Path(folder)))
-        return
     rows = []
     for title, tally in measure(range(1, asked.students + 1)):
         rows.append(row_of(title, title, tally, None))

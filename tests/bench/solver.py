@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from grader.cli.benchmark import construction_error
 from reference.authored.assignment import Assignment, built_in, load_assignment
 from reference.plan import Plan, exact_plan
-from tests.bench.branches import BranchRow, count_branches
 from tests.bench.oracle import ExactMotion
 from tests.bench.plain_text import NOTHING, Table
 from tests.bench.speed import SpeedRow, measure_speed
@@ -44,16 +43,14 @@ class SolverFigures:
     speed: tuple[SpeedRow, ...] = ()
     errors: tuple[ErrorRow, ...] = ()
     stability: tuple[StabilityRow, ...] = ()
-    branches: tuple[BranchRow, ...] = ()
 
 
 def measure_solver(*, quick: bool = False) -> SolverFigures:
-    """Measure speed, errors, stability and branches."""
+    """Measure speed, errors and stability."""
     return SolverFigures(
         tuple(measure_speed(quick=quick)),
         tuple(measure_errors()),
         tuple(measure_stability(quick=quick)),
-        tuple(count_branches(quick=quick)),
     )
 
 
@@ -106,7 +103,6 @@ def solver_tables(solver: SolverFigures) -> Iterator[Table]:
     yield _speed(solver.speed)
     yield _error_table(solver.errors)
     yield _summary(solver.stability)
-    yield _branches(solver.branches)
 
 
 def _speed(rows: Sequence[SpeedRow]) -> Table:
@@ -165,12 +161,6 @@ def _overall(cells: Sequence[Outcomes]) -> str:
     errors = [cell.worst for cell in cells if cell.worst is not None]
     worst = _units(max(errors)) if errors else NOTHING
     return "; ".join([worst, *(f"{count} {told}" for count, told in counts if count)])
-
-
-def _branches(rows: Iterable[BranchRow]) -> Table:
-    heads = ["solver", "random cases", "wrong branch", "refused", "silent nan"]
-    lines = [[row.solver, str(row.cases), str(row.wrong), str(row.refused), str(row.silent)] for row in rows]
-    return "Stability: branches in random mechanisms", heads, lines
 
 
 def _units(error: float) -> str:

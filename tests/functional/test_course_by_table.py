@@ -118,15 +118,6 @@ def test_sheets_say_the_side_in_the_students_language(planmark, conveyor, tmp_pa
     assert "la dreapta" in texts[-1]
 
 
-def test_plans_of_all_rows_stand_in_one_table(planmark, conveyor, tmp_path):
-    assert planmark("plan", conveyor, "--all", "--csv", "all.csv").returncode == 0
-    lines = (tmp_path / "all.csv").read_text(encoding="utf-8").splitlines()
-    one = json.loads(planmark("plan", conveyor, "--n", 9, "--json").stdout)
-    row = dict(zip(lines[0].split(","), lines[9].split(","), strict=True))
-    assert row["n"] == "9"
-    assert float(row["v_C"]) == pytest.approx(one["vectors"]["v_C"]["drawn_mm"], rel=1e-8)
-
-
 def test_position_0_at_a_dead_point_as_documented(conveyor):
     assert DEAD_POINT.strip() in re.sub(r"(?m)^    ", "", DOCS.read_text(encoding="utf-8"))
     text = conveyor.read_text(encoding="utf-8")

@@ -1,7 +1,6 @@
 """``planmark plan`` and what every command has in common."""
 
 import json
-import xml.etree.ElementTree as ET
 
 import jsonschema
 import pypdfium2
@@ -83,25 +82,6 @@ def test_the_scales_follow_from_the_crank_as_drawn(planmark):
     assert document["vectors"]["v_A"]["drawn_mm"] == pytest.approx(50.0)
 
 
-def test_the_plan_is_drawn_into_a_file(planmark, tmp_path):
-    ran = planmark("plan", "pump", "--n", 7, "--svg", "new/plan.svg")
-    assert ran.returncode == 0
-    assert ET.parse(tmp_path / "new" / "plan.svg").getroot().tag.endswith("svg")
-    assert [path.name for path in (tmp_path / "new").iterdir()] == ["plan.svg"]
-
-
-def test_a_mechanism_that_does_not_assemble_has_its_own_status(planmark, tmp_path):
-    own = planmark("plan", "pump", "--n", 1, cwd=tmp_path)
-    assert own.returncode == 0
-    for kind in ("assignment", "mechanism"):
-        text = (library() / f"pump.{kind}.toml").read_text(encoding="utf-8")
-        text = text.replace("lengths = [40, 30]", "lengths = [4, 3]")
-        (tmp_path / f"pump.{kind}.toml").write_text(text, encoding="utf-8")
-    ran = planmark("plan", "./pump.assignment.toml", "--n", 1)
-    assert ran.returncode == 3
-    assert "group of B does not assemble" in ran.stderr
-
-
 @pytest.mark.parametrize("name", [*MODELS, "lti"])
 def test_every_schema_is_a_schema(planmark, name):
     ran = planmark("schema", name)
@@ -121,15 +101,6 @@ def test_the_program_tells_its_version_and_its_commands(planmark):
     assert planmark("--help").returncode == 0
     assert planmark().returncode == 2
     assert planmark("frobnicate").returncode == 2
-
-
-def test_lint_tells_all_that_is_unwise_in_an_assignment(planmark, tmp_path):
-    found = planmark("lint", "pump")
-    assert found.returncode == 1
-    assert "a_DC_n is shorter than" in found.stdout
-    assert found.stdout.splitlines()[-1].startswith("pump: 30 variants, ")
-    (tmp_path / "broken.assignment.toml").write_text("id = 1\n", encoding="utf-8")
-    assert planmark("lint", "broken.assignment.toml").returncode == 2
 
 
 CRANK_ALONE = """

@@ -41,17 +41,6 @@ def test_every_node_as_drawn_lies_where_the_closed_form_has_it(
             assert np.max(np.abs(nodes[node] - place)) <= ROUNDING * size, node
 
 
-@given(a_mechanism, st.floats(0.2, 5.0))
-def test_a_plan_at_another_scale_is_the_same_plan_enlarged(mechanism, factor):
-    construction, nodes = drawn(mechanism, 0.01, 0.1, 1.0)
-    _, other = drawn(mechanism, 0.01, 0.1 / factor, 1.0 / factor)
-    for figure in ("velocity_plan", "acceleration_plan"):
-        names = [step.node for step in construction.figures[figure]]
-        size = size_of(other[name] for name in names)
-        for name in names:
-            assert np.max(np.abs(nodes[name] * factor - other[name])) <= ROUNDING * size
-
-
 PARTS = {"n": "t", "c": "r"}
 """Each first part of a relative acceleration, and the second that starts where it ends."""
 

@@ -43,15 +43,6 @@ def arms(mechanism, motion):
 
 
 @given(a_mechanism)
-def test_the_ends_of_a_link_neither_part_nor_approach(mechanism):
-    motion = move(mechanism)
-    for _, arm, v, a in arms(mechanism, motion):
-        reach = max(float(np.abs(arm)[0]), 1e-3)
-        assert abs(dot(arm, v)[0]) <= ROUNDING * reach * speed(motion)
-        assert abs((dot(arm, a) + dot(v, v))[0]) <= ROUNDING * max(reach, 1.0) * acceleration(motion)
-
-
-@given(a_mechanism)
 def test_points_of_one_link_turn_alike(mechanism):
     motion = move(mechanism)
     for link, arm, v, a in arms(mechanism, motion):
@@ -150,22 +141,16 @@ def test_accelerations_are_those_of_the_speed_plus_those_of_the_drivers_accelera
         assert near(a, uniform.acceleration[joint] + started.acceleration[joint], size)
 
 
-@given(a_mechanism, st.floats(0.1, 10.0))
+BACKWARDS = -1.0
+
+
+@given(a_mechanism, st.floats(0.1, 10.0) | st.just(BACKWARDS))
 def test_at_another_speed_velocities_grow_once_and_accelerations_twice(mechanism, factor):
     rate, growth = rates_of(mechanism)
     slow, fast = move(mechanism), move(driven(mechanism, factor * rate, factor**2 * growth))
     for joint in slow.velocity:
         assert near(factor * slow.velocity[joint], fast.velocity[joint], speed(fast))
         assert near(factor**2 * slow.acceleration[joint], fast.acceleration[joint], acceleration(fast))
-
-
-@given(a_mechanism)
-def test_backwards_in_time_velocities_turn_round_and_accelerations_stay(mechanism):
-    rate, growth = rates_of(mechanism)
-    forth, back = move(mechanism), move(driven(mechanism, -rate, growth))
-    for joint in forth.velocity:
-        assert near(forth.velocity[joint], -back.velocity[joint], speed(forth))
-        assert near(forth.acceleration[joint], back.acceleration[joint], acceleration(forth))
 
 
 SIZES = [1e-6, 0.01, 1.0, 39.37, 1e5]

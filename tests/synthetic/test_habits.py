@@ -17,7 +17,6 @@ from samples.simulation import (
     simulate,
     with_hardships,
 )
-from samples.simulation.student import encoded
 
 pytestmark = pytest.mark.slow
 SMALL = Scan(dpi=45.0, noise=0.0, tint_grain=0.0, dust=0)
@@ -57,13 +56,6 @@ def test_a_habit_and_a_hardship_are_seen_and_leave_the_true_vectors(changes):
             assert vectors[name]["length_mm"] == pytest.approx(vector["length_mm"], abs=1e-3)
 
 
-def test_overlapping_figures_lie_on_each_other():
-    one = drawn(habits=("overlapping",))
-    boxes = [np.array(list(figure["nodes"].values())) for figure in one.truth["figures"].values()]
-    low, high = np.array([box.min(axis=0) for box in boxes]), np.array([box.max(axis=0) for box in boxes])
-    assert any(np.all((low[i] < high[j]) & (low[j] < high[i])) for i, j in ((0, 1), (0, 2), (1, 2)))
-
-
 def test_long_helper_lines_stand_in_the_truth():
     one, plain = drawn(habits=("long helpers",)), drawn()
     counts = [len(sheet.truth["figures"]["velocity_plan"]["construction"]) for sheet in (one, plain)]
@@ -84,12 +76,6 @@ def test_a_dithered_page_has_two_values_and_tones():
         np.count_nonzero(image[:, 1:] != image[:, :-1]) / (image == 0).sum() for image in (plain, tones)
     ]
     assert changes[1] > 1.5 * changes[0]
-
-
-def test_coarse_tables_are_those_of_the_file():
-    sheet = drawn()
-    coarse = replace(sheet.settings.scan, jpeg_tables="web_low")
-    assert len(encoded(sheet.image, coarse)) < len(encoded(sheet.image, sheet.settings.scan))
 
 
 def test_millimetre_paper_has_its_colour():

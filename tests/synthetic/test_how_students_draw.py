@@ -15,7 +15,6 @@ from samples.simulation.instruments import Instruments
 from samples.simulation.mistakes import (
     CODES,
     CODES_OF_FORCES,
-    SPEED_FACTORS,
     Occasion,
     possible,
     with_mistake,
@@ -103,31 +102,6 @@ def test_the_codes_are_those_of_the_published_formats():
     entered = {"units"}  # not drawn: a slip in the numbers entered
     of_the_data = {"data_misread"}  # another crank angle, drawn in tests/unit/given_data
     assert {*CODES, *CODES_OF_FORCES} == set(operators.CODES) - entered - of_the_data
-
-
-@pytest.mark.parametrize("code", [code for code in CODES if code not in {"labels_swapped", "vector_missing"}])
-def test_every_mistake_moves_a_node_or_a_scale(code):
-    occasion = occasion_of("pump")
-    right = evaluate(occasion.construction, occasion.right.parameters)
-    for mistake in possible(code, occasion):
-        wrong = with_mistake(occasion.right, mistake)
-        nodes = evaluate(wrong.construction, wrong.parameters)
-        moved = max(abs(complex(nodes[node] - place)) for node, place in right.items())
-        scales = [float(wrong.parameters[name]) for name in ("kL", "kv", "ka")]
-        own = [float(occasion.right.parameters[name]) for name in ("kL", "kv", "ka")]
-        assert moved > ROUNDING_MM or scales != own, mistake
-
-
-def test_a_speed_left_unconverted_changes_the_scales_and_leaves_the_plans():
-    occasion = occasion_of("pump")
-    right = evaluate(occasion.construction, occasion.right.parameters)
-    factors = []
-    for mistake in possible("rpm_not_converted", occasion):
-        wrong = with_mistake(occasion.right, mistake)
-        nodes = evaluate(wrong.construction, wrong.parameters)
-        assert all(abs(complex(nodes[node] - place)) < ROUNDING_MM for node, place in right.items())
-        factors.append(float(wrong.parameters["kv"] / occasion.right.parameters["kv"]))
-    assert factors == pytest.approx(list(SPEED_FACTORS))
 
 
 def test_mistakes_go_beyond_those_that_the_program_looks_for():

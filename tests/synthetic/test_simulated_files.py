@@ -10,7 +10,7 @@ from PIL import Image
 from grader.printed.answer_sheet import make_sheets
 from grader.tables.roster import RosterRow
 from reference.authored.assignment import load_assignment
-from samples.simulation import Scan, Settings, Student, blank_back, simulate, write_pdf, write_truth
+from samples.simulation import Scan, Settings, Student, blank_back, simulate, write_pdf
 from samples.simulation.printing import printed_sheets
 
 pytestmark = pytest.mark.slow
@@ -71,14 +71,6 @@ def test_a_class_pdf_holds_fronts_and_blank_backs_at_their_size(tmp_path, assign
         width, height = (float(v) / 72 * 25.4 for v in document.pages[0].MediaBox[2:])
     assert width == pytest.approx(420.0, abs=13.0)
     assert height == pytest.approx(297.0, abs=10.0)
-
-
-def test_truth_is_a_line_per_sheet(tmp_path, assignment):
-    sheets = simulate(assignment, assignment.variant(1), 2, Settings(scan=SMALL, student=Student(sheets=2)))
-    write_truth(tmp_path / "truth.jsonl", [sheet.truth for sheet in sheets])
-    lines = (tmp_path / "truth.jsonl").read_text(encoding="utf-8").splitlines()
-    assert len(lines) == 2
-    assert '"schema_version": 1' in lines[0]
 
 
 def test_a_printed_sheet_is_drawn_on_inside_its_zones(assignment):

@@ -85,24 +85,6 @@ def test_the_signs_of_a_label_fill_its_box():
         np.testing.assert_allclose(corners, label["box_mm"], atol=1e-3)
 
 
-def test_a_mistake_is_followed_through():
-    assignment = load_assignment("pump")
-    student = Student(mistakes=("sense_reversed",))
-    settings = Settings(hand=PERFECT, student=student, scan=TINY)
-    sheets = simulate(assignment, assignment.variant(9), 1, settings)
-    right = simulate(assignment, assignment.variant(9), 1, replace(settings, student=Student()))
-    at = sheets[0].truth["mistakes"][0]["at"]
-    wrong, proper = vectors_of(sheets), vectors_of(right)
-    name = "a_A" if at.endswith("'") else "v_A"
-    kin = "a_D" if name == "a_A" else "v_D"
-    turned = (wrong[name]["direction_deg"] - proper[name]["direction_deg"]) % 360
-    assert turned == pytest.approx(180.0, abs=0.01)
-    if kin == "v_D":
-        turned = (wrong[kin]["direction_deg"] - proper[kin]["direction_deg"]) % 360
-        assert turned == pytest.approx(180.0, abs=0.01)
-    assert wrong[kin]["intended"]["length_mm"] == pytest.approx(wrong[kin]["length_mm"], abs=ROUNDING_MM)
-
-
 def test_errors_grow_along_the_construction():
     assignment = load_assignment("pump")
     spread = {"a'": [], "d'": []}

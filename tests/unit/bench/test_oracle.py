@@ -1,20 +1,17 @@
 """The oracle: it has the textbook's values, and the closed form agrees with it for every group."""
 
-import tomllib
 from typing import get_args
 
 import numpy as np
 import pytest
 from mpmath import mp, mpc
 
-from reference.authored.assembly import build_mechanism
-from reference.authored.mechanism import MechanismFile
-from reference.authored.toml_file import validate
 from reference.construction.derive import construction_of
 from reference.construction.graph import Vector, evaluate, parameters_of
 from reference.kinematics.motion import move
 from reference.mechanism import Crank, Dyad, FixedGuide, Group, Mechanism, MovingGuide, Slider
 from reference.plan import _measured
+from tests import every_group
 from tests.bench.oracle import DIGITS, ExactMotion, _root
 from tests.bench.singular import KINDS
 
@@ -23,86 +20,6 @@ FAR = 0.1
 SHARE_OF_PLAN = 1e-11
 ROUNDING = 1e-50
 """Metres, m/s, m/s^2: what is promised of numbers near 1."""
-
-
-ALL_GROUPS = """
-schema_version = 1
-id = "all"
-length_unit = "cm"
-[title]
-en = "All groups"
-[ground]
-O1 = [0, 0]
-O2 = [110.1, 0.7]
-O3 = [40.3, -10.9]
-[crank]
-link = "1"
-pivot = "O1"
-pin = "A"
-length = 30.3
-angle_deg = 40.1
-rpm = 1350
-gear_ratio = 23.5
-epsilon = -2.7
-[[group]]
-type = "RRR"
-node = "B"
-pins = ["A", "O2"]
-lengths = [90.7, 80.9]
-links = ["2", "3"]
-side = "left"
-[[group]]
-type = "plate"
-node = "C"
-base = ["A", "B"]
-link = "2"
-lengths = [35.7, 70.1]
-side = "right"
-[[group]]
-type = "point"
-node = "P"
-base = ["A", "B"]
-link = "2"
-at = [20.3, -7.7]
-[[group]]
-type = "point_on_line"
-node = "Q"
-base = ["A", "B"]
-link = "2"
-ratio = 0.3
-[[group]]
-type = "RRP"
-node = "D"
-pin = "O3"
-link = "4"
-length = 60.7
-guide = { joints = ["A", "B"], coincident = "D2" }
-side = "ahead"
-[[group]]
-type = "RPR"
-node = "C5"
-pin = "C"
-pivot = "O3"
-link = "5"
-offset = 1.1
-foot = "F"
-[[group]]
-type = "point"
-node = "S"
-base = ["O3", "C5"]
-link = "5"
-at = [33.3, 4.1]
-[[group]]
-type = "PRP"
-node = "X"
-guides = [{ joints = ["O1", "A"], coincident = "X1" }, { through = [70.1, 0], angle_deg = 80.3 }]
-[[group]]
-type = "RPP"
-node = "Y"
-pin = "P"
-slot_deg = 80.7
-guide = { through = [3.3, -20.1], angle_deg = 5.3 }
-"""
 
 
 def far(kind):
@@ -167,7 +84,7 @@ def test_a_point_on_a_moving_guide_slides_along_it_and_coriolis_is_across():
 
 
 def test_every_vector_of_a_construction_of_all_groups_agrees_with_fifty_digits():
-    mechanism = build_mechanism(validate(MechanismFile, tomllib.loads(ALL_GROUPS), "all.toml"), {}, 1)
+    mechanism = every_group.mechanism()
     assert {type(group) for group in mechanism.groups} == set(get_args(Group))
     construction, scale = construction_of(mechanism), np.array([0.01])
     measured = _measured(construction, move(mechanism))

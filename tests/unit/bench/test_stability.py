@@ -1,7 +1,6 @@
 """The stability table: outcomes are told apart, distances are as asked, fsolve is asked fairly."""
 
 import math
-from dataclasses import replace
 from statistics import median
 
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 
 from reference.authored.assignment import load_assignment
 from reference.kinematics.motion import move
-from tests.bench import branches
 from tests.bench.peers import Answer, Fsolve, NoAnswerError, error_of, one_of, plain_of, sketch, stacked
 from tests.bench.singular import KINDS
 from tests.bench.speed import spread
@@ -118,42 +116,3 @@ def test_variants_put_together_can_be_taken_out_again():
     assert again.ground_m == cases[1].ground_m
     assert again.groups[0].lengths_m == cases[1].groups[0].lengths_m
     assert float(again.groups[0].side[0]) == cases[1].groups[0].side
-
-
-@pytest.mark.parametrize("index", [0, 1, 2])
-def test_branches_are_told_by_the_side_of_the_node(index):
-    mechanism = branches._all_kinds(60)[index]
-    flipped = replace(mechanism.groups[0], side=-mechanism.groups[0].side)
-    other = replace(mechanism, groups=(flipped, *mechanism.groups[1:]))
-    for assembled, share in ((mechanism, 1.0), (other, -1.0)):
-        told = branches._side_share(mechanism, move(assembled).position)
-        np.testing.assert_allclose(told, share, rtol=1e-3)
-
-
-def test_ours_puts_no_random_case_on_the_wrong_branch():
-    row = branches.count_ours(quick=True)
-    assert row.cases == branches.CASES_QUICK
-    assert row.wrong == row.silent == row.refused == 0
-
-
-def test_solvers_that_fail_are_counted_for_how_they_fail(monkeypatch):
-    seen = []
-
-    class Odd:
-        def __init__(self, mechanism):
-            del mechanism
-            self.start = seen
-
-        def solve(self, index, start):
-            if index:
-                raise AssertionError
-            self.start.append(start)
-            if len(self.start) % 3 == 0:
-                raise NoAnswerError("not today")
-            place = dict(start) if len(self.start) % 3 == 1 else dict.fromkeys(start, complex(math.nan))
-            return lambda: Answer(place, place, place)
-
-    monkeypatch.setattr(branches, "PEER_CASES_QUICK", 12)
-    monkeypatch.setattr(branches, "Fsolve", Odd)
-    row = branches.count_peer(quick=True)
-    assert (row.cases, row.refused, row.silent) == (12, 4, 4)

@@ -13,7 +13,7 @@ from grader.comparison.follow_through import ReplayResult
 from grader.comparison.own import PlanBasis
 from grader.comparison.task import task_of
 from grader.marking.mark import judge
-from grader.records import Figure, OtherReading, Reading, ReadNode, ReadVector, Reason, Unread
+from grader.records import Figure, OtherReading, Reading, ReadNode, Reason, Unread
 from grader.rubric import Band, CriterionTable, DoubtTable, ToleranceTable, load_rubric
 from grader.self_check.results import checked_values
 from reference.authored.assignment import load_assignment
@@ -126,19 +126,6 @@ def test_at_a_dead_point_nothing_drawn_is_right_and_something_drawn_is_not():
     assert [outcome_of(entered, name).expected.value for name in rates] == [0.0] * len(rates)
     assert any(rates.values())
     assert outcome.expected.direction_deg is None
-
-
-def test_the_printed_table_of_the_press_is_right():
-    segments = {"v_A": 50.0, "v_B": 46.4, "v_BA": 47.17, "v_C": 92.8, "v_D": 89.36, "v_DC": 21.61,
-                "a_BA_n": 22.2, "a_B_n": 32.4, "a_DC_n": 15.7}  # fmt: skip
-    values = {"v_B": 1.67, "v_BA": 1.7, "v_C": 3.34, "v_D": 3.22, "v_DC": 0.78}
-    vectors = {name: ReadVector(length, 0.0, None, None, 1.0) for name, length in segments.items()}
-    declared = {"kL": "0.00667 m/mm", "kv": "0.036 (m/s)/mm", "ka": "0.108 (m/s2)/mm"}
-    submission = Submission(measured=Reading({"all": Figure({}, vectors)}), values=values, declared=declared)
-    comparison = compare(with_rubric(PRESS, missing="not_judged"), submission)
-    assert lost(comparison) == []
-    assert {one.criterion for one in comparison.outcomes if one.verdict == "full"} == {
-        "kL", "kv", "ka", *segments, *(f"{name}_value" for name in values)}  # fmt: skip
 
 
 def test_bands_give_their_shares():

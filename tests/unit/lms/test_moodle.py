@@ -142,29 +142,6 @@ def test_a_worksheet_that_states_no_maximum_needs_one():
         filled_in(data, report("s01", 8.5), maximum=100.0)
 
 
-GERMAN = (
-    "ID,Vollständiger Name,E-Mail-Adresse,Status,Bewertung,Bestwertung,Bewertung kann geändert werden,"
-    "Zuletzt geändert (Abgabe),Texteingabe online,Zuletzt geändert (Bewertung),Feedback als Kommentar"
-)
-
-
-@pytest.mark.parametrize("graded", [True, False])
-def test_columns_of_any_language_are_known_by_what_stands_in_them(graded):
-    old = '"4,00"' if graded else ""
-    moment = '"Montag, 2. März 2026, 09:15"' if graded else "-"
-    data = worksheet(
-        f'"Teilnehmer/in7","Ion Popescu",ion@x.ro,Keine,{old},"10,00",Ja,-,,{moment},',
-        f'"Teilnehmer/in8","Ana Ionescu",ana@x.ro,Keine,{old},"10,00",Ja,-,,{moment},',
-        header=GERMAN,
-    )
-    delivery = filled_in(data, report("s01", 8.5), report("s02", 4.0), comments={"s01": "<p>a</p>"})
-    first, second = (row.split(",") for row in delivery.content.decode().replace('"', "").splitlines()[1:])
-    assert (first[4], second[4], first[-1]) == ("8.5", "4", "<p>a</p>")
-    assert (first[-2] == "2026-03-02T10:30:00+00:00") == graded
-    with pytest.raises(CallError, match="maximum there is 10"):
-        filled_in(data, report("s01", 8.5, max_score=20.0))
-
-
 DATED = "Identificator,Nume complet,Adresa de e-mail,Notă,Notă maximă,Ultima modificare (nota)"
 
 
@@ -450,26 +427,3 @@ def test_a_class_that_moodle_does_not_know_has_no_archive(tmp_path):
     pages(tmp_path / "marks", one)
     with pytest.raises(CallError, match="no student has a number in Moodle"):
         archive(tmp_path, one)
-
-
-def test_moodle_stores_the_worksheets_grades_as_they_are_meant(tmp_path):
-    header = WORKSHEET.replace("(grade)\r\n", "(grade),Feedback comments\r\n").replace(",-\r\n", ",-,\r\n")
-    form = tmp_path / "w.csv"
-    form.write_text(header, encoding="utf-8", newline="")
-    reports = (
-        marked("s01", 5.0, 2.5),
-        marked("s02", 5.0, 5.0),
-        marked("s_3", None, 2.5, status="needs_review"),
-    )
-    delivery, path = moodle(tmp_path, "grades", *reports, name="o.csv", form=form, people=BY_MAIL)
-    site = importers.MoodleSite(10.0).upload(path.read_bytes())
-    assert site.grades == {101: (7.5, importers.NOW)}
-    assert site.comments == {101: "<ul><li>~ <b>Vector 2</b>: Told &lt;why&gt; &amp; how.</li></ul>"}
-    assert set(delivery.unplaced) == {"s02"}
-    assert set(delivery.withheld) == {"s_3"}
-
-
-def test_a_new_item_of_moodles_gradebook_has_no_zero_for_who_is_withheld(tmp_path):
-    reports = marked("s01", 5.0, 2.5), marked("s02", None, 2.5, status="needs_review")
-    _, path = moodle(tmp_path, "grades", *reports, name="o.csv")
-    assert importers.moodle_gradebook(path.read_text(encoding="utf-8"), {"s01", "s02"}) == {"s01": 7.5}

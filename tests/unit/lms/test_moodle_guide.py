@@ -196,18 +196,6 @@ def test_numbers_that_are_none_are_refused_with_the_student(tmp_path, answer, pe
     assert not (tmp_path / "out.json").exists()
 
 
-def test_points_above_a_criterions_maximum_are_refused(tmp_path, answer):
-    wrong = marked("s01", 5.0, 2.5)
-    wrong = wrong.model_copy(
-        update={
-            "score": 9.5,
-            "criteria": [wrong.criteria[0].model_copy(update={"points": 7.0}), wrong.criteria[1]],
-        }
-    )
-    with pytest.raises(InputFileError, match="c1: 7 of 5 points"):
-        moodle(tmp_path, "marks", wrong, criteria=answer(GUIDE), people=PEOPLE, assignment_id=17)
-
-
 def test_a_criterion_that_has_no_number_of_moodle_is_refused(tmp_path):
     path = tmp_path / "criteria.csv"
     path.write_text("criterion,id\nc1,x\nc2,12\n")

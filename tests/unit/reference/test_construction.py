@@ -13,9 +13,6 @@ from tests import every_group
 
 BUILT_IN = ["pump", "pump-230", "pump-collinear", "engine", "press", "shaper", "piston"]
 SHARE_OF_PLAN = 1e-12
-SMALL_ERROR = 1e-6
-LINEAR = 1e-3
-"""Relative departure from proportionality allowed when an error of 1e-6 is doubled."""
 
 
 def plan_of(name, *, accelerations=True):
@@ -99,29 +96,6 @@ def test_only_what_is_asked_for_and_its_ancestors_are_drawn(wanted):
         np.testing.assert_array_equal(place, whole[node])
 
 
-@pytest.mark.parametrize("name", ["pump", "press", "engine", "pump-collinear", "shaper", "piston"])
-def test_small_errors_of_the_hand_move_the_nodes_in_proportion(name):
-    plan, drawn = drawn_plan(name)
-    rng = np.random.default_rng(7)
-    size = max(float(np.max(np.abs(place))) for place in drawn.values())
-    tried = 0
-    for step in plan.construction.steps:
-        for kind in ("angle", "shift", "length", "x", "y"):
-            key = (step.node, int(rng.integers(0, 2)), kind)
-            once, twice = (
-                evaluate(
-                    plan.construction, plan.drawing.parameters, errors={key: np.asarray(f * SMALL_ERROR)}
-                )
-                for f in (1.0, 2.0)
-            )
-            for node, place in drawn.items():
-                first, second = once[node] - place, twice[node] - place
-                largest = np.max(np.abs(first))
-                assert np.max(np.abs(second - 2 * first)) <= LINEAR * largest + 1e-12 * size
-                tried += bool(largest > 1e-9)
-    assert tried > 20
-
-
 def test_an_error_at_a_node_is_seen_at_that_node():
     plan, drawn = drawn_plan("pump")
     for node in ("b", "c'", "n_BA", "B"):
@@ -156,16 +130,6 @@ def test_a_flat_plate_comes_by_similarity_and_divides_the_image_as_it_divides_th
     np.testing.assert_allclose(drawn["c'"], (drawn["a'"] + drawn["b'"]) / 2, atol=1e-10)
 
 
-@pytest.mark.parametrize("name", BUILT_IN)
-def test_every_vector_has_its_ends_among_the_nodes_and_every_rate_its_vector(name):
-    construction = plan_of(name).construction
-    nodes = {step.node for step in construction.steps}
-    for vector in construction.vectors.values():
-        assert {vector.tail, vector.head} <= nodes
-    for rate in construction.rates.values():
-        assert rate.vector in construction.vectors
-
-
 def test_the_pump_has_the_names_that_students_use():
     construction = plan_of("pump").construction
     assert (
@@ -179,21 +143,6 @@ def test_the_pump_has_the_names_that_students_use():
     assert {step.node for step in construction.figures["acceleration_plan"]} == set(
         "o' a' b' c' d' n_BA n_B n_CA n_CB n_DC".split()
     )
-
-
-@pytest.mark.parametrize("name", BUILT_IN)
-def test_a_full_relative_acceleration_is_the_difference_of_two_and_the_sum_of_its_components(name):
-    plan = plan_of(name)
-    sums = [vector for vector in plan.construction.vectors.values() if vector.is_sum]
-    assert sums
-    for vector in sums:
-        pin, node = vector.link
-        size = plan.size_mm("acceleration_plan") * plan.scales.ka
-        full, of = plan.vectors_si[vector.name], plan.motion.acceleration
-        assert np.max(np.abs(full - (of[node] - of[pin])) / size) <= SHARE_OF_PLAN
-        parts = [f"{vector.name}_{part}" for part in "ntcr" if f"{vector.name}_{part}" in plan.vectors_si]
-        added = sum(plan.vectors_si[part] for part in parts)
-        assert not parts or np.max(np.abs(full - added) / size) <= SHARE_OF_PLAN
 
 
 def test_a_turned_sketch_turns_the_plans_with_it():

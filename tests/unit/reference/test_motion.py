@@ -124,16 +124,6 @@ def test_the_group_that_fails_is_named_not_one_that_stands_on_it():
         move(mechanism(dyad(1.0, 0.5), end))
 
 
-def test_a_data_of_one_entry_hold_for_all_variants():
-    angles = np.linspace(0.1, 0.9, 7)
-    motion = move(mechanism(dyad(1.5, 2.0), angles=tuple(angles)))
-    assert all(place.shape == (7,) for place in motion.position.values())
-    assert all(rate.shape == (7,) for rate in (*motion.omega.values(), *motion.epsilon.values()))
-    for index, angle in enumerate(angles):
-        one = move(mechanism(dyad(1.5, 2.0), angles=(angle,)))
-        np.testing.assert_allclose(motion.acceleration["B"][index], one.acceleration["B"][0], rtol=1e-12)
-
-
 def test_a_mechanism_far_from_the_origin_moves_as_exactly_as_at_home():
     assignment = load_assignment("shaper")
     at_home = assignment.mechanism(assignment.variants())

@@ -106,16 +106,6 @@ def test_lengths_alone_tell_a_reversed_normal_component_by_what_follows():
     assert [(one.code, one.at) for one in best.made] == [("normal_reversed", "n_B")]
 
 
-def test_lengths_alone_do_not_tell_a_mirrored_sense():
-    right = pump()
-    exact = drawn(right)
-    reversed_plan = drawn(right, Mistake("sense_reversed", "a"))
-    velocities = [one for one in right.construction.vectors.values() if one.scale == "kv"]
-    for one in velocities:
-        lengths = (abs(places[one.head] - places[one.tail]) for places in (exact, reversed_plan))
-        assert next(lengths) == pytest.approx(next(lengths), abs=1e-9)
-
-
 def test_a_slip_is_told_with_its_factor():
     right = pump()
     made = Mistake("arithmetic", "n_B", factor=1.4)

@@ -9,12 +9,11 @@ import pytest
 from reference.authored.assignment import library, load_assignment
 from reference.drawing import symbols
 from reference.drawing.canvas import Area, Curve, Label, Ring, Stroke, set_pieces, shifted
-from reference.drawing.labels import Wanted, place_labels, segments_of
+from reference.drawing.labels import segments_of
 from reference.drawing.sheets import (
     CELL_MM,
     FRAME,
     LEAST_GAP_MM,
-    _roomiest,
     figures_of,
     lay_out,
     reference_drawing,
@@ -201,17 +200,6 @@ def test_the_altitude_construction_is_drawn_true_to_the_normal_components(name):
     assert sum("IV" in mark for mark in marks) == len(normals)
 
 
-def test_letters_that_need_several_rounds_are_placed_after_one_too():
-    crowd = [Wanted(str(k), (0.4 * k, 0.0), f"letter {k}", 4.0, "#000000") for k in range(6)]
-    for rounds in (1, 3):
-        standing = place_labels(crowd, [], rounds)
-        boxes = [one.label.bounds for one in standing]
-        for one, other in itertools.combinations(boxes, 2):
-            across = min(one[2], other[2]) - max(one[0], other[0])
-            down = min(one[3], other[3]) - max(one[1], other[1])
-            assert min(across, down) <= 0.0
-
-
 def test_arrowheads_are_shorter_on_short_vectors():
     long, short = (list(symbols.arrow(0j, complex(length), 0.3, "#000000")) for length in (40.0, 2.0))
     for shapes, length in ((long, 40.0), (short, 2.0)):
@@ -278,13 +266,6 @@ def test_a_table_too_long_for_the_sheet_is_told():
     names = list(subject.plan.nodes_mm)
     assert column(subject, names, (FRAME[2], FRAME[1]), FRAME[3]).fits
     assert not column(subject, names, (FRAME[2], FRAME[1]), FRAME[1] + 60.0).fits
-
-
-def test_a_figure_larger_than_its_room_has_no_place_in_it():
-    room = np.zeros((20, 30), bool)
-    assert _roomiest(room, np.ones((4, 5), bool), None)[1] > 0.0
-    for rows, columns in ((20, 31), (21, 30)):
-        assert _roomiest(room, np.ones((rows, columns), bool), None)[1] == 0.0
 
 
 @pytest.mark.parametrize("pages", [True, False])

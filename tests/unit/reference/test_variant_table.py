@@ -5,7 +5,6 @@ import pytest
 
 from grader.texts.spoken import fault
 from reference.authored.assignment import Variant, load_assignment
-from reference.construction.graph import evaluate
 from reference.errors import AuthoredFileError, CallError, ranges_of
 from reference.plan import exact_plan
 from tests import conveyor
@@ -98,20 +97,6 @@ def test_each_variant_is_in_the_assembly_of_its_row(course):
     turned = np.imag(np.conj(place["O2"] - place["A"]) * (place["B"] - place["A"]))
     np.testing.assert_array_equal(np.sign(turned), [1, -1, 1, 1])
     np.testing.assert_array_equal(np.sign(np.real(place["C"] - place["B"])), [1, 1, -1, 1])
-
-
-def test_plans_of_all_are_those_of_each_and_the_construction_agrees(course):
-    assignment = load_assignment(course())
-    together = exact_plan(assignment, assignment.variants())
-    nodes = evaluate(together.construction, together.drawing.parameters)
-    for figure in together.nodes_mm.values():
-        for name, place in figure.items():
-            np.testing.assert_allclose(nodes[name], place, atol=1e-9)
-    for index, variant in enumerate(assignment.variants()):
-        alone = exact_plan(assignment, [variant])
-        assert alone.construction is together.construction
-        for name, vector in together.vectors_si.items():
-            assert vector[index] == pytest.approx(alone.vectors_si[name][0], rel=1e-12)
 
 
 def test_the_same_table_stands_in_the_file_itself(course):

@@ -3,7 +3,7 @@
 import ast
 import pickle
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -89,20 +89,6 @@ def taken_apart(tree: ast.AST) -> Iterator[int]:
                 yield node.lineno
 
 
-@pytest.mark.parametrize(
-    "code",
-    [
-        'a.message.partition(" ")',
-        '"no" in a.message',
-        "re.match(x, a.reason)",
-        "message(a)[:3]",
-        "message(a).replace(x, y)",
-    ],
-)
-def test_what_takes_a_sentence_apart_is_seen(code: str) -> None:
-    assert list(taken_apart(ast.parse(code))) == [1]
-
-
 def test_no_code_takes_a_sentence_apart() -> None:
     assert [f"{name}:{line}" for name, tree in trees() for line in taken_apart(tree)] == []
 
@@ -147,6 +133,12 @@ def test_every_code_that_is_made_has_its_sentence() -> None:
     assert {code: where for code, where in found.items() if code not in known} == {}
 
 
+def has_words(parts: Iterable[ast.AST]) -> bool:
+    """Tell whether two words stand in a text of these parts."""
+    constants = [one for part in parts for one in ast.walk(part) if isinstance(one, ast.Constant)]
+    return any(re.search("[a-z]{2,} [a-z]", str(one.value)) for one in constants)
+
+
 def words_of_findings(tree: ast.AST) -> Iterator[int]:
     """The lines on which a finding or a fault is made with a text of the code itself."""
     for node in nodes(tree):
@@ -157,21 +149,8 @@ def words_of_findings(tree: ast.AST) -> Iterator[int]:
                 pass
             case _:
                 continue
-        constants = [one for one in ast.walk(ast.Tuple(parts)) if isinstance(one, ast.Constant)]
-        if any(re.search("[a-z]{2,} [a-z]", str(one.value)) for one in constants):
+        if has_words(parts):
             yield node.lineno
-
-
-@pytest.mark.parametrize(
-    "code",
-    [
-        'Finding("$", "is missing here")',
-        'FaultError("limit", limit=f"more than {most}")',
-        'raise ValueError(f"has {count} of them")',
-    ],
-)
-def test_a_findings_own_words_are_seen(code: str) -> None:
-    assert list(words_of_findings(ast.parse(code))) == [1]
 
 
 def test_faults_of_authored_files_have_no_words_of_their_own() -> None:
@@ -251,22 +230,8 @@ def words_of_errors(tree: ast.AST) -> Iterator[int]:
             case ast.Call(func=ast.Name(id=kind), args=[_, text, *_]) if kind in ERRORS:
                 names = [one.id for one in ast.walk(text) if isinstance(one, ast.Name)]
                 parts = [text, *(told[name] for name in names if name in told)]
-                constants = [one for part in parts for one in ast.walk(part) if isinstance(one, ast.Constant)]
-                if any(re.search("[a-z]{2,} [a-z]", str(one.value)) for one in constants):
+                if has_words(parts):
                     yield node.lineno
-
-
-@pytest.mark.parametrize(
-    "code",
-    [
-        'raise CallError("no", "there is none")',
-        'raise OutputError("no", f"{path}: cannot be written")',
-        'why = f"{path} is none"; raise InputFileError("no", why)',
-        'why = "there is none"; raise PlanmarkError("no", f"{path}: {why}")',
-    ],
-)
-def test_an_errors_own_words_are_seen(code: str) -> None:
-    assert list(words_of_errors(ast.parse(code))) == [1]
 
 
 def test_outside_of_texts_no_error_has_words_of_its_own() -> None:
@@ -292,23 +257,36 @@ def words_told(tree: ast.AST) -> Iterator[int]:
                 name, parts = getattr(inner, "id", getattr(inner, "attr", "")), [value]
             case _:
                 continue
-        constants = [one for part in parts for one in ast.walk(part) if isinstance(one, ast.Constant)]
-        if name in TOLD and any(re.search("[a-z]{2,} [a-z]", str(one.value)) for one in constants):
-            yield constants[0].lineno
+        if name in TOLD and has_words(parts):
+            yield parts[0].lineno
 
 
 @pytest.mark.parametrize(
-    "code",
+    ("seen_by", "code"),
     [
-        'Delivery(x, notes=("look at it",))',
-        'sheet.notes.append(f"{count} are changed")',
-        'missing[student] = f"nobody in {table} has it"',
-        'notes += ["nobody is there"]',
-        'why = "nobody is there"',
+        (taken_apart, 'a.message.partition(" ")'),
+        (taken_apart, '"no" in a.message'),
+        (taken_apart, "re.match(x, a.reason)"),
+        (taken_apart, "message(a)[:3]"),
+        (taken_apart, "message(a).replace(x, y)"),
+        (words_of_findings, 'Finding("$", "is missing here")'),
+        (words_of_findings, 'FaultError("limit", limit=f"more than {most}")'),
+        (words_of_findings, 'raise ValueError(f"has {count} of them")'),
+        (words_of_errors, 'raise CallError("no", "there is none")'),
+        (words_of_errors, 'raise OutputError("no", f"{path}: cannot be written")'),
+        (words_of_errors, 'why = f"{path} is none"; raise InputFileError("no", why)'),
+        (words_of_errors, 'why = "there is none"; raise PlanmarkError("no", f"{path}: {why}")'),
+        (words_told, 'Delivery(x, notes=("look at it",))'),
+        (words_told, 'sheet.notes.append(f"{count} are changed")'),
+        (words_told, 'missing[student] = f"nobody in {table} has it"'),
+        (words_told, 'notes += ["nobody is there"]'),
+        (words_told, 'why = "nobody is there"'),
     ],
 )
-def test_an_exports_own_words_are_seen(code: str) -> None:
-    assert list(words_told(ast.parse(code))) == [1]
+def test_what_takes_a_sentence_apart_and_a_texts_own_words_are_seen(
+    seen_by: Callable[[ast.AST], Iterator[int]], code: str
+) -> None:
+    assert list(seen_by(ast.parse(code))) == [1]
 
 
 def test_notes_and_reasons_of_exports_are_data() -> None:

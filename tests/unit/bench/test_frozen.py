@@ -1,14 +1,10 @@
-"""The scripts that guard a rebuild: what moved between two checkouts, and a sheet's walk."""
+"""Reports of two checkouts are compared field by field."""
 
 import json
 
-import pytest
-
-from grader.records import Reason, Unread
 from tests.bench.frozen import compare, differences
 from tests.bench.judging_handed_in import measured_line
 from tests.bench.judging_students import StudentKey
-from tests.bench.walk import records_in, walk_of_a_sheet
 
 
 def test_reports_differ_by_what_they_say_and_not_by_times_version_or_rounding():
@@ -37,15 +33,3 @@ def test_a_student_is_entered_as_a_line_of_the_table():
     assert line["v_A"] > 0.0
     assert "v_A_deg" in line
     assert "v_A_deg" not in measured_line(StudentKey("engine", "careful", "right", 5), with_directions=False)
-
-
-def test_records_are_found_in_containers():
-    assert set(records_in([{"v_B": (Unread("v_B", Reason("no_stroke")), 3)}])) == {Unread}
-    assert not list(records_in({"v_B": 3.0}))
-
-
-@pytest.mark.slow
-def test_a_sheet_walks_through_the_pipeline(tmp_path):
-    walk = walk_of_a_sheet(tmp_path)
-    assert "grader.pipeline" in walk.modules
-    assert walk.kinds(by_pipeline=True)
