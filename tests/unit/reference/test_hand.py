@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from reference.construction.elements import View, drawn
 from reference.construction.graph import evaluate
 from reference.construction.uncertainty import SMALL, OwnNode, Skill, acts, spread, step_errors, trace
 from tests.hands import task_for
@@ -30,11 +31,11 @@ def test_many_drawings_scatter_as_the_derivative_says(name, n, position):
     task = task_for(name, n, position)
     lot = np.random.default_rng(7)
     errors = {act: SKILL.deviation(act[2]) * lot.standard_normal(DRAWINGS) for act in acts(task.construction)}
-    drawn = evaluate(task.construction, task.parameters, errors=errors)
+    sheets = evaluate(task.construction, task.parameters, errors=errors)
     found = traced(task)
     for vector in task.construction.vectors.values():
         exact = found.vector(vector.tail, vector.head)
-        off = np.asarray(drawn[vector.head] - drawn[vector.tail]) - exact
+        off = np.asarray(sheets[vector.head] - sheets[vector.tail]) - exact
         meant = spread(found.shifts(vector.tail, vector.head), exact)
         turned = off * np.conj(exact / abs(exact)) if exact else off
         assert np.std(turned.real) == pytest.approx(meant.along, rel=WITHIN), vector.name
@@ -49,6 +50,13 @@ def test_without_own_nodes_a_drawing_is_the_exact_one_and_every_act_moves_someth
         assert abs(found.made[node].at - complex(np.ravel(place)[0])) < ROUNDING_MM
     shifts = np.array([found.nodes[node].shifts for node in exact])
     assert np.all(np.abs(shifts).max(axis=0) > 0.0)
+
+
+def test_a_line_is_drawn_as_far_to_its_left_and_turned_as_far_as_its_errors_say():
+    errors = {("b", 0, "shift"): np.array([-0.5, 0.25]), ("b", 0, "angle"): np.array([0.0, 0.01])}
+    foot, along = drawn(View({}, {}, errors), "b", 0, np.array(2.0 + 1j), np.array(1j))
+    assert np.allclose(foot, [2.5 + 1j, 1.75 + 1j], rtol=0.0, atol=1e-15)
+    assert np.allclose(np.angle(along) - np.pi / 2.0, [0.0, 0.01], rtol=0.0, atol=1e-15)
 
 
 def test_own_nodes_are_taken_as_drawn_and_only_what_comes_after_may_be_missed():
