@@ -8,6 +8,7 @@ that, at the first criterion that shows it. Small errors that are each within th
 later node are no mistake. Verdicts are `Outcome`s with reasons as data (`grader.outcomes`).
 """
 
+import cmath
 import math
 import statistics
 from collections.abc import Iterator, Mapping
@@ -597,6 +598,10 @@ def _own_turnings(charges: Charges, name: str, value: float, per_mm: float) -> I
         yield Expectation(turned / per_mm, "vector", source.name, frozenset({source.head}))
 
 
+LEAST_ACROSS = 0.2
+"""Least share of a vector across its link that tells which way it turns it."""
+
+
 def _own_rate(charges: Charges, rate: AngularRate, value: float) -> float | None:
     """The angular rate that the student's own vector gives; of two senses or factors, the nearer.
 
@@ -606,9 +611,11 @@ def _own_rate(charges: Charges, rate: AngularRate, value: float) -> float | None
     segment, drawn = task.segments[rate.vector], evidence.vector(rate.vector)
     own = own_rate(task, evidence, rate, following.used[segment.scale], following.nodes_instead())
     is_made_wrongly = segment.head in charges.charged | charges.doubtful
-    if own is not None and drawn is not None and drawn.direction_rad is None and is_made_wrongly:
-        # Which way it points is not known.
-        own = math.copysign(own, value)
+    if own is not None and drawn is not None and is_made_wrongly:
+        direction, right = drawn.direction_rad, cmath.phase(segment.real)
+        if direction is None or abs(math.cos(direction - right)) < LEAST_ACROSS:
+            # It has no direction, or was drawn along the link: which way it turns that is not known.
+            own = math.copysign(own, value)
     factor = _common_factor(charges, segment.scale)
     if factor is None:
         return own

@@ -124,7 +124,7 @@ def nodes_from_lengths(task: Task, evidence: Evidence, sketch: PlanBasis) -> dic
             made = [np.asarray(way.place(view)) + np.zeros(len(tracking.cost)) for way in ways]
             if ends:
                 tracking.settle(step, made, ends)
-            elif _is_component(step) and step.node not in poles:
+            elif _is_component(step) and step.node not in poles and tracking.may_be_missed(step, made[0]):
                 tracking.guessed[step.node] = step.start
                 tracking.part(step.node, [tracking.nodes[step.start]], made, [], [])
             else:
@@ -164,6 +164,11 @@ class _LengthBranches:
     def sigma_mm(self) -> float:
         """A rough standard error of a node by drawing and measuring: half the tolerance."""
         return self.task.rubric.tolerance.length_mm / 2.0
+
+    def may_be_missed(self, step: Given, made: ComplexArray) -> bool:
+        """Return whether a component is so long that lengths tell whether it was left out."""
+        size = np.abs(made - self.nodes[step.start])
+        return bool(np.any(size > AS_EXPECTED * self.sigma_mm))
 
     def settle(self, step: Step, made: Sequence[ComplexArray], ends: Sequence[_Measured]) -> None:
         """Place a node in each branch; branches divide where its lengths admit several positions.

@@ -16,6 +16,7 @@ from grader.records import Figure, ReadVector, Reason, Unread
 from grader.rubric import CriterionTable
 from reference.authored.toml_file import Text
 from reference.construction.mistakes import Mistake
+from samples.simulation.wording import declared_texts
 from tests.drawn import planned
 from tests.hands import changed, drawn_nodes, measured, rule_scales, sheet, task_for, without
 from tests.unit.comparison.rubrics import with_rubric
@@ -92,21 +93,16 @@ def test_a_coriolis_component_follows_the_own_angular_velocity_where_no_velocity
     name = next(name for name, one in SHAPER.construction.vectors.items() if one.part == "c")
     rate = f"omega_{SHAPER.construction.vectors[name].turning}"
     velocities = [other for other, one in SHAPER.construction.vectors.items() if one.scale == "kv"]
-    exact = measured(SHAPER)
     length = share * abs(SHAPER.real[name]) / rule_scales(SHAPER)["ka"]
-    reading = changed(without(exact, *velocities), name, length_mm=length)
-    alone = outcome_of(SHAPER, Submission(measured=reading), name)
-    follows = outcome_of(
-        SHAPER, Submission(measured=reading, values={rate: share * SHAPER.rates[rate]}), name
-    )
-    assert alone.verdict in {"none", "partial"}
-    assert follows.verdict == "follow_through"
+    alone = Submission(measured=changed(without(measured(SHAPER), *velocities), name, length_mm=length))
+    assert outcome_of(SHAPER, alone, name).verdict in {"none", "partial"}
+    follows = replace(alone, values={rate: share * SHAPER.rates[rate]})
+    assert outcome_of(SHAPER, follows, name).verdict == "follow_through"
 
 
 def test_an_angular_velocity_turns_as_the_own_vector_turns_the_own_link():
-    mistake = Mistake("other_assembly", "B")
-    read = sheet(PUMP, mistakes=(mistake,), turn_deg=20.0)
-    nodes = drawn_nodes(PUMP, mistakes=(mistake,))
+    made = (Mistake("other_assembly", "B"),)
+    read, nodes = sheet(PUMP, mistakes=made, turn_deg=20.0), drawn_nodes(PUMP, mistakes=made)
     link, vector = nodes["B"] - nodes["A"], nodes["b"] - nodes["a"]
     omega = abs(vector) * rule_scales(PUMP)["kv"] / (abs(link) * rule_scales(PUMP)["kL"])
     sense = math.copysign(1.0, math.sin(cmath.phase(vector) - cmath.phase(link)))
@@ -114,6 +110,21 @@ def test_an_angular_velocity_turns_as_the_own_vector_turns_the_own_link():
     for factor, verdicts in ((1.0, {"full", "follow_through"}), (-1.0, {"none"})):
         submission = Submission(readings=(read,), values={rate: factor * sense * omega})
         assert outcome_of(PUMP, submission, rate).verdict in verdicts
+
+
+def test_a_vector_drawn_along_its_link_leaves_the_sense_of_the_angular_velocity_open():
+    reading = measured(PUMP, mistakes=(Mistake("parallel_for_perpendicular", "b", 0),))
+    size = reading.figures["velocity_plan"].vectors["v_BA"].length_mm * rule_scales(PUMP)["kv"] / 0.4
+    submission = Submission(measured=reading, values={"omega_3": size})
+    assert outcome_of(PUMP, submission, "omega_3").verdict == "follow_through"
+
+
+def test_a_component_too_short_to_tell_is_not_taken_for_left_out_because_it_was_not_entered():
+    task = task_for("pump", 1)
+    scales = {**rule_scales(task), "ka": abs(task.real["a_CB_n"]) / 1.3}
+    reading = without(measured(task, scales, mistakes=(Mistake("normal_reversed", "n_B"),)), "a_CB_n")
+    outcomes = judge(task, Submission(measured=reading, declared=declared_texts(scales))).outcomes
+    assert {one.name for one in outcomes if one.verdict in {"none", "partial"}} <= {"a_B_n", "a_CB_n"}
 
 
 def test_what_is_measured_of_no_known_vector_is_passed_over():
