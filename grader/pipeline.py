@@ -32,6 +32,7 @@ from grader.overlay.picture import overlay
 from grader.overlay.scene import Picture
 from grader.printed.layout import cells_of, position_zones, values_of
 from grader.reading import page_scale
+from grader.reading.another import told_instead
 from grader.reading.corrected import corrected
 from grader.reading.read import read_figures
 from grader.reading.sketch import drawings
@@ -81,6 +82,7 @@ def read_submission(
         all_of_it = replace(asked, figures=frozenset())
         whole = [own(scan(page.ref, all_of_it)) if page.narrowed else page for page in pages]
         read = read_pages(whole, assignment, submission.variant, submission.declared, asked.vectors)
+    read = told_instead(read, assignment, submission.variant)
     return [_with_number_compared(page, submission.variant, assignment) for page in read]
 
 
@@ -151,7 +153,7 @@ def read_pages(
         readings = readings_of(pages)
         right = None if variant is None else drawings(assignment, [variant], scales)[0]
         sure: Collection[str] = () if variant is None else understood_scales(assignment, variant, known)
-        for at_drawing in (_upright, partial(page_scale.at_drawn_scales, declared=sure)):
+        for at_drawing in (_upright, _level, partial(page_scale.at_drawn_scales, declared=sure)):
             if (placed := at_drawing(pages, readings, right)) is not None:
                 pages, readings = placed, readings_of(placed)
     drawn = sum(page.ink is not None for page in pages)
@@ -169,20 +171,34 @@ def _upright(
 ) -> list[ScannedPage] | None:
     """The pages, the other way up where nothing but a drawing says so; None where none is."""
     upright = [
-        _turned(page) if page_scale.turn_doubts(page) and page_scale.is_upside_down(reading, right) else page
+        _opened_again(page, turned(page))
+        if page_scale.turn_doubts(page) and page_scale.is_upside_down(reading, right)
+        else page
         for page, reading in zip(pages, readings, strict=True)
     ]
     return upright if any(one is not page for one, page in zip(upright, pages, strict=True)) else None
 
 
-def _turned(page: ScannedPage) -> ScannedPage:
-    """A page opened the other way up, with the doubt about that; itself where nothing is found so."""
-    other = turned(page)
-    if other is page or other.image is None:
+def _level(
+    pages: Sequence[ScannedPage], readings: Sequence[Reading], right: Drawing | None
+) -> list[ScannedPage] | None:
+    """The pages without a frame, turned as their drawings lie; None where none is."""
+    tilts = [page_scale.drawn_tilt(*both, right) for both in zip(pages, readings, strict=True)]
+    return [
+        _opened_again(page, open_page(replace(page.ref, tilt_rad=tilt))) if tilt else page
+        for page, tilt in zip(pages, tilts, strict=True)
+    ] if any(tilts) else None  # fmt: skip
+
+
+def _opened_again(page: ScannedPage, other: ScannedPage) -> ScannedPage:
+    """A page as opened another way, with the doubts about its turn; itself where nothing is found so."""
+    if other is page or other.image is None or other.ink is None:
         return page
     behind = backdrop(other.image, other.sheet) if page.backdrop is not None else None
-    problems = (*other.problems, *page_scale.turn_doubts(page))
-    return replace(other, image=page.image and other.image, backdrop=behind, problems=problems)
+    doubts = tuple(one for one in page_scale.turn_doubts(page) if one not in other.problems)
+    return replace(
+        other, image=page.image and other.image, backdrop=behind, problems=(*other.problems, *doubts)
+    )
 
 
 # One student's mark ---------------------------------------------------------------------------------

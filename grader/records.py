@@ -97,6 +97,7 @@ class Page:
     turn_is_sure : a person confirmed the turn: no other orientation is tried
     ruling : the printed squares of its paper, or None
     device : `camera` or `scanner`, where the file says so; else empty
+    tilt_rad : as in `PageRef`
     """
 
     source: str
@@ -109,6 +110,7 @@ class Page:
     turn_is_sure: bool = False
     ruling: Ruling | None = None
     device: str = ""
+    tilt_rad: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +141,8 @@ class PageRef:
     turn_deg : counter-clockwise turn that makes it upright, if a person gave it
     corners_px : the sheet's corners, from the upright sheet's top left clockwise, stored pixels, if a person
         gave them; else empty
+    tilt_rad : angle from the image's x axis or y axis to the sheet's nearest one, y down, and its standard
+        error, where the drawing has shown it; else None
     """
 
     file: str
@@ -152,6 +156,7 @@ class PageRef:
     content: str = ""
     turn_deg: int | None = None
     corners_px: tuple[tuple[float, float], ...] = ()
+    tilt_rad: tuple[float, float] | None = None
 
     def __str__(self) -> str:
         return self.file if self.pages == 1 else f"{self.file}#{self.page}"
@@ -189,7 +194,8 @@ class Sheet:
     px_per_mm : mean resolution
     rotation_deg : counter-clockwise turn that makes the stored image upright
     residual_mm : root mean square misfit of the evidence used
-    scale_se : relative standard error of a length, common to the whole sheet
+    scale_se, turn_se_rad : relative standard error of a length, and without a frame that of a direction,
+        common to the whole sheet
     drawable_mm : the box inside the frame, where drawings can be
     zones : the printed sheet's zones by name, empty for a plain sheet
     identity : from the QR code, or None
@@ -210,6 +216,7 @@ class Sheet:
     identity: Identity | None = None
     problems: tuple[Reason, ...] = ()
     lens: Lens | None = None
+    turn_se_rad: float = 0.0
 
     def longer(self, factor: float, scale_se: float) -> "Sheet":
         """Return the page with every length scaled by a factor."""
@@ -433,6 +440,16 @@ class Ink:
             marks=self.marks[inside(middle(self.marks))],
             letters=letters and _rows(letters, inside(middle(letters.box_mm))),
             tips=replace(_rows(tips, pointed), stroke=row[tips.stroke[pointed]]),
+        )
+
+    def mirrored(self) -> "Ink":
+        """Return the ink as it shows through the back of the sheet, without letters."""
+        wide = np.array([(self.where.ink.shape[1] - 1) / self.where.px_per_mm, 0.0, 0.0])
+        flip, where = np.array([-1.0, 1.0, 1.0]), replace(self.where, ink=self.where.ink[:, ::-1])
+        strokes = replace(self.strokes, ends=wide[:2] + flip[:2] * self.strokes.ends)
+        circles = wide + flip * self.circles
+        return replace(
+            self, strokes=strokes, circles=circles, marks=self.marks[:0], where=where, letters=None
         )
 
     def longer(self, factor: float) -> "Ink":

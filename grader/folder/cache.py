@@ -41,8 +41,8 @@ SCAN_STAGE = (
 )  # fmt: skip
 """The modules that `grader.scan.page` and `grader.pipeline.scan` call."""
 READ_STAGE = (
-    "grader.reading.read", "grader.tables.scale_text", "grader.scan.handwriting.captions",
-    "grader.scan.strokes.nodes",
+    "grader.reading.another", "grader.reading.read", "grader.tables.scale_text",
+    "grader.scan.handwriting.captions", "grader.scan.strokes.nodes",
 )  # fmt: skip
 """The modules that `grader.pipeline.read_submission` calls beside them."""
 MARK_STAGE = ("grader.folder.batch",)
@@ -217,7 +217,7 @@ class PageCache:
 
     def path_of(self, ref: PageRef) -> Path:
         """Return the path of a page's scan."""
-        placed = (ref.turn_deg, ref.corners_px)
+        placed = (ref.turn_deg, ref.corners_px, ref.tilt_rad)
         return self.folder / f"{digest_of((self.key, ref.file, ref.page, ref.digest, *placed))}.page"
 
     def identified(self, ref: PageRef) -> PageRef:

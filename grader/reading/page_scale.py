@@ -59,6 +59,10 @@ NEGLIGIBLE = 0.001
 """Scales that differ by less are the same: 0.1 mm in 100 mm."""
 TELLING = 1.4
 """Factor from which the scale's standard error counts as changed."""
+LEVEL_RAD = math.radians(0.25)
+"""Standard error of a sheet's turn from which its drawing is asked."""
+DRAWN_RAD, SAME_EDGE_RAD = math.radians(0.6), math.radians(0.1)
+"""Standard error of a drawn direction, in addition to that of its ends, and of what all were set out from."""
 UPRIGHT_UNSURE = "upright_unsure"
 """A problem of registration: neither title block nor letters show which way up the page is."""
 UPSIDE_DOWN_RAD = math.radians(135.0)
@@ -76,14 +80,38 @@ def is_upside_down(reading: Reading, drawing: Drawing | None) -> bool:
     """
     if drawing is None:
         return False
+    turned = [abs(cmath.phase(sum(turns))) > UPSIDE_DOWN_RAD for turns in _turns_of_figures(reading, drawing)]
+    return sum(turned) > 1
+
+
+def drawn_tilt(page: ScannedPage, reading: Reading, drawing: Drawing | None) -> tuple[float, float] | None:
+    """Return the tilt of a page without a frame by its drawing, as in `PageRef`; None if that is known.
+
+    Links and components have their directions from the mechanism alone, whatever was drawn before them. If
+    all are turned by one angle, the sheet lay so: nobody turns each line by the same degree.
+    """
+    sheet = page.sheet
+    if drawing is None or sheet is None or sheet.turn_se_rad < LEVEL_RAD or page.ref.tilt_rad:
+        return None
+    told = [
+        _Length("", math.remainder(cmath.phase(turn), math.pi), math.hypot(DRAWN_MM / size_mm, DRAWN_RAD))
+        for turns in _turns_of_figures(reading, drawing)
+        for turn in turns
+        if (size_mm := math.sqrt(abs(turn))) > LEAST_MM
+    ]
+    shown = _page_scale(told, sheet.turn_se_rad)
+    tilt = math.remainder(math.radians(sheet.rotation_deg), math.pi / 2.0) - math.log(shown.factor)
+    return tilt, math.hypot(shown.se, SAME_EDGE_RAD)
+
+
+def _turns_of_figures(reading: Reading, drawing: Drawing) -> Iterator[list[complex]]:
+    """Yield `_turns` of each figure: of its links, or of its vectors without sums."""
     vectors = drawing.construction.vectors
-    turned = []
     for name, figure in reading.figures.items():
         ends = drawing.construction.links if name == MECHANISM else {
-            vector: (vectors[vector].tail, vectors[vector].head) for vector in figure.vectors
+            one: (vectors[one].tail, vectors[one].head) for one in figure.vectors if not vectors[one].is_sum
         }  # fmt: skip
-        turned.append(abs(cmath.phase(sum(_turns(figure, ends, drawing)))) > UPSIDE_DOWN_RAD)
-    return sum(turned) > 1
+        yield _turns(figure, ends, drawing)
 
 
 def turn_doubts(page: ScannedPage) -> tuple[Reason, ...]:

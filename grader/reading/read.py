@@ -363,7 +363,7 @@ def _readings(pages: Sequence[_PageReading], drawing: Drawing, wanted: Collectio
         if page.sketch is not None:
             figures[MECHANISM] = figure_of_sketch(page.sketch)
         for figure, plan in page.plans.items():
-            figures[figure], missing = figure_of_plan(plan, page.sheet.scale_se, page.ink.where)
+            figures[figure], missing = figure_of_plan(plan, page.sheet, page.ink.where)
             forward = forward_mm(plan, page.ink.where) if group_of(figure) else None
             if forward is not None:
                 # Later polygons take forces over in their sense.

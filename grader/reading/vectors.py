@@ -21,6 +21,7 @@ from grader.records import (
     ReadNode,
     ReadVector,
     Reason,
+    Sheet,
     Unread,
     Value,
 )
@@ -47,6 +48,8 @@ LEAST_ODDS, MOST_ODDS = 0.45, 12.0
 """Bounds of the factor of the odds that a force is right."""
 SAME_LINE_MM = 0.3
 """The sum of a part and a shorter one has that part's line."""
+ONE_LINE_MM = 0.7
+"""Two lines that are nearer to each other look like one."""
 BEYOND_MM = (0.7, 4.0)
 MOST_OPEN = 0.8
 """Most confidence in a line of two opposite forces with ink behind its end, of an arrowhead perhaps; and in a
@@ -63,15 +66,15 @@ def figure_of_sketch(sketch: SketchReading) -> Figure:
     return Figure(nodes, {})
 
 
-def figure_of_plan(plan: PlanReading, scale_se: float, where: InkMap) -> tuple[Figure, list[Unread]]:
+def figure_of_plan(plan: PlanReading, sheet: Sheet, where: InkMap) -> tuple[Figure, list[Unread]]:
     """Return nodes and vectors of a plan; for those not drawn, the reason.
 
-    Arguments: `scale_se` is the sheet's relative standard error of lengths, `where` its ink.
+    Arguments: `where` is the sheet's ink.
     """
     fit, names = plan.fit, plan.assignment.expected.names
     explanations = _explanations(plan, fit)
     absent = dict(plan.hypothesis.absent)
-    vectors, unread = _vectors(plan, fit, explanations, scale_se, where)
+    vectors, unread = _vectors(plan, fit, explanations, sheet, where)
     fit, at = in_usual_order(plan), explanations.at
     at = at if plan.usual is None else at @ plan.usual.T
     nodes = {
@@ -123,7 +126,7 @@ def _node(fit: NodeFit, index: int, confidence: float) -> ReadNode:
 
 
 def _vectors(
-    plan: PlanReading, fit: NodeFit, explanations: "_Explanations", scale_se: float, where: InkMap
+    plan: PlanReading, fit: NodeFit, explanations: "_Explanations", sheet: Sheet, where: InkMap
 ) -> tuple[dict[str, ReadVector], list[Unread]]:
     expected = plan.assignment.expected
     vectors: dict[str, ReadVector] = {}
@@ -138,7 +141,7 @@ def _vectors(
         if gap is not None:
             unread.append(gap)
             continue
-        cov = _difference_cov(fit.cov, edge) + _scaled(span, scale_se)
+        cov = _difference_cov(fit.cov, edge) + _of_sheet(span, sheet)
         spans = explanations.at[:, edge.head] - explanations.at[:, edge.tail]
         of_two = is_polygon and is_double(plan, edge)
         (_, named), *others = explanations.of(spans, EITHER_MM if of_two else NEAR_MM)
@@ -148,16 +151,18 @@ def _vectors(
             least = UNMARKED if abs(span) > SHORT_MM and not is_polygon else 0.0
             signs = replace(signs, off_mm=off_mm, marked=max(_marked(plan, fit, edge, row), least))
         # A long vector is never more certain than the sheet's scale.
-        most = math.erf(NEAR_MM / max(math.sqrt(2.0) * scale_se * abs(span), 1e-9))
+        most = math.erf(NEAR_MM / max(math.sqrt(2.0) * sheet.scale_se * abs(span), 1e-9))
         sure = signs.confidence()
         if is_polygon:
-            sure = _weighed(sure, plan, edge, span, cov, scale_se)
+            sure = _weighed(sure, plan, edge, span, cov, sheet)
             # What a mistake that was sought predicts is no evidence against the other explanations.
             sure = sure if plan.hypothesis.label in REGULAR else min(sure, named)
             is_tiny = min(abs(span), abs(_predicted(plan, edge))) < LEAST_VECTOR_MM
             is_inferred = not of_two and _is_inferred(plan, index)
             if is_tiny or is_inferred or (of_two and _goes_on(where, complex(fit.at[edge.tail]), span)):
                 sure = min(sure, MOST_OPEN)
+        elif row < 0 and abs(span) > LEAST_VECTOR_MM and _may_lie_under(plan, fit, edge):
+            sure = min(sure, MOST_OPEN)
         read = vector_of(span, cov, min(sure, most, HIGHEST))
         rivals = (
             OtherReading(abs(other), degrees(cmath.phase(other)), replace(signs, named=together).confidence())
@@ -184,6 +189,14 @@ def _gap(plan: PlanReading, edge: Edge, where: InkMap) -> Unread | None:
     if not edge.optional and on_it < INKED:
         return Unread(edge.name, Reason(code[1], between))
     return None
+
+
+def _may_lie_under(plan: PlanReading, fit: NodeFit, edge: Edge) -> bool:
+    """Return whether a vector without a stroke lies on another's line, drawn or not."""
+    rows = plan.assignment.stroke[plan.assignment.stroke >= 0]
+    from_start = fit.at[[edge.tail, edge.head], None] - plan.lines.start[rows]
+    across = np.abs((from_start * np.conj(plan.lines.along[rows])).imag).max(axis=0)
+    return bool((across < ONE_LINE_MM).any())
 
 
 def _is_inferred(plan: PlanReading, index: int) -> bool:
@@ -213,7 +226,7 @@ def _predicted(plan: PlanReading, edge: Edge) -> complex:
 
 
 def _weighed(
-    sure: float, plan: PlanReading, edge: Edge, span: complex, cov: FloatArray, scale_se: float
+    sure: float, plan: PlanReading, edge: Edge, span: complex, cov: FloatArray, sheet: Sheet
 ) -> float:
     """Return the confidence in a force, by how far it lies from its prediction for what that is good for.
 
@@ -225,7 +238,7 @@ def _weighed(
     anywhere = near + ASTRAY_MM**2 * np.eye(2)
     nearer = np.linalg.inv(near) - np.linalg.inv(anywhere)
     odds = math.sqrt(np.linalg.det(anywhere) / np.linalg.det(near)) * math.exp(-0.5 * off @ nearer @ off)
-    seen = _difference_cov((plan.seen or plan.fit).cov, edge) + _scaled(span, scale_se)
+    seen = _difference_cov((plan.seen or plan.fit).cov, edge) + _of_sheet(span, sheet)
     odds = max(LEAST_ODDS, min(odds, MOST_ODDS if within(seen) >= LEAST_PLACED else 1.0))
     return sure * odds / (sure * odds + 1.0 - sure)
 
@@ -245,10 +258,10 @@ def _difference_cov(cov: FloatArray, edge: Edge) -> FloatArray:
     return np.asarray(difference @ cov @ difference.T)
 
 
-def _scaled(span: complex, scale_se: float) -> FloatArray:
-    """Return the covariance (2, 2) that the sheet's scale adds to a vector."""
-    scaled = scale_se * np.array([span.real, span.imag])
-    return np.outer(scaled, scaled)
+def _of_sheet(span: complex, sheet: Sheet) -> FloatArray:
+    """Return the covariance (2, 2) that the sheet's scale and turn add to a vector."""
+    moves = np.array([sheet.scale_se * span, sheet.turn_se_rad * 1j * span])
+    return np.asarray(xy(moves).reshape(2, 2).T @ xy(moves).reshape(2, 2))
 
 
 def vector_of(span: complex, cov: FloatArray, confidence: float) -> ReadVector:

@@ -39,6 +39,7 @@ def open_page(
     except InputFileError as error:
         page = _refused(ScannedPage(ref, timing_ms=timing), of_error(error))
         return replace(page, ref=replace(ref, problem=page.problems[0]))
+    image = replace(image, tilt_rad=ref.tilt_rad)
     if ref.turn_deg is not None:
         image = replace(image, turn_deg=ref.turn_deg, turn_is_sure=True)
     ref = replace(ref, content=blake2b(image.grey.tobytes(), digest_size=8).hexdigest())

@@ -44,6 +44,7 @@ PLACING: dict[str, str] = {
         " again and keep the resolution in the file"
     ),
     "part_in_picture": N_("only %(share)s of the sheet is in the picture"),
+    "two_sheets": N_("it shows two sheets side by side: scan or photograph each one by itself"),
     "corners": N_("the corners that were given span no sheet"),
     "not_calibration": N_("this is not the calibration page: print it by `planmark sheet --calibration`"),
     "few_markers": N_("%(markers)s whole markers are seen, at least %(least)s are needed"),

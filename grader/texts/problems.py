@@ -179,6 +179,19 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
     "nothing_handed_in": (N_("Nothing was handed in."),),
     "nothing_usable": (N_("Nothing that was handed in can be used."),),
     "nothing_read": (N_("No figure of this assignment could be read on the pages handed in."),),
+    "sheet_mirrored": (
+        N_(
+            "The drawing fits far better as a mirror image: the sheet was scanned or photographed"
+            " mirrored, or drawn so. Look at it, and ask for the sheet as it was drawn."
+        ),
+    ),
+    "sheet_of_another": (
+        N_(
+            "The drawing fits the assignment %(other)s far better than %(own)s: was it handed in under the"
+            " wrong assignment?"
+        ),
+        N_("The drawing fits another assignment far better: was it handed in under the wrong one?"),
+    ),
     "variant_unknown": (N_("Nothing says this student's number or position; add it to the roster."),),
     "n_disagrees": (
         N_("Sources disagree about the student's number: %(numbers)s."),

@@ -61,6 +61,9 @@ def register(
     if corners_px:
         return printed or register_by_corners(page, corners_px), identity
     sheet = printed or _by_squares(page, register_plain(page))
+    is_open = isinstance(sheet, Unread) or any(problem.code == "scale_unknown" for problem in sheet.problems)
+    if is_open and _shows_two(page):
+        return _refused("two_sheets"), identity
     if isinstance(sheet, Unread):
         return (_with_halves(sheet) if looks_a4(page) else sheet), identity
     share = _share_in_picture(page, sheet)
@@ -82,6 +85,18 @@ def _with_halves(sheet: Unread) -> Unread:
     """The same, with what to do about a sheet that was scanned in two halves."""
     reason = sheet.reason
     return replace(sheet, reason=replace(reason, parameters={**reason.parameters, "advice": "halves"}))
+
+
+def _shows_two(page: Page) -> bool:
+    """Return whether each half of a picture has the whole frame of a sheet."""
+    return any(
+        all(
+            isinstance(sheet := register_plain(replace(page, grey=half.copy(), ruling=None)), Sheet)
+            and _FRAMELESS.isdisjoint(problem.code for problem in sheet.problems)
+            for half in np.array_split(page.grey, 2, axis)
+        )
+        for axis in (0, 1)
+    )
 
 
 def rectify(page: Page) -> Sheet | Unread:
@@ -179,6 +194,7 @@ _LEVEL_WITHIN = 3.0
 _ASSUMED_PAPER_SE = 0.004
 """Paper that looks like A3 may be a trimmed sheet or another format of nearly its ratio."""
 _SCALE_DOUBTS = frozenset({"paper_assumed", "registration_disagrees"})
+_FRAMELESS = frozenset({"paper_assumed", "frame_missing"})
 _SAME = 1e-6
 """Scores of readings that the drawing does not tell apart differ by rounding only."""
 _AS_LIKELY = 2.0
@@ -429,7 +445,7 @@ def _from_resolution(
     Where nothing shows that the page is A3 (`doubt` says so), its drawing is to bear the scale out.
     """
     high, wide = page.grey.shape
-    tilt = _tilt(lines)
+    tilt, turn_se = page.tilt_rad or _tilt_of_squares(page) or _tilt(lines)
     quarter = 0.0 if wide >= high else np.pi / 2.0
     drawn = drawn_ends(lines)
     tried: list[tuple[float, FloatArray]] = []
@@ -460,7 +476,9 @@ def _from_resolution(
     if doubt is not None:
         problems.append(Reason("scale_unknown", doubt.parameters, page.source))
         scale_se = max(scale_se, _UNKNOWN_SE)
-    return _sheet(_placed(matrix, resolution, lines, scale_se), None, scale_se, problems)
+    fit = _placed(matrix, resolution, lines, scale_se)
+    turn_se = turn_se if fit.mm_to_px is matrix else _LEVEL_SE
+    return replace(_sheet(fit, None, scale_se, problems), turn_se_rad=turn_se)
 
 
 def _placed(matrix: FloatArray, resolution: Resolution, lines: list[LongLine], scale_se: float) -> Fit:
@@ -474,10 +492,19 @@ def _placed(matrix: FloatArray, resolution: Resolution, lines: list[LongLine], s
     return replace(fit, mm_to_px=matrix) if np.abs(axes).max() > _EDGE_SE else fit
 
 
-def _tilt(lines: list[LongLine]) -> float:
-    """Tilt of the sheet in its image, radians: that of lines that agree on one.
+def _tilt_of_squares(page: Page) -> tuple[float, float] | None:
+    """Tilt of a sheet with printed squares, radians, and its standard error; None without."""
+    if page.ruling is None:
+        return None
+    angles = np.arctan2(*page.ruling.lines_per_px.T[::-1])
+    return float(np.remainder(angles + np.pi / 4.0, np.pi / 2.0).mean() - np.pi / 4.0), _LEVEL_SE
 
-    A link may slope by a few degrees, so one line far from the image's axes shows no tilt.
+
+def _tilt(lines: list[LongLine]) -> tuple[float, float]:
+    """Tilt of the sheet in its image, radians, and its standard error: that of lines that agree on one.
+
+    A link may slope by a few degrees, so one line far from the image's axes shows no tilt. Vectors lie along
+    links and across them: agreeing with each other they may be as far from level.
     """
     angles, weights = [], []
     for line in lines:
@@ -492,10 +519,11 @@ def _tilt(lines: list[LongLine]) -> float:
     likely = np.log1p(_LEVEL_PEAK * np.exp(-0.5 * apart**2)).sum(axis=1) - 0.5 * (tried / _TILT_SE) ** 2
     agree = np.abs(apart[likely.argmax()]) < _LEVEL_WITHIN
     if not agree.any():
-        return 0.0
+        return 0.0, _TILT_SE
     order = np.argsort(every[agree])
     cumulated = np.cumsum(np.array(weights)[agree][order])
-    return float(every[agree][order][np.searchsorted(cumulated, cumulated[-1] / 2.0)])
+    tilt = float(every[agree][order][np.searchsorted(cumulated, cumulated[-1] / 2.0)])
+    return tilt, float(np.hypot(tilt, _TILT_SE))
 
 
 # By corners that a person gave -------------------------------------------------------------------

@@ -281,6 +281,11 @@ def test_a_scanned_page_comes_back_with_its_ink_to_the_last_digit(tmp_path):
     assert replace(identified, content="") == now.ref
 
 
+def test_a_page_turned_by_its_drawing_has_a_scan_of_its_own(tmp_path):
+    cache, ref = PageCache(tmp_path), PageRef("s1.png")
+    assert cache.path_of(ref) != cache.path_of(replace(ref, tilt_rad=(0.02, 0.003)))
+
+
 def test_cells_that_moved_are_read_again_on_printed_sheets_alone(tmp_path):
     plain = ScannedPage(PageRef("s1.png"))
     sheet = Sheet(np.eye(3), (420.0, 297.0), "markers", 8.0, 0.0, 0.1, 0.002, (0.0, 0.0, 1.0, 1.0))

@@ -9,6 +9,7 @@ from grader.reading.page_scale import (
     BY_PLANS,
     UPRIGHT_UNSURE,
     at_drawn_scales,
+    drawn_tilt,
     is_drawn_otherwise,
     is_upside_down,
     no_surer_than_turn,
@@ -207,3 +208,40 @@ def test_only_a_sketch_with_a_link_in_another_direction_looks_like_another_varia
     assert not is_drawn_otherwise(Reading({}), RIGHT)
     (other,) = drawings(PUMP, [PUMP.variant(12)], None)
     assert is_drawn_otherwise(drawn(), other)
+
+
+# The turn of a page without a frame --------------------------------------------------------------
+
+
+def frameless(se_deg: float = 1.0) -> ScannedPage:
+    one = page(0.0015)
+    return replace(one, sheet=replace(one.sheet, rotation_deg=180.5, turn_se_rad=np.radians(se_deg)))
+
+
+@pytest.mark.parametrize("turn_deg", [-1.8, 0.0, 1.2])
+def test_a_drawing_that_is_turned_as_a_whole_shows_how_its_sheet_lies(turn_deg):
+    tilt, se = drawn_tilt(frameless(), drawn(turn=np.exp(1j * np.radians(turn_deg))), RIGHT)
+    assert np.degrees(tilt) == pytest.approx(0.5 - turn_deg, abs=0.2)
+    assert 0.1 < np.degrees(se) < 0.3
+
+
+def test_a_few_lines_drawn_in_wrong_directions_do_not_tilt_the_sheet():
+    right, turned = drawn(), drawn(turn=np.exp(1j * np.radians(6.0)))
+    nodes = {**right.figures[VELOCITY_PLAN].nodes, "b": turned.figures[VELOCITY_PLAN].nodes["b"]}
+    figures = {**right.figures, VELOCITY_PLAN: replace(right.figures[VELOCITY_PLAN], nodes=nodes)}
+    assert np.degrees(drawn_tilt(frameless(), Reading(figures), RIGHT)[0]) == pytest.approx(0.5, abs=0.3)
+
+
+def test_a_page_whose_frame_shows_its_turn_is_not_turned_by_its_drawing():
+    reading = drawn(turn=np.exp(1j * np.radians(1.0)))
+    assert drawn_tilt(frameless(0.1), reading, RIGHT) is None
+    assert drawn_tilt(frameless(), reading, None) is None
+    before = frameless()
+    known = replace(before, ref=replace(before.ref, tilt_rad=(0.0, 0.003)))
+    assert drawn_tilt(known, reading, RIGHT) is None
+
+
+def test_an_empty_page_is_as_level_as_it_was_and_no_surer():
+    tilt, se = drawn_tilt(frameless(), Reading({}), RIGHT)
+    assert np.degrees(tilt) == pytest.approx(0.5, abs=0.05)
+    assert np.degrees(se) > 0.9

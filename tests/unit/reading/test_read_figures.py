@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from grader.reading.read import read_figures
-from grader.reading.vectors import INKED, ON_IT_PX, SHORT_MM
+from grader.reading.vectors import INKED, MOST_OPEN, ON_IT_PX, SHORT_MM
 from grader.records import ACCELERATION_PLAN, HEAD_AHEAD, MECHANISM, VELOCITY_PLAN, InkMap, Reading, Tips
 from reference.authored.assignment import Assignment, Variant, built_in, load_assignment
 from reference.construction.elements import View
@@ -146,6 +146,16 @@ def test_a_vector_that_is_not_drawn_is_unread_with_its_reason():
     reasons = {one.name: one.reason for one in reading.unread}
     assert "v_C" in reasons or vectors_read(reading)["v_C"][1] < SURE
     assert "v_B" not in reasons
+
+
+def test_a_vector_under_the_line_of_another_may_be_drawn_or_not():
+    """Without a normal component the whole relative acceleration lies along the tangential one."""
+    assignment, variant, drawing = task("press", Variant(position=6))
+    drawn = draw(drawing)
+    inked = replace(drawn.ink, where=InkMap(np.full((297, 420), 255, np.uint8), 1.0))
+    found = vectors_read(read(replace(drawn, ink=inked), assignment, variant))
+    assert abs(found["a_DC"][0] - found["a_DC_t"][0]) < NEAR_MM
+    assert found["a_DC"][1] <= MOST_OPEN
 
 
 def test_the_sides_of_a_similar_triangle_are_not_read_as_tangential_components():
@@ -352,3 +362,19 @@ def test_nothing_is_read_where_nothing_was_added_and_nothing_else_changes():
     plain, asked = (read(drawn, assignment, variant, wanted) for wanted in (names, (*names, *ADDED)))
     assert vectors_read(plain) == vectors_read(asked)
     assert plain.unread == asked.unread
+
+
+def test_a_sheet_that_may_lie_turned_leaves_the_directions_of_its_vectors_open_by_as_much():
+    assignment, _, drawing = task("pump", built_in_variant(7))
+    drawn = draw(drawing, PLACES)
+    turned = replace(drawn, sheet=replace(drawn.sheet, turn_se_rad=math.radians(1.0)))
+    for before, after in zip(
+        *(
+            read(one, assignment, built_in_variant(7)).figures[VELOCITY_PLAN].vectors.values()
+            for one in (drawn, turned)
+        ),
+        strict=True,
+    ):
+        assert after.se_deg == pytest.approx(math.hypot(before.se_deg, 1.0), rel=0.01)
+        assert after.se_mm == pytest.approx(before.se_mm)
+        assert after.confidence <= before.confidence

@@ -1,6 +1,7 @@
 """Plain sheets painted with a known map, registered again: scans, copies and photos."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -152,6 +153,26 @@ def test_links_that_slope_a_little_do_not_tilt_a_sheet_without_a_frame():
         stroke(grey, apply(matrix, [(x, top), (x + (bottom - top) * np.tan(slope), bottom)]))
     sheet = rectify(Page("a.png", 1, grey, (150.0, 150.0)))
     assert sheet.rotation_deg == pytest.approx(0.4, abs=0.5)
+
+
+def test_without_a_frame_lines_hardly_show_the_turn_and_printed_squares_do():
+    """Links and the vectors across them agree with each other, not with the sheet."""
+    matrix, shape = scanner()
+    page = Page("a.png", 1, painted(matrix, shape, frame=None, bed=248), (150.0, 150.0))
+    assert np.degrees(rectify(page).turn_se_rad) >= 1.0
+    along = 0.0333 * np.exp(1j * np.radians(0.7))
+    squared = replace(page, ruling=Ruling(np.array([[along.real, along.imag], [-along.imag, along.real]])))
+    sheet = rectify(squared)
+    assert sheet.rotation_deg == pytest.approx(0.7, abs=0.01)
+    assert np.degrees(sheet.turn_se_rad) < 0.2
+
+
+def test_a_sheet_lies_as_its_drawing_has_shown():
+    matrix, shape = scanner()
+    page = Page("a.png", 1, painted(matrix, shape, frame=None, bed=248), (150.0, 150.0))
+    sheet = rectify(replace(page, tilt_rad=(np.radians(-1.3), 0.003)))
+    assert sheet.rotation_deg == pytest.approx(358.7, abs=0.01)
+    assert sheet.turn_se_rad == 0.003
 
 
 @pytest.mark.parametrize("dpi", [None, (72.0, 72.0)])
@@ -308,3 +329,19 @@ def test_a_bent_photo_of_paper_without_a_frame_keeps_the_doubt_whether_it_is_a3(
     assert "paper_assumed" in [problem.code for problem in sheet.problems]
     assert sheet.lens is not None
     assert straighten(page, sheet)[1].scale_se > 0.003
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_two_sheets_on_one_picture_are_told_as_two(axis):
+    matrix, shape = scanner(bed_mm=4)
+    one = painted(matrix, shape, bed=215)
+    two = np.concatenate([one, one], axis=axis)
+    sheet = rectify(Page("a.png", 1, two, (150.0, 150.0)))
+    assert sheet.reason.parameters["why"] == "two_sheets"
+
+
+def test_a_larger_sheet_is_not_told_as_two():
+    _, shape = scanner(bed_mm=4)
+    blank = np.full(shape, 248, dtype=np.uint8)
+    sheet = rectify(Page("a.png", 1, np.concatenate([blank, blank], axis=0), (150.0, 150.0)))
+    assert sheet.reason.parameters["why"] != "two_sheets"

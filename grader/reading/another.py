@@ -1,0 +1,62 @@
+"""Find what pages show that do not read as their student's drawing: a mirror image, another assignment."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+from grader.reading.read import read_figures
+from grader.records import Ink, Reading, Reason, ScannedPage, Sheet
+from reference.authored.assignment import Assignment, Variant, load_assignment, names_in
+from reference.errors import PlanmarkError
+
+SURE = 0.9
+"""Confidence from which a vector counts as read."""
+LEAST, FAR_BETTER = 12, 2
+"""A velocity plan alone, of eight vectors, was surely read in its mirror image."""
+
+
+def told_instead(
+    pages: Sequence[ScannedPage], assignment: Assignment, variant: Variant | None
+) -> list[ScannedPage]:
+    """Return a student's pages; where they were hardly read, with what they show instead, if that fits."""
+    drawn = [(one.ink, one.sheet) for one in pages if one.ink and one.sheet and not one.sheet.zones]
+    readings = [page.reading for page in pages]
+    own, named = _surely(readings), _surely(readings, 0.0)
+    is_read = own >= LEAST or (named > 0 and FAR_BETTER * own >= named)
+    shown = None if is_read or not drawn else _shown(drawn, own, assignment, variant)
+    if shown is None:
+        return list(pages)
+    return [replace(one, problems=(replace(shown, file=one.ref.file), *one.problems)) for one in pages]
+
+
+def _shown(
+    drawn: Sequence[tuple[Ink, Sheet]], own: int, assignment: Assignment, variant: Variant | None
+) -> Reason | None:
+    """Return what pages show of which `own` vectors were surely read; other assignments with any variant."""
+    mirrored = [(ink.mirrored(), sheet) for ink, sheet in drawn]
+    if variant is not None and _read_as(mirrored, assignment, variant) >= max(LEAST, FAR_BETTER * own):
+        return Reason("sheet_mirrored")
+    least = max(LEAST, FAR_BETTER * max(own, _read_as(drawn, assignment)))
+    fits = {other.id: _read_as(drawn, other) for other in _beside(assignment)}
+    best = max(fits, key=lambda name: fits[name], default="")
+    is_far_better = fits.get(best, 0) >= least
+    return Reason("sheet_of_another", {"other": best, "own": assignment.id}) if is_far_better else None
+
+
+def _surely(readings: Iterable[Reading], least: float = SURE) -> int:
+    figures = [figure for reading in readings for figure in reading.figures.values()]
+    return sum(one.confidence >= least for figure in figures for one in figure.vectors.values())
+
+
+def _read_as(drawn: Sequence[tuple[Ink, Sheet]], assignment: Assignment, own: Variant | None = None) -> int:
+    return _surely(read_figures(drawn, assignment, own, None, ()))
+
+
+def _beside(assignment: Assignment) -> Iterator[Assignment]:
+    """Yield the other assignments with files in the same folder, without those that have faults."""
+    for name in names_in(assignment.path.parent, "assignment"):
+        path = assignment.path.parent / f"{name}.assignment.toml"
+        try:
+            if path != assignment.path:
+                yield load_assignment(path)
+        except PlanmarkError:
+            continue
