@@ -30,7 +30,7 @@ def N_(text: str) -> str:  # noqa: N802 - gettext's own name for it
 UNITS = (
     N_("mm"), N_("m"), N_("m/s"), N_("m/s²"), N_("rad/s"), N_("rad/s²"),
     N_("s"), N_("m/mm"), N_("(m/s)/mm"), N_("(m/s²)/mm"), N_("N"), N_("N m"), N_("N/mm"),
-    N_("kg"), N_("kg m²"),
+    N_("kg"), N_("kg m²"), N_("rev/min"), N_("cm"), N_("rad"), N_("°"),
 )  # fmt: skip
 """Units as people read them; each has its letters in every language."""
 

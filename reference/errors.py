@@ -91,11 +91,6 @@ class FaultError(ValueError):
         return Finding(path, self.code, {**self.parameters, **more}, line)
 
 
-def counted(count: int, noun: str) -> str:
-    """Return a number with its noun: ``1 fault``, ``2 faults``."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
 def near_names(name: str, known: Iterable[str], *, most: int = 2, cutoff: float = 0.6) -> list[str]:
     """Return the known names that a misspelt name may stand for, nearest first, ignoring case.
 

@@ -67,14 +67,6 @@ TITLES: dict[KindName, str] = {
     "omega": N_("Angular velocities"),
     "epsilon": N_("Angular accelerations"),
 }
-REASONS = (
-    N_("its links are in line"),
-    N_("its rod is perpendicular to the guide"),
-    N_("the pin is at the link's pivot, or as near to it as the offset lets it"),
-    N_("its guides are parallel"),
-    N_("slot and guide are parallel"),
-)
-"""Reasons why a group stops or is passed, in the words of `reference.kinematics.motion`."""
 POSITIONS = 1441
 """Positions drawn, four for each degree of a turn: tips of speeds at dead points look sharp."""
 MARGIN = 0.035

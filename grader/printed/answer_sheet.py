@@ -71,8 +71,6 @@ KINDS = {
     "acceleration": N_("Accelerations"),
     "forces": N_("Forces"),
 }
-UNITS = (N_("rev/min"), N_("cm"), N_("°"))
-"""Units of given data beyond those of `grader.language`."""
 
 _STUDENT_MM: Box = (39.0, 12.5, 103.0, 36.0)
 _TASK_MM: Box = (159.0, 12.5, 113.0, 36.0)

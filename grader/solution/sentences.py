@@ -72,7 +72,6 @@ TITLES = {
 VARIANT = {"n": N_("n"), "position": N_("position")}
 COLUMNS = (N_("vector"), N_("on paper"), N_("mm"), N_("real value"), N_("direction"))
 TOO_LARGE = N_("does not fit A3 at these scales")
-OTHER_UNITS = (N_("rev/min"), N_("cm"), N_("rad"))
 DIGITS = 5
 NEXT_TO_NOTHING = 1e-9
 """Share of a figure's size below which lengths are stated as zero, and triangles as lines."""
@@ -90,7 +89,7 @@ def wording_of(tongue: Tongue) -> Wording:
         columns=(first, second, third, fourth, fifth),
         too_large=_(TOO_LARGE),
         sides={side: _(words) for side, words in SIDES.items()},
-        units={unit: _(unit) for unit in (*UNITS, *OTHER_UNITS)},
+        units={unit: _(unit) for unit in UNITS},
     )
 
 
