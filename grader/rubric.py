@@ -413,7 +413,7 @@ def check_rubric(rubric: RubricFile, construction: Construction) -> list[Finding
         Finding(
             f"$.criterion[{index}].{key}",
             "not_in_mechanism",
-            {"name": name, "texts": tuple(names), **look_alikes(name)},
+            {"name": name, **({"texts": tuple(names)} if names else {}), **look_alikes(name)},
         )
         for index, criterion in enumerate(rubric.criterion)
         for key, all_names in known.items()

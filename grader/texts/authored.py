@@ -246,7 +246,10 @@ AUTHORED: dict[str, tuple[str, ...]] = {
     "point_direction": (N_("must have a direction: a point's distance alone is not judged"),),
     "no_force_plans": (N_("no page of the assignment shows a force plan: leave it out"),),
     "no_own_accelerations": (N_('no page shows the acceleration plan: add one, or say "given"'),),
-    "not_in_mechanism": (N_("%(name)s is not in this mechanism: %(texts)s"),),
+    "not_in_mechanism": (
+        N_("no drawing of this assignment has %(name)s; they have: %(texts)s"),
+        N_("no drawing of this assignment has %(name)s"),
+    ),
     "id_of_decisions": (N_("%(name)s has a meaning in decisions.csv: choose another id"),),
     "weight_idle": (N_("no criterion belongs to it: none has such a %(name)s"),),
     # Classes: planmark.toml, and rows of a roster

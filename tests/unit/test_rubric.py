@@ -3,10 +3,11 @@
 import pytest
 
 from grader.rubric import ToleranceTable, check_rubric, load_rubric, rubric_of
-from grader.texts.spoken import in_english
+from grader.texts.spoken import ENGLISH, clause, in_english
 from reference.authored.assignment import built_in, library, load_assignment
 from reference.construction.derive import construction_of
 from reference.errors import AuthoredFileError, CallError
+from reference.plan import construction_for
 from tests.told import tells
 
 HEAD = 'schema_version = 1\nid = "r"\ntitle = { en = "r" }\n'
@@ -137,8 +138,17 @@ def test_an_assignment_with_a_rubric_of_another_mechanism_is_refused(tmp_path):
     text = (library() / "press.assignment.toml").read_text(encoding="utf-8")
     path = tmp_path / "mixed.assignment.toml"
     path.write_text(text.replace('rubric = "press"', 'rubric = "pump"'), encoding="utf-8")
-    with pytest.raises(AuthoredFileError, check=tells("v_CA is not in this mechanism")):
+    with pytest.raises(AuthoredFileError, check=tells("no drawing of this assignment has v_CA")):
         rubric_of(load_assignment(str(path)))
+
+
+def test_a_rate_is_not_asked_for_where_no_page_shows_its_plan():
+    forces = load_assignment("pump-forces")
+    rubric = rubric_of(forces)
+    last = rubric.criterion[-1].model_copy(update={"angular": "omega_2", "moment": None})
+    asked = rubric.model_copy(update={"criterion": [*rubric.criterion, last]})
+    (fault,) = check_rubric(asked, construction_for(forces))
+    assert clause(fault, ENGLISH) == "no drawing of this assignment has omega_2"
 
 
 def test_an_unknown_rubric_is_a_wrong_call():

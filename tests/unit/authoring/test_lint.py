@@ -136,7 +136,7 @@ def test_how_far_links_miss_each_other_is_told_as_a_range(tmp_path):
 def test_a_rubric_that_asks_for_what_is_not_there_is_a_fault(tmp_path):
     path = edited(tmp_path, "engine", "rubric", 'vector = "v_D"', 'vector = "v_E"')
     (fault,) = findings_of(path, "unknown_in_rubric")
-    assert "v_E is not in this mechanism" in fault.message()
+    assert "no drawing of this assignment has v_E" in fault.message()
     assert fault.severity == "fault"
 
 
