@@ -493,11 +493,15 @@ def _placed(matrix: FloatArray, resolution: Resolution, lines: list[LongLine], s
 
 
 def _tilt_of_squares(page: Page) -> tuple[float, float] | None:
-    """Tilt of a sheet with printed squares, radians, and its standard error; None without."""
+    """Tilt of a sheet with printed squares, radians, and its standard error; None without.
+
+    A feeder turns few sheets by degrees: the farther from level, the likelier the squares are turned themselves.
+    """
     if page.ruling is None:
         return None
     angles = np.arctan2(*page.ruling.lines_per_px.T[::-1])
-    return float(np.remainder(angles + np.pi / 4.0, np.pi / 2.0).mean() - np.pi / 4.0), _LEVEL_SE
+    tilt = float(np.remainder(angles + np.pi / 4.0, np.pi / 2.0).mean() - np.pi / 4.0)
+    return tilt, float(np.hypot(tilt, _LEVEL_SE))
 
 
 def _tilt(lines: list[LongLine]) -> tuple[float, float]:

@@ -155,16 +155,18 @@ def test_links_that_slope_a_little_do_not_tilt_a_sheet_without_a_frame():
     assert sheet.rotation_deg == pytest.approx(0.4, abs=0.5)
 
 
-def test_without_a_frame_lines_hardly_show_the_turn_and_printed_squares_do():
+def test_without_a_frame_lines_hardly_show_the_turn_and_squares_near_level_do():
     """Links and the vectors across them agree with each other, not with the sheet."""
     matrix, shape = scanner()
     page = Page("a.png", 1, painted(matrix, shape, frame=None, bed=248), (150.0, 150.0))
     assert np.degrees(rectify(page).turn_se_rad) >= 1.0
-    along = 0.0333 * np.exp(1j * np.radians(0.7))
-    squared = replace(page, ruling=Ruling(np.array([[along.real, along.imag], [-along.imag, along.real]])))
-    sheet = rectify(squared)
-    assert sheet.rotation_deg == pytest.approx(0.7, abs=0.01)
-    assert np.degrees(sheet.turn_se_rad) < 0.2
+    for tilt, least, most in ((0.1, 0.0, 0.2), (2.5, 2.4, 2.6)):
+        # Squares far from level may be turned themselves.
+        along = 0.0333 * np.exp(1j * np.radians(tilt))
+        ruling = Ruling(np.array([[along.real, along.imag], [-along.imag, along.real]]))
+        sheet = rectify(replace(page, ruling=ruling))
+        assert sheet.rotation_deg == pytest.approx(tilt, abs=0.01)
+        assert least < np.degrees(sheet.turn_se_rad) < most
 
 
 def test_a_sheet_lies_as_its_drawing_has_shown():
