@@ -495,7 +495,7 @@ def _placed(matrix: FloatArray, resolution: Resolution, lines: list[LongLine], s
 def _tilt_of_squares(page: Page) -> tuple[float, float] | None:
     """Tilt of a sheet with printed squares, radians, and its standard error; None without.
 
-    A feeder turns few sheets by degrees: the farther from level, the likelier the squares are turned themselves.
+    A feeder turns few sheets by degrees: squares far from level are likely to be turned themselves.
     """
     if page.ruling is None:
         return None
