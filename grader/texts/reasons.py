@@ -94,7 +94,7 @@ FULL: dict[str, str] = {
     ),
     "unread": N_("It could not be read on the sheet (%(why)s)."),
     "entry_refused": N_("It depends on an unusable entry (%(entries)s); an instructor will check it."),
-    "doubtful": N_("It was read with too little certainty (%(confidence)s)."),
+    "doubtful": N_("It was read with a certainty of %(confidence)s: too little to decide without a person."),
     UNSURE: N_("It was read with too little certainty (%(why)s)."),
     MISREAD: N_("It was probably misread; the dotted stroke may be the one meant."),
     "scale_seems_off": N_("%(declared)s is declared, but %(expected)s was probably used: %(factor)s."),

@@ -19,7 +19,7 @@ SLACK = 1e-5
 ROUNDING = 0.06
 """Largest difference of two numbers that are rounded to one decimal."""
 OPPOSITE_DEG = 150.0
-DOUBTS = re.compile(r"too close to|too little certainty|a person must look|an instructor will")
+DOUBTS = re.compile(r"too close to|too little (certainty|to decide)|a person must look|an instructor will")
 NOT_READ = re.compile(r"could not be read|Nothing was handed in|is not required")
 COUNTED = {"counted_for_you", "at_stake"}
 """Reasons that say why more than the tolerance is right."""
