@@ -24,7 +24,7 @@ from grader.records import FloatArray, Reason
 from grader.rubric import CriterionTable, RubricFile
 from reference.authored.assignment import SCALE_NAMES
 from reference.construction.graph import evaluate
-from reference.construction.mistakes import Mistake
+from reference.construction.mistakes import OF_ALL, Mistake
 from reference.quantities import OF_MOTION, kind_of, vector_of_value
 from reference.replay.replay import Replay
 
@@ -168,12 +168,13 @@ def _with_arrows_turned(
     """
     judgement, as_entered, slips = _judged(task, submission, comparison, owner), comparison.outcomes, []
     named_here = [one.at for one in judgement.mistakes]
+    in_all = tuple(at for at in named_here if at in OF_ALL)
     is_reversed = any(one.code == "inertia_reversed" for one in judgement.mistakes)
     for index, one in enumerate(as_entered):
         is_force = one.name in task.construction.vectors and kind_of(one.name).name == "force"
         if not is_force or one.verdict not in CHARGED or named_here == [one.name]:
             continue
-        if any(one.name.startswith(at) and one.name != at for at in named_here):
+        if one.name.startswith(in_all):
             continue  # All of its kind are.
         turned = with_turned(submission, one.name)
         meant = compare(task, turned, partial(explain, owner=owner))

@@ -11,8 +11,18 @@ from grader.reading.lines import Lines, lines_of
 from grader.reading.matching import StrokeAssignment
 from grader.reading.nodes import LINK_ENDS, PLAN_ENDS, fit_nodes
 from grader.reading.orders import corners_of, ends_on_sheet, ring_of
-from grader.reading.vectors import LEAST_VECTOR_MM, NEAR_MM, vector_of
-from grader.records import MECHANISM, Figure, FloatArray, Ink, Reading, ReadNode, ReadVector, ScannedPage
+from grader.reading.vectors import LEAST_VECTOR_MM, NEAR_MM, of_sheet, vector_of
+from grader.records import (
+    MECHANISM,
+    Figure,
+    FloatArray,
+    Ink,
+    Reading,
+    ReadNode,
+    ReadVector,
+    ScannedPage,
+    Sheet,
+)
 from reference.construction.graph import Construction
 from reference.geometry import ComplexArray
 
@@ -177,7 +187,7 @@ def _with_nodes(
     there = {name: replace(node, at=at[name]) for name, node in before.nodes.items() if name in at}
     nodes, drawn = {**there, **moved}, dict(before.drawn)
     corners = corners_of(construction, figure, before) if figure != MECHANISM else {}
-    vectors, scale_se = dict(before.vectors), 0.0 if page.sheet is None else page.sheet.scale_se
+    vectors = dict(before.vectors)
     for name, arrow in corners.items():
         if moved.keys().isdisjoint(arrow) or not nodes.keys() >= {*arrow}:
             continue
@@ -189,7 +199,7 @@ def _with_nodes(
             continue
         stays = all(abs(nodes[end].at - at[end]) < NEAR_MM for end in arrow if end in at)
         least = known.confidence if known is not None and stays else 0.0
-        vectors[name] = _between(tail, head, scale_se, least)
+        vectors[name] = _between(tail, head, page.sheet, least)
     if drawn:
         nodes = _in_usual_order(Figure(before.nodes, vectors, drawn), figure, construction)
     order = [step.node for step in construction.figures[figure]]
@@ -219,11 +229,10 @@ def _in_usual_order(read: Figure, figure: str, construction: Construction) -> di
     return nodes
 
 
-def _between(tail: ReadNode, head: ReadNode, scale_se: float, least: float) -> ReadVector:
+def _between(tail: ReadNode, head: ReadNode, sheet: Sheet | None, least: float) -> ReadVector:
     """Return the vector between two nodes, as sure as the less sure of them, and no less than `least`."""
     span = head.at - tail.at
-    scaled = scale_se * np.array([span.real, span.imag])
-    cov = tail.cov + head.cov + np.outer(scaled, scaled)
+    cov = tail.cov + head.cov + (0.0 if sheet is None else of_sheet(span, sheet))
     return vector_of(span, np.asarray(cov), max(least, min(tail.confidence, head.confidence)))
 
 

@@ -93,6 +93,7 @@ def drawn_tilt(page: ScannedPage, reading: Reading, drawing: Drawing | None) -> 
     sheet = page.sheet
     if drawing is None or sheet is None or sheet.turn_se_rad < LEVEL_RAD or page.ref.tilt_rad:
         return None
+    # A turn is fitted as the logarithm of a scale is: most lines are turned alike, some are drawn wrongly.
     told = [
         _Length("", math.remainder(cmath.phase(turn), math.pi), math.hypot(DRAWN_MM / size_mm, DRAWN_RAD))
         for turns in _turns_of_figures(reading, drawing)

@@ -256,8 +256,8 @@ def _in_other_orders(problem: PlanProblem, usual: PlanHypothesis) -> Iterator[Pl
 def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) -> PlanReading | None:
     """Return the best reading of a plan; the others are its rivals.
 
-    If the regular plans leave something open, mistakes are tried in the best of them, and the plan is read as
-    a lettered graph.
+    If the regular plans leave something open, mistakes are tried in the best of them; then a force polygon is
+    sought with mistakes in other places and orders, and another plan is read as a lettered graph.
 
     Arguments: `plans`, the regular ones, best first; `drawing`, the student's right drawing.
     """
@@ -265,10 +265,11 @@ def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) 
     if plans:
         bases = {plan.hypothesis.label: plan.hypothesis for plan in reversed(plans)}
         everything.extend(_with_mistakes(problem, plans[0], bases.values()))
-    if group_of(problem.figure) and (not plans or plans[0].pose.score < EXPLAINED or _suspects(plans[0])):
-        everything.extend(_mistaken_polygons(problem, drawing))
     is_lettered = not group_of(problem.figure)
-    if is_lettered and (not plans or plans[0].pose.score < EXPLAINED or _suspects(plans[0])):
+    is_open = not plans or plans[0].pose.score < EXPLAINED or bool(_suspects(plans[0]))
+    if is_open and not is_lettered:
+        everything.extend(_mistaken_polygons(problem, drawing))
+    elif is_open:
         lettered = [one for base in regular(drawing, problem.figure) for one in _by_letters(problem, base)]
         here = bool(plans) and plans[0].pose.score > EXPLAINED and plans[0].score > NO_CHANCE
         everything += [one for one in lettered if not here or np.isin(one.members, plans[0].members).any()]

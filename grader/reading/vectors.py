@@ -141,7 +141,7 @@ def _vectors(
         if gap is not None:
             unread.append(gap)
             continue
-        cov = _difference_cov(fit.cov, edge) + _of_sheet(span, sheet)
+        cov = _difference_cov(fit.cov, edge) + of_sheet(span, sheet)
         spans = explanations.at[:, edge.head] - explanations.at[:, edge.tail]
         of_two = is_polygon and is_double(plan, edge)
         (_, named), *others = explanations.of(spans, EITHER_MM if of_two else NEAR_MM)
@@ -238,7 +238,7 @@ def _weighed(
     anywhere = near + ASTRAY_MM**2 * np.eye(2)
     nearer = np.linalg.inv(near) - np.linalg.inv(anywhere)
     odds = math.sqrt(np.linalg.det(anywhere) / np.linalg.det(near)) * math.exp(-0.5 * off @ nearer @ off)
-    seen = _difference_cov((plan.seen or plan.fit).cov, edge) + _of_sheet(span, sheet)
+    seen = _difference_cov((plan.seen or plan.fit).cov, edge) + of_sheet(span, sheet)
     odds = max(LEAST_ODDS, min(odds, MOST_ODDS if within(seen) >= LEAST_PLACED else 1.0))
     return sure * odds / (sure * odds + 1.0 - sure)
 
@@ -258,7 +258,7 @@ def _difference_cov(cov: FloatArray, edge: Edge) -> FloatArray:
     return np.asarray(difference @ cov @ difference.T)
 
 
-def _of_sheet(span: complex, sheet: Sheet) -> FloatArray:
+def of_sheet(span: complex, sheet: Sheet) -> FloatArray:
     """Return the covariance (2, 2) that the sheet's scale and turn add to a vector."""
     moves = np.array([sheet.scale_se * span, sheet.turn_se_rad * 1j * span])
     return np.asarray(xy(moves).reshape(2, 2).T @ xy(moves).reshape(2, 2))

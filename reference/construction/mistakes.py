@@ -69,6 +69,7 @@ OF_FORCES = frozenset[str](
     ("inertia_reversed", "force_missing", "force_reversed", "couple_missing", "couple_reversed")
 )
 """Mistakes in what acts on a link: its moments and its polygon have them alike."""
+OF_ALL = ("F_i", "G_", "M_i")  # places of a mistake in all acts of a kind: their names begin so
 FACTORS: dict[str, float | None] = {
     "sense_reversed": -1.0,
     "normal_reversed": -1.0,
@@ -409,10 +410,9 @@ def _further_lines(step: TwoLines, slot: int, line: Line, construction: Construc
             yield Mistake("wrong_intersection", step.node, slot, other=(node,))
     for vector in construction.vectors.values():
         # With a line through the other foot, the two lines would meet at that foot.
-        if vector.head in earlier and foot not in {vector.tail, vector.head}:
-            drawn = line_of(vector, construction)
-            if drawn is not None and drawn not in {line, other}:
-                yield Mistake("wrong_intersection", step.node, slot, other=(vector.name,))
+        is_apart = vector.head in earlier and foot not in {vector.tail, vector.head}
+        if is_apart and line_of(vector, construction) not in {None, line, other}:
+            yield Mistake("wrong_intersection", step.node, slot, other=(vector.name,))
 
 
 def laid_off(step: Given, construction: Construction) -> str:
@@ -441,7 +441,7 @@ def mistakes_of_forces(drawing: Drawing) -> Iterator[Mistake]:
         for name, datum in data.items():
             at = vectors[name].head if name in vectors else name
             yield Mistake(code, at, factor=factor, parameters=_changed(drawing, factor, datum))
-        for start in ("F_i", "G_", "M_i"):
+        for start in OF_ALL:
             alike = [datum for name, datum in data.items() if name.startswith(start)]
             if len(alike) > 1:
                 yield Mistake(code, start, factor=factor, parameters=_changed(drawing, factor, *alike))
