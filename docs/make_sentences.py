@@ -56,7 +56,7 @@ EXAMPLES: Mapping[str, str] = {
     "low": "0",
     "maximum": "42", "measured": "@1.91 m/s", "model": "ABC", "n": "7", "name": "v_BA", "node": "c",
     "nodes": "n_CA, n_CB", "number": "1", "of": "v_BA", "off": "@2.3 mm", "origin": "O1", "other": "BC",
-    "own": "pump",
+    "own": "pump", "foot": "@23.0 mm",
     "crank_deg": "212", "part": "the velocity plan",
     "p": "a", "p_radius": "@60.0 mm", "points": "0.5", "position": "3", "q": "b", "q_radius": "@40.0 mm",
     "radius": "@60.0 mm", "rate": "omega_3", "ratio": "0.4", "real_x": "@0.3 m", "real_y": "@0.1 m",

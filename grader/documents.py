@@ -148,6 +148,13 @@ class FigureDocument(Document):
     """
 
 
+class AltitudeDocument(Document):
+    """A right triangle on the sketch: the velocity laid off at a joint, and the distance of the foot."""
+
+    velocity_mm: float
+    foot_mm: float
+
+
 class UnreadDocument(Document):
     """A requested vector or length that was not read, and the reason in English."""
 
@@ -176,6 +183,8 @@ class ReadingDocument(Document):
     student_id: str | None
     sheet: SheetDocument | None
     figures: dict[FigureName, FigureDocument]
+    altitudes: dict[str, AltitudeDocument] = {}
+    """By the normal component that the triangle gives."""
     unread: list[UnreadDocument] = []
     problems: list[ProblemDocument] = []
     timing_ms: TimingDocument | None = None

@@ -32,6 +32,13 @@ not_drawn                                                                    no 
 no_line                                                                      no ink to a point's place by
                                                                              similarity
 value_alone                                                                  computed, and not drawn
+triangle_shows        at, foot_mm                                            unread; its triangle was read
+half_turn_missing     at                                                     reversed, long as its triangle
+                                                                             on the sketch gives it
+right_triangle        at                                                     so long by its triangle, at
+                                                                             scales that do not allow that
+triangle_wrong        at                                                     so long by a wrong triangle
+not_carried_over      at, foot_mm, measured_mm                               not as its right triangle has it
 by_similarity         of                                                     replaced by a right image
 letters_exchanged     first, second                                          named by exchanged letters
 letters_unclear       first, second                                          letters may be exchanged

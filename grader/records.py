@@ -587,6 +587,14 @@ class Swapped:
 
 
 @dataclass(frozen=True, slots=True)
+class Altitude:
+    """A right triangle on a sketch: the velocity laid off at a joint, and how far off its foot lies."""
+
+    velocity_mm: float
+    foot_mm: float
+
+
+@dataclass(frozen=True, slots=True)
 class Reading:
     """A drawing as read (or as measured by hand), with names.
 
@@ -599,6 +607,7 @@ class Reading:
     lengths : measured lengths from the printed cells, mm, with their probability, by vector; and computed
         values, SI, by ``NAME_value``, moments with their sign and ``NAME_sense``: 1, -1 or 0
     swapped : exchanged letters; the figures keep the construction's names
+    altitudes : right triangles on the sketch, by the normal component that each gives
     """
 
     figures: Mapping[str, Figure]
@@ -607,6 +616,7 @@ class Reading:
     written: Mapping[str, Written] = field(default_factory=dict)
     lengths: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     swapped: tuple[Swapped, ...] = ()
+    altitudes: Mapping[str, Altitude] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

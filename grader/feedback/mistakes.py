@@ -265,6 +265,22 @@ _BY_TRIANGLE: dict[str, Words] = {
            " v²/l, divide it by ka, and lay that off."),
     ),
 }  # fmt: skip
+_TRIANGLE_WRONG: dict[str, Words] = {
+    "arithmetic": Words(
+        N_("right triangle drawn wrongly"),
+        N_("At %(at)s, the normal component was taken from a right triangle on the sketch that is wrong."),
+        N_("Lay off the velocity at the joint, perpendicular to the link and as long as in the plan; draw the"
+           " right angle at its end."),
+    ),
+}  # fmt: skip
+_NOT_CARRIED_OVER: dict[str, Words] = {
+    "arithmetic": Words(
+        N_("wrong length taken from the right triangle"),
+        N_("At %(at)s, the normal component is not as long as the right triangle on the sketch makes it."),
+        N_("Take the distance from the joint to the point where the triangle meets the link's line, and lay"
+           " that off."),
+    ),
+}  # fmt: skip
 _DRIVING = Words(
     N_("sense reversed"),
     N_("%(at)s turns the other way."),
@@ -321,6 +337,7 @@ _TAKEN_OVER = re.compile(r"R_(?!0)[^_]+")
 _BY_LINE = {
     ALONG_GUIDE: _ALONG_GUIDE, DRIVING_ACROSS: _DRIVING_ACROSS, DRIVING_ALONG: _DRIVING_ALONG,
     OF_FORCE: _FORCE, ACROSS_GUIDE: _ACROSS_GUIDE, RIGHT_TRIANGLE: _BY_TRIANGLE,
+    "triangle_wrong": _TRIANGLE_WRONG, "not_carried_over": _NOT_CARRIED_OVER,
     "driven across": _DRIVING_ACROSS, "driven along": _DRIVING_ALONG,  # earlier versions
 }  # fmt: skip
 

@@ -26,8 +26,8 @@ from reference.construction.equations import Equation, equations
 from reference.construction.graph import evaluate
 from reference.construction.mistakes import RIGHT_TRIANGLE
 from reference.construction.steps import Coincide, Divide, Given, Similar, Step, TwoLines
+from reference.construction.triangles import triangles
 from reference.drawing.subject import Subject
-from reference.drawing.triangles import triangles
 from reference.plan import exact_plan
 
 LAY_OFF_UNMEASURED = N_("From %(start)s lay off %(segment)s, %(direction)s; it ends in %(node)s.")
@@ -146,10 +146,11 @@ def with_mistakes_explained(
     used = {name: scale.used for name, scale in judgement.scales.items()}
     plan = exact_plan(assignment, [variant], assignment.scales([variant], **used))
     subject = Subject(assignment, plan, 0, wording_of(speaker))
-    told = []
+    told, seen = [], {one.criterion for one in judgement.outcomes if "half_turn_missing" in one.codes}
     for document, mistake in zip(report.mistakes, judgement.mistakes, strict=True):
         said, *others = mistake_sentences(mistake, speaker, level, names)
-        said += _by_triangle(subject, mistake, speaker, level)
+        # A triangle that was read is told with its criterion.
+        said += _by_triangle(subject, mistake, speaker, level) if seen.isdisjoint(mistake.explains) else ""
         known = zip(document.rivals, others, strict=True)
         rivals = [rival.model_copy(update={"feedback": text}) for rival, text in known]
         redrawn = _redo(subject, mistake, speaker, level)

@@ -14,6 +14,7 @@ from grader.comparison.scales import Scale
 from grader.comparison.task import Task, tasks_at_speed
 from grader.comparison.verdicts import FULL, NONE
 from grader.given_data.owner import Owner, owner_of
+from grader.marking.altitudes import with_causes, with_sources
 from grader.marking.drawn import case_of, explain
 from grader.marking.lettering import exchanged_pair, letters_charged, with_letters_exchanged, with_turned
 from grader.marking.naming import LEAST_CONFIDENCE, Lost, drawn_instead, named, not_explained, speed_mistake
@@ -222,6 +223,8 @@ def _judged(task: Task, submission: Submission, comparison: Comparison, owner: O
     outcomes = at_stake(task.rubric, outcomes)
     if unfit is None or (owner is not None and owner.named is not None):
         outcomes = of_another(task, outcomes, owner)
+    outcomes = tuple(with_sources(task, comparison, submission.readings, outcomes))
+    mistakes = with_causes(task.construction, outcomes, mistakes)
     outcomes = tuple(with_mistake(outcome, mistakes) for outcome in outcomes)
     return Judgement(outcomes, mistakes, comparison.scales, score(task.rubric, outcomes), unfit)
 

@@ -27,6 +27,7 @@ def reading_document(page: ScannedPage, student_id: str | None) -> ReadingDocume
             "student_id": student_id,
             "sheet": None if page.sheet is None else _sheet(page.sheet),
             "figures": {name: _figure(figure) for name, figure in page.reading.figures.items()},
+            "altitudes": page.reading.altitudes,
             "unread": [unread_document(gap) for gap in page.reading.unread],
             "problems": [*problem_documents((*of_sheet, *page.problems, *page.reading.problems))],
             "timing_ms": {**timing, "total": sum(timing.values())},

@@ -14,7 +14,7 @@ from operator import itemgetter
 import numpy as np
 
 from grader.reading.lines import Lines
-from grader.records import MECHANISM, Figure, IntArray, Reading, ReadVector
+from grader.records import MECHANISM, Figure, InkMap, IntArray, Reading, ReadVector
 from reference.construction.elements import View
 from reference.construction.graph import ON_SKETCH, evaluate
 from reference.construction.mistakes import Drawing
@@ -51,12 +51,14 @@ class SketchPage:
     lines : its strokes; `links` are the numbers of those that the sketch's links are made of
     circles : (c,) centres of circles, complex mm
     turn_rad : the sketch's turn
+    where : the ink map
     """
 
     lines: Lines
     links: IntArray
     circles: ComplexArray
     turn_rad: float
+    where: InkMap
 
 
 @dataclass(frozen=True, slots=True)

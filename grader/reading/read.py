@@ -7,6 +7,7 @@ from functools import cache, partial
 
 import numpy as np
 
+from grader.reading.altitudes import with_altitudes
 from grader.reading.apart import told_apart
 from grader.reading.arrowheads import TOLD_MM, forward_mm
 from grader.reading.by_ink import Look
@@ -59,6 +60,8 @@ Nodes = dict[str, ComplexArray]
 class _PageReading:
     """The figures read on one sheet so far."""
 
+    strokes: Lines
+    """All of the sheet's; `lines` are those that may belong to a figure not read yet."""
     lines: Lines
     ink: Ink
     sheet: Sheet
@@ -99,8 +102,9 @@ def read_figures(
     own_position = None if variant is None else variant.position
     least = LEAST_EXPECTED if every else LEAST_PLAN
     pages = [
-        _PageReading(lines_of(ink), ink, sheet, places and partial(places, ink.where), own_position, least)
+        _PageReading(lines, lines, ink, sheet, places and partial(places, ink.where), own_position, least)
         for ink, sheet in drawn
+        for lines in [lines_of(ink)]
     ]
     for page in (one for one in pages if not one.sheet.zones):
         page.beside = every
@@ -126,14 +130,16 @@ def read_figures(
         for reading, page in zip(_readings(pages, drawing, wanted), pages, strict=True)
     ]
     added = [name for name in wanted if name in drawing.construction.on_sketch]
-    return with_additions(readings, [*map(_sketch_page, pages)], drawing, added) if added else readings
+    sketches = [*map(_sketch_page, pages)]
+    readings = with_additions(readings, sketches, drawing, added) if added else readings
+    return with_altitudes(readings, sketches, drawing.construction)
 
 
 def _sketch_page(page: _PageReading) -> SketchPage:
     circles = page.ink.circles[:, 0] - 1j * page.ink.circles[:, 1]
-    if page.sketch is None:
-        return SketchPage(page.lines, np.zeros(0, np.int64), circles, 0.0)
-    return SketchPage(lines_of(page.ink), page.sketch.members, circles, page.sketch.guide_turn_rad)
+    links = np.zeros(0, np.int64) if page.sketch is None else page.sketch.members
+    turn = 0.0 if page.sketch is None else page.sketch.guide_turn_rad
+    return SketchPage(page.strokes, links, circles, turn, page.ink.where)
 
 
 # The drawing to look for ---------------------------------------------------------------------------

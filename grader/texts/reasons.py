@@ -57,6 +57,17 @@ HINTS: dict[str, str] = {
         "Its lines meet at so small an angle that even careful drawing can miss by this much:"
         " a person must look."
     ),
+    "triangle_shows": N_("The right triangle at %(at)s on the sketch shows its length."),
+    "half_turn_missing": N_(
+        "The right triangle at %(at)s on the sketch gives this length: the half turn about %(at)s is missing."
+    ),
+    "right_triangle": N_("It is as long as the right triangle at %(at)s on the sketch makes it."),
+    "triangle_wrong": N_(
+        "It agrees with the right triangle at %(at)s on the sketch: that triangle is wrong."
+    ),
+    "not_carried_over": N_(
+        "The right triangle at %(at)s on the sketch gives another length: it was taken over wrongly."
+    ),
     "readings_disagree": N_("The drawing and the entered measurement differ."),
     "written_disagrees": N_("The drawing and the length written on the sheet differ: a person must look."),
     "cells_off": N_("The number read in the sheet's cells does not fit: a person must look."),
@@ -121,6 +132,11 @@ FULL: dict[str, str] = {
         "The letters %(first)s and %(second)s seem to stand at each other's point: a person must look."
     ),
     "not_explained": N_("These vectors do not belong together: %(unfit)s of %(of)s fit nothing."),
+    "triangle_shows": N_("By the right triangle at %(at)s on the sketch it is %(foot)s long."),
+    "not_carried_over": N_(
+        "The right triangle at %(at)s on the sketch gives %(foot)s, the plan has %(measured)s: it was taken"
+        " over wrongly."
+    ),
     "readings_disagree": N_("The drawing gives %(first)s, the entered measurement %(second)s."),
     "written_disagrees": N_("The drawing gives %(drawn)s, the sheet says %(written)s: a person must look."),
     "scale_refused": N_(

@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from reference.construction.elements import Along, Component, Line, Normal
-from reference.construction.graph import Construction, Vector, evaluate
-from reference.construction.steps import Given, Step, TwoLines
+from reference.construction.graph import Construction, evaluate
+from reference.construction.triangles import Triangle, triangles
 from reference.drawing import symbols
 from reference.drawing.canvas import CONSTRUCTION, Curve, Piece, Stroke, pieces_of
 from reference.drawing.labels import Wanted
@@ -26,49 +25,6 @@ from reference.plan import Plan
 FIGURE = "altitude"
 RATIO_TOLERANCE = 1e-6
 """Tolerance of kL ka / kv^2 about 1: far below what a ruler shows."""
-
-
-@dataclass(frozen=True, slots=True)
-class Triangle:
-    """The right triangle of one normal component, at the joint that turns about the pin.
-
-    Attributes
-    ----------
-    velocity : ends, in the velocity plan, of the joint's velocity relative to the pin
-    end, beyond, turned : nodes b'', b''' and b^IV
-    """
-
-    vector: Vector
-    pin: str
-    joint: str
-    velocity: tuple[str, str]
-    end: str
-    beyond: str
-    turned: str
-
-    @property
-    def steps(self) -> tuple[Step, ...]:
-        """The steps from the velocity, drawn at the joint, to the normal component."""
-        across, outward = Along(self.pin, self.joint, 1), Along(self.pin, self.joint)
-        inward = Along(self.joint, self.pin)
-        return (
-            Given(self.end, self.joint, Component(*self.velocity, across), across),
-            TwoLines(self.beyond, Line(self.end, Along(self.pin, self.end, 1)), Line(self.joint, outward)),
-            Given(self.turned, self.joint, Component(self.beyond, self.joint, inward), inward),
-        )
-
-
-def triangles(construction: Construction) -> tuple[Triangle, ...]:
-    """Return a triangle for each normal component that the acceleration plan takes from a velocity."""
-    found = []
-    for step in construction.figures.get("acceleration_plan", ()):
-        if isinstance(step, Given) and isinstance(step.length, Normal):
-            vector = next(one for one in construction.vectors.values() if one.head == step.node)
-            pin, joint = vector.link or ("", "")
-            about = vector.name.split("_")[1]
-            nodes = (f"{joint.lower()}{mark}_{about}" for mark in ("''", "'''", "IV"))
-            found.append(Triangle(vector, pin, joint, (step.length.tail, step.length.head), *nodes))
-    return tuple(found)
 
 
 def with_triangles(construction: Construction) -> Construction:

@@ -1,5 +1,7 @@
 """The mechanism's sketch and the two plans as a student draws them."""
 
+import cmath
+import math
 import re
 from collections.abc import Iterator, Mapping
 
@@ -8,6 +10,7 @@ import numpy as np
 from reference.construction.elements import FixedLine, Line, View
 from reference.construction.graph import ON_SKETCH, Vector, coincident, evaluate
 from reference.construction.steps import ArcAndLine, Divide, Given, OnGuide, Similar, Step, TwoArcs, TwoLines
+from reference.construction.triangles import triangles
 from reference.mechanism import (
     Crank,
     Dyad,
@@ -133,7 +136,7 @@ def draw_mechanism(sketch: SheetSketch, task: DrawingTask, nodes: Nodes, student
     if student.from_plans:
         _from_plans(sketch, task, nodes)
     if student.altitude:
-        _altitude(sketch, task, nodes)
+        _altitude(sketch, task, nodes, every=student.every_altitude)
     for joint in named:
         index = joint[1:] or sketch.index
         text = joint[0] + (f"_{{{index}}}" if index else "")
@@ -212,6 +215,8 @@ def _vectors_at_pin(sketch: SheetSketch, task: DrawingTask, nodes: Nodes) -> Non
             sketch.letter(q, vector_text(sketch, name), height, names=name, distance_mm=1.5)
 
 
+ALLOWED, MOST_FOOT_MM = 0.01, 100.0
+"""Largest error of the ratio kL ka / kv^2 for a single right triangle; the farthest foot that is drawn."""
 POLE_MM, NEAR_POLE_MM = 1.2, 150.0
 """Radius of the circle that marks a pole, and the longest way to one that is drawn."""
 
@@ -242,31 +247,30 @@ def _from_plans(sketch: SheetSketch, task: DrawingTask, nodes: Nodes) -> None:
             sketch.lines[MECHANISM, f"J_{name[1:]}"] = (at, at)
 
 
-def _altitude(sketch: SheetSketch, task: DrawingTask, nodes: Nodes) -> None:
-    """Draw the right triangle whose altitude gives a normal component, at the first moving link's end."""
-    fixed = task.mechanism.is_ground
-    dyads = (g for g in task.mechanism.groups if isinstance(g, Dyad) and not fixed(g.pins[0]))
-    dyad = next(dyads, None)
-    if dyad is None:
-        return
-    known = task.wrong.parameters
-    if abs(float(known["kL"] * known["ka"] / known["kv"] ** 2) - 1.0) > 0.01:
-        return  # the triangle's altitude is a normal component only at matching scales
-    tail, head = nodes[dyad.pins[0]], nodes[dyad.node]
-    ideal = evaluate(task.wrong.construction, known, wanted=_velocity_ends(task, dyad))
-    start, end = (complex(ideal[node]) for node in _velocity_ends(task, dyad))
-    link = head - tail
-    speed = end - start
-    tip = head + speed
-    foot = head + link / abs(link) * abs(speed) ** 2 / abs(link)
-    pen = sketch.pen("thin")
-    for p, q in ((head, tip), (tail, tip), (tip, foot), (head, foot)):
-        sketch.line(pen, *sketch.redrawn(p, q))
+def _altitude(sketch: SheetSketch, task: DrawingTask, nodes: Nodes, *, every: bool) -> None:
+    """Draw right triangles whose altitudes give normal components: at the first moving link, or at every one.
 
-
-def _velocity_ends(task: DrawingTask, dyad: Dyad) -> tuple[str, str]:
-    vector = task.right.construction.vectors[f"v_{dyad.node}{dyad.pins[0]}"]
-    return vector.tail, vector.head
+    A single one is drawn only at scales that allow it, each only where its foot is near enough.
+    """
+    construction, known = task.wrong.construction, task.wrong.parameters
+    holds = abs(float(known["kL"] * known["ka"] / known["kv"] ** 2) - 1.0) <= ALLOWED
+    found = [one for one in triangles(construction) if every or not task.mechanism.is_ground(one.pin)]
+    ends = evaluate(construction, known, wanted=[node for one in found for node in one.velocity])
+    for one in found if every else found[:holds]:
+        tail, head = nodes[one.pin], nodes[one.joint]
+        speed = abs(complex(ends[one.velocity[1]]) - complex(ends[one.velocity[0]]))
+        link = head - tail
+        if speed < TOO_SHORT_MM or speed**2 > MOST_FOOT_MM * abs(link):
+            continue
+        laid = sketch.rng.choice([-1.0, 1.0]) * (speed + sketch.rng.normal(0.0, sketch.hand.reading_mm))
+        tip = head + 1j * laid * link / abs(link)
+        slip = math.radians(sketch.hand.square_deg) * sketch.rng.normal() * abs(tip - tail) / 100.0
+        across = 1j * (tip - tail) * cmath.exp(1j * slip)
+        foot = head + link * (np.conj(across) * (tip - head)).imag / (np.conj(across) * link).imag
+        pen = sketch.pen("thin")
+        for p, q in ((head, tip), (tail, tip), (tip, foot), (head, foot)):
+            sketch.line(pen, *sketch.redrawn(p, q))
+        sketch.lines[MECHANISM, f"f_{one.vector.name}"] = (head, foot)
 
 
 # Plans --------------------------------------------------------------------------------------------

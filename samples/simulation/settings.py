@@ -60,7 +60,8 @@ class Student:
     sheets : 1 for all figures on one sheet, 2 for velocities and accelerations apart
     vectors_on_mechanism : v_A and a_A drawn at the crank's pin as well
     from_plans : a_D drawn at D, and the acceleration poles of links
-    altitude : right-triangle construction of a normal component on the mechanism
+    altitude : right-triangle construction of a normal component on the mechanism; with `every_altitude` of
+        each one, at any scales
     omitted : share of the pole-to-point vectors that are not drawn out
     abandoned : a figure begun and crossed out; with `abandoned_whole` drawn to its end before
     helpers : thin lines of no meaning: directions carried over from the sketch, rulers set wrongly
@@ -83,6 +84,7 @@ class Student:
     vectors_on_mechanism: bool = False
     from_plans: bool = False
     altitude: bool = False
+    every_altitude: bool = False
     omitted: float = 0.0
     abandoned: bool = False
     abandoned_whole: bool = False

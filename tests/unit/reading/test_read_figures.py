@@ -364,6 +364,50 @@ def test_nothing_is_read_where_nothing_was_added_and_nothing_else_changes():
     assert plain.unread == asked.unread
 
 
+# Right triangles on the sketch --------------------------------------------------------------------
+
+
+def sides_of_triangle(drawn: Drawn, *, velocity: float = 1.0, square_deg: float = 0.0):
+    """The sides of the triangle of a_DC_n, its velocity so many times too long, its right angle off."""
+    pin, joint = drawn.nodes["C"], drawn.nodes["D"]
+    link, laid = joint - pin, velocity * abs(drawn.vectors["v_DC"])
+    tip = joint + 1j * laid * link / abs(link)
+    across = 1j * (tip - pin) * cmath.rect(1.0, math.radians(square_deg))
+    foot = joint + link * (across.conjugate() * (tip - joint)).imag / (across.conjugate() * link).imag
+    return [(joint, tip), (pin, tip), (tip, foot)], laid, abs(foot - joint)
+
+
+def altitudes_read(sides: list[tuple[complex, complex]]) -> dict[str, tuple[float, float]]:
+    """Velocities and feet as read where these sides are drawn on the sketch."""
+    assignment, variant, drawing = task("pump", built_in_variant(4))
+    drawn = draw(drawing, pen=Pen(extra=sides))
+    at = np.concatenate([np.linspace(*side, 2000) for side in sides])
+    ink = np.zeros((6 * 297, 6 * 420), dtype=np.uint8)
+    ink[np.rint(-6.0 * at.imag).astype(int), np.rint(6.0 * at.real).astype(int)] = 255
+    inked = replace(drawn, ink=replace(drawn.ink, where=InkMap(ink, 6.0)))
+    found = read(inked, assignment, variant).altitudes
+    return {name: (one.velocity_mm, one.foot_mm) for name, one in found.items()}
+
+
+@pytest.mark.parametrize("velocity", [1.0, 0.8])
+@pytest.mark.parametrize("square_deg", [0.0, 1.5])
+def test_a_right_triangle_on_the_sketch_is_read_as_it_was_drawn(velocity, square_deg):
+    plain = draw(task("pump", built_in_variant(4))[2])
+    sides, laid, foot = sides_of_triangle(plain, velocity=velocity, square_deg=square_deg)
+    assert altitudes_read(sides) == {"a_DC_n": pytest.approx((laid, foot), abs=0.6)}
+
+
+@pytest.mark.parametrize("left_out", [0, 1, 2])
+def test_two_sides_are_no_triangle(left_out):
+    sides, _, _ = sides_of_triangle(draw(task("pump", built_in_variant(4))[2]))
+    assert not altitudes_read([side for index, side in enumerate(sides) if index != left_out])
+
+
+def test_sides_at_another_angle_than_a_right_one_are_no_triangle():
+    plain = draw(task("pump", built_in_variant(4))[2])
+    assert not altitudes_read(sides_of_triangle(plain, square_deg=8.0)[0])
+
+
 def test_a_sheet_that_may_lie_turned_leaves_the_directions_of_its_vectors_open_by_as_much():
     assignment, _, drawing = task("pump", built_in_variant(7))
     drawn = draw(drawing, PLACES)

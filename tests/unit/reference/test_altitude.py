@@ -8,7 +8,8 @@ import pytest
 from reference.authored.assignment import load_assignment
 from reference.construction.graph import evaluate
 from reference.construction.mistakes import Mistake, commit
-from reference.drawing.triangles import RATIO_TOLERANCE, altitude_nodes, triangles, with_triangles
+from reference.construction.triangles import triangles
+from reference.drawing.triangles import RATIO_TOLERANCE, altitude_nodes, with_triangles
 from reference.errors import CallError
 from reference.plan import exact_plan
 
