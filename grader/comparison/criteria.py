@@ -29,7 +29,7 @@ from grader.comparison.outcomes import (
     with_images,
     without_drawing,
 )
-from grader.comparison.own import known, own_rate
+from grader.comparison.own import fits, known, own_rate
 from grader.comparison.scales import Scale, settle
 from grader.comparison.task import Task, TaskSegment
 from grader.comparison.verdicts import (
@@ -338,7 +338,7 @@ def _computed(charges: Charges, criterion: CriterionTable, name: str) -> Outcome
     value, drawn, sure = evidence.values[name], evidence.vector(name), evidence.sure.get(name, 1.0)
     held = HeldValue(rubric, criterion, abs(value), following.used[one.scale])
     wrong = frozenset(charges.charged | charges.doubtful)
-    by_nodes = follows and drawn is None
+    by_nodes = follows and (drawn is None or _may_be_mistyped(charges, one))
     choice = choose(charges, one, following.expectations(one, wrong, follows_through=by_nodes), held)
     charges.charged |= choice.shown
     if not choice.mark.is_full and follows and drawn is not None:
@@ -596,6 +596,18 @@ def _own_turnings(charges: Charges, name: str, value: float, per_mm: float) -> I
     turned, source = _own_rate(charges, rate, value), task.segments[rate.vector]
     if turned is not None:
         yield Expectation(turned / per_mm, "vector", source.name, frozenset({source.head}))
+    if _may_be_mistyped(charges, source) and source.real:
+        right = task.rates[name] / per_mm / source.real
+        wrong = frozenset(charges.charged | charges.doubtful)
+        for one in following.expectations(source, wrong, follows_through=True):
+            yield replace(one, vector=complex((right * one.vector * following.used[source.scale]).real))
+
+
+def _may_be_mistyped(charges: Charges, one: TaskSegment) -> bool:
+    """Return whether a vector may be wrong in its entry alone: values come from the drawing, not from it."""
+    drawn, exact = charges.evidence.vector(one.name), one.drawn(charges.following.used)
+    is_charged = drawn is not None and one.head in charges.charged and not charges.evidence.has_sheets
+    return is_charged and not fits(drawn, exact, charges.task.rubric.tolerance_of(one.name))
 
 
 LEAST_ACROSS = 0.2

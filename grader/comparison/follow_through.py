@@ -270,7 +270,7 @@ class FollowThrough:
     ) -> Iterator[tuple[frozenset[str], "FollowThrough"]]:
         """Yield what follows if wrong vectors are wrong in their entry alone, with the nodes where they end.
 
-        One or two point the other way; a force that acts was drawn as it is due.
+        One or two point the other way; one that is laid off was drawn as it is due.
         """
         if self.evidence.has_sheets:
             return
@@ -285,8 +285,10 @@ class FollowThrough:
                 continue
             right = self.task.segments[name].drawn(self.followed)
             turned[name] = replace(one, direction_rad=one.direction_rad + math.pi)
-            if name in forces:
-                due[name] = replace(one, length_mm=abs(right), direction_rad=cmath.phase(right))
+            right = (
+                right if name in forces else self.from_nodes(self.task.segments[name], self.followed).vector
+            )
+            due[name] = replace(one, length_mm=abs(right), direction_rad=cmath.phase(right))
         ways = [{name: each[name]} for each in (turned, due) for name in each]
         ways += [{one: turned[one], other: turned[other]} for one, other in combinations(turned, 2)]
         for entries in ways:
@@ -446,10 +448,11 @@ class FollowThrough:
         line = line_of(construction.vectors[segment.name], construction)
         if drawn is None or line is None or not isinstance(construction.step(segment.head), TwoLines):
             return None
-        made = self.from_nodes(segment, self.followed)
-        if not abs(made.vector) > self.task.rubric.tolerance_of(segment.name).least_mm:
-            return None
-        along = made.vector / abs(made.vector)
+        made, nodes = self.from_nodes(segment, self.followed), self.traced(self.followed).nodes
+        view = View(
+            {name: np.asarray(one.at) for name, one in nodes.items()}, self.right(self.followed).parameters
+        )
+        along = complex(line.along.at(view))
         vector = along * (drawn * along.conjugate()).real
         return replace(made, vector=vector, causes=frozenset({segment.head}))
 
@@ -648,7 +651,13 @@ class FollowThrough:
         if shares:
             farthest = max(shares, key=lambda one: abs(shares[one] - 1.0))
             relies_on = frozenset(vectors[one].head for one in shares)
-            yield Expectation(right * math.prod(shares.values()), "vector", farthest, relies_on)
+            size = math.prod(shares.values())
+            yield Expectation(right * size, "vector", farthest, relies_on)
+            own = self.evidence.vector(slide) if slide else None
+            if slide and own and own.direction_rad is not None:
+                # Across the own sliding velocity, wherever that points.
+                turn = own.direction_rad - cmath.phase(self.task.real[slide] * shares.get(slide, 1.0))
+                yield Expectation(right * size * cmath.rect(1.0, turn), "vector", slide, relies_on)
         if rate is not None and (turned := self.own_turn(rate)) is not None:
             slid = {one: share for one, share in shares.items() if one == slide}
             relies_on = frozenset({rate.name, *(vectors[one].head for one in slid)})

@@ -101,6 +101,7 @@ AS_EXPECTED = 3.0
 UNEXPECTED = 12.0
 """Cost of a node that lies elsewhere; the most that one length adds."""
 BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,10 +188,10 @@ class _LengthBranches:
             self.part(step.node, positions, made, pair, ends)
 
     def direct(self, node: str, made: Sequence[ComplexArray], ends: Sequence[_Measured]) -> None:
-        """Place a node at the end of the first of some vectors with directions.
+        """Place a node at the end of a vector with a direction; branches divide where several end apart.
 
-        Of one that points the opposite way from where the others end, these count. Branches in which its step
-        or the other vectors put it elsewhere cost more.
+        One that points the opposite way from where another ends comes last. Branches in which its step or the
+        other vectors put it elsewhere cost more.
         """
         tails, drawn = (
             [self.nodes[one.vector.tail] for one in ends],
@@ -199,13 +200,18 @@ class _LengthBranches:
         positions = [tail + vector for tail, vector in zip(tails, drawn, strict=True)]
         back, near = tails[0] - drawn[0], AS_EXPECTED * self.sigma_mm
         is_back = [float(np.abs(back - place).min()) <= near < abs(drawn[0]) for place in positions]
-        first = is_back.index(True) if any(is_back) else 0
-        self.nodes[node] = place = positions[first]
-        self.cost = self.cost + self._apart(
-            [_nearest(made, place), *(np.abs(one - place) for one in positions)]
-        )
-        self.is_known[node] = np.ones(len(self.cost), np.bool_)
-        self.sources[node] = ends[first : first + 1]
+        apart = list[ComplexArray]()
+        for _, place, one in sorted(zip(is_back, positions, ends, strict=True), key=lambda each: not each[0]):
+            is_apart = all(float(np.abs(place - other).max()) > near for other in apart)
+            if is_apart and not (apart and one.vector.tail in self.guessed):
+                apart.append(place)
+        index = np.tile(np.arange(len(self.cost)), len(apart))
+        every = np.concatenate(apart)
+        residuals = [_nearest([one[index] for one in made], every)]
+        residuals += [np.abs(one[index] - every) for one in positions]
+        total = self.cost[index] + self._apart(residuals)
+        self._continue(node, every, total, index, np.ones(len(index), np.bool_))
+        self.sources[node] = ends
 
     def _apart(self, residuals: Sequence[FloatArray]) -> FloatArray:
         """The cost of distances at which a node's step and vectors put it elsewhere."""
@@ -252,13 +258,19 @@ class _LengthBranches:
             total += np.minimum(((length - one.drawn.length_mm) / self.sigma_mm) ** 2, UNEXPECTED)
         found = np.asarray((is_expected & is_known).reshape(ways, count).any(axis=0))
         total = np.where(np.isfinite(total) & (is_known | ~found[index]), total, np.inf)
+        self._continue(node, every, total, index, is_known)
+        self.sources[node] = sources
+
+    def _continue(
+        self, node: str, every: ComplexArray, total: FloatArray, index: IntArray, is_known: BoolArray
+    ) -> None:
+        """Continue with the cheapest of all places of a node, each in the branch of its index."""
         order = np.argsort(total, kind="stable")[:BRANCHES]
         order = order[(total[order] < total[order[0]] + COST_WINDOW) | (np.arange(len(order)) == 0)]
         self.take(index[order])
-        self.cost, self.nodes[node] = total[order], every[order]
-        self.is_known[node], self.sources[node] = is_known[order], sources
+        self.cost, self.nodes[node], self.is_known[node] = total[order], every[order], is_known[order]
 
-    def take(self, index: np.ndarray[tuple[int, ...], np.dtype[np.int64]]) -> None:
+    def take(self, index: IntArray) -> None:
         """Keep these branches, in this order."""
         for name, positions in self.nodes.items():
             self.nodes[name] = positions[index]
@@ -275,11 +287,20 @@ class _LengthBranches:
         }
         for name, sources in self.sources.items():
             place = complex(self.nodes[name][0])
+            sources = self._taken(sources, place)  # noqa: PLW2901 - those of them that count
             tails = [one.vector.tail for one in sources] or [self.guessed[name]]
             if self.is_known[name][0] and shifts.keys() >= set(tails):
                 shifts[name] = self._shifts(place, sources, columns, shifts) if sources else shifts[tails[0]]
                 found[name] = OwnNode(place, shifts[name])
         return found
+
+    def _taken(self, ends: Sequence[_Measured], place: complex) -> Sequence[_Measured]:
+        """Return the vectors from which a place was taken: all lengths, or the first that points there."""
+        for one in ends:
+            vector, tail = one.drawn.as_complex, complex(self.nodes[one.vector.tail][0])
+            if vector is not None and abs(tail + vector - place) <= AS_EXPECTED * self.sigma_mm:
+                return [one]
+        return ends
 
     def _shifts(
         self,
@@ -452,10 +473,11 @@ def _vectors(construction: Construction, parameters: Parameters) -> dict[str, co
 
 def _fitting(task: Task, vectors: Mapping[str, complex], known: Mapping[str, DrawnVector]) -> int:
     """Count the vectors that lie within twice their tolerance."""
-    return sum(_fits(drawn, vectors[name], task.rubric.tolerance_of(name)) for name, drawn in known.items())
+    return sum(fits(drawn, vectors[name], task.rubric.tolerance_of(name)) for name, drawn in known.items())
 
 
-def _fits(drawn: DrawnVector, exact: complex, table: ToleranceTable) -> bool:
+def fits(drawn: DrawnVector, exact: complex, table: ToleranceTable) -> bool:
+    """Return whether a measured vector is another, mm, up to twice its tolerances."""
     size = abs(exact)
     if not abs(size - drawn.length_mm) <= 2.0 * table.length_at(size):
         return False

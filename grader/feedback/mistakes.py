@@ -70,7 +70,7 @@ MISTAKES: dict[str, Words] = {
     ),
     "normal_missing": Words(
         N_("normal component left out"),
-        N_("At %(at)s, the normal component was left out."),
+        N_("At %(at)s, the perpendicular was drawn without the normal component."),
         N_("Lay off v²/l along the link first, then draw the perpendicular through its end."),
     ),
     "normal_from_absolute": Words(
@@ -359,7 +359,7 @@ PRECISE: dict[str, tuple[str, ...]] = {
     "normal_reversed": (
         N_("The normal component %(vector)s was laid off away from the centre of rotation."),
     ),
-    "normal_missing": (N_("The normal component %(vector)s was left out."),),
+    "normal_missing": (N_("The perpendicular was drawn without the normal component %(vector)s."),),
     "normal_from_absolute": (
         N_("The normal component %(vector)s was computed from an absolute velocity."),
     ),

@@ -160,7 +160,7 @@ class Workers:
                 self._fill(futures, waiting, tasks, seconds)
                 if not futures:
                     break
-                ended = _ended(futures, longest + _STALLED_S)
+                ended = self._ended(futures, longest + _STALLED_S)
                 if not ended:
                     break
                 for future in ended:
@@ -174,6 +174,17 @@ class Workers:
                 self._end_pool()
         for index in sorted(left):
             yield index, Reason("crashed", {"why": "killed"})
+
+    def _ended(self, futures: Iterable[Future[Any]], seconds: float) -> set[Future[Any]]:
+        """The futures that have ended as soon as there are any; none after so many seconds.
+
+        None, too, of a pool that is broken, since its workers cannot start: it ends no future.
+        """
+        deadline, pool = time.monotonic() + seconds, self._started_pool()
+        while not (ended := wait(futures, _LOOK_S, FIRST_COMPLETED).done):
+            if time.monotonic() > deadline or not pool.active:
+                break
+        return ended
 
     def _fill(
         self,
@@ -246,14 +257,6 @@ class Workers:
                     if psutil.Process(worker.pid).memory_info().rss > limit:
                         self._over_memory.add(worker.pid or 0)
                         worker.kill()
-
-
-def _ended(futures: Iterable[Future[Any]], seconds: float) -> set[Future[Any]]:
-    """The futures that have ended as soon as there are any; none after so many seconds."""
-    deadline = time.monotonic() + seconds
-    while not (ended := wait(futures, _LOOK_S, FIRST_COMPLETED).done) and time.monotonic() < deadline:
-        pass
-    return ended
 
 
 def _workers() -> list[BaseProcess]:

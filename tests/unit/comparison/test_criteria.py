@@ -387,10 +387,32 @@ def test_a_value_follows_from_the_own_segment_and_the_own_scale(scale):
 
 def test_a_value_beside_its_own_segment_does_not_follow_from_another_node():
     turned = measured(PUMP).figures["velocity_plan"].vectors["v_C"].direction_deg + 30.0
-    reading = changed(measured(PUMP), "v_C", direction_deg=turned)
+    reading = without(changed(measured(PUMP), "v_C", direction_deg=turned), "v_CA", "v_CB")
     for given, verdict in ((reading, "none"), (without(reading, "v_D"), "follow_through")):
         found = verdicts(compare(PUMP, Submission(measured=given, values={"v_D": 7.95})))
         assert found["v_D_value"] == verdict
+
+
+def test_what_was_drawn_after_a_mistyped_entry_is_judged_by_the_vectors_that_agree():
+    reading = changed(measured(PUMP), "v_C", length_mm=5.0)
+    assert lost(compare(PUMP, Submission(measured=reading))) == ["v_C"]
+
+
+def test_values_follow_from_the_drawing_and_not_from_a_mistyped_entry():
+    """The crank's vector is reversed, and so is the drawing; one of its vectors is written tenfold."""
+    reversed_deg = {
+        name: one.direction_deg + 180.0
+        for name, one in measured(PUMP).figures["velocity_plan"].vectors.items()
+    }
+    reading = measured(PUMP)
+    for name, turned in reversed_deg.items():
+        reading = changed(reading, name, direction_deg=turned % 360.0)
+    values = {"omega_4": -PUMP.rates["omega_4"], "v_D": abs(PUMP.segments["v_D"].real)}
+    for name in ("v_DC", "v_D"):
+        length = reading.figures["velocity_plan"].vectors[name].length_mm
+        found = verdicts(compare(PUMP, Submission(
+            measured=changed(reading, name, length_mm=10.0 * length), values=values)))  # fmt: skip
+        assert (found[name], found["omega_4"], found["v_D_value"]) == ("none", "follow_through", "full")
 
 
 def test_a_value_without_its_segment_earns_what_is_asked_of_the_value():

@@ -87,11 +87,12 @@ def test_a_normal_component_follows_from_the_own_value_of_omega():
     assert (found["omega_3"], found["a_BA_n"]) == ("none", "follow_through")
 
 
-def test_a_reversed_sliding_velocity_reverses_the_coriolis_component():
+@pytest.mark.parametrize("by_deg", [180.0, 40.0, 90.0])
+def test_the_coriolis_component_stands_across_the_own_sliding_velocity(by_deg):
     right = measured(SHAPER)
     reading = right
     for name, figure in (("v_A3A", "velocity_plan"), ("a_A3A_c", "acceleration_plan")):
-        turned = (right.figures[figure].vectors[name].direction_deg + 180.0) % 360.0
+        turned = (right.figures[figure].vectors[name].direction_deg + by_deg) % 360.0
         reading = changed(reading, name, direction_deg=turned)
     found = verdicts(judge(SHAPER, Submission(measured=reading)))
     assert found["v_A3A"] == "none"

@@ -86,6 +86,14 @@ def test_a_call_that_gives_none_has_ended():
         assert dict(workers.run(print, [(), ()])) == {0: None, 1: None}
 
 
+def test_processes_that_cannot_start_end_the_calls_before_any_time_limit():
+    with Workers(1, LIMITS, "grader.no_such_room") as workers:
+        begun = time.monotonic()
+        ((_, result),) = workers.run(print, [()])
+    assert result.code == "crashed"
+    assert time.monotonic() - begun < workers_module._PATIENCE * LIMITS.seconds
+
+
 @pytest.mark.slow
 def test_processes_killed_at_any_moment_lose_no_call():
     """Also between two calls, and while one is handed over; some results come between two kills."""
