@@ -189,7 +189,7 @@ class MechanismError(PlanmarkError):
 
     Attributes
     ----------
-    template : the message, with ``{gap}`` where the gap stands in it
+    template : the message, with ``{gap}`` where the gap stands in it, or the directions of the assemblies
     group : the joint that the failing group places; None where no single group is meant
     gap_m : by how much the group's links miss each other; None where they meet
     """
@@ -197,9 +197,16 @@ class MechanismError(PlanmarkError):
     exit_status = 3
 
     def __init__(
-        self, code: str, template: str, *, group: str | None = None, gap_m: float | None = None
+        self,
+        code: str,
+        template: str,
+        *,
+        group: str | None = None,
+        gap_m: float | None = None,
+        texts: str = "",
     ) -> None:
-        gap: dict[str, Parameter] = {} if gap_m is None else {"texts": f"{gap_m:.6g} m"}
+        texts = texts if gap_m is None else f"{gap_m:.6g} m"
+        gap: dict[str, Parameter] = {"texts": texts} if texts else {}
         message = template.replace("{gap}", str(gap.get("texts", "")))
         super().__init__(code, message, **{} if group is None else {"node": group}, **gap)
         self.template, self.group, self.gap_m = template, group, gap_m

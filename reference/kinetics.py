@@ -36,6 +36,7 @@ from reference.mechanism import (
     MovingGuide,
     Slider,
     SlottedLink,
+    Triad,
     Yoke,
     carriers,
     named_links,
@@ -370,6 +371,8 @@ class _Statics:
                 self._guide(node, links[1], rails[1])
             case Yoke():
                 self._balance_yoke(group, links)
+            case Triad():
+                self._balance_triad(group)
 
     def _balance_dyad(self, group: Dyad, links: tuple[str, ...]) -> None:
         (p, q), node = group.pins, group.node
@@ -379,6 +382,27 @@ class _Statics:
         self._react(p, links[0], self.carriers[p], force)
         self._close(node, *links)
         self._close(q, links[1])
+
+    def _balance_triad(self, group: Triad) -> None:
+        """Balance a triad: moments of a leg about its corner for the part across it, then of all about S."""
+        s, ternary = group.assur_point, group.links[3]
+        legs = list(zip(group.links[:3], group.pins, group.corners, strict=True))
+        rest, moment = self._sum(ternary, s)
+        arms, forces = list[_Near](), list[_Near]()
+        for link, pin, corner in legs:
+            arm = self._arm(corner, pin)
+            force = arm.left.by(-self._sum(link, corner)[1]).over(arm.by(arm, dot))
+            total, more = self._sum(link, s)
+            rest, moment = rest + total + force, moment + more + self._arm(s, pin).by(force, cross)
+            arms.append(arm)
+            forces.append(force)
+        last = -moment.over(self._arm(s, legs[2][1]).by(arms[2], cross))
+        rest = rest + arms[2].by(last)
+        crossing = arms[0].by(arms[1], cross)
+        along = (rest.by(arms[1], cross).over(-crossing), rest.by(arms[0], cross).over(crossing), last)
+        for (link, pin, corner), arm, force, one in zip(legs, arms, forces, along, strict=True):
+            self._react(pin, link, self.carriers[pin], force + arm.by(one))
+            self._close(corner, link, ternary)
 
     def _balance_yoke(self, group: Yoke, links: tuple[str, ...]) -> None:
         rail, pin = self._rail(group.guide), group.pin

@@ -204,7 +204,48 @@ class SlotPoint:
     local_m: ComplexArray
 
 
-Group = Dyad | Slider | SlottedLink | CrossSlider | Yoke | Plate | PointOnLine | SlotPoint
+@dataclass(frozen=True, slots=True)
+class Triad:
+    """Assur group of the third class: a ternary link on three legs from `pins`, all turning pairs.
+
+    Attributes
+    ----------
+    corners : joints of the ternary link, in the order of the legs
+    assur_point : the point of the ternary link where the lines of the first two legs cross
+    links : the three legs, then the ternary link
+    legs_m : lengths of the legs
+    sides_m : |DE|, |EF|, |FD| of the ternary link D E F; `shape` is (F - D) / (E - D)
+    direction_rad : roughly the direction of D E, which tells the assembly
+    leg_rad : the direction of A D where it is followed, else None
+    sign : that of the group's determinant where it is followed, else 0
+    """
+
+    corners: tuple[str, str, str]
+    pins: tuple[str, str, str]
+    assur_point: str
+    links: tuple[str, str, str, str]
+    legs_m: tuple[FloatArray, FloatArray, FloatArray]
+    sides_m: tuple[FloatArray, FloatArray, FloatArray]
+    turned: Side
+    shape: ComplexArray
+    direction_rad: FloatArray
+    leg_rad: FloatArray | None = None
+    sign: int = 0
+
+    @property
+    def node(self) -> str:
+        """The third joint of the ternary link."""
+        return self.corners[2]
+
+    @property
+    def bars(self) -> tuple[tuple[str, str, str], ...]:
+        """Each leg and each side of the ternary link: its link, its earlier joint, its later joint."""
+        (d, e, f), ternary = self.corners, self.links[3]
+        legs = zip(self.links[:3], self.pins, self.corners, strict=True)
+        return *legs, (ternary, d, e), (ternary, d, f), (ternary, e, f)
+
+
+Group = Dyad | Slider | SlottedLink | CrossSlider | Yoke | Plate | PointOnLine | SlotPoint | Triad
 
 
 @dataclass(frozen=True, slots=True)
@@ -331,6 +372,8 @@ def moving_guides(group: Group) -> tuple[MovingGuide, ...]:
 
 def joints_of(group: Group) -> tuple[str, ...]:
     """The joints that a group adds: its node, the points that coincide with it, a guide's foot."""
+    if isinstance(group, Triad):
+        return (*group.corners, group.assur_point)
     foot = (group.foot,) if isinstance(group, SlottedLink) and group.foot else ()
     return (*foot, group.node, *(guide.coincident for guide in moving_guides(group)))
 
@@ -379,6 +422,9 @@ def members_of(group: Group) -> tuple[Member, ...]:
         case Yoke(node=node, pin=pin, link=link, guide=guide):
             yoke = _slider(link or SLIDER + node, node, guide)
             return yoke, Member(SLIDER + pin, (pin,), yoke.turns_with)
+        case Triad(corners=corners, pins=pins, links=links):
+            held = (*zip(pins, corners, strict=True), corners)
+            return tuple(Member(link, ends, link) for link, ends in zip(links, held, strict=True))
     return ()
 
 
@@ -455,6 +501,9 @@ def hinged_at(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
                 found[group.node] = named[group.node][:1]
             case Dyad() | Slider():
                 found[group.node] = named[group.node]
+            case Triad(links=(*legs, ternary)):
+                found |= {corner: (leg, ternary) for corner, leg in zip(group.corners, legs, strict=True)}
+                found[group.assur_point] = (ternary,)
             case _:
                 found[group.node] = (group.link,)
     return found
@@ -499,7 +548,8 @@ def turning(mechanism: Mechanism) -> dict[str, tuple[str, str, str]]:
     found = {driver.link: (driver.link, driver.pivot, driver.pin)} if isinstance(driver, Crank) else {}
     for name, member, group in members(mechanism):
         if not member.slides:
-            found[name] = (name, member.points[0], group.node)
+            end = member.points[1] if isinstance(group, Triad) else group.node
+            found[name] = (name, member.points[0], end)
         elif member.turns_with:
             found[name] = found[member.turns_with]
     return found

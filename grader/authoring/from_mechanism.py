@@ -29,6 +29,7 @@ from reference.authored.mechanism import (
     PlateTable,
     SliderTable,
     SlottedLinkTable,
+    TriadTable,
 )
 from reference.authored.toml_file import SideText, Text, load, text_of
 from reference.authored.variant_table import KEYS, MEASURES
@@ -295,6 +296,11 @@ def _labels(table: object) -> dict[Any, str]:
             return {("lengths", index): pin + table.node for index, pin in enumerate(table.base)} | {
                 "side": side
             }
+        case TriadTable(nodes=(d, e, f), pins=(a, b, c)):
+            ends = (a + d, b + e, c + f, d + e, e + f, f + d)
+            return {("lengths", index): name for index, name in enumerate(ends)} | {
+                ("angle_deg", 0): f"φ({d}{e}) ± 20°", "side": f"{f}, {d}→{e}",
+            }  # fmt: skip
         case SlottedLinkTable():
             return {"offset": f"{table.pivot}{table.foot}"}
     return {}

@@ -66,6 +66,8 @@ def broken_findings(assignment: Assignment, broken: Broken) -> Iterator[LintFind
         known: dict[str, Parameter] = {"node": error.group or ""}
         if gaps:
             known["texts"] = " .. ".join(dict.fromkeys(f"{gap:.3g} m" for gap in (gaps[0], gaps[-1])))
+        elif "texts" in error.parameters:
+            known["texts"] = error.parameters["texts"]
         place = group_place(assignment, error.group)
         yield LintFinding("fault", error.code, *place, known, tuple(variants))
 

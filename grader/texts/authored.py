@@ -92,6 +92,7 @@ AUTHORED: dict[str, tuple[str, ...]] = {
         " %(first)s -> %(second)s; say which: side"),),
     "cylinder_length": (N_("'%(text)s' (cylinder) must lie between %(least)s and %(most)s m, in line with"
         " the crank"),),
+    "no_triangle": (N_("the joints %(names)s form no triangle: DE, EF and FD are the last three lengths"),),
     "offset_zero": (N_("the offset of link %(link)s is zero: leave out offset and foot"),),
     "motion_of_cylinder": (N_("angle, speed and acceleration come from the cylinder: leave out the"
         " crank's"),),
@@ -130,6 +131,9 @@ AUTHORED: dict[str, tuple[str, ...]] = {
         N_("%(names)s form a group of class %(rank)s: not solved; %(advice)s"),
         N_("%(names)s form a group of a higher class than the second: not solved; %(advice)s"),
     ),
+    "is_triad": (N_('%(names)s form a triad, a group of class III: write one group of type = "triad"'),),
+    "force_plan_of_triad": (N_("force plans of a mechanism with a triad (%(joint)s) are not drawn: leave them"
+        " out; plan --json has its forces"),),
     "assur_points": (
         N_("velocities can be found by Assur points, by interpolation between two trial plans, or with"
             " %(link)s as the driving link: all groups are then of the second class"),
@@ -144,6 +148,7 @@ AUTHORED: dict[str, tuple[str, ...]] = {
     "joint_case": (N_("joint %(joint)s: another one has the same letters in another case"),),
     "joints_alike": (N_("joints %(names)s: %(name)s would have two meanings, one of them %(first)s about"
         " %(second)s; rename one"),),
+    "first_leg_fixed": (N_("%(joint)s is fixed: write first a leg from a joint that moves"),),
     "joints_equal": (N_("must be two different joints"),),
     "guides_fixed": (N_("two fixed guides cross in a fixed point: one of them must be on a moving link"),),
     "guide_joints": (
@@ -169,8 +174,8 @@ AUTHORED: dict[str, tuple[str, ...]] = {
         ' "RPR"'),),
     "kind_not_rigid": (N_("'%(text)s': planmark solves plane mechanisms of rigid links, hinges and"
         " sliders"),),
-    "kind_class": (N_("'%(text)s': a group of more than two links: only groups of the second class are"
-        " solved"),),
+    "kind_class": (N_("'%(text)s': of groups of a higher class than the second only a ternary link on"
+        ' three legs with turning pairs is solved, type = "triad"'),),
     "kind_yoke": (N_("'%(text)s': a block in a yoke on a guide is type = \"RPP\""),),
     "kind_links": (N_("'%(text)s': two links that meet in a joint are type = \"RRR\""),),
     "kind_slot": (N_("'%(text)s': a block in the slot of a turning link is type = \"RPR\""),),
@@ -265,7 +270,10 @@ AUTHORED: dict[str, tuple[str, ...]] = {
     # Findings of lint
     "does_not_assemble": (N_("the group of %(node)s does not assemble: its links miss each other by"
         " %(texts)s; check the lengths, the position of the driving link, and the sides of the groups before"
-        " it"),),
+        " it"), N_("the triad of %(node)s does not assemble, or the lines of its legs meet in one"
+        " point: check its lengths")),
+    "assembly_unclear": (N_("angle_deg of the triad of %(node)s tells no assembly clearly: there are"
+        " %(texts)s"),),
     "singular": (N_("the velocities of the group of %(node)s are not determined: its links are in line, its"
         " rod is perpendicular to the guide, or its guides are parallel; choose another position of the"
         " driving link, or two directions"),),

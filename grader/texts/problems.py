@@ -238,6 +238,7 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
     "n_needed": (N_("Nothing says this student's number or position; add it to the roster."),),
     "position_needed": (N_("Nothing says this student's number or position; add it to the roster."),),
     "does_not_assemble": (N_("The mechanism does not assemble with these data."),),
+    "assembly_unclear": (N_("The mechanism does not assemble with these data."),),
     "singular": (N_("The velocities are not determined in this position of the mechanism."),),
     "sheet_values": (
         N_("Page %(form)s: there is no room for the computed values of %(values)s; none is printed."),

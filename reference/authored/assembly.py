@@ -20,6 +20,7 @@ from reference.authored.mechanism import (
     PointTable,
     SliderTable,
     SlottedLinkTable,
+    TriadTable,
 )
 from reference.authored.toml_file import LENGTH_UNITS_M, SideText
 from reference.errors import nearest
@@ -43,6 +44,7 @@ from reference.mechanism import (
     Slider,
     SlotPoint,
     SlottedLink,
+    Triad,
     Yoke,
     with_arrays,
 )
@@ -275,6 +277,8 @@ def _group(table: AnyGroupTable, numbers: Numbers, bodies: _LinkAxes) -> Group:
         case CrossSliderTable():
             first_guide, second_guide = (_guide(guide, numbers, bodies) for guide in table.guides)
             return CrossSlider(node, (first_guide, second_guide))
+        case TriadTable():
+            return _triad(table, numbers, bodies)
         case _:
             slot = np.zeros(1) if table.slot_deg is None else numbers.angle(table.slot_deg)
             return Yoke(node, table.pin, slot, _guide(table.guide, numbers, bodies), table.link or "")
@@ -291,6 +295,21 @@ def _slotted_link(table: SlottedLinkTable, numbers: Numbers, bodies: _LinkAxes) 
     bodies.slots[table.link] = table.node
     side = numbers.side(table.side)
     return SlottedLink(table.node, table.pin, table.pivot, table.link, offset, table.foot, side)
+
+
+def _triad(table: TriadTable, numbers: Numbers, bodies: _LinkAxes) -> Triad:
+    (d, e, f), (a, b, c), (*legs, ternary) = table.nodes, table.pins, table.links
+    first, second, third, near, across, far = (numbers.length(length, f) for length in table.lengths)
+    for link, pin, node, length in zip(legs, (a, b, c), (d, e, f), (first, second, third), strict=True):
+        bodies.carry(link, pin, node, length)
+    side = numbers.side(table.side)
+    shape = _shape(near, far, across, side)
+    if np.any(flat := ~np.isfinite(shape) | (shape.imag == 0.0)):
+        raise FormulaError("no_triangle", flat, names=(d, e, f))
+    bodies.axes[ternary] = {d: 0.0 * shape, e: near + 0.0 * shape, f: near * shape}
+    links, sides = (legs[0], legs[1], legs[2], ternary), (near, across, far)
+    told = table.assur_point, links, (first, second, third), sides, side, shape
+    return Triad((d, e, f), (a, b, c), *told, numbers.angle(table.angle_deg))
 
 
 def _link_point(

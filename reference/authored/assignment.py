@@ -45,7 +45,7 @@ from reference.errors import (
 )
 from reference.geometry import FloatArray
 from reference.kinematics.motion import BoolArray
-from reference.mechanism import Crank, Driver, Mechanism, members_of
+from reference.mechanism import Crank, Driver, Mechanism, Triad, members_of
 from reference.quantities import FIGURE, FORCE_PLAN, FORCE_PLANS, SCALE_UNITS, group_of, scale_of, zone_of
 
 
@@ -670,6 +670,8 @@ def _check_force_plans(assignment: Assignment) -> Iterator[Finding]:
     if assignment.file.scales.kF is None:
         yield Finding("$.scales.kF", "force_scale_missing")
     mechanism = assignment.mechanism(assignment.variants()[:1])
+    for triad in (group for group in mechanism.groups if isinstance(group, Triad)):
+        yield Finding("$.page", "force_plan_of_triad", {"joint": triad.node})
     # A cylinder that drives stands in the plan of its crank.
     driving = getattr(mechanism.driver, "cylinder", None)
     groups = [group for group in reversed(mechanism.groups) if members_of(group)]

@@ -105,6 +105,9 @@ def refusal(chain: Chain) -> FaultError:
 
 def _of_higher_class(chain: Chain, group: Links) -> FaultError:
     """Return the refusal of a group, with ways to its velocities."""
+    slides = any(group & {*pair} for pair in chain.slides)
+    if chain.class_of(group) == "III" and len(group) == 4 and not slides:
+        return FaultError("is_triad", names=chain.named(group))
     known: dict[str, Parameter] = {"names": chain.named(group), "advice": "assur_points"}
     if rank := chain.class_of(group):
         known["rank"] = rank

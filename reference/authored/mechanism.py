@@ -23,6 +23,7 @@ from reference.authored.toml_file import (
     Point,
     SideText,
     Text,
+    ThreeJoints,
     TwoFormulas,
     TwoJoints,
 )
@@ -195,6 +196,31 @@ class YokeTable(Authored):
         return self
 
 
+class TriadTable(Authored):
+    """Assur group of the third class: a ternary link on three legs, all turning pairs."""
+
+    type: Literal["triad"]
+    nodes: ThreeJoints
+    """Joints D, E, F of the ternary link, in the order of the legs."""
+    pins: ThreeJoints
+    """Joints A, B, C of the legs; the first one moves."""
+    links: Annotated[list[LinkName], Field(min_length=4, max_length=4)]
+    """The three legs, then the ternary link."""
+    lengths: Annotated[list[FormulaText], Field(min_length=6, max_length=6)]
+    """AD, BE, CF, then DE, EF, FD."""
+    side: LeftRight
+    """Side of F, seen from D to E."""
+    angle_deg: FormulaText
+    """Roughly the direction from D to E: it tells which of up to six assemblies is meant."""
+    assur_point: Joint
+    """A name for the point of the ternary link where the lines AD and BE cross, as ``S``."""
+
+    @property
+    def node(self) -> str:
+        """The third joint of the ternary link, after which the group is called."""
+        return self.nodes[2]
+
+
 class PlateTable(Authored):
     """A third point of the link through `base`, by its distances from base[0] and base[1]."""
 
@@ -231,7 +257,9 @@ class PointTable(Authored):
 
 
 LinkPointTable = PlateTable | PointOnLineTable | PointTable
-AnyGroupTable = DyadTable | SliderTable | SlottedLinkTable | CrossSliderTable | YokeTable | LinkPointTable
+AnyGroupTable = (
+    DyadTable | SliderTable | SlottedLinkTable | CrossSliderTable | YokeTable | TriadTable | LinkPointTable
+)
 GroupTable = Annotated[AnyGroupTable, Field(discriminator="type")]
 
 
@@ -320,6 +348,9 @@ def _parts_of(group: AnyGroupTable) -> Iterator[tuple[str, tuple[str, ...], Guid
         case YokeTable():
             yoke = f"yoke {node}"
             yield from ((yoke, (node,), group.guide), (block, (group.pin,), yoke))
+        case TriadTable(nodes=nodes, links=links):
+            held = (*zip(group.pins, nodes, strict=True), tuple(nodes))
+            yield from ((link, ends, None) for link, ends in zip(links, held, strict=True))
         case PointTable():
             yield group.link, (node,), None
         case _:
@@ -473,7 +504,7 @@ def _guides(group: AnyGroupTable) -> list[tuple[str, GuideTable]]:
 def _needed(group: AnyGroupTable) -> Keyed:
     """Yield the joints that must be placed before the group."""
     match group:
-        case DyadTable(pins=pins):
+        case DyadTable(pins=pins) | TriadTable(pins=pins):
             yield from ((f"pins[{index}]", pin) for index, pin in enumerate(pins))
         case SliderTable(pin=pin) | YokeTable(pin=pin):
             yield "pin", pin
@@ -487,6 +518,10 @@ def _needed(group: AnyGroupTable) -> Keyed:
 
 def _added(group: AnyGroupTable) -> Keyed:
     """Yield the joints that the group places."""
+    if isinstance(group, TriadTable):
+        yield from ((f"nodes[{index}]", node) for index, node in enumerate(group.nodes))
+        yield "assur_point", group.assur_point
+        return
     yield "node", group.node
     if isinstance(group, SlottedLinkTable) and group.foot is not None:
         yield "foot", group.foot
@@ -511,6 +546,8 @@ def _check_links(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> It
             yield from _add_link(group.link, carried, bodies, f"{where}.link")
             bodies.slots[group.link] = {group.pivot, group.node}
             bodies.moments[group.node] = group.link
+        case TriadTable():
+            yield from _check_triad(group, bodies, where)
         case YokeTable(link=str(link)):
             yield from _add_link(link, set(), bodies, f"{where}.link")
             bodies.moments[group.node] = link
@@ -519,6 +556,17 @@ def _check_links(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> It
                 yield Finding(f"{where}.guides", "guides_fixed")
         case PlateTable() | PointOnLineTable() | PointTable():
             yield from _check_base(group, bodies, f"{where}.base")
+
+
+def _check_triad(group: TriadTable, bodies: _CarriedJoints, where: str) -> Iterator[Finding]:
+    if len({*group.pins}) < len(group.pins):
+        yield Finding(f"{where}.pins", "joints_equal")
+    if (first := group.pins[0]) in bodies.ground:
+        yield Finding(f"{where}.pins[0]", "first_leg_fixed", {"joint": first})
+    held = [*({pin, node} for pin, node in zip(group.pins, group.nodes, strict=True)), {*group.nodes}]
+    for index, (link, joints) in enumerate(zip(group.links, held, strict=True)):
+        yield from _add_link(link, joints, bodies, f"{where}.links[{index}]")
+    bodies.moments[group.assur_point] = group.links[3]
 
 
 def _check_guides(group: AnyGroupTable, bodies: _CarriedJoints, where: str) -> Iterator[Finding]:

@@ -122,6 +122,7 @@ Joint = Annotated[str, Field(min_length=1, max_length=4), AfterValidator(_check_
 Identifier = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]
 LinkName = Annotated[str, Field(pattern=r"^[A-Za-z0-9]{1,4}$")]
 TwoJoints = Annotated[list[Joint], Field(min_length=2, max_length=2)]
+ThreeJoints = Annotated[list[Joint], Field(min_length=3, max_length=3)]
 TwoFormulas = Annotated[list[FormulaText], Field(min_length=2, max_length=2)]
 Point = TwoFormulas
 
@@ -356,7 +357,7 @@ _OTHER_KINDS = {
     ".*(gears?$|gear.?(pair|set|train|wheel)|planet|epicycl|pinion|belt|pulley|friction).*": "kind_gears",
     ".*(geneva|maltese).*": "kind_geneva",
     ".*(spring|damper|rope|cable|screw|spheric|cardan).*": "kind_not_rigid",
-    "triad|.*third.*|class.?iii|rr[rp].?[rp]+": "kind_class",
+    ".*third.*|class.?iii|rr[rp].?[rp]+": "kind_class",
     "oldham.*|(scotch.?)?yoke|ppr|pp": "kind_yoke",
     "dyad|rr|bars?|rods?|rocker|lever": "kind_links",
     "cylinder|slott?ed.*|quick.?return": "kind_slot",
@@ -375,7 +376,7 @@ def _other_kind(name: str, **known: Parameter) -> FaultError | None:
     return FaultError(code, text=word, **known) if code else None
 
 
-_GROUP_TYPES = ("RRR", "RRP", "RPR", "PRP", "RPP", "plate", "point_on_line", "point")
+_GROUP_TYPES = ("RRR", "RRP", "RPR", "PRP", "RPP", "triad", "plate", "point_on_line", "point")
 _UNION_TAGS = {*_GROUP_TYPES, "str", "MechanismFile"}
 
 

@@ -9,8 +9,9 @@ plan), ground joints have the pole for their image, a normal component a_BA_n en
 Coriolis component a_B3B_c in ``k_B3B``.
 """
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from reference.construction.elements import (
     Along,
@@ -55,6 +56,7 @@ from reference.mechanism import (
     Slider,
     SlotPoint,
     SlottedLink,
+    Triad,
     Yoke,
     form_of,
     moving_guides,
@@ -322,7 +324,9 @@ def _write_down(
     rates = {rate.name: rate for rate in ordered if rate.vector in vectors}
     images = {node: step for node, step in draft.images.items() if node in keep}
     links = [draft.vectors[name] for name in _in_order(draft) if name in draft.vectors]
-    pairs = tuple(dict.fromkeys(one.link for one in links if one.link and one.part != "r"))
+    crossings = {group.assur_point for group in mechanism.groups if isinstance(group, Triad)}
+    ends = (one.link for one in links if one.link and one.part != "r")
+    pairs = tuple(dict.fromkeys(link for link in ends if crossings.isdisjoint(link)))
     centres, dots = _centres(draft, rates), mechanism.dots
     whole = Construction(figures, poles, vectors, rates, images, centres, pairs, dots)
     return whole if forces is None else with_force_plans(mechanism, whole, forces)
@@ -430,12 +434,8 @@ def _draw_group(draft: Draft, group: Group) -> None:
         case CrossSlider(node=node, guides=guides):
             draft.sketch.append(TwoLines(node, *(guide_line(node, guide) for guide in guides)))
             images_at(draft, node, slides(draft, node, guides))
-        case Yoke():
-            _draw_yoke(draft, group)
-        case SlottedLink():
-            _draw_slotted_link(draft, group)
         case _:
-            _draw_slot_point(draft, group)
+            _DRAWN[type(group)](draft, group)
 
 
 def _side(group: Dyad | Plate | Slider | SlottedLink) -> Side:
@@ -484,6 +484,47 @@ def _draw_slotted_link(draft: Draft, group: SlottedLink) -> None:
         rigid_images(draft, group.foot, (pivot, node))
 
 
+def _draw_triad(draft: Draft, group: Triad) -> None:
+    """Draw a triad by its Assur point S, in which the lines of the first two legs A D and B E cross.
+
+    v_S is across both lines; so is what is left of a_S after the normal components of D about A and of S
+    about D, and of E about B and of S about E. From S and C follows F, from F the joints D and E.
+    """
+    (d, e, f), (a, b, c), s = group.corners, group.pins, group.assur_point
+    _draw_ternary(draft, group)
+    link, ternary = dict(zip((d, e, f), group.links[:3], strict=True)), group.links[3]
+    lines, starts = dict[str, Condition](), list[Condition]()
+    for pin, corner in ((a, d), (b, e)):
+        length = Normal(draft.image(pin), draft.image(corner), pair(pin, corner))
+        lines[corner] = turning(draft, (pin, corner), length)
+        about, end = draft.relative(s, pin), f"n_{s}{corner}"
+        length = Normal(draft.image(s), draft.image(corner), pair(corner, s), measured=(corner, s))
+        draft.acceleration.append(Given(end, f"n_{draft.relative(corner, pin)}", length, Along(s, corner)))
+        draft.vector(f"v_{corner}{s}", draft.image(s), draft.image(corner), (s, corner))
+        draft.vector(f"a_{s}{corner}_n", f"n_{draft.relative(corner, pin)}", end, (corner, s), "n")
+        draft.vector(f"a_{about}_t", end, draft.image(s, primed=True), (pin, s), "t")
+        relative(draft, (pin, s))
+        starts.append((lines[corner][0], Line(end, Along(pin, corner, 1))))
+        rates_of(draft, link[corner], draft.relative(corner, pin), (pin, corner))
+    images_at(draft, s, starts)
+    length = Normal(draft.image(s), draft.image(f), pair(s, f), measured=(s, f))
+    of_s = turning(draft, (s, f), length)
+    images_at(draft, f, [of_s, *rotations(draft, f, {c: link[f]})])
+    for corner in (d, e):
+        images_at(draft, corner, [lines[corner], *rotations(draft, corner, {f: ternary})])
+
+
+def _draw_ternary(draft: Draft, group: Triad) -> None:
+    """Draw a triad's joints on the sketch, from the direction of its first leg, and its Assur point."""
+    (d, e, f), (a, b, _), s = group.corners, group.pins, group.assur_point
+    draft.sketch.append(Given(d, a, Scaled(pair(a, d), "kL"), Fixed(f"angle {pair(a, d)}")))
+    names = {e: (pair(d, e), pair(b, e)), f: (pair(f, d), pair(f, e))}
+    for node, centres in ((e, (d, b)), (f, (d, e))):
+        radii = (Scaled(names[node][0], "kL"), Scaled(names[node][1], "kL"))
+        draft.sketch.append(TwoArcs(node, centres, radii, VariantSide(f"side {node}")))
+    draft.sketch.append(TwoLines(s, Line(a, Along(a, d)), Line(b, Along(b, e))))
+
+
 def _is_used(mechanism: Mechanism, joint: str) -> bool:
     """Return whether another group is attached to a joint, or it is a centre of mass."""
     several = [getattr(group, key, ()) for group in mechanism.groups for key in ("pins", "base")]
@@ -499,3 +540,12 @@ def _draw_slot_point(draft: Draft, group: SlotPoint) -> None:
     x, y = Scaled(f"x {node}", "kL"), Scaled(f"y {node}", "kL")
     draft.sketch.append(Local(node, slotted.pivot, slot_axis(slotted), x, y))
     rigid_images(draft, node, (slotted.pivot, slotted.node))
+
+
+_DRAWN: Mapping[type, Callable[[Draft, Any], None]] = {
+    Yoke: _draw_yoke,
+    SlottedLink: _draw_slotted_link,
+    SlotPoint: _draw_slot_point,
+    Triad: _draw_triad,
+}
+"""The groups whose drawing takes a function of its own."""

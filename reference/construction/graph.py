@@ -46,7 +46,8 @@ from reference.construction.steps import (
     TwoArcs,
     TwoLines,
 )
-from reference.geometry import ComplexArray, FloatArray
+from reference.geometry import ComplexArray, FloatArray, cross
+from reference.kinematics.motion import move_where_possible
 from reference.mechanism import (
     Crank,
     Driver,
@@ -60,6 +61,7 @@ from reference.mechanism import (
     Slider,
     SlotPoint,
     SlottedLink,
+    Triad,
     Yoke,
     guides_of,
 )
@@ -84,6 +86,20 @@ def parameters_of(
         known[f"x {joint}"], known[f"y {joint}"] = np.asarray(place.real), np.asarray(place.imag)
     for group in mechanism.groups:
         known.update(_group_parameters(group))
+    if any(isinstance(group, Triad) for group in mechanism.groups):
+        known.update(_assemblies(mechanism))
+    return known
+
+
+def _assemblies(mechanism: Mechanism) -> dict[str, FloatArray]:
+    """Return what no ruler and compasses find: the direction of each triad's first leg, and its assembly."""
+    at, known = move_where_possible(mechanism, accelerations=False).position, dict[str, FloatArray]()
+    for group in mechanism.groups:
+        if isinstance(group, Triad):
+            (d, e, f), (a, b, _) = group.corners, group.pins
+            known[f"angle {pair(a, d)}"] = np.angle(at[d] - at[a])
+            for node, (p, q) in ((e, (d, b)), (f, (d, e))):
+                known[f"side {node}"] = np.sign(cross(at[q] - at[p], at[node] - at[p]))
     return known
 
 
@@ -135,6 +151,9 @@ def _group_parameters(group: Group) -> dict[str, FloatArray]:
             known[f"angle slot {node}"] = slot
         case SlottedLink(node=node, offset_m=offset):
             known[f"offset {node}"] = offset
+        case Triad(corners=(d, e, f), pins=pins, legs_m=legs, sides_m=sides):
+            known |= {pair(pin, end): leg for pin, end, leg in zip(pins, group.corners, legs, strict=True)}
+            known |= dict(zip((pair(d, e), pair(f, e), pair(f, d)), sides, strict=True))
         case SlotPoint(node=node, local_m=local):
             known |= {f"x {node}": np.asarray(local.real), f"y {node}": np.asarray(local.imag)}
     return known
@@ -402,8 +421,11 @@ def _starts(step: Step, construction: Construction) -> Iterator[str]:
     match step:
         case Given(start=start):
             yield start
-        case TwoArcs(centres=centres):
+        case TwoArcs(node=node, centres=centres):
             yield from centres
+            # The third leg of a triad; a side of its ternary link is drawn from its earlier corner.
+            others = (pin for pin, end in construction.pairs if end == node and pin not in centres)
+            yield from (pin for pin in others if node not in getattr(construction.step(pin), "centres", ()))
         case ArcAndLine(centre=centre) | Tangent(centre=centre):
             yield centre
         case Divide(base=base):

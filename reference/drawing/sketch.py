@@ -21,6 +21,7 @@ from reference.mechanism import (
     Plate,
     PointOnLine,
     SlotPoint,
+    Triad,
     members,
     slotted_links,
 )
@@ -74,9 +75,13 @@ def _layers(subject: Subject, nodes: dict[str, complex]) -> Iterator[Iterator[Pa
 
 def _plates(subject: Subject, nodes: dict[str, complex]) -> Iterator[Part]:
     for group in subject.plan.mechanism.groups:
-        if isinstance(group, Plate):
-            corners = tuple(point(nodes[corner]) for corner in (*group.base, group.node))
-            yield Part(group.node, Area(corners, PLATE_FILL))
+        if isinstance(group, Plate | Triad):
+            joints = (*group.base, group.node) if isinstance(group, Plate) else group.corners
+            yield Part(group.node, Area(tuple(point(nodes[joint]) for joint in joints), PLATE_FILL))
+        if isinstance(group, Triad):
+            crossing = subject.plan.construction.step(group.assur_point)
+            lines = construction_lines(crossing, subject.view, nodes)
+            yield from (Part(group.assur_point, line) for line in lines)
 
 
 # Guides and grounds --------------------------------------------------------------------------------
@@ -177,6 +182,7 @@ def _free_points(mechanism: Mechanism) -> set[str]:
     """Return points of a link at which nothing is hinged."""
     kinds = PointOnLine | Plate | SlotPoint
     points = {group.node for group in mechanism.groups if isinstance(group, kinds)}
+    points.update(group.assur_point for group in mechanism.groups if isinstance(group, Triad))
     points.update(link.foot for link in slotted_links(mechanism).values() if link.foot)
     return points - {member.points[0] for _, member, _ in members(mechanism)}
 
@@ -206,6 +212,7 @@ def _link_numbers(subject: Subject, nodes: dict[str, complex]) -> Iterator[Wante
         )  # fmt: skip
     groups, dots = subject.plan.mechanism.groups, subject.plan.construction.dots
     plates = {group.link for group in groups if isinstance(group, Plate) and group.node not in dots}
+    plates.update(group.links[3] for group in groups if isinstance(group, Triad))
     stretches: dict[str, list[Bar]] = {}
     for bar in bars(subject, nodes):
         stretches.setdefault(bar.link, []).append(bar)

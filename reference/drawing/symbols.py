@@ -25,6 +25,7 @@ from reference.mechanism import (
     Slider,
     SlotPoint,
     SlottedLink,
+    Triad,
     Yoke,
     moving_guides,
     slotted_links,
@@ -217,6 +218,8 @@ def _bars_of(subject: Subject, group: Group, nodes: dict[str, complex]) -> Itera
                 yield _between(node, link, pivot, group.foot, nodes)
         case SlotPoint(node=node, link=link):
             yield _between(node, link, slotted_links(subject.plan.mechanism)[link].pivot, node, nodes)
+        case Triad():
+            yield from (_between(end, link, start, end, nodes) for link, start, end in group.bars)
         case Yoke(node=node, pin=pin):
             foot, along = slot_of_yoke(subject, group, nodes)
             way = nodes[pin] - foot

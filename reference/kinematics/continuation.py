@@ -8,15 +8,16 @@ Sides thus follow from the closures' zeros and minima, not from one sample to th
 coarse, and no near miss of a flat position is taken for a passage.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reference.geometry import FloatArray, cross, dot
+from reference.kinematics import triad
 from reference.kinematics.motion import WHAT_IS_IN_LINE
-from reference.kinematics.solving import Joint, Rail, Solution, rail_of, solve
+from reference.kinematics.solving import Joint, Rail, Solution, loops_of, rail_of, solve
 from reference.mechanism import (
     Crank,
     CrossSlider,
@@ -26,6 +27,7 @@ from reference.mechanism import (
     Mechanism,
     Slider,
     SlottedLink,
+    Triad,
     with_arrays,
 )
 from reference.numbers import Complex, Number
@@ -70,6 +72,22 @@ class Closure:
 
 
 @dataclass(frozen=True, slots=True)
+class Track:
+    """A triad's assembly along the driving coordinate: directions (rad), and its determinant's sign."""
+
+    driving: FloatArray
+    direction: FloatArray
+    leg: FloatArray
+    sign: int
+
+    def of(self, group: Triad, driving: FloatArray) -> Triad:
+        """Return the triad in its assembly at some driving coordinates; in none beyond the ends."""
+        angles = (self.direction, self.leg)
+        direction, leg = (np.interp(driving, self.driving, one, np.nan, np.nan) for one in angles)
+        return replace(group, direction_rad=direction, leg_rad=leg, sign=self.sign)
+
+
+@dataclass(frozen=True, slots=True)
 class Continuation:
     """A mechanism of one variant, followed in both directions from its own position.
 
@@ -79,6 +97,7 @@ class Continuation:
     low, high : how far the closures were followed
     stops : what ends the motion at `low` and at `high`, None where nothing does
     changes : flat positions that are passed, by the group's node, ascending
+    tracks : the assemblies of triads, by the group's node
     """
 
     mechanism: Mechanism
@@ -87,10 +106,11 @@ class Continuation:
     high: float
     stops: tuple[Event | None, Event | None]
     changes: Mapping[str, tuple[float, ...]]
+    tracks: Mapping[str, Track] = field(default_factory=dict)
 
     def at(self, driving: FloatArray) -> Mechanism:
         """Return the mechanism at some driving coordinates, shape (N,), each group on its side there."""
-        return _driving_at(self.mechanism, driving, self.start, self.changes)
+        return _driving_at(self.mechanism, driving, self.start, self.changes, self.tracks)
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -106,14 +126,25 @@ class Continuation:
 def follow(mechanism: Mechanism, start: float, low: float, high: float) -> Continuation:
     """Follow a mechanism of one variant from `start`, where it assembles, at most to `low` and `high`."""
     changes: dict[str, tuple[float, ...]] = {}
+    tracks: dict[str, Track] = {}
     ends = [low, high]
     stops: list[Event | None] = [None, None]
     for count, group in enumerate(mechanism.groups):
         before = replace(mechanism, groups=mechanism.groups[:count])
 
-        def closures(driving: FloatArray, before: Mechanism = before, group: Group = group) -> list[Closure]:
-            return closures_of(_unit_speed(_driving_at(before, driving, start, changes)), group)
+        def placed(driving: FloatArray, before: Mechanism = before) -> Solution:
+            return _unit_speed(_driving_at(before, driving, start, changes, tracks))
 
+        def closures(
+            driving: FloatArray, placed: Callable[[FloatArray], Solution] = placed, group: Group = group
+        ) -> list[Closure]:
+            return closures_of(placed(driving), group)
+
+        if isinstance(group, Triad):
+            tracks[group.node], found = _track(placed, group, start, (ends[0], ends[1]))
+            for end, stop in enumerate(found):
+                if stop is not None:
+                    ends[end], stops[end] = stop, Event(stop, group.node, _why(group))
         touched: set[float] = set()
         for index in range(len(closures(np.array([start])))):
             for end in (0, 1):
@@ -124,7 +155,7 @@ def follow(mechanism: Mechanism, start: float, low: float, high: float) -> Conti
                     stops[end] = Event(walk.stop, group.node, _why(group))
         changes[group.node] = tuple(sorted(touched))
     inside = {node: tuple(at for at in passed if ends[0] < at < ends[1]) for node, passed in changes.items()}
-    return Continuation(mechanism, start, ends[0], ends[1], (stops[0], stops[1]), inside)
+    return Continuation(mechanism, start, ends[0], ends[1], (stops[0], stops[1]), inside, tracks)
 
 
 def signs_between(mechanism: Mechanism, start: float, ends: FloatArray) -> dict[str, FloatArray]:
@@ -152,7 +183,7 @@ def may_pass(mechanism: Mechanism, low: FloatArray, high: FloatArray) -> BoolArr
     wide = with_arrays(mechanism, lambda values: np.repeat(np.broadcast_to(values, (count,)), GLANCES))
     near = np.zeros(count, dtype=np.bool_)
     for index, group in enumerate(wide.groups):
-        before = _driving_at(replace(wide, groups=wide.groups[:index]), driving, 0.0, {})
+        before = _driving_at(replace(wide, groups=wide.groups[:index]), driving, 0.0, {}, {})
         for closure in closures_of(_unit_speed(before), group):
             value = np.abs(closure.value.reshape(count, GLANCES))
             with np.errstate(invalid="ignore"):
@@ -166,14 +197,21 @@ def _why(group: Group) -> str:
 
 
 def _driving_at(
-    mechanism: Mechanism, driving: FloatArray, start: float, changes: Mapping[str, tuple[float, ...]]
+    mechanism: Mechanism,
+    driving: FloatArray,
+    start: float,
+    changes: Mapping[str, tuple[float, ...]],
+    tracks: Mapping[str, Track],
 ) -> Mechanism:
     if isinstance(mechanism.driver, Crank):
         driver: Crank | DrivingSlider = replace(mechanism.driver, angle_rad=driving)
     else:
         driver = replace(mechanism.driver, displacement_m=driving)
     groups = tuple(
-        _on_its_side(group, driving, start, changes.get(group.node, ())) for group in mechanism.groups
+        tracks[group.node].of(group, driving)
+        if isinstance(group, Triad) and group.node in tracks
+        else _on_its_side(group, driving, start, changes.get(group.node, ()))
+        for group in mechanism.groups
     )
     return replace(mechanism, driver=driver, groups=groups)
 
@@ -200,6 +238,56 @@ def _unit_speed(mechanism: Mechanism) -> Solution:
         driver = replace(mechanism.driver, speed=one)
     with np.errstate(all="ignore"):
         return solve(replace(mechanism, driver=driver), accelerations=False)
+
+
+# Triads ---------------------------------------------------------------------------------------------
+
+FARTHEST_STEP_RAD = 0.01
+"""Farthest turn of a triad's links from one position to the next; positions are set nearer to each other
+until it is no farther. Where that does not help, the motion stops."""
+
+
+def _track(
+    placed: Callable[[FloatArray], Solution], group: Triad, start: float, span: tuple[float, float]
+) -> tuple[Track, list[float | None]]:
+    """Return a triad's assembly over a span of the driving coordinate, and where it stops at either end.
+
+    From position to position it is the nearest assembly whose determinant has the same sign: two assemblies
+    that meet at a stop have different ones.
+    """
+
+    def found(driving: FloatArray) -> Iterator[tuple[float, FloatArray, FloatArray]]:
+        loops = tuple(np.broadcast_to(part, driving.shape) for part in loops_of(placed(driving), group))
+        z, u = triad.assemblies(loops)
+        sine = triad.sine(triad.columns(loops), z, u)
+        # With a margin, so that the assembly is found again at the stop.
+        signs = np.where(np.abs(sine) >= 2.0 * triad.LEAST_SINE, np.sign(sine), 0.0)
+        return zip(driving.tolist(), np.stack([np.angle(u), np.angle(z)], axis=2), signs, strict=True)
+
+    def follow_to(limit: float) -> tuple[list[float], list[FloatArray], float | None]:
+        driving, angles = [start], [first]
+        ahead = list(found(np.linspace(start, limit, SCANNED)[1:]))[::-1]
+        while ahead:
+            at, choices, signs = ahead[-1]
+            turns = (choices - angles[-1] + np.pi) % TURN - np.pi
+            off = np.where(signs == sign, np.abs(turns).sum(axis=1), np.inf)
+            best = int(np.argmin(off))
+            if off[best] < FARTHEST_STEP_RAD:
+                driving.append(at)
+                angles.append(angles[-1] + turns[best])
+                ahead.pop()
+            elif abs(at - driving[-1]) <= FINEST * max(abs(at), abs(start)):
+                return driving, angles, driving[-1]
+            else:
+                ahead += list(found(np.linspace(driving[-1], at, PARTS + 1)[1:-1]))[::-1]
+        return driving, angles, None
+
+    loops = tuple(np.atleast_1d(part) for part in loops_of(placed(np.array([start])), group))
+    z, u = triad.chosen(loops, group.direction_rad, group.leg_rad, group.sign)
+    first, sign = np.array([np.angle(u[0]), np.angle(z[0])]), float(np.sign(triad.sine(loops, z, u)[0]))
+    (before, low, stop), (after, high, other) = (follow_to(limit) for limit in span)
+    driving, angles = np.array([*before[:0:-1], *after]), np.array([*low[:0:-1], *high])
+    return Track(driving, angles[:, 0], angles[:, 1], int(sign)), [stop, other]
 
 
 # Closures -----------------------------------------------------------------------------------------

@@ -14,6 +14,7 @@ from reference.geometry import FloatArray
 from reference.kinematics.continuation import TURN, BoolArray, Continuation, Event, change, follow
 from reference.kinematics.motion import Motion, move, move_where_possible
 from reference.kinematics.solving import one_variant, solve
+from reference.kinematics.triad import SAME
 from reference.mechanism import (
     Crank,
     DrivingSlider,
@@ -24,6 +25,7 @@ from reference.mechanism import (
     Plate,
     Slider,
     SlottedLink,
+    Triad,
     guides_of,
 )
 
@@ -109,7 +111,10 @@ def _followed(mechanism: Mechanism) -> tuple[Continuation, int]:
         reversed_once = any(
             sum(start < at < start + TURN for at in changes) % 2 for changes in following.changes.values()
         )
-        return following, 2 if reversed_once else 1
+        tracks, after = following.tracks.values(), (start, start + TURN)
+        angles = [np.interp(after, one.driving, each) for one in tracks for each in (one.direction, one.leg)]
+        elsewhere = any(abs(np.exp(1j * one[1]) - np.exp(1j * one[0])) > SAME for one in angles)
+        return following, 2 if reversed_once or elsewhere else 1
     # The middle of the range comes to lie between -90 and 270 degrees.
     middle = 0.5 * (following.low + following.high)
     shift = -TURN * np.floor((middle + 0.25 * TURN) / TURN)
@@ -128,6 +133,7 @@ def _shifted(following: Continuation, by: float) -> Continuation:
         high=following.high + by,
         stops=(low, high),
         changes={node: tuple(at + by for at in changes) for node, changes in following.changes.items()},
+        tracks={node: replace(track, driving=track.driving + by) for node, track in following.tracks.items()},
     )
 
 
@@ -146,6 +152,8 @@ def _lengths(group: Group) -> float:
     match group:
         case Dyad(lengths_m=lengths) | Plate(lengths_m=lengths):
             return float(np.sum(lengths))
+        case Triad(legs_m=legs, sides_m=sides):
+            return float(np.sum(legs) + np.sum(sides))
         case Slider(length_m=length) | SlottedLink(offset_m=length):
             return float(np.abs(length[0]))
     return 0.0

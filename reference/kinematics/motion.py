@@ -24,6 +24,7 @@ from reference.geometry import ComplexArray, FloatArray
 from reference.kinematics.solving import (
     Solution,
     as_it_is,
+    directions_of,
     each_number_once,
     one_variant,
     rail_of,
@@ -40,6 +41,7 @@ from reference.mechanism import (
     Plate,
     Slider,
     SlottedLink,
+    Triad,
     Yoke,
     translated,
 )
@@ -275,7 +277,8 @@ def _in_digits(mechanism: Mechanism, index: int, accelerations: bool) -> Solutio
     rates: list[Any] = [
         number for joint in solution.joints.values() for number in (joint.velocity, joint.acceleration)
     ]
-    return solution if all(mp.isfinite(rate) for rate in rates) else None
+    is_flat = any(sine < LEAST_SINE for sine in solution.transmission.values())
+    return solution if all(mp.isfinite(rate) for rate in rates) and not is_flat else None
 
 
 def _replace_rows(motion: Motion, solution: Solution, rows: NDArray[np.intp]) -> None:
@@ -304,6 +307,7 @@ WHAT_IS_IN_LINE = {
     SlottedLink: "the pin is at the link's pivot, or as near to it as the offset lets it",
     CrossSlider: "its guides are parallel",
     Yoke: "slot and guide are parallel",
+    Triad: "the lines of its three legs meet in one point, or those of the first two are parallel",
 }
 
 
@@ -327,6 +331,8 @@ def reason_at(mechanism: Mechanism, index: int, where: str = "") -> MechanismErr
             except ZeroDivisionError:
                 break
             node = after.joints[group.node]
+            if isinstance(group, Triad) and np.isnan(node.position):
+                return _no_assembly(group, before, where)
             if not np.isfinite(node.position) or np.isnan(after.transmission.get(group.node, 1.0)):
                 gap, reach = _gap(group, before), max(abs(one.position) for one in before.joints.values())
                 # The gap is only rounding: the group is flat, as exactly as its data can be.
@@ -354,6 +360,17 @@ def _does_not_close(group: Group, gap_m: float, where: str, driving: str) -> Mec
         group=group.node,
         gap_m=gap_m,
     )
+
+
+def _no_assembly(group: Triad, before: Solution, where: str) -> MechanismError:
+    """Return the error for a triad that has no assembly, or none that its direction tells clearly."""
+    found = directions_of(before, group)
+    if not found.size:
+        message = f"the triad of {group.node} does not assemble, or its legs' lines meet in one point{where}"
+        return MechanismError("does_not_assemble", message, group=group.node)
+    message = f"angle_deg of the triad of {group.node} tells no assembly clearly{where}; there are {{gap}}"
+    degrees = ", ".join(f"{one:.1f}°" for one in np.sort(np.degrees(found)))
+    return MechanismError("assembly_unclear", message, group=group.node, texts=degrees)
 
 
 def _singular(group: Group, where: str, driving: str) -> MechanismError:

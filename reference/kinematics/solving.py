@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.kinematics import assur
+from reference.kinematics import assur, triad
 from reference.mechanism import (
     Crank,
     CrossSlider,
@@ -26,6 +26,7 @@ from reference.mechanism import (
     Slider,
     SlotPoint,
     SlottedLink,
+    Triad,
     Yoke,
 )
 from reference.numbers import Complex, Number, cross, dot, larger, root, where
@@ -163,6 +164,8 @@ def _add(solution: Solution, group: Group) -> None:
             _add_carried_yoke(solution, group)
         case SlotPoint():
             _add_slot_point(solution, group, solution.take(group.local_m))
+        case Triad():
+            _add_triad(solution, group)
         case _:
             _add_point(solution, group)
 
@@ -288,6 +291,76 @@ def _shape_anew(take: Take, group: Plate | PointOnLine, shape: Complex, d: Compl
     along, across, _ = assur.rrr_place(d, first, second, side)
     in_line = first / abs(d)
     return where(shape.imag == 0.0, where(shape.real < 0.0, -in_line, in_line), along + 1j * across)
+
+
+def loops_of(solution: Solution, group: Triad) -> triad.Loops:
+    """Return the loops of a triad, from the joints before it."""
+    a, b, c = (solution.joints[pin] for pin in group.pins)
+    side, far, near = map(solution.take, group.sides_m)
+    shape = solution.take(group.shape)
+    if solution.anew:
+        along, across, _ = assur.rrr_place(side + 0j, near, far, solution.take(group.turned))
+        shape = along + 1j * across
+    first, second, third = map(solution.take, group.legs_m)
+    return _between(b, a), _between(c, a), first, second, third, side, side * shape
+
+
+def _doubles(value: Any) -> Any:  # noqa: ANN401 - numbers of any kind
+    """Return an array of doubles."""
+    array = value if isinstance(value, np.ndarray) else np.array([complex(value)])
+    return array.astype(np.complex128 if np.iscomplexobj(array) else np.float64)
+
+
+def directions_of(before: Solution, group: Triad) -> Any:  # noqa: ANN401 - an array of shape (M,)
+    """Return the directions of D E (rad) in all M assemblies of a triad of one variant."""
+    _, u = triad.assemblies(tuple(map(_doubles, loops_of(before, group))))
+    return np.angle(u[np.isfinite(u)])
+
+
+def _assembled(solution: Solution, group: Triad, loops: triad.Loops) -> tuple[Complex, Complex]:
+    """Return D - A and the unit vector along D E, in the numbers of the solution."""
+    direction = _doubles(solution.take(group.direction_rad)).real
+    leg = None if group.leg_rad is None else _doubles(solution.take(group.leg_rad)).real
+    near = triad.chosen(tuple(map(_doubles, loops)), direction, leg, group.sign)
+    zero = loops[0] * 0.0
+    z, u = (zero + (each if isinstance(zero, np.ndarray) else complex(each[0])) for each in near)
+    return triad.polished(loops, z, u) if solution.anew else (z, u)
+
+
+def _add_triad(solution: Solution, group: Triad) -> None:
+    """Add the corners of a triad's ternary link and its Assur point: all are D plus an arm on that link."""
+    pins, loops = [solution.joints[pin] for pin in group.pins], loops_of(solution, group)
+    a, lengths, (z, u) = pins[0], loops[2:5], _assembled(solution, group, loops)
+    legs = (z, *triad.parts(loops, z, u))
+    arms = (0.0 * z, loops[5] * u, loops[6] * u, z * (cross(loops[5] * u, legs[1]) / cross(z, legs[1])))
+    each = list(zip(pins, legs, lengths, arms[:3], strict=True))
+    along = tuple(dot(leg, pin.velocity - a.velocity) / length for pin, leg, length, _ in each[1:])
+    turn, omega = triad.turns(loops, z, u, along)
+    joints = [Joint(a.position + z + arm, a.velocity + 1j * (turn * z + omega * arm)) for arm in arms]
+    relative = [joint.velocity - pin.velocity for joint, pin in zip(joints[:3], pins, strict=True)]
+    rates = [cross(leg, v) / dot(leg, leg) for leg, v in zip(legs, relative, strict=True)]
+    solution.omega |= dict(zip(group.links, (*rates, omega), strict=True))
+    if solution.accelerations:
+        carried = a.acceleration - turn * turn * z
+        along = tuple(
+            (dot(leg, pin.acceleration - carried + omega * omega * arm) - dot(v, v)) / length
+            for (pin, leg, length, arm), v in zip(each[1:], relative[1:], strict=True)
+        )
+        growth, epsilon = triad.turns(loops, z, u, along)
+        for joint, arm in zip(joints, arms, strict=True):
+            joint.acceleration = carried + 1j * growth * z + assur.turned(arm, omega, epsilon)
+        relative = [
+            joint.acceleration - pin.acceleration for joint, pin in zip(joints[:3], pins, strict=True)
+        ]
+        rates = [cross(leg, v) / dot(leg, leg) for leg, v in zip(legs, relative, strict=True)]
+        solution.epsilon |= dict(zip(group.links, (*rates, epsilon), strict=True))
+    square, sine = dot(z, z), triad.sine(loops, z, u)
+    amplification = larger(*(_amplification(square, a, pin) for pin in pins[1:]))
+    for name, joint in zip(group.corners, joints[:3], strict=True):
+        solution.add(group.node, joint, sine, amplification)
+        solution.joints[name] = joint
+    crossing = cross(z, legs[1]) / (lengths[0] * lengths[1])
+    solution.add(group.assur_point, joints[3], crossing, joints[0].amplification)
 
 
 def rail_of(solution: Solution, guide: Guide) -> Rail:

@@ -21,6 +21,7 @@ from reference.mechanism import (
     Slider,
     SlotPoint,
     SlottedLink,
+    Triad,
     Yoke,
     moving_guides,
     slotted_links,
@@ -56,6 +57,8 @@ def _bars(task: DrawingTask, group: Group) -> Iterator[tuple[str, str]]:
         case PointOnLine(node=node, base=(p, q), ratio=ratio):
             if not 0.0 < float(np.mean(ratio)) < 1.0:
                 yield (q if float(np.mean(ratio)) > 1.0 else p), node
+        case Triad():
+            yield from ((start, end) for _, start, end in group.bars)
         case Dyad(node=node, pins=pins) | Plate(node=node, base=pins):
             yield from ((pin, node) for pin in pins)
         case Slider(node=node, pin=pin) | Yoke(node=node, pin=pin, guide=FixedGuide()):

@@ -108,7 +108,7 @@ group = [
 
 
 def test_a_new_author_comes_from_a_six_bar_of_a_textbook_to_printed_sheets(planmark, tmp_path):
-    """Groups in any order; then the crank at the third pivot, which leaves a group of the third class."""
+    """Groups in any order; then the crank at the third pivot, which leaves a triad."""
     path = tmp_path / "six.mechanism.toml"
     path.write_text(STEPHENSON_III, encoding="utf-8")
     told = planmark("new", "mine", "--mechanism", "six.mechanism.toml")
@@ -124,9 +124,52 @@ def test_a_new_author_comes_from_a_six_bar_of_a_textbook_to_printed_sheets(planm
     path.write_text(third, encoding="utf-8")
     told = planmark("new", "other", "--mechanism", "six.mechanism.toml")
     assert told.returncode == 2
-    assert "AC, BCD, O2B, O1D form a group of class III: not solved" in told.stderr
-    assert "or with O2B as the driving link" in told.stderr
+    assert (
+        'AC, BCD, O2B, O1D form a triad, a group of class III: write one group of type = "triad"'
+        in told.stderr
+    )
     assert not (tmp_path / "other.assignment.toml").exists()
+
+
+SIX_BAR_WITH_A_TRIAD = """
+schema_version = 1
+id = "six"
+title = { en = "Six-bar with a triad" }
+length_unit = "mm"
+ground = { O1 = [0, 0], B = [143, -54], C = [146, 82] }
+crank = { pivot = "O1", pin = "A", length = 25, angle_deg = "12*n", omega = 10 }
+
+[[group]]
+type = "triad"
+nodes = ["D", "E", "F"]
+pins = ["A", "B", "C"]
+links = ["2", "3", "4", "5"]
+lengths = [94, 87, 87, 54, 69, 65]
+side = "left"
+angle_deg = -110
+assur_point = "S"
+"""
+
+
+def test_a_triad_is_drawn_by_its_assur_point_explained_and_printed(planmark, tmp_path):
+    path = tmp_path / "six.mechanism.toml"
+    path.write_text(SIX_BAR_WITH_A_TRIAD, encoding="utf-8")
+    told = planmark("new", "mine", "--mechanism", "six.mechanism.toml")
+    assert (told.returncode, told.stderr) == (0, "")
+    assert "fault" not in planmark("lint", "mine.assignment.toml").stdout
+    told = planmark("plan", "mine.assignment.toml", "--n", "3", "--svg", "plan.svg", "--steps", "steps.txt")
+    assert told.returncode == 0
+    steps = (tmp_path / "steps.txt").read_text(encoding="utf-8")
+    assert "They meet in S." in steps
+    assert "a̅_A    + a̅_DAⁿ      + a̅_SDⁿ      + a̅_SAᵗ" in steps
+    plan = json.loads(planmark("plan", "mine.assignment.toml", "--n", "3", "--json").stdout)
+    assert plan["conditioning"]["predicted_error"] < 1e-9
+    told = planmark("cycle", "mine.assignment.toml", "--n", "3")
+    assert "the crank turns fully" in told.stdout
+    path.write_text(SIX_BAR_WITH_A_TRIAD.replace("-110", "0"), encoding="utf-8")
+    (tmp_path / "mine.mechanism.toml").write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
+    told = planmark("lint", "mine.assignment.toml")
+    assert "angle_deg of the triad of F tells no assembly clearly: there are" in told.stdout
 
 
 EXCAVATOR = """

@@ -20,6 +20,7 @@ from reference.mechanism import (
     Slider,
     SlotPoint,
     SlottedLink,
+    Triad,
     Yoke,
     hinged_at,
     moving_guides,
@@ -29,13 +30,17 @@ from reference.mechanism import (
 
 KINDS = (
     "RRR", "RRP", "RRP on a link", "RPR", "RPR with offset", "PRP", "PRP on two links", "RPP",
-    "RPP on a link", "plate", "point on line", "slot point",
+    "RPP on a link", "plate", "point on line", "slot point", "triad",
 )  # fmt: skip
+LEAST_TRIAD = 0.1
+"""Least determinant of a triad, 1 at best, in place of such a sine."""
 LEAST_SINE = 0.25
 """Least sine of the angle that a group's accuracy depends on; other tests go nearer to singularities."""
 LEAST_SPAN, FARTHEST = 0.2, 6.0
 TRIES = 60
 NAMES = "ABCDEFGHIJKLMPQRSTUVW"
+TRIAD_NAMES = ("KLM", "PQR", "TUV", "XYZ", ("NK", "NL", "NM"), ("NP", "NQ", "NR"), ("NT", "NU", "NV"))
+"""Two corners of the ternary link, and the Assur point."""
 
 
 def array(value):
@@ -271,6 +276,41 @@ class Sketch:
         group = PointOnLine(self.node(), (p, q), link, array(ratio))
         return self.add(group, self.at[p] + ratio * (self.at[q] - self.at[p]), {link: [group.node]})
 
+    def triad(self) -> bool:
+        a = self.moving()
+        b = self.partner(a)
+        if b is None:
+            return False
+        d, e = self.near(self.at[a]), self.near(self.at[b])
+        f = self.near(d)
+        first, second, sides = d - self.at[a], e - self.at[b], (e - d, f - e, d - f)
+        crossing = cross(first, second) / abs(first * second)
+        if abs(crossing) < LEAST_SINE or abs(cross(*sides[:2])) < LEAST_SPAN**2:
+            return False
+        s = self.at[a] + first * cross(self.at[b] - self.at[a], second) / cross(first, second)
+        lever, sine = abs(s - f), self.sine()
+        if min(map(abs, (*sides, s - d, s - e, s - f))) < LEAST_SPAN or abs(s) > FARTHEST:
+            return False
+        if self.least_sine >= LEAST_SINE and abs(crossing) * lever * sine < LEAST_TRIAD * max(
+            map(abs, sides)
+        ):
+            return False
+        along = (s - f) / lever * complex(self.sign() * np.sqrt(1 - sine * sine), self.sign() * sine)
+        reach = self.number(0.3, 1.5)
+        c = self.pivot(f + along * reach)
+        links = tuple(str(int(self.link()) + more) for more in range(4))
+        *others, point = TRIAD_NAMES[sum(isinstance(group, Triad) for group in self.groups)]
+        corners = (*others, self.node())
+        self.at |= {corners[0]: d, corners[1]: e}
+        shape = (f - d) / (e - d)
+        group = Triad(
+            corners, (a, b, c), point, links, (array(abs(first)), array(abs(second)), array(reach)),
+            tuple(array(abs(side)) for side in sides), sign_of(shape.imag), array(shape),
+            array(float(np.angle(e - d))),
+        )  # fmt: skip
+        ends = {leg: [*joints] for leg, *joints in zip(links[:3], (a, b, c), corners, strict=True)}
+        return self.add(group, f, ends | {links[3]: [*corners]})
+
     def slot_point(self) -> bool:
         found = self.choose(self.slots)
         if found is None:
@@ -394,6 +434,16 @@ def group_table(group, mechanism: Mechanism) -> dict:
             told |= {"type": "point", "base": list(base), "link": link, "at": point_table(along)}
         case PointOnLine(base=base, link=link, ratio=ratio):
             told |= {"type": "point_on_line", "base": list(base), "link": link, "ratio": float(ratio[0])}
+        case Triad():
+            told = {
+                "type": "triad",
+                "nodes": [*group.corners],
+                "pins": [*group.pins],
+                "links": [*group.links],
+            }
+            told |= {"lengths": [float(one[0]) for one in (*group.legs_m, *group.sides_m)]}
+            told |= {"side": "left" if group.turned > 0 else "right", "assur_point": group.assur_point}
+            told |= {"angle_deg": degrees(group.direction_rad)}
         case SlotPoint(slotted=slotted, link=link, local_m=local):
             pivot = next(one.pivot for one in mechanism.groups if one.node == slotted)
             told |= {"type": "point", "base": [pivot, slotted], "link": link, "at": point_table(local)}
@@ -419,6 +469,10 @@ def points_of_links(mechanism: Mechanism) -> dict[str, list[str]]:
                 carry(second, q, node)
             case Slider(node=node, pin=pin, link=link):
                 carry(link, pin, node)
+            case Triad(links=(*legs, ternary)):
+                for leg, *joints in zip(legs, group.pins, group.corners, strict=True):
+                    carry(leg, *joints)
+                carry(ternary, *group.corners, group.assur_point)
             case SlottedLink(node=node, pivot=pivot, link=link, foot=foot):
                 carry(link, pivot, node, *([foot] if foot else []))
             case (
@@ -534,6 +588,12 @@ def transformed(mechanism: Mechanism, turn: complex, *, mirror=False, factor=1.0
                 return replace(group, length_m=group.length_m * factor, guide=guide_of(group.guide))
             case SlottedLink():
                 return replace(group, offset_m=sign * factor * group.offset_m)
+            case Triad(legs_m=legs, sides_m=sides, shape=shape):
+                legs, sides = (tuple(one * factor for one in each) for each in (legs, sides))
+                return replace(
+                    group, legs_m=legs, sides_m=sides, shape=np.conj(shape) if mirror else shape,
+                    turned=sign * group.turned, direction_rad=sign * group.direction_rad + angle,
+                )  # fmt: skip
             case SlotPoint(local_m=local):
                 return replace(group, local_m=factor * (np.conj(local) if mirror else local))
             case CrossSlider(guides=guides):

@@ -19,11 +19,14 @@ K_FORCE = 3.0
 
 
 def cases(count: int, seed: int = 0):
-    """Random mechanisms with bodies and loads, those that move, with what is exact about them."""
+    """Random mechanisms with bodies and loads, those that move, with what is exact about them.
+
+    Of a triad, the last kind, no force plan is drawn.
+    """
     lot, found = np.random.default_rng(seed), 0
     while found < count:
         seed += 1
-        chain = [str(kind) for kind in lot.choice(KINDS, lot.integers(1, 6))]
+        chain = [str(kind) for kind in lot.choice(KINDS[:-1], lot.integers(1, 6))]
         mechanism = loaded(random_mechanism(seed, chain, slider_drives=seed % 3 == 0), seed)
         motion = move_where_possible(mechanism)
         if np.all(motion.predicted_error < 1e-12):

@@ -20,6 +20,7 @@ from reference.mechanism import (
     Mechanism,
     Slider,
     SlottedLink,
+    Triad,
     Yoke,
     carriers,
     named_links,
@@ -97,10 +98,8 @@ class Equations:
         for group in self.mechanism.groups:
             links = self.named[group.node]
             match group:
-                case Dyad(pins=pins, node=node):
-                    for pin, link in zip(pins, links, strict=True):
-                        self.hinge(pin, link, self.carriers[pin])
-                    self.hinge(node, *links)
+                case Dyad() | Triad():
+                    self.connect_links(group, links)
                 case Slider(pin=pin, node=node, guide=guide):
                     self.hinge(pin, links[0], self.carriers[pin])
                     self.hinge(node, *links)
@@ -129,6 +128,15 @@ class Equations:
                     self.slide(pin, links[1], links[0], slot)
                     self.hinge(pin, links[1], self.carriers[pin])
                     self.turns |= {links[0]: by, links[1]: by}
+
+    def connect_links(self, group, links):
+        for pin, link in zip(group.pins, links, strict=False):
+            self.hinge(pin, link, self.carriers[pin])
+        if isinstance(group, Dyad):
+            self.hinge(group.node, *links)
+        else:
+            for corner, leg in zip(group.corners, links[:3], strict=True):
+                self.hinge(corner, leg, links[3])
 
     def load(self):
         """Given forces, from the accelerations of 50 digits."""

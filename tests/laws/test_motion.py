@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from reference.geometry import cross, dot
 from reference.kinematics.motion import move
-from reference.mechanism import CrossSlider, FixedGuide, Mechanism, SlottedLink, Yoke, moving_guides
+from reference.mechanism import CrossSlider, FixedGuide, Mechanism, SlottedLink, Triad, Yoke, moving_guides
 from tests.laws.mechanisms import after, driven, points_of_links, rates_of, transformed
 
 ROUNDING = 1e-9
@@ -192,6 +192,8 @@ def test_velocities_and_accelerations_are_the_slopes_of_positions_and_velocities
 
     now = at[0]
     moments = {joint for _, joint, _, _ in slides(mechanism, now)}
+    moments |= {one.node for one in mechanism.groups if isinstance(one, Yoke) and moving_guides(one)}
+    moments |= {one.assur_point for one in mechanism.groups if isinstance(one, Triad)}
     for joint in now.position.keys() - moments:
         assert near(slope("position", joint), now.velocity[joint], speed(now) + abs(rate), DIFFERENCE)
         size = acceleration(now) + rate**2 + abs(growth)

@@ -82,11 +82,50 @@ def test_six_bars_of_the_second_class_are_accepted_in_any_order_of_their_groups(
         assert [groups[index]["node"] for index, _ in ordered] == nodes
 
 
+TRIAD = {
+    "type": "triad", "nodes": ["B", "C", "D"], "pins": ["A", "O2", "O3"], "links": ["2", "3", "4", "5"],
+    "lengths": [200, 200, 200, 100, 100, 100], "side": "left", "angle_deg": 0, "assur_point": "S",
+}  # fmt: skip
+
+
+def test_a_six_bar_with_a_triad_is_accepted():
+    assert told(mechanism(TRIAD)) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"pins": ["O2", "A", "O3"]}, "$.group[0].pins[0]: O2 is fixed: write first a leg from a joint that"),
+        ({"pins": ["A", "O2", "O2"]}, "$.group[0].pins: must be two different joints"),
+        ({"links": ["2", "3", "3", "5"]}, "$.group[0].links[2]: '3'"),
+        ({"assur_point": "D"}, "$.group[0].assur_point: D has a place already"),
+        ({"lengths": [200, 200, 200]}, "$.group[0].lengths"),
+    ],
+)
+def test_faults_of_a_triad_are_told(change, words):
+    found = told(mechanism(TRIAD | change))
+    assert any(words in one or words.replace("'3'", "") in one for one in found), found
+
+
+def test_nothing_is_hinged_to_an_assur_point():
+    found = told(mechanism(TRIAD, two("E", "S O1", "6 7")))
+    assert any("S is a point of link 5 for this instant only" in one for one in found), found
+
+
+def test_a_triad_with_a_slider_is_refused():
+    slide = {"type": "RRP", "node": "D", "pin": "B", "link": "3", "length": 100, "side": "ahead"}
+    slide |= {"guide": {"through": [0, 0], "angle_deg": 0}}
+    groups = (two("B", "A C", "2 3"), third("D", "B C", "3"), two("C", "O2 D", "4 3"), slide)
+    assert "of class III: not solved; velocities can be found by Assur points" in " ".join(
+        told(mechanism(*groups))
+    )
+
+
 # Groups as an author might write them; the refusal in any order of theirs, and what it says in this order.
 REFUSED = {
     "Stephenson II by its ternary link": (
         (third("B", "O1 A", "1"), two("C", "A D", "2 3"), two("D", "B E", "4 3"), two("E", "C O2", "3 5")),
-        "form a group of class III: not solved; velocities can be found by Assur points",
+        'form a triad, a group of class III: write one group of type = "triad"',
         "AC, DCE, BD, O2E",
     ),
     "Stephenson II by its binary link": (
@@ -102,7 +141,7 @@ REFUSED = {
     ),
     "Stephenson III by its third pivot": (
         (two("B", "A C", "2 3"), third("D", "B C", "3"), two("C", "O2 D", "4 3"), two("D", "O3 B", "5 3")),
-        "as the driving link: all groups are then of the second class",
+        'form a triad, a group of class III: write one group of type = "triad"',
         "AB, CBD, O2C, O3D",
     ),
     "a five-bar": (
@@ -164,7 +203,7 @@ def test_mechanisms_that_are_not_of_the_second_class_are_refused_with_their_mobi
             mechanism({"type": "Geneva", "node": "B"}),
             "a Geneva wheel is a slotted link",
         ),
-        (mechanism({"type": "RRR-RRR", "node": "B"}), "only groups of the second class are solved"),
+        (mechanism({"type": "RRR-RRR", "node": "B"}), "only a ternary link on three legs"),
         (mechanism({"type": "oldham_coupling", "node": "B"}), 'a block in a yoke on a guide is type = "RPP"'),
         (
             mechanism(driving_slider=SLIDER | {"guide": MOVING}, crank=None),
