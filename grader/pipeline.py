@@ -82,7 +82,7 @@ def read_submission(
         all_of_it = replace(asked, figures=frozenset())
         whole = [own(scan(page.ref, all_of_it)) if page.narrowed else page for page in pages]
         read = read_pages(whole, assignment, submission.variant, submission.declared, asked.vectors)
-    read = told_instead(read, assignment, submission.variant)
+    read = told_instead(read, assignment, submission.variant, asked.vectors)
     return [_with_number_compared(page, submission.variant, assignment) for page in read]
 
 
@@ -159,10 +159,12 @@ def read_pages(
     drawn = sum(page.ink is not None for page in pages)
     read = []
     for page, reading in zip(pages, readings, strict=True):
-        told = replace(reading, written=page.reading.written, lengths=page.reading.lengths)
+        told = replace(reading, written=page.reading.written, lengths=page.reading.lengths, problems=())
+        problems = (*page.problems, *(replace(one, file=page.ref.file) for one in reading.problems))
         told = page_scale.no_surer_than_turn(told, page)
         spent = timing["reading"] / drawn if page.ink is not None else 0.0
-        read.append(replace(page, reading=told, timing_ms={**page.timing_ms, "reading": spent}))
+        times = {**page.timing_ms, "reading": spent}
+        read.append(replace(page, reading=told, problems=problems, timing_ms=times))
     return read
 
 

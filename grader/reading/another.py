@@ -1,6 +1,6 @@
 """Find what pages show that do not read as their student's drawing: a mirror image, another assignment."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from grader.reading.read import read_figures
@@ -15,17 +15,33 @@ LEAST, FAR_BETTER = 12, 2
 
 
 def told_instead(
-    pages: Sequence[ScannedPage], assignment: Assignment, variant: Variant | None
+    pages: Sequence[ScannedPage],
+    assignment: Assignment,
+    variant: Variant | None,
+    wanted: Collection[str] = (),
 ) -> list[ScannedPage]:
-    """Return a student's pages; where they were hardly read, with what they show instead, if that fits."""
+    """Return a student's pages; where they were hardly read, with what they show instead, if that fits.
+
+    Arguments: `wanted` are the names asked for, all by default.
+    """
     drawn = [(one.ink, one.sheet) for one in pages if one.ink and one.sheet and not one.sheet.zones]
     readings = [page.reading for page in pages]
-    own, named = _surely(readings), _surely(readings, 0.0)
-    is_read = own >= LEAST or (named > 0 and FAR_BETTER * own >= named)
-    shown = None if is_read or not drawn else _shown(drawn, own, assignment, variant)
+    # At a dead point little can be read: on sheets with all positions another one shows whose they are.
+    positions = assignment.shared_positions if drawn else ()
+    others = (replace(variant, position=one) for one in positions) if variant is not None else ()
+    is_read = _is_read(readings) or any(
+        _is_read(read_figures(drawn, assignment, other, None, wanted)) for other in others if other != variant
+    )
+    shown = None if is_read or not drawn else _shown(drawn, _surely(readings), assignment, variant)
     if shown is None:
         return list(pages)
     return [replace(one, problems=(replace(shown, file=one.ref.file), *one.problems)) for one in pages]
+
+
+def _is_read(readings: Sequence[Reading]) -> bool:
+    """Return whether much is read surely, or most of what is named."""
+    own, named = (_surely(readings, least) for least in (SURE, 0.0))
+    return own >= LEAST or (named > 0 and FAR_BETTER * own >= named)
 
 
 def _shown(

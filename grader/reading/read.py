@@ -8,7 +8,7 @@ from functools import cache, partial
 import numpy as np
 
 from grader.reading.altitudes import with_altitudes
-from grader.reading.apart import told_apart
+from grader.reading.apart import UNPLACED, Apart, told_apart
 from grader.reading.arrowheads import TOLD_MM, forward_mm
 from grader.reading.by_ink import Look
 from grader.reading.lettering import lettered, support
@@ -72,8 +72,8 @@ class _PageReading:
     """Least nats of a plan there."""
     beside: Mapping[int, Drawing] = field(default_factory=dict)
     """Drawings of all positions, by number, if all of them may stand on the sheet."""
-    told: float = 1.0
-    """The chance that the plan read there is the own position's."""
+    apart: dict[str, Apart] = field(default_factory=dict)
+    """The own position's part of it, by figure."""
     sketch: SketchReading | None = None
     plans: dict[str, PlanReading] = field(default_factory=dict)
 
@@ -126,7 +126,7 @@ def read_figures(
         known = _find_motion(pages, drawing, renamed, accelerations=_asks_accelerations(wanted, drawing))
     _find_forces(pages, drawing, known, renamed)
     readings = [
-        no_surer(lettered(reading, page.ink.letters, drawing.construction, renamed), page.told)
+        lettered(reading, page.ink.letters, drawing.construction, renamed)
         for reading, page in zip(_readings(pages, drawing, wanted), pages, strict=True)
     ]
     added = [name for name in wanted if name in drawing.construction.on_sketch]
@@ -267,9 +267,9 @@ def _find_plan(
             problem = replace(problem, lines=problem.free)
         for drawing in at_scales:
             turned = Drawing(drawing.construction, {**drawing.parameters, "turn": np.asarray(guide_turn)})
-            if page.beside and page.position is not None:
-                every = {**page.beside, page.position: turned}
-                problem, page.told = told_apart(problem, every, page.position)
+            if page.beside and page.position is not None and len(page.lines):
+                page.apart[figure] = told_apart(problem, page.beside, page.position)
+                problem = page.apart[figure].problem
             laid.append(_LaidPlan(page, problem, turned, regular_plans(problem, turned)))
         if zone_of(figure) in page.sheet.zones and any(one.is_explained for one in laid):
             break
@@ -367,7 +367,9 @@ def _readings(pages: Sequence[_PageReading], drawing: Drawing, wanted: Collectio
         figures: dict[str, Figure] = {}
         unread: list[Unread] = []
         if page.sketch is not None:
-            figures[MECHANISM] = figure_of_sketch(page.sketch)
+            # Links of all positions lie across each other about the same pivots.
+            sketched = Reading({MECHANISM: figure_of_sketch(page.sketch)})
+            figures.update((no_surer(sketched, UNPLACED) if page.beside else sketched).figures)
         for figure, plan in page.plans.items():
             figures[figure], missing = figure_of_plan(plan, page.sheet, page.ink.where)
             forward = forward_mm(plan, page.ink.where) if group_of(figure) else None
@@ -376,8 +378,13 @@ def _readings(pages: Sequence[_PageReading], drawing: Drawing, wanted: Collectio
                 is_told, is_backwards = forward > TOLD_MM, is_backwards or forward < -TOLD_MM
             if group_of(figure) and (is_backwards or not is_told):
                 figures[figure] = no_surer(Reading({figure: figures[figure]}), MOST_OPEN).figures[figure]
+            if figure in page.apart:
+                only = Reading({figure: figures[figure]})
+                figures[figure] = no_surer(only, page.apart[figure].chance).figures[figure]
             unread.extend(gap for gap in missing if not wanted or gap.name in wanted)
-        readings.append(Reading(figures, tuple(unread)))
+        doubts = [one for figure, one in page.apart.items() if figure in figures and one.positions]
+        problems = [Reason("position_unclear", {"positions": one.positions}) for one in doubts]
+        readings.append(Reading(figures, tuple(unread), tuple(problems)))
     named = {gap.name for reading in readings for gap in reading.unread}
     for figure_read in (figure for reading in readings for figure in reading.figures.values()):
         named.update((*figure_read.nodes, *figure_read.vectors))

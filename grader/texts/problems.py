@@ -192,6 +192,10 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
         ),
         N_("The drawing fits another assignment far better: was it handed in under the wrong one?"),
     ),
+    "position_unclear": (
+        N_("It is not clear which position this plan belongs to: %(positions)s."),
+        N_("It is not clear which position this plan belongs to."),
+    ),
     "variant_unknown": (N_("Nothing says this student's number or position; add it to the roster."),),
     "n_disagrees": (
         N_("Sources disagree about the student's number: %(numbers)s."),

@@ -420,7 +420,8 @@ def _letters(sketch: SheetSketch, task: DrawingTask, figure: str, nodes: Nodes) 
             symbols.dot(sketch, at, sketch.rng.uniform(0.35, 0.55))
         is_pole = node == task.wrong.construction.poles[figure]
         text = pole_text(task, figure) if is_pole else re.sub(r"(\d+)", r"_{\1}", letter)
-        text += f"_{{{sketch.index}}}" if sketch.index else ""
+        index = sketch.index or (sketch.pole_index if is_pole else "")
+        text += f"_{{{index}}}" if index else ""
         sketch.letter(at, text, sketch.page.letter_mm, names=node, distance_mm=1.2)
 
 

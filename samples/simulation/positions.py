@@ -6,13 +6,13 @@ or on plain paper in rows, their poles numbered. They have the directions of the
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from reference.authored.assignment import Assignment, PageTable, Variant
 from reference.construction.graph import evaluate
-from samples.simulation import figures, page, truth, wording
+from samples.simulation import figures, page, symbols, truth, wording
 from samples.simulation.desk import Printed, PrintedSheet
 from samples.simulation.drawing import drawn_nodes
 from samples.simulation.hand import DrawingTask, DrawnFigure, DrawnSheet, task_of
@@ -29,6 +29,38 @@ _SHEET_ROOM: Box = (24.0, 26.0, 382.0, 204.0)
 
 
 @dataclass(frozen=True, slots=True)
+class Numbering:
+    """A student numbers and orders the plans on plain paper in one way.
+
+    Attributes
+    ----------
+    marks : the number behind every letter, behind the pole's alone, in a ring beside the pole, or nowhere
+    order : of the plans' places, row after row: as indexes of positions; None in the assignment's order
+    first : the number of the first position, None for the assignment's own
+    left_out : positions without a plan
+    """
+
+    marks: Literal["letters", "pole", "ring", "none"] = "letters"
+    order: tuple[int, ...] | None = None
+    first: int | None = None
+    left_out: tuple[int, ...] = ()
+
+
+def any_numbering(seed: int, positions: Sequence[int], columns: int = 3) -> Numbering:
+    """Return a random student's habits; a quarter count from another number, or leave out a plan."""
+    rng = np.random.default_rng([seed, 6])
+    marks = ("letters", "pole", "ring", "none")[rng.choice(4, p=[0.3, 0.25, 0.25, 0.2])]
+    count = len(positions)
+    rows = -(-count // columns)
+    by_columns = [row + rows * column for row in range(rows) for column in range(columns)]
+    mixed = [*range(count)], [one for one in by_columns if one < count], rng.permutation(count).tolist()
+    order = tuple(mixed[rng.choice(3, p=[0.7, 0.15, 0.15])])
+    first = None if rng.random() < 0.75 else 1 - min(positions[0], 1)
+    left_out = () if rng.random() < 0.75 else (int(rng.choice(positions)),)
+    return Numbering(marks, order, first, left_out)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, slots=True)
 class PositionsSheet:
     """One page with all positions: the page as scanned, and the truth of each position's drawing on it."""
 
@@ -36,7 +68,7 @@ class PositionsSheet:
     truths: Mapping[int, dict[str, Any]]
 
 
-def simulate_positions(
+def simulate_positions(  # noqa: PLR0913
     assignment: Assignment,
     n: int | None,
     seed: int,
@@ -44,6 +76,7 @@ def simulate_positions(
     *,
     student_id: str = "s01",
     printed: Printed | None = None,
+    numbering: Numbering | None = None,
 ) -> list[PositionsSheet]:
     """Draw and scan the pages of an assignment whose pages have all positions, without mistakes."""
     rng = np.random.default_rng([seed, 1])
@@ -58,8 +91,9 @@ def simulate_positions(
             name: at for name, at in (drawn[0] if drawn else {}).items() if task.mechanism.is_ground(name)
         }
         drawn.append(drawn_nodes(task.wrong.construction, task.wrong.parameters, settings.hand, rng, ground))
+    told = seed, settings, student_id, printed, numbering or Numbering()
     return [
-        _scanned(table, number, list(zip(tasks, drawn, strict=True)), (seed, settings, student_id, printed))
+        _scanned(table, number, list(zip(tasks, drawn, strict=True)), told)
         for number, table in enumerate(assignment.file.page, start=1)
     ]
 
@@ -68,10 +102,13 @@ Drawn = Sequence[tuple[DrawingTask, Mapping[str, complex]]]
 
 
 def _scanned(
-    table: PageTable, number: int, drawn: Drawn, told: tuple[int, Settings, str, Printed | None]
+    table: PageTable,
+    number: int,
+    drawn: Drawn,
+    told: tuple[int, Settings, str, Printed | None, Numbering],
 ) -> PositionsSheet:
     """Draw one page with all positions and scan it."""
-    seed, settings, student_id, printed = told
+    seed, settings, student_id, printed, numbering = told
     rng, writing = np.random.default_rng([seed, 2, number]), any_handwriting(np.random.default_rng([seed, 5]))
     sketch = SheetSketch(rng, settings.hand, settings.pen, settings.page, writing)
     paper, task, figure = None if printed is None else printed[table.kind], drawn[0][0], table.figures[0]
@@ -82,16 +119,26 @@ def _scanned(
     else:
         _fill_boxes(sketch, task, paper, written)
     truths = {}
-    for one, sheet, origin in _placed(table, drawn, paper, rng):
+    order = numbering.order if paper is None and numbering.order else range(len(drawn))
+    for one, whole, origin in _placed(table, [drawn[at] for at in order], paper, rng):
+        sheet = whole
         sketch.lines, sketch.construction, sketch.labels = {}, {}, []
-        sketch.index = str(one.variant.position)
+        place = [task.variant for task, _ in drawn].index(one.variant)
+        said = str(one.variant.position if numbering.first is None else numbering.first + place)
+        sketch.index = said if numbering.marks == "letters" else ""
+        sketch.pole_index = said if numbering.marks == "pole" else ""
         nodes = figures.at_origin(sheet.figures[0], origin)
         missing: dict[str, dict[str, str]] = {}
         if figure == MECHANISM:
             figures.draw_mechanism(sketch, one, nodes, settings.student)
             sketch.with_supports = False
+        elif one.variant.position in numbering.left_out:
+            nodes, sheet = {}, _without_drawing(whole)
+            missing[figure] = dict.fromkeys(one.right.construction.vectors, "left out")
         else:
             missing[figure] = figures.draw_plan(sketch, one, figure, nodes, settings.student)
+            if numbering.marks == "ring":
+                _ringed(sketch, said, nodes[one.wrong.construction.poles[figure]])
         truths[one.variant.position or 0] = truth.drawing_truth(one, sheet, sketch, {figure: origin}, missing)
     view = view_of(settings.scan, np.random.default_rng([seed, 3, number]))
     background = None if paper is None else paper.background
@@ -134,6 +181,19 @@ def _placed(
         free = max(box[2] - (high - low).real - 20.0, 0.0), max(box[3] - (high - low).imag - 20.0, 0.0)
         aside = complex(*(rng.uniform(-slack, slack, 2) * free))
         yield task, sheet, complex(box[0] + box[2] / 2, -box[1] - box[3] / 2) + aside - (low + high) / 2.0
+
+
+def _without_drawing(sheet: DrawnSheet) -> DrawnSheet:
+    """Return a sheet whose figures have no nodes."""
+    return replace(sheet, figures=tuple(replace(one, nodes={}, intended={}) for one in sheet.figures))
+
+
+def _ringed(sketch: SheetSketch, said: str, pole: complex) -> None:
+    """Write the number of a plan in a ring beside its pole."""
+    height = 0.9 * sketch.page.letter_mm
+    sketch.letter(pole, said, height, names="number", distance_mm=2.5)
+    label = sketch.labels[-1]
+    symbols.circle(sketch, (label.low + label.high) / 2, 0.85 * height, sketch.pen("text"))
 
 
 def _cell(index: int, columns: int, rows: int) -> Box:

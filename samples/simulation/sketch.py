@@ -36,7 +36,7 @@ class SheetSketch:
     labels : letters and texts
     lines : the strokes of named vectors and links, as ruled, by figure and name
     construction : thin construction lines, as ruled, by figure
-    index : written behind each letter, where a sheet has several positions
+    index, pole_index : written behind each letter, or behind a pole's, where a sheet has several positions
     with_supports : the fixed pivots' symbols are drawn, not there already
     """
 
@@ -50,6 +50,7 @@ class SheetSketch:
     lines: dict[tuple[str, str], Segment] = field(default_factory=dict)
     construction: dict[str, list[Segment]] = field(default_factory=dict)
     index: str = ""
+    pole_index: str = ""
     with_supports: bool = True
 
     def pen(self, kind: str, *, plan: bool = False) -> PenWidth:

@@ -3,7 +3,9 @@
     OMP_NUM_THREADS=1 python -m tests.bench.positions --students 6
 
 Students with careful and typical hands draw the press in eight positions: each on an answer sheet of its own
-(`press`), all on two answer sheets, and all on two plain sheets (`press-all`); flatbed scans at 300 dpi.
+(`press`), all on two answer sheets, and all on two plain sheets (`press-all`), numbered and in rows or with
+any of the habits of people (numbers behind letters, beside the pole or nowhere, from one; plans in columns,
+mixed, one left out); flatbed scans at 300 dpi.
 Counts are those of `tests.bench.reading_truth`, of the velocities.
 """
 
@@ -29,7 +31,7 @@ from reference.authored.assignment import Assignment, Variant
 from reference.construction.derive import construction_of
 from samples.simulation import CAREFUL, TYPICAL, Settings, any_settings
 from samples.simulation.desk import Printed
-from samples.simulation.positions import simulate_positions
+from samples.simulation.positions import Numbering, any_numbering, simulate_positions
 from samples.simulation.printing import printed_sheets
 from samples.simulation.student import drawn_by, scanned
 from tests.bench.plain_text import as_text
@@ -38,6 +40,7 @@ from tests.bench.reading_tally import ReadingTally, reading_tables, row_of
 from tests.bench.reading_truth import figures_of
 
 ALL, SINGLE = "press-all", "press"
+ANYHOW = "two plain sheets, numbered and ordered anyhow"
 
 
 def settings_of(seed: int) -> Settings:
@@ -72,10 +75,13 @@ def measure(students: Sequence[int]) -> Iterator[tuple[str, ReadingTally]]:
                 sheet = scanned(desk, drawn[0], (1, 2))
                 _add(tally, single, variant, [sheet.save(at)], [sheet.truth], asked.vectors)
         yield "a sheet for each position", tally
-        for title, paper in (("two answer sheets", printed), ("two plain sheets", None)):
+        for title, paper in (("two answer sheets", printed), ("two plain sheets", None), (ANYHOW, None)):
             tally = ReadingTally()
             for seed in students:
-                pages = simulate_positions(assignment, None, seed, settings_of(seed), printed=paper)
+                habits = any_numbering(seed, assignment.shared_positions) if title == ANYHOW else Numbering()
+                pages = simulate_positions(
+                    assignment, None, seed, settings_of(seed), printed=paper, numbering=habits
+                )
                 paths = [page.sheet.save(at.with_name(f"s01_{k}")) for k, page in enumerate(pages)]
                 for variant in assignment.variants():
                     truths = [page.truths[variant.position or 0] for page in pages]
@@ -109,10 +115,11 @@ def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--students", type=int, default=6)
+    parser.add_argument("--first", type=int, default=1, help="seed of the first student")
     asked = parser.parse_args()
     cv2.setNumThreads(1)
     rows = []
-    for title, tally in measure(range(1, asked.students + 1)):
+    for title, tally in measure(range(asked.first, asked.first + asked.students)):
         rows.append(row_of(title, title, tally, None))
         print(f"{title}: done", file=sys.stderr)
     print(as_text(list(reading_tables(rows))[:1]))

@@ -8,14 +8,15 @@ import pytest
 from grader.owners.pages import assign_pages
 from grader.pipeline import read_submission
 from grader.printed.answer_sheet import make_sheets
-from grader.records import Identity, PageRef
+from grader.reading import another
+from grader.records import Identity, PageRef, Reason
 from grader.rubric import asked_of, rubric_of
 from grader.scan.page import open_page
 from grader.tables.measurements import StudentSubmission
 from grader.tables.roster import Roster, RosterRow
 from reference.authored.assignment import AssignmentFile, Variant, load_assignment
 from samples.simulation import CAREFUL, CLEAN_SCAN, PenStyle, Settings
-from samples.simulation.positions import simulate_positions
+from samples.simulation.positions import Numbering, simulate_positions
 from samples.simulation.printing import printed_sheets
 
 ALL = load_assignment("press-all")
@@ -70,12 +71,14 @@ def test_a_grid_that_cannot_be_printed_is_refused(page, said):
         AssignmentFile.model_validate(told)
 
 
-def _drawn(folder, printed):
+def _drawn(folder, printed, numbering=None):
     """The two sheets of one student, opened, and their truths."""
     pen = PenStyle(erased=0.0, construction_lines=0.3, smudges=0)
     own = Settings(CAREFUL, pen=pen, scan=replace(CLEAN_SCAN, dpi=200.0, dpi_tag=200.0))
     opened, truths = [], []
-    for number, page in enumerate(simulate_positions(ALL, None, 5, own, printed=printed)):
+    for number, page in enumerate(
+        simulate_positions(ALL, None, 5, own, printed=printed, numbering=numbering)
+    ):
         path = page.sheet.save(folder / f"s01_{number}")
         opened.append(open_page(PageRef(path.name, path=path)))
         truths.append(page.truths)
@@ -108,24 +111,75 @@ def test_plans_on_plain_paper_are_told_apart(plain, position):
         assert abs(plan.nodes[name].at - at) < 1.0
 
 
-@pytest.mark.parametrize(("written", "stands"), [("4", True), ("1", False), ("o", None)])
-def test_the_number_beside_a_plan_tells_the_position(plain, written, stands):
-    """The plan of position 0 taken for that of 4 by a number alone; without one nothing of either is sure."""
-    pages, truths = plain
+MIXED = (2, 6, 4, 1, 0, 7, 5, 3)
+"""Positions in the order of their plans, with the two dead points among others."""
+
+
+def _without_letters(pages, signs):
+    """The pages with these signs alone beside the plans: boxes' corners and what is written."""
     letters = pages[1].ink.letters
-    x, y = truths[1][0]["figures"]["velocity_plan"]["nodes"]["o"]
-    probability = np.zeros((1, letters.probability.shape[1]))
-    probability[0, letters.column[written]] = 1.0
-    one = replace(
-        letters, box_mm=np.array([[x + 2, y, 2, 3]]), probability=probability, whole=np.ones(1, bool)
-    )
-    pages = [pages[0], replace(pages[1], ink=replace(pages[1].ink, letters=one))]
-    plan = _read(pages, 4)[1].reading.figures["velocity_plan"]
+    probability = np.zeros((len(signs), letters.probability.shape[1]))
+    for row, (_, sign) in enumerate(signs):
+        probability[row, letters.column[sign]] = 1.0
+    box = np.array([[x + 2, y, 2, 3] for (x, y), _ in signs]).reshape(-1, 4)
+    own = replace(letters, box_mm=box, probability=probability, whole=np.ones(len(signs), bool))
+    return [pages[0], replace(pages[1], ink=replace(pages[1].ink, letters=own))]
+
+
+def _pole(truths, position):
+    return truths[1][position]["figures"]["velocity_plan"]["nodes"]["o"]
+
+
+def _lies_at(page, truths, position):
+    """Return whether the velocity plan was read at a position's place."""
+    plan, (x, y) = page.reading.figures["velocity_plan"], _pole(truths, position)
     middle = (plan.nodes["o"].at + plan.nodes["a"].at) / 2.0
-    if stands is None:
-        assert max(vector.confidence for vector in plan.vectors.values()) < 0.9
-    else:
-        assert (abs(middle - complex(x, -y)) < 40.0) is stands
+    return abs(middle - complex(x, -y)) < 40.0
+
+
+@pytest.fixture(scope="module")
+def mixed(tmp_path_factory):
+    return _drawn(tmp_path_factory.mktemp("mixed"), None, Numbering("none", MIXED))
+
+
+@pytest.mark.parametrize(("first", "second"), [(0, 4), (4, 0)])
+def test_the_numbers_beside_plans_tell_the_positions(mixed, first, second):
+    """Two dead points have one shape: of two numbers beside them, 4 is read, and 0 is no number."""
+    pages, truths = mixed
+    signed = _without_letters(pages, [(_pole(truths, first), "4")])
+    assert _lies_at(_read(signed, 4)[1], truths, first)
+    assert _lies_at(_read(signed, 0)[1], truths, second)
+
+
+def test_numbers_that_count_from_one_tell_the_positions(mixed):
+    pages, truths = mixed
+    signs = [(_pole(truths, position), str(position + 1)) for position in (1, 2, 3, 5, 6, 7)]
+    signed = _without_letters(pages, [*signs, (_pole(truths, 0), "5"), (_pole(truths, 4), "1")])
+    assert _lies_at(_read(signed, 4)[1], truths, 0)
+
+
+def test_a_plan_that_may_be_another_positions_is_told(mixed):
+    pages, _ = mixed
+    page = _read(_without_letters(pages, []), 4)[1]
+    assert Reason("position_unclear", {"positions": ("0", "4")}, page.ref.file) in page.problems
+    vectors = page.reading.figures["velocity_plan"].vectors.values()
+    assert max(vector.confidence for vector in vectors) < 0.9
+
+
+@pytest.mark.parametrize("position", [0, 4])
+def test_the_order_of_the_plans_tells_the_positions(plain, position):
+    """Without letters and numbers, six other plans stand in order."""
+    pages, truths = plain
+    page = _read(_without_letters(pages, []), position)[1]
+    assert _lies_at(page, truths, position)
+    assert "position_unclear" not in {problem.code for problem in page.problems}
+
+
+def test_a_dead_point_is_not_held_against_other_assignments(plain, monkeypatch):
+    asked = []
+    monkeypatch.setattr(another, "_shown", lambda *arguments: asked.append(arguments))
+    _read(_without_letters(plain[0], []), 4)
+    assert asked == []
 
 
 @pytest.mark.parametrize("position", [1, 5, 7])
