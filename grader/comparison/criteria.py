@@ -606,8 +606,9 @@ def _own_turnings(charges: Charges, name: str, value: float, per_mm: float) -> I
 def _may_be_mistyped(charges: Charges, one: TaskSegment) -> bool:
     """Return whether a vector may be wrong in its entry alone: values come from the drawing, not from it."""
     drawn, exact = charges.evidence.vector(one.name), one.drawn(charges.following.used)
-    is_charged = drawn is not None and one.head in charges.charged and not charges.evidence.has_sheets
-    return is_charged and not fits(drawn, exact, charges.task.rubric.tolerance_of(one.name))
+    if drawn is None or one.head not in charges.charged or charges.evidence.has_sheets:
+        return False
+    return not fits(drawn, exact, charges.task.rubric.tolerance_of(one.name))
 
 
 LEAST_ACROSS = 0.2

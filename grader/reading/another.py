@@ -4,6 +4,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from grader.reading.read import read_figures
+from grader.reading.vectors import MOST_OPEN
 from grader.records import Ink, Reading, Reason, ScannedPage, Sheet
 from reference.authored.assignment import Assignment, Variant, load_assignment, names_in
 from reference.errors import PlanmarkError
@@ -40,7 +41,8 @@ def told_instead(
 
 def _is_read(readings: Sequence[Reading]) -> bool:
     """Return whether much is read surely, or most of what is named."""
-    own, named = (_surely(readings, least) for least in (SURE, 0.0))
+    # Forces whose sense alone is open are read, too.
+    own, named = (_surely(readings, least) for least in (MOST_OPEN, 0.0))
     return own >= LEAST or (named > 0 and FAR_BETTER * own >= named)
 
 

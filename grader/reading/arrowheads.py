@@ -1,6 +1,7 @@
 """Tell by its arrowheads in which sense the sides of a force polygon run."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -16,6 +17,8 @@ BARE_MM, STEP_MM = 0.3, 0.1
 """Nothing is looked for nearer to a force's ends; distance of the places along it."""
 ASIDE_MM, FARTHER_MM = (0.4, 0.5, 0.6), 0.2
 """Lines beside a force that cross its arrowhead; so much farther off they do so farther behind the tip."""
+WIDER_MM, MOST_INKED = (0.0, 0.2, 0.4, 0.6), 0.4
+"""Those of a broad line are so much farther off: the first that are inked along no more than this share."""
 LAGS = 4, 8, 12
 """Distances behind the tip that are compared, in steps."""
 CLEAR_MM = 0.7
@@ -51,8 +54,11 @@ def forward_mm(plan: PlanReading, where: InkMap) -> float | None:
         along = np.arange(BARE_MM, abs(head - tail) - BARE_MM, STEP_MM)
         on_it = np.asarray(tail + along * out, np.complex128)
         for aside in (side * off * out for side in (1j, -1j) for off in ASIDE_MM):
-            farther = aside * (1.0 + FARTHER_MM / abs(aside))
-            near, far = (_own_ink(on_it, off, others, where) for off in (aside, farther))
+            off_mm = (abs(aside) + wider for wider in (*WIDER_MM, WIDER_MM[-1] + FARTHER_MM))
+            rows = (_own_ink(on_it, off * aside / abs(aside), others, where) for off in off_mm)
+            # Farther lines are looked at only where the nearer ones are inked.
+            pairs = (pair for pair in pairwise(rows) if pair[0].mean() <= MOST_INKED)
+            near, far = next(pairs, 2 * (np.zeros(len(along), dtype=bool),))
             for lag in LAGS:
                 behind, before = near[lag:] & far[:-lag], near[:-lag] & far[lag:]
                 told += STEP_MM * (int(behind.sum()) - int(before.sum()))

@@ -152,8 +152,8 @@ def reordered(construction: Construction, figure: str, ring: Ring, order: Order)
 # The order by the ink -----------------------------------------------------------------------------
 
 
-def orders_by_ink(expected: Expected, ring: Ring, lines: Lines) -> list[Order]:
-    """Return likely orders of a polygon's sides, likeliest first, by the strokes along each side.
+def orders_by_ink(expected: Expected, ring: Ring, lines: Lines) -> dict[Order, float]:
+    """Return likely orders of a polygon's sides, likeliest first, with the share of it that strokes support.
 
     Wherever a long side may lie, all sets of the other sides are laid off from its end, each in the best
     orders of its members: the corner that a set ends in does not depend on their order.
@@ -161,7 +161,7 @@ def orders_by_ink(expected: Expected, ring: Ring, lines: Lines) -> list[Order]:
     spans = np.roll(expected.at, -1) - expected.at
     items = list(_items(spans, ring))
     if not np.isfinite(spans).all() or not 3 <= len(items) <= MOST_ITEMS:
-        return []
+        return {}
     search = _Sets(items, spans, lines)
     found: dict[Order, float] = {}
     for order, share in search.best():
@@ -173,7 +173,7 @@ def orders_by_ink(expected: Expected, ring: Ring, lines: Lines) -> list[Order]:
     kept = [order for order in likely if found[order] > best - WORSE][:KEPT]
     # Of the two orders of the closing sides only the better one was kept at each place.
     swapped = [(*order[:-2], order[-1], order[-2]) for order in kept[:1] if ring.closing == 2]
-    return list(dict.fromkeys([*kept, *swapped]))
+    return {order: found.get(order, best) for order in (*kept, *swapped)}
 
 
 def _items(spans: ComplexArray, ring: Ring) -> Iterator[tuple[Order, ...]]:

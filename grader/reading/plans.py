@@ -1,7 +1,7 @@
 """Read a velocity or acceleration plan by comparing each hypothesis of how it was drawn with the strokes."""
 
 import math
-from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
@@ -57,6 +57,9 @@ LETTERED_MM = 2.0
 """Standard error of the nodes of such a hypothesis along x and y before strokes are assigned."""
 COST_OF_ODD_NODE = 4.0
 """Nats for a node that is not where the construction puts it from the student's own nodes: one in fifty."""
+ARROWS_PER_MM, MOST_BY_ARROWS = 1.25, 5.0
+"""Nats for each millimetre of ink that arrowheads have in the sense of the forces, and most of them: of 164
+polygons 4 mm tell the sense of all but one."""
 EXPLAINED, NO_CHANCE = 0.85, 12.0
 """A regular plan supported over more of its length is taken as drawn, and with more nats by no chance."""
 ODD_NODE_NATS = 1.5
@@ -96,6 +99,8 @@ WORSE = 0.3
 """Poses supported by this much less of the plan's length are not examined."""
 WORSE_WRONG = 0.12
 """The same for force polygons with a mistake, of which there are many: true ones are within 0.07."""
+WORSE_BY_INK = 0.2
+"""The same before such a polygon is placed, by the strokes along its sides in the best order."""
 LEAST_VISIBLE_MM = 2.5
 """A shorter vector may have no stroke of its own."""
 RIVALS = 25
@@ -126,7 +131,9 @@ class PlanProblem:
     letters : of the sheet, None if they were not looked for
     renamed : what students write for a node, by name, if it is not the name
     elsewhere : strokes, by their number, that belong to the sketch
-    look : tells where nodes lie by the sheet's ink
+    look : tells where nodes lie by the sheet's ink; without it, as where it is only asked whether a sheet
+        shows a drawing, mistaken force polygons are sought beside the right one only
+    arrows : tells of a force polygon by how many millimetres of ink its arrowheads point as its forces do
     """
 
     lines: Lines
@@ -136,6 +143,7 @@ class PlanProblem:
     renamed: Mapping[str, str] = field(default_factory=dict)
     elsewhere: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
     look: Look | None = None
+    arrows: "Callable[[PlanReading], float | None] | None" = None
 
     @property
     def free(self) -> Lines:
@@ -213,6 +221,16 @@ class PlanReading:
         taken[stroke >= 0] = self.lines.members[stroke[stroke >= 0]]
         return self.placed.edges, taken.tobytes(), self.assignment.shared.tobytes()
 
+    @property
+    def sense(self) -> bytes:
+        """The senses in which a polygon's forces run on their strokes, as a key; empty for other plans."""
+        rows, at = np.flatnonzero(self.assignment.stroke >= 0), self.assignment.expected.at
+        if not group_of(self.figure):
+            return b""
+        spans = np.array([at[self.placed.edges[row].head] - at[self.placed.edges[row].tail] for row in rows])
+        along = self.lines.along[self.assignment.stroke[rows]]
+        return bytes((spans * np.conj(along)).real > 0.0)
+
 
 def regular_plans(problem: PlanProblem, drawing: Drawing, count: int = 2) -> list[PlanReading]:
     """Return readings of a plan as it should be drawn, best first.
@@ -235,22 +253,31 @@ def regular_plans(problem: PlanProblem, drawing: Drawing, count: int = 2) -> lis
 def _regular(problem: PlanProblem, drawing: Drawing) -> list[PlanHypothesis]:
     """Return the right hypotheses, a force polygon in every order of its sides that the strokes support."""
     usual, *others = regular(drawing, problem.figure)
-    return [usual, *others, *_in_other_orders(problem, usual)]
+    expected = problem.expected(usual) if group_of(problem.figure) else None
+    orders = [] if expected is None else _in_orders(problem, usual, expected)
+    return [usual, *others, *(one for one, _ in orders if one.order)]
 
 
-def _in_other_orders(problem: PlanProblem, usual: PlanHypothesis) -> Iterator[PlanHypothesis]:
-    """Yield a force polygon in every other order of its sides that the strokes support."""
+def _in_orders(
+    problem: PlanProblem, usual: PlanHypothesis, expected: Expected
+) -> list[tuple[PlanHypothesis, float]]:
+    """Return a force polygon in the usual order of its sides and in every other that the strokes support.
+
+    Each has the share of the polygon that they support, infinite where orders cannot be sought. Arguments:
+    `expected` is the polygon in its usual order.
+    """
     drawing, figure = usual.drawing, problem.figure
-    ring = ring_of(drawing.construction, figure) if group_of(figure) else None
-    expected = None if ring is None else problem.expected(usual)
-    if ring is None or expected is None:
-        return
+    ring = ring_of(drawing.construction, figure)
     long = problem.lines.take(problem.lines.length > LEAST_LAID_MM)
-    for order in orders_by_ink(expected, ring, long):
-        if order != ring.usual:
-            construction = reordered(drawing.construction, figure, ring, order)
-            drawn, cost = Drawing(construction, drawing.parameters), usual.cost + COST_OF_ORDER
-            yield replace(usual, drawing=drawn, cost=cost, order=order)
+    shares = {} if ring is None else orders_by_ink(expected, ring, long)
+    if ring is None or not shares:
+        return [(usual, math.inf)]
+    found = [(usual, shares.pop(ring.usual, 0.0))]
+    for order, share in shares.items():
+        construction = reordered(drawing.construction, figure, ring, order)
+        drawn, cost = Drawing(construction, drawing.parameters), usual.cost + COST_OF_ORDER
+        found.append((replace(usual, drawing=drawn, cost=cost, order=order), share))
+    return found
 
 
 def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) -> PlanReading | None:
@@ -267,15 +294,17 @@ def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) 
         everything.extend(_with_mistakes(problem, plans[0], bases.values()))
     is_lettered = not group_of(problem.figure)
     is_open = not plans or plans[0].pose.score < EXPLAINED or bool(_suspects(plans[0]))
-    if is_open and not is_lettered:
+    # Reversed in part, other forces would leave the lines of the right polygon in the opposite sense.
+    is_open |= bool(plans) and _nats_by_arrows(problem, plans[0]) <= -MOST_BY_ARROWS
+    if is_open and not is_lettered and problem.look is not None:
         everything.extend(_mistaken_polygons(problem, drawing))
-    elif is_open:
+    elif is_open and is_lettered:
         lettered = [one for base in regular(drawing, problem.figure) for one in _by_letters(problem, base)]
         here = bool(plans) and plans[0].pose.score > EXPLAINED and plans[0].score > NO_CHANCE
         everything += [one for one in lettered if not here or np.isin(one.members, plans[0].members).any()]
     if not everything:
         return None
-    best, *rivals = _with_letters(problem, everything)
+    best, *rivals = _weighed(problem, everything)
     rivals = [*rivals[: RIVALS - 1], *_without_each_stroke(best, problem.prior)]
     drawn = [best.placed.edges[index] for index in best.placed.required]
     by_ink = problem.look and held_against_ink(best.fit, drawn, problem.look)
@@ -354,9 +383,16 @@ def _with_mistakes(
 def _mistaken_polygons(problem: PlanProblem, drawing: Drawing) -> list[PlanReading]:
     """Return readings of a force polygon with a mistake in what acts, wherever it lies, in any order."""
     usual, *_ = regular(drawing, problem.figure)
-    wrong = [one for one, mistake in mistaken(usual, problem.figure) if mistake.code in MOVING]
-    every = (hypothesis for one in wrong for hypothesis in (one, *_in_other_orders(problem, one)))
-    cases = [*_posed(problem, every, count=1)]
+    known = [problem.expected(usual)]
+    every: list[tuple[PlanHypothesis, float]] = []
+    for wrong, mistake in mistaken(usual, problem.figure):
+        expected = problem.expected(wrong) if mistake.code in MOVING else None
+        # What acts on other links leaves this polygon as it is, and two mistakes may make the same one.
+        if expected is not None and not any(one and np.allclose(expected.at, one.at) for one in known):
+            known.append(expected)
+            every.extend(_in_orders(problem, wrong, expected))
+    supported = max((share for _, share in every if share < math.inf), default=0.0)
+    cases = [*_posed(problem, (one for one, share in every if share > supported - WORSE_BY_INK), count=1)]
     best = max((case.pose.score for case in cases), default=0.0)
     likely = [case for case in cases if case.pose.score > best - WORSE_WRONG]
     return _read(likely, problem.lines, problem.prior)
@@ -436,20 +472,34 @@ def _named_by(letters_nats: float, hypothesis: PlanHypothesis) -> float:
     return 1.0 / (1.0 + math.exp(ODD_NODE_NATS * odd - letters_nats)) if odd else 1.0
 
 
-def _with_letters(problem: PlanProblem, plans: Sequence[PlanReading]) -> list[PlanReading]:
-    """Return the best readings with the letters in their scores, best first, each set of strokes once."""
+def _nats_by_arrows(problem: PlanProblem, plan: PlanReading) -> float:
+    """Return the nats by which arrowheads support the sense of a force polygon; 0 for other plans."""
+    forward_mm = problem.arrows(plan) if problem.arrows else None
+    return max(-MOST_BY_ARROWS, min(ARROWS_PER_MM * (forward_mm or 0.0), MOST_BY_ARROWS))
+
+
+def _weighed(problem: PlanProblem, plans: Sequence[PlanReading]) -> list[PlanReading]:
+    """Return the best readings, best first, each set of strokes once, in either sense if that is open."""
     poles = frozenset(plans[0].hypothesis.drawing.construction.poles.values())
-    least = max(plan.score for plan in plans) - FAR_WORSE
+    first = max(plans, key=lambda plan: plan.score)
+    is_told = _nats_by_arrows(problem, first) >= MOST_BY_ARROWS
+    least = first.score - FAR_WORSE
+    least_of_arrows = math.inf if is_told else first.score - 2.0 * MOST_BY_ARROWS
     scored: dict[Hashable, PlanReading] = {}
+    by_arrows: dict[Hashable, float] = {}
     for plan in sorted(plans, key=lambda plan: -plan.score):
-        if plan.score >= least and plan.strokes not in scored:
+        if plan.score >= least and (key := (plan.strokes, is_told or plan.sense)) not in scored:
             expected = plan.assignment.expected
             nodes = ((problem.figure, name) for name in expected.names)
             at = dict(zip(nodes, expected.at.tolist(), strict=True)) if not group_of(problem.figure) else {}
             writing = lettering(at, problem.letters, poles, problem.renamed)
             nats = 0.0 if writing is None else writing.log()
             named = _named_by(nats, plan.hypothesis)
-            scored[plan.strokes] = replace(plan, score=plan.score + nats, named=named)
+            alike = plan.hypothesis.label, plan.hypothesis.order, plan.sense
+            if alike not in by_arrows:
+                by_arrows[alike] = _nats_by_arrows(problem, plan) if plan.score >= least_of_arrows else 0.0
+            nats += by_arrows[alike]
+            scored[key] = replace(plan, score=plan.score + nats, named=named)
     return sorted(scored.values(), key=lambda plan: -plan.score)
 
 

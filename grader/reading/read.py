@@ -236,7 +236,12 @@ def _find_forces(
     pages: Sequence[_PageReading], drawing: Drawing, known: Nodes, renamed: Mapping[str, str]
 ) -> None:
     """Find the force plans, one after another: each takes reactions over from those before it."""
-    for figure in filter(group_of, drawing.construction.figures):
+    figures = [*filter(group_of, drawing.construction.figures)]
+    if figures and any(page.sketch is not None and page.sketch.score > SURE_PLAN for page in pages):
+        # Strokes of polygons may look like a sketch beside the one on another sheet.
+        for page in pages:
+            page.sketch = page.sketch if page.sketch and page.sketch.score > SURE_PLAN else None
+    for figure in figures:
         for found in [one for page in pages for one in page.plans.values()]:
             _set_apart(pages, found)
         plan = _find_plan(pages, [drawing], figure, known, renamed)
@@ -261,7 +266,8 @@ def _find_plan(
         joints, guide_turn = _sketched(page, pages)
         links = page.sketch.members if page.sketch is not None else np.zeros(0, np.int64)
         given = {**joints, **known}
-        problem = PlanProblem(page.lines, figure, given, page.ink.letters, renamed, links, page.look)
+        arrows = partial(forward_mm, where=page.ink.where) if group_of(figure) else None
+        problem = PlanProblem(page.lines, figure, given, page.ink.letters, renamed, links, page.look, arrows)
         if group_of(figure) and page.sketch is not None and page.sketch.score > SURE_PLAN:
             # Reactions lie along links: their strokes would fit a force polygon as well.
             problem = replace(problem, lines=problem.free)

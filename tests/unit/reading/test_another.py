@@ -6,7 +6,8 @@ import pytest
 
 from grader.reading.another import told_instead
 from grader.reading.read import read_figures
-from grader.records import ACCELERATION_PLAN, Ink, PageRef, Reading, Reason, ScannedPage
+from grader.reading.vectors import MOST_OPEN
+from grader.records import ACCELERATION_PLAN, Figure, Ink, PageRef, Reading, ReadVector, Reason, ScannedPage
 from reference.authored.assignment import Assignment, Variant, load_assignment
 from tests.unit.reading.drawn import PLACES, Pen, blank_sheet, draw, ink_of, task
 
@@ -41,6 +42,13 @@ def test_pages_of_which_one_was_read_are_not_told():
     ink = drawn("pump", OWN)
     pages = [page(each, PUMP, OWN) for each in (ink, ink.mirrored())]
     assert [list(one.problems) for one in told_instead(pages, ALONE, OWN)] == [[], []]
+
+
+def test_a_sheet_of_forces_whose_sense_alone_is_open_is_not_compared(monkeypatch):
+    monkeypatch.setattr("grader.reading.another._shown", lambda *_: pytest.fail("the sheet was read"))
+    forces = {name: ReadVector(30.0, 0.1, 20.0, 0.5, MOST_OPEN) for name in ("F_D", "F_iD", "R_0D", "R_34")}
+    reading = Reading({"force_plan_D": Figure({}, forces)})
+    assert told(ScannedPage(PageRef("s.png"), sheet=blank_sheet(), ink=ink_of([]), reading=reading)) == []
 
 
 def test_a_velocity_plan_alone_is_not_told_as_mirrored():

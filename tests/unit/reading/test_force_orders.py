@@ -1,6 +1,7 @@
 """Force polygons may be drawn in any order of their sides: the vectors stay, and the usual corners follow."""
 
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,9 +14,10 @@ from grader.reading.corrected import corrected
 from grader.reading.expected import Edge, Expected
 from grader.reading.lines import lines_of
 from grader.reading.orders import ends_on_sheet, orders_by_ink, reordered, ring_of, to_usual
-from grader.reading.read import read_figures
+from grader.reading.plans import ARROWS_PER_MM, MOST_BY_ARROWS, _nats_by_arrows
+from grader.reading.read import _find_forces, read_figures
 from grader.reading.vectors import vector_of
-from grader.records import Figure, InkMap, PageRef, Reading, ReadNode, ScannedPage
+from grader.records import Figure, InkMap, NodePlaces, NodeView, PageRef, Reading, ReadNode, ScannedPage
 from reference.construction.graph import evaluate
 from reference.construction.mistakes import commit, mistakes_of_forces
 from reference.plan import exact_plan
@@ -116,6 +118,13 @@ def test_what_the_ink_does_not_tell_is_not_asserted(name, seed):
     assert not any(vector.misread for vector in judged(one, pages))
 
 
+def nowhere(where: InkMap, views: Sequence[NodeView]) -> NodePlaces:
+    """Ink that tells of no node."""
+    del where
+    nothing = np.zeros((len(views), 1))
+    return NodePlaces(nothing.astype(complex), nothing + 1.0, nothing)
+
+
 def test_a_polygon_that_a_mistake_moves_is_read_where_it_lies():
     assignment = task_with_forces("pump")
     variant = assignment.variants()[1]
@@ -124,15 +133,36 @@ def test_a_polygon_that_a_mistake_moves_is_read_where_it_lies():
     mistake = next(one for one in mistakes_of_forces(right) if (one.code, one.at) == ("force_reversed", load))
     places = {"mechanism": 120.0 - 190.0j, "force_plan_D": 300.0 - 150.0j}
     drawn = draw(commit(mistake, right), places)
-    (reading,) = read_figures([(drawn.ink, drawn.sheet)], assignment, variant, None, ())
+    (reading,) = read_figures([(drawn.ink, drawn.sheet)], assignment, variant, None, (), nowhere)
     read_as = reading.figures["force_plan_D"].vectors
     for name, vector in drawn.vectors.items():
         if abs(vector) > LONG_MM:
             assert read_as[name].length_mm == pytest.approx(abs(vector), abs=WIDTH_MM), name
 
 
-@pytest.mark.parametrize("tip", [1.0, 0.55], ids=["at the end", "in the middle"])
-def test_arrowheads_anywhere_on_its_sides_tell_the_sense_of_a_polygon(tip):
+def test_arrowheads_speak_for_a_polygon_or_against_it_up_to_a_limit():
+    told = [
+        _nats_by_arrows(SimpleNamespace(arrows=lambda _, forward=forward: forward), None)
+        for forward in (-20.0, 2.0, None)
+    ]
+    assert told == [-MOST_BY_ARROWS, 2.0 * ARROWS_PER_MM, 0.0]
+    assert _nats_by_arrows(SimpleNamespace(arrows=None), None) == 0.0
+
+
+def test_a_doubtful_sketch_among_force_polygons_is_none_beside_a_sure_one(monkeypatch):
+    monkeypatch.setattr("grader.reading.read._find_plan", lambda *_: None)
+    scores = [67.0, 16.0]
+    pages = [SimpleNamespace(sketch=SimpleNamespace(score=score), plans={}) for score in scores]
+    for figures, kept in (({"velocity_plan": ()}, [67.0, 16.0]), ({"force_plan_D": ()}, [67.0])):
+        drawing = SimpleNamespace(construction=SimpleNamespace(figures=figures))
+        _find_forces(pages, drawing, {}, {})
+        assert [one.sketch.score for one in pages if one.sketch] == kept
+
+
+@pytest.mark.parametrize(
+    ("tip", "pen"), [(1.0, 2), (0.55, 2), (1.0, 6)], ids=["at the end", "in the middle", "of a broad pencil"]
+)
+def test_arrowheads_anywhere_on_its_sides_tell_the_sense_of_a_polygon(tip, pen):
     at, ink = np.array([10.0 - 10.0j, 50.0 - 20.0j, 20.0 - 40.0j]), np.zeros((300, 360), np.uint8)
     around = [(0, 1), (1, 2), (2, 0)]
 
@@ -144,7 +174,7 @@ def test_arrowheads_anywhere_on_its_sides_tell_the_sense_of_a_polygon(tip):
 
     def line(start, end):
         first, last = ((round(6.0 * place.real), round(-6.0 * place.imag)) for place in (start, end))
-        cv2.line(ink, first, last, 255, 2)
+        cv2.line(ink, first, last, 255, pen)
 
     for tail, head in around:
         line(at[tail], at[head])
