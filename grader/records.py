@@ -5,6 +5,8 @@ Where a record holds a *complex* position it is x - i y: y points up, so that th
 difference is the direction counter-clockwise from the sheet's +x, as in `reference`.
 """
 
+import cmath
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -14,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.errors import InputFileError, Parameter, PlanmarkError
+from reference.geometry import degrees
 from reference.quantities import zone_of
 
 FloatArray = NDArray[np.float64]
@@ -217,6 +220,12 @@ class Sheet:
     problems: tuple[Reason, ...] = ()
     lens: Lens | None = None
     turn_se_rad: float = 0.0
+
+    def cov_of(self, span: complex) -> FloatArray:
+        """Return the covariance (2, 2) that the scale and the turn add to a vector, complex mm."""
+        moves = np.array([self.scale_se * span, self.turn_se_rad * 1j * span])
+        shifts = np.array([moves.real, moves.imag])
+        return np.asarray(shifts @ shifts.T)
 
     def longer(self, factor: float, scale_se: float) -> "Sheet":
         """Return the page with every length scaled by a factor."""
@@ -530,6 +539,17 @@ class ReadVector:
     se_deg: float | None
     confidence: float
     others: tuple[OtherReading, ...] = ()
+
+    @staticmethod
+    def of(span: complex, cov: FloatArray, confidence: float) -> "ReadVector":
+        """Return the vector of a span, complex mm, with covariance (2, 2)."""
+        length = float(abs(span))
+        along = np.array([span.real, span.imag]) / max(length, 1e-9)
+        across = np.array([-along[1], along[0]])
+        se_along, se_across = (math.sqrt(max(float(axis @ cov @ axis), 0.0)) for axis in (along, across))
+        se_deg = math.degrees(math.atan2(se_across, max(length, 1e-9)))
+        direction = degrees(cmath.phase(span)) if length > se_across else None
+        return ReadVector(length, se_along, direction, se_deg, confidence)
 
 
 @dataclass(frozen=True, slots=True)

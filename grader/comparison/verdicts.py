@@ -268,6 +268,10 @@ SHORT_MM, WRONG_SHORT = 5.0, 0.03
 """A vector expected to be shorter may be hidden by the marks of its ends; there is little to misread."""
 
 
+DIRECTED_MM = 3.0
+"""A vector expected to be shorter has no direction to judge: its arrowhead shows all there is."""
+
+
 def with_confidence(
     mark: MarkRange,
     confidence: float,
@@ -295,7 +299,7 @@ def with_confidence(
     else:
         wrong = (WRONG_SHORT if expected_mm < SHORT_MM else WRONG_CREDIT) * misread**2
     sure = min(mark.sure, 1.0 - wrong)
-    is_likelier_another = confidence < EVEN and expected_mm >= SHORT_MM
+    is_likelier_another = confidence < EVEN and expected_mm >= DIRECTED_MM
     if sure >= settle and not is_likelier_another:
         return replace(mark, sure=sure)
     sure = EVEN if any(map(_is_mostly_error, mark.reasons)) else sure

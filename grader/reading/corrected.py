@@ -11,7 +11,7 @@ from grader.reading.lines import Lines, lines_of
 from grader.reading.matching import StrokeAssignment
 from grader.reading.nodes import LINK_ENDS, PLAN_ENDS, fit_nodes
 from grader.reading.orders import corners_of, ends_on_sheet, ring_of
-from grader.reading.vectors import LEAST_VECTOR_MM, NEAR_MM, of_sheet, vector_of
+from grader.reading.vectors import LEAST_VECTOR_MM, NEAR_MM
 from grader.records import (
     MECHANISM,
     Figure,
@@ -232,8 +232,8 @@ def _in_usual_order(read: Figure, figure: str, construction: Construction) -> di
 def _between(tail: ReadNode, head: ReadNode, sheet: Sheet | None, least: float) -> ReadVector:
     """Return the vector between two nodes, as sure as the less sure of them, and no less than `least`."""
     span = head.at - tail.at
-    cov = tail.cov + head.cov + (0.0 if sheet is None else of_sheet(span, sheet))
-    return vector_of(span, np.asarray(cov), max(least, min(tail.confidence, head.confidence)))
+    cov = tail.cov + head.cov + (0.0 if sheet is None else sheet.cov_of(span))
+    return ReadVector.of(span, np.asarray(cov), max(least, min(tail.confidence, head.confidence)))
 
 
 def _is_drawn(ink: Ink | None, tail: complex, head: complex) -> bool:

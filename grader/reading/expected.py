@@ -14,6 +14,7 @@ from reference.construction.mistakes import (
     Mistake,
     affected,
     commit,
+    line_of,
     mistakes_of_forces,
     single_mistakes,
 )
@@ -23,6 +24,10 @@ from reference.geometry import ComplexArray
 
 STEP_OF_DERIVATIVE = 1e-5
 """Step of numerical derivatives, mm or rad: small against any curvature, large against rounding."""
+
+
+SLIP = {"angle": float(np.radians(20.0)), "length": 1.5}
+"""Standard errors of a short vector that is drawn wrongly in no known way, rad and mm."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +40,7 @@ class DraftingErrors:
     length_mm, relative : of a length laid off, and in addition this share of it
     computed : that share of a length that is computed from others
     mark_mm : of a point's mark, along x and along y
+    slipped : the node of a step, and the index of its line, that is drawn with larger errors
     """
 
     angle_rad: float = float(np.radians(0.8))
@@ -43,13 +49,16 @@ class DraftingErrors:
     relative: float = 0.02
     computed: float = 0.04
     mark_mm: float = 0.15
+    slipped: tuple[str, int] | None = None
 
-    def of(self, step: Step, kind: str, size_mm: float) -> float:
+    def of(self, step: Step, slot: int, kind: str, size_mm: float) -> float:
         """Return the standard error of one act of a step, mm or rad.
 
-        Arguments: `kind` as in `reference.construction.elements.Errors`; `size_mm` is the length that the
-        step draws.
+        Arguments: `slot`, `kind` as in `reference.construction.elements.Errors`; `size_mm` is the length
+        that the step draws.
         """
+        if (step.node, slot) == self.slipped and kind in SLIP:
+            return SLIP[kind]
         match kind:
             case "angle":
                 return self.angle_rad
@@ -57,13 +66,10 @@ class DraftingErrors:
                 return self.shift_mm
             case "length" if isinstance(step, Given):
                 # A computed length is laid off after one more measurement than a given one.
-                is_given = isinstance(step.length, Scaled | Same)
-                share = self.relative if is_given else self.computed
+                share = self.relative if isinstance(step.length, Scaled | Same) else self.computed
                 return self.length_mm + share * size_mm
-            case "length":
-                return self.length_mm
             case _:
-                return self.length_mm if isinstance(step, Similar) else self.mark_mm
+                return self.length_mm if kind == "length" or isinstance(step, Similar) else self.mark_mm
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +170,7 @@ def expect(
     tried = {(step.node, slot, kind): row for (step, slot, kind), row in zip(acts, columns, strict=True)}
     bent = evaluate(construction, parameters, given=given, errors=tried, wanted=names)
     place = {name: complex(np.ravel(at)[0]) for name, at in bent.items()}
-    deviation = [errors.of(step, kind, _size_mm(step, place)) for step, _, kind in acts]
+    deviation = [errors.of(step, slot, kind, _size_mm(step, place)) for step, slot, kind in acts]
     at = np.array([place[name] for name in names])
     with np.errstate(invalid="ignore"):
         drawn = np.stack([np.broadcast_to(bent[name], len(acts) + 1) for name in names])
@@ -218,6 +224,9 @@ COST_OF_MISTAKE = 8.0
 """Nats: a third of plans have a mistake, one of some forty; strokes of one student err alike."""
 LEFT_OUT = {"n": Reason("normal_left_out"), "k": Reason("coriolis_left_out")}
 """Reason by the first letter of the node at the end of a component left out."""
+COST_OF_SLIP, SLIPPED_MM = 4.0, (2.0, 9.0)
+"""Nats for a short vector drawn wrongly in no known way, and its expected lengths: the sides of its arrowhead
+look like the right one's stroke."""
 OF_THE_WHOLE = {"figure_rotated", "scale_wrong", "rpm_not_converted", "vector_missing"}
 """Mistakes that the search for the plan's pose finds anyway, because it turns and scales the plan."""
 
@@ -233,6 +242,7 @@ class PlanHypothesis:
     absent : nodes that are not drawn then, with the reason
     cost : nats, the prior cost before strokes are considered
     order : of a force polygon's sides, if it is not the usual one
+    slipped : as in `DraftingErrors`
     """
 
     label: str
@@ -240,6 +250,7 @@ class PlanHypothesis:
     absent: Mapping[str, Reason]
     cost: float
     order: tuple[int, ...] = ()
+    slipped: tuple[str, int] | None = None
 
     def is_side(self, name: str) -> bool:
         """Return whether a similar triangle's side is drawn where the vector of this name would be."""
@@ -276,6 +287,17 @@ def mistaken(base: PlanHypothesis, figure: str) -> Iterator[tuple[PlanHypothesis
         label = label if base.label in REGULAR else f"{base.label}, {label}"
         cost = base.cost + COST_OF_MISTAKE
         yield replace(base, label=label, drawing=changed, absent=absent, cost=cost), mistake
+
+
+def slipped(base: PlanHypothesis, expected: Expected) -> Iterator[tuple[PlanHypothesis, frozenset[str]]]:
+    """Yield a plan with each of its short vectors drawn wrongly in no known way, and the nodes it moves."""
+    construction = base.drawing.construction
+    for edge in expected.edges:
+        head, line = expected.names[edge.head], line_of(construction.vectors[edge.name], construction)
+        if line is not None and SLIPPED_MM[0] < expected.length_mm(edge) < SLIPPED_MM[1]:
+            slot = int(line == getattr(construction.step(head), "second", None))
+            moved = frozenset(one for one in expected.names if head in construction.upstream(one))
+            yield replace(base, slipped=(head, slot), cost=base.cost + COST_OF_SLIP), moved
 
 
 def _by_similarity(construction: Construction, figure: str) -> tuple[Construction, dict[str, Reason]]:

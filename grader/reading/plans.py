@@ -21,6 +21,7 @@ from grader.reading.expected import (
     poses,
     regular,
     resized,
+    slipped,
     tied,
     vectors_of,
 )
@@ -158,7 +159,8 @@ class PlanProblem:
     def expected(self, hypothesis: PlanHypothesis) -> Expected | None:
         """Return the plan about its own pole; None if it cannot be drawn."""
         edges = vectors_of(tied(hypothesis), self.figure, hypothesis.absent)
-        errors = FORCE_ERRORS if group_of(self.figure) else DRAFTING_ERRORS
+        usual = FORCE_ERRORS if group_of(self.figure) else DRAFTING_ERRORS
+        errors = replace(usual, slipped=hypothesis.slipped)
         expected = expect(hypothesis.drawing, self.figure, self.given, errors, edges)
         known = np.abs(expected.at).max() < FARTHEST_MM and expected.cov.max() < VAGUE_MM**2
         return expected if known else None
@@ -219,7 +221,7 @@ class PlanReading:
         stroke = self.assignment.stroke
         taken = np.full((len(stroke), self.lines.members.shape[1]), -1)
         taken[stroke >= 0] = self.lines.members[stroke[stroke >= 0]]
-        return self.placed.edges, taken.tobytes(), self.assignment.shared.tobytes()
+        return self.placed.edges, self.hypothesis.slipped, taken.tobytes(), self.assignment.shared.tobytes()
 
     @property
     def sense(self) -> bytes:
@@ -364,19 +366,21 @@ def _poses(expected: Expected, lines: Lines, count: int, *, is_turnable: bool) -
 def _with_mistakes(
     problem: PlanProblem, best: PlanReading, bases: Iterable[PlanHypothesis]
 ) -> list[PlanReading]:
-    """Return the plan with a mistake, in the best one's position."""
+    """Return the plan with a mistake or a short vector drawn wrongly, in the best one's position."""
     suspect = None if best.pose.score < POOR else _suspects(best)
     # The strokes give the plan's pole more exactly than the pose does.
     here = replace(best.pose, at=complex(best.assignment.expected.at[0]))
-    cases: list[_PlanCase] = []
+    tried = [] if group_of(problem.figure) else [*slipped(best.hypothesis, best.expected)]
     for hypothesis, mistake in (pair for base in bases for pair in mistaken(base, problem.figure)):
         touched = affected(mistake, hypothesis.drawing.construction)
         made_at = touched if mistake.code in OF_FORCES else {mistake.at}
-        if suspect is not None and not made_at & suspect:
-            continue
-        expected = problem.expected(hypothesis)
-        if expected is not None:
-            cases.append(_PlanCase(hypothesis, expected, here, touched))
+        if suspect is None or made_at & suspect:
+            tried.append((hypothesis, touched))
+    cases = [
+        _PlanCase(hypothesis, expected, here, touched)
+        for hypothesis, touched in tried
+        if (expected := problem.expected(hypothesis)) is not None
+    ]
     return _read(cases, problem.lines, problem.prior, best)
 
 

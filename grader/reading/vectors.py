@@ -141,7 +141,7 @@ def _vectors(
         if gap is not None:
             unread.append(gap)
             continue
-        cov = _difference_cov(fit.cov, edge) + of_sheet(span, sheet)
+        cov = _difference_cov(fit.cov, edge) + sheet.cov_of(span)
         spans = explanations.at[:, edge.head] - explanations.at[:, edge.tail]
         of_two = is_polygon and is_double(plan, edge)
         (_, named), *others = explanations.of(spans, EITHER_MM if of_two else NEAR_MM)
@@ -163,7 +163,7 @@ def _vectors(
                 sure = min(sure, MOST_OPEN)
         elif row < 0 and abs(span) > LEAST_VECTOR_MM and _may_lie_under(plan, fit, edge):
             sure = min(sure, MOST_OPEN)
-        read = vector_of(span, cov, min(sure, most, HIGHEST))
+        read = ReadVector.of(span, cov, min(sure, most, HIGHEST))
         rivals = (
             OtherReading(abs(other), degrees(cmath.phase(other)), replace(signs, named=together).confidence())
             for other, together in others
@@ -238,7 +238,7 @@ def _weighed(
     anywhere = near + ASTRAY_MM**2 * np.eye(2)
     nearer = np.linalg.inv(near) - np.linalg.inv(anywhere)
     odds = math.sqrt(np.linalg.det(anywhere) / np.linalg.det(near)) * math.exp(-0.5 * off @ nearer @ off)
-    seen = _difference_cov((plan.seen or plan.fit).cov, edge) + of_sheet(span, sheet)
+    seen = _difference_cov((plan.seen or plan.fit).cov, edge) + sheet.cov_of(span)
     odds = max(LEAST_ODDS, min(odds, MOST_ODDS if within(seen) >= LEAST_PLACED else 1.0))
     return sure * odds / (sure * odds + 1.0 - sure)
 
@@ -256,23 +256,6 @@ def _difference_cov(cov: FloatArray, edge: Edge) -> FloatArray:
     for axis in (0, 1):
         difference[axis, 2 * edge.head + axis], difference[axis, 2 * edge.tail + axis] = 1.0, -1.0
     return np.asarray(difference @ cov @ difference.T)
-
-
-def of_sheet(span: complex, sheet: Sheet) -> FloatArray:
-    """Return the covariance (2, 2) that the sheet's scale and turn add to a vector."""
-    moves = np.array([sheet.scale_se * span, sheet.turn_se_rad * 1j * span])
-    return np.asarray(xy(moves).reshape(2, 2).T @ xy(moves).reshape(2, 2))
-
-
-def vector_of(span: complex, cov: FloatArray, confidence: float) -> ReadVector:
-    """Return length and direction with their standard errors."""
-    length = float(abs(span))
-    along = np.array([span.real, span.imag]) / max(length, 1e-9)
-    across = np.array([-along[1], along[0]])
-    se_along, se_across = (math.sqrt(max(float(axis @ cov @ axis), 0.0)) for axis in (along, across))
-    se_deg = math.degrees(math.atan2(se_across, max(length, 1e-9)))
-    direction = degrees(cmath.phase(span)) if length > se_across else None
-    return ReadVector(length, se_along, direction, se_deg, confidence)
 
 
 # Confidence ----------------------------------------------------------------------------------------

@@ -57,16 +57,14 @@ HINTS: dict[str, str] = {
         "Its lines meet at so small an angle that even careful drawing can miss by this much:"
         " a person must look."
     ),
-    "triangle_shows": N_("The right triangle at %(at)s on the sketch shows its length."),
+    "triangle_shows": N_("The right triangle on the sketch shows its length."),
     "half_turn_missing": N_(
-        "The right triangle at %(at)s on the sketch gives this length: the half turn about %(at)s is missing."
+        "The right triangle on the sketch gives this length: the half turn about the joint is missing."
     ),
-    "right_triangle": N_("It is as long as the right triangle at %(at)s on the sketch makes it."),
-    "triangle_wrong": N_(
-        "It agrees with the right triangle at %(at)s on the sketch: that triangle is wrong."
-    ),
+    "right_triangle": N_("It is as long as the right triangle on the sketch makes it."),
+    "triangle_wrong": N_("It agrees with the right triangle on the sketch: that triangle is wrong."),
     "not_carried_over": N_(
-        "The right triangle at %(at)s on the sketch gives another length: it was taken over wrongly."
+        "The right triangle on the sketch gives another length: it was taken over wrongly."
     ),
     "readings_disagree": N_("The drawing and the entered measurement differ."),
     "written_disagrees": N_("The drawing and the length written on the sheet differ: a person must look."),

@@ -217,12 +217,13 @@ def test_an_error_that_cannot_change_the_verdict_does_not():
     assert outcome_of(compare(PUMP, Submission(measured=longer)), "v_A").verdict == "full"
 
 
+@pytest.mark.parametrize("name", ["v_A", "a_CA_n"])
 @pytest.mark.parametrize(("confidence", "verdict"), [(0.49, "review"), (0.5, "full"), (0.8, "full")])
 def test_a_doubtful_reading_that_lies_where_it_must_is_right_unless_it_is_likelier_another_stroke(
-    confidence, verdict
+    name, confidence, verdict
 ):
-    doubtful = changed(measured(PUMP), "v_A", confidence=confidence)
-    outcome = outcome_of(compare(PUMP, Submission(measured=doubtful)), "v_A")
+    doubtful = changed(measured(PUMP), name, confidence=confidence)
+    outcome = outcome_of(compare(PUMP, Submission(measured=doubtful)), name)
     assert outcome.verdict == verdict
     assert PUMP.rubric.doubt.settle <= outcome.probability < 1.0
 

@@ -16,8 +16,17 @@ from grader.reading.lines import lines_of
 from grader.reading.orders import ends_on_sheet, orders_by_ink, reordered, ring_of, to_usual
 from grader.reading.plans import ARROWS_PER_MM, MOST_BY_ARROWS, _nats_by_arrows
 from grader.reading.read import _find_forces, read_figures
-from grader.reading.vectors import vector_of
-from grader.records import Figure, InkMap, NodePlaces, NodeView, PageRef, Reading, ReadNode, ScannedPage
+from grader.records import (
+    Figure,
+    InkMap,
+    NodePlaces,
+    NodeView,
+    PageRef,
+    Reading,
+    ReadNode,
+    ReadVector,
+    ScannedPage,
+)
 from reference.construction.graph import evaluate
 from reference.construction.mistakes import commit, mistakes_of_forces
 from reference.plan import exact_plan
@@ -218,7 +227,7 @@ def test_a_corner_is_moved_where_it_lies_on_the_sheet():
     astray = names[2]
     read = {**at, astray: at[astray] + 3.0}
     drawn = {one.name: tuple(read[node] for node in one.arrow) for one in changed.vectors_of(figure)}
-    spans = {name: vector_of(head - tail, np.eye(2) * 0.01, 0.6) for name, (tail, head) in drawn.items()}
+    spans = {name: ReadVector.of(head - tail, np.eye(2) * 0.01, 0.6) for name, (tail, head) in drawn.items()}
     known = dict.fromkeys(names, ReadNode(200.0 - 150.0j, np.eye(2) * 0.01, 0.6))
     page = ScannedPage(PageRef("s.png"), reading=Reading({figure: Figure(known, spans, drawn)}))
     ends = ends_on_sheet(plan.construction, figure, page.reading.figures[figure])

@@ -125,6 +125,19 @@ def test_a_wrong_drawing_is_read_as_wrong_as_it_is(mistake):
     assert not silently_wrong(drawn, reading)
 
 
+@pytest.mark.parametrize("turn_deg", [-25.0, 25.0])
+def test_a_short_vector_in_a_wrong_direction_is_not_drawn_towards_the_right_one(turn_deg):
+    assignment, variant, drawing = task("pump", Variant(n=28))
+    right = draw(drawing)
+    nodes, vector = right.nodes, right.vectors["a_BA_n"]
+    wrong = cmath.rect(abs(vector), cmath.phase(vector) + math.radians(turn_deg))
+    extra = [(nodes["a'"], nodes["a'"] + wrong), (nodes["a'"] + wrong, nodes["b'"])]
+    pen = Pen(left_out=frozenset({"a_BA_n", "a_BA_t"}), extra=extra)
+    found, _ = vectors_read(read(draw(drawing, pen=pen), assignment, variant))["a_BA_n"]
+    assert abs(vector) < 6.0
+    assert abs(found - wrong) < NEAR_MM
+
+
 def test_another_students_variant_is_read_as_drawn():
     assignment, _, drawing = task("pump", Variant(n=20))
     drawn = draw(drawing)
