@@ -248,6 +248,7 @@ IN_LINE = (
     N_("its links are in line"), N_("its rod is perpendicular to the guide"), N_("its guides are parallel"),
     N_("the pin is at the link's pivot, or as near to it as the offset lets it"),
     N_("slot and guide are parallel"), N_("its base has no length"),
+    N_("the lines of its three legs meet in one point, or those of the first two are parallel"),
 )  # fmt: skip
 """Texts of `reference.kinematics` on a flat position, for the catalogues."""
 
