@@ -104,6 +104,8 @@ WORSE_BY_INK = 0.2
 """The same before such a polygon is placed, by the strokes along its sides in the best order."""
 LEAST_VISIBLE_MM = 2.5
 """A shorter vector may have no stroke of its own."""
+TWICE, LEAST_TWICE = 0.5, 40.0
+"""A plan is drawn twice if other strokes give one of its size with this share of its score, and this much."""
 RIVALS = 25
 """Number of explanations used for the confidences; the others weigh next to nothing."""
 BEAM_OF_DOUBTS = 3
@@ -290,11 +292,12 @@ def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) 
 
     Arguments: `plans`, the regular ones, best first; `drawing`, the student's right drawing.
     """
+    is_lettered = not group_of(problem.figure)
+    plans, meant = _of_several(problem, plans) if plans and is_lettered else (plans, 1.0)
     everything = list(plans)
     if plans:
         bases = {plan.hypothesis.label: plan.hypothesis for plan in reversed(plans)}
         everything.extend(_with_mistakes(problem, plans[0], bases.values()))
-    is_lettered = not group_of(problem.figure)
     is_open = not plans or plans[0].pose.score < EXPLAINED or bool(_suspects(plans[0]))
     # Reversed in part, other forces would leave the lines of the right polygon in the opposite sense.
     is_open |= bool(plans) and _nats_by_arrows(problem, plans[0]) <= -MOST_BY_ARROWS
@@ -313,7 +316,38 @@ def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) 
     seen = None if is_lettered else fit_nodes(best.assignment, best.lines)
     if seen is not None and problem.look:
         seen = held_against_ink(seen, drawn, problem.look)
-    return replace(best, rivals=tuple(rivals), by_ink=by_ink, seen=seen)
+    return replace(best, rivals=tuple(rivals), by_ink=by_ink, seen=seen, named=min(best.named, meant))
+
+
+def _of_several(problem: PlanProblem, plans: list[PlanReading]) -> tuple[list[PlanReading], float]:
+    """Return the readings of the plan that counts where it is drawn twice, and the chance that it does.
+
+    The other one is a first attempt, or crossed out: letters stand at the one that counts.
+    """
+    first = plans[0]
+    apart = [
+        plan
+        for plan in plans
+        if plan.score > max(TWICE * first.score, LEAST_TWICE)
+        and abs(math.log(plan.pose.size / first.pose.size)) < SAME_SIZE
+        and not np.isin(plan.members, first.members).any()
+    ]
+    if not apart:
+        return plans, 1.0
+    here, there = (_letters_nats(problem, plan) for plan in (first, apart[0]))
+    kept = (apart[0] if there > here else first).members
+    chance = 1.0 / (1.0 + math.exp(-abs(there - here)))
+    return [plan for plan in plans if np.isin(plan.members, kept).any()], chance
+
+
+def _letters_nats(problem: PlanProblem, plan: PlanReading) -> float:
+    """Return the nats of the letters at the nodes of a plan."""
+    expected, poles = plan.assignment.expected, plan.hypothesis.drawing.construction.poles.values()
+    at = {(problem.figure, name): at for name, at in zip(expected.names, expected.at.tolist(), strict=True)}
+    writing = lettering(
+        {} if group_of(problem.figure) else at, problem.letters, frozenset(poles), problem.renamed
+    )
+    return 0.0 if writing is None else writing.log()
 
 
 # Where a plan may lie -----------------------------------------------------------------------------
@@ -484,7 +518,6 @@ def _nats_by_arrows(problem: PlanProblem, plan: PlanReading) -> float:
 
 def _weighed(problem: PlanProblem, plans: Sequence[PlanReading]) -> list[PlanReading]:
     """Return the best readings, best first, each set of strokes once, in either sense if that is open."""
-    poles = frozenset(plans[0].hypothesis.drawing.construction.poles.values())
     first = max(plans, key=lambda plan: plan.score)
     is_told = _nats_by_arrows(problem, first) >= MOST_BY_ARROWS
     least = first.score - FAR_WORSE
@@ -493,11 +526,7 @@ def _weighed(problem: PlanProblem, plans: Sequence[PlanReading]) -> list[PlanRea
     by_arrows: dict[Hashable, float] = {}
     for plan in sorted(plans, key=lambda plan: -plan.score):
         if plan.score >= least and (key := (plan.strokes, is_told or plan.sense)) not in scored:
-            expected = plan.assignment.expected
-            nodes = ((problem.figure, name) for name in expected.names)
-            at = dict(zip(nodes, expected.at.tolist(), strict=True)) if not group_of(problem.figure) else {}
-            writing = lettering(at, problem.letters, poles, problem.renamed)
-            nats = 0.0 if writing is None else writing.log()
+            nats = _letters_nats(problem, plan)
             named = _named_by(nats, plan.hypothesis)
             alike = plan.hypothesis.label, plan.hypothesis.order, plan.sense
             if alike not in by_arrows:

@@ -107,3 +107,19 @@ def test_letters_elsewhere_name_no_plan_that_is_drawn_as_constructed():
     reading = read_figures([(ink, blank_sheet())], assignment, variant, None, tuple(drawn.vectors))[0]
     read = reading.figures[VELOCITY_PLAN].nodes
     assert abs(read["o"].at - drawn.nodes["o"]) < NEAR_MM
+
+
+@pytest.mark.parametrize("is_lettered", [False, True])
+def test_of_a_plan_drawn_twice_the_lettered_one_counts_and_none_is_sure_without_letters(is_lettered):
+    """The other one is whole: it was crossed out, or a first attempt."""
+    assignment, variant, drawing = task("pump")
+    pen = Pen(left_out=frozenset({"v_CB"}))
+    drawn, away = draw(drawing, {VELOCITY_PLAN: 90 - 200j}, pen), 160 + 80j
+    whole = drawing.construction.polygon_of(VELOCITY_PLAN)
+    pen.extra = [(drawn.nodes[one.tail] + away, drawn.nodes[one.head] + away) for one in whole]
+    ink = draw(drawing, {VELOCITY_PLAN: 90 - 200j}, pen).ink
+    ink = lettered_ink(ink, drawn.nodes) if is_lettered else ink
+    found = read_figures([(ink, blank_sheet())], assignment, variant, None, tuple(drawn.vectors))[0]
+    read = found.figures[VELOCITY_PLAN]
+    assert is_lettered == (abs(read.nodes["o"].at - drawn.nodes["o"]) < NEAR_MM)
+    assert is_lettered == any(one.confidence >= SURE for one in read.vectors.values())
