@@ -222,7 +222,10 @@ def _check_positions(rows: Sequence[RosterRow]) -> Iterator[Reason]:
 
 
 def _check_scans(rows: Sequence[RosterRow]) -> Iterator[Reason]:
-    """Files and pages that two lines name, or one line twice; a whole file holds each of its pages."""
+    """Files and pages of two students, or named twice on a line; a whole file holds each of its pages.
+
+    A student's positions may share a sheet.
+    """
     owners: dict[str, dict[int | None, tuple[ScanRef, RosterRow]]] = {}
     for row in rows:
         for ref in row.scans:
@@ -234,5 +237,6 @@ def _check_scans(rows: Sequence[RosterRow]) -> Iterator[Reason]:
             )
             if clash is not None:
                 other, first = clash
-                yield _at("scan_twice", row, "scans", scan=str(ref), first=first.line, other=str(other))
-            named.setdefault(ref.page, (ref, row))
+                if first is row or first.student_id != row.student_id:
+                    yield _at("scan_twice", row, "scans", scan=str(ref), first=first.line, other=str(other))
+            named[ref.page] = ref, row

@@ -13,7 +13,7 @@ from grader.records import Identity, PageRef, Reason
 from grader.rubric import asked_of, rubric_of
 from grader.scan.page import open_page
 from grader.tables.measurements import StudentSubmission
-from grader.tables.roster import Roster, RosterRow
+from grader.tables.roster import Roster, RosterRow, ScanRef
 from reference.authored.assignment import AssignmentFile, Variant, load_assignment
 from samples.simulation import CAREFUL, CLEAN_SCAN, PenStyle, Settings
 from samples.simulation.positions import Numbering, simulate_positions
@@ -35,6 +35,12 @@ def test_a_sheet_with_all_positions_belongs_to_each_of_the_students(page):
     assert [(one.student_id, one.position) for one in owners(page, roster).owned] == [
         ("s01", position) for position in POSITIONS
     ]
+
+
+def test_a_sheet_that_is_named_on_several_lines_belongs_to_their_positions():
+    rows = [replace(row, scans=(ScanRef("IMG_1.jpg"),) if row.position != 0 else ()) for row in ROWS]
+    found = owners(PageRef("IMG_1.jpg"), Roster("roster.csv", tuple(rows)))
+    assert [one.position for one in found.owned] == list(POSITIONS)[1:]
 
 
 def test_without_a_roster_such_a_sheet_still_has_all_positions():

@@ -88,6 +88,13 @@ def test_a_page_cannot_belong_to_two_students(first, second):
     assert told.startswith("line 3, scans")
 
 
+def test_a_students_positions_may_share_a_sheet_that_no_line_names_twice():
+    text = "student_id,name,position,scans\ns1,A,0,c.pdf#1;d.jpg\ns1,A,1,c.pdf#1;d.jpg{more}\n"
+    assert [len(row.scans) for row in parse_roster(text.format(more="")).rows] == [2, 2]
+    (told,) = faults(text.format(more=";c.pdf"))
+    assert told.startswith("line 3, scans")
+
+
 def test_a_misspelt_column_is_a_fault_and_a_foreign_one_is_passed_over_and_told():
     (told,) = faults("student_id,name,postion\ns1,A,1\n")
     assert "did you mean position" in told
