@@ -9,7 +9,7 @@ from mpmath import mp, mpc
 from reference.construction.derive import construction_of
 from reference.construction.graph import Vector, evaluate, parameters_of
 from reference.kinematics.motion import move
-from reference.mechanism import Crank, Dyad, FixedGuide, Group, Mechanism, MovingGuide, Slider
+from reference.mechanism import Crank, Dyad, FixedGuide, Group, Mechanism, MovingGuide, Slider, Triad
 from reference.plan import _measured
 from tests import every_group
 from tests.bench.oracle import DIGITS, ExactMotion, _root
@@ -85,7 +85,8 @@ def test_a_point_on_a_moving_guide_slides_along_it_and_coriolis_is_across():
 
 def test_every_vector_of_a_construction_of_all_groups_agrees_with_fifty_digits():
     mechanism = every_group.mechanism()
-    assert {type(group) for group in mechanism.groups} == set(get_args(Group))
+    # The truth of triads, which are not solved joint by joint, is in the reference's own tests.
+    assert {type(group) for group in mechanism.groups} == {*get_args(Group)} - {Triad}
     construction, scale = construction_of(mechanism), np.array([0.01])
     measured = _measured(construction, move(mechanism))
     nodes = evaluate(construction, {**measured, **parameters_of(mechanism, scale, scale, scale)})
