@@ -192,6 +192,7 @@ class MechanismError(PlanmarkError):
     template : the message, with ``{gap}`` where the gap stands in it, or the directions of the assemblies
     group : the joint that the failing group places; None where no single group is meant
     gap_m : by how much the group's links miss each other; None where they meet
+    texts : what stands for ``{gap}``
     """
 
     exit_status = 3
@@ -206,10 +207,15 @@ class MechanismError(PlanmarkError):
         texts: str = "",
     ) -> None:
         texts = texts if gap_m is None else f"{gap_m:.6g} m"
-        gap: dict[str, Parameter] = {"texts": texts} if texts else {}
-        message = template.replace("{gap}", str(gap.get("texts", "")))
-        super().__init__(code, message, **{} if group is None else {"node": group}, **gap)
-        self.template, self.group, self.gap_m = template, group, gap_m
+        known: dict[str, Parameter] = {"texts": texts} if texts else {}
+        message = template.replace("{gap}", texts)
+        super().__init__(code, message, **{} if group is None else {"node": group}, **known)
+        self.template, self.group, self.gap_m, self.texts = template, group, gap_m, texts
+
+    def after(self, told: str) -> "MechanismError":
+        """Return the same error with something told before its message."""
+        code, template = self.code, f"{told}{self.template}"
+        return MechanismError(code, template, group=self.group, gap_m=self.gap_m, texts=self.texts)
 
 
 class InputFileError(PlanmarkError):

@@ -24,7 +24,7 @@ from grader.options import CycleOptions, PlanOptions
 from grader.solution.document import plan_documents
 from grader.texts.spoken import failure
 from reference.authored.assignment import Assignment, Variant, load_assignment
-from reference.errors import CallError, MechanismError
+from reference.errors import CallError
 from reference.kinematics.cycle import cycle
 from reference.plan import Plan, exact_plan
 from reference.quantities import unit_of
@@ -85,8 +85,7 @@ def _sound(assignment: Assignment) -> list[Variant]:
     broken = broken_variants(assignment, variants)
     if len(broken) == len(variants):
         first = broken[variants[0]]
-        told = f"no variant can be solved; {variants[0]}: {first.template}"
-        error = MechanismError(first.code, told, group=first.group, gap_m=first.gap_m)
+        error = first.after(f"no variant can be solved; {variants[0]}: ")
         error.parameters |= {"variant": named(variants[0].numbers), "more": len(variants) - 1}
         raise error
     for finding in broken_findings(assignment, broken):

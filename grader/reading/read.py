@@ -61,8 +61,6 @@ class _PageReading:
     """The figures read on one sheet so far."""
 
     strokes: Lines
-    """All of the sheet's; `lines` are those that may belong to a figure not read yet."""
-    lines: Lines
     ink: Ink
     sheet: Sheet
     look: Look | None
@@ -76,6 +74,11 @@ class _PageReading:
     """The own position's part of it, by figure."""
     sketch: SketchReading | None = None
     plans: dict[str, PlanReading] = field(default_factory=dict)
+    lines: Lines = field(init=False)
+    """Those of the strokes that may belong to a figure not read yet."""
+
+    def __post_init__(self) -> None:
+        self.lines = self.strokes
 
 
 def read_figures(
@@ -102,9 +105,8 @@ def read_figures(
     own_position = None if variant is None else variant.position
     least = LEAST_EXPECTED if every else LEAST_PLAN
     pages = [
-        _PageReading(lines, lines, ink, sheet, places and partial(places, ink.where), own_position, least)
+        _PageReading(lines_of(ink), ink, sheet, places and partial(places, ink.where), own_position, least)
         for ink, sheet in drawn
-        for lines in [lines_of(ink)]
     ]
     for page in (one for one in pages if not one.sheet.zones):
         page.beside = every

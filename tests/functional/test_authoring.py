@@ -170,6 +170,8 @@ def test_a_triad_is_drawn_by_its_assur_point_explained_and_printed(planmark, tmp
     (tmp_path / "mine.mechanism.toml").write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
     told = planmark("lint", "mine.assignment.toml")
     assert "angle_deg of the triad of F tells no assembly clearly: there are" in told.stdout
+    told = planmark("plan", "mine.assignment.toml", "--all")
+    assert re.search(r"no variant can be solved; n = 1: .* clearly; there are -?\d", told.stderr)
 
 
 EXCAVATOR = """
