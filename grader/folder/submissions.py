@@ -264,8 +264,10 @@ def _agreed(name: str, values: Iterable[int | None], problems: list[Reason]) -> 
 def _variant(
     assignment: Assignment, n: int | None, position: int | None, problems: list[Reason]
 ) -> Variant | None:
+    """The variant with these numbers; None where one is missing, which is told when it is to be judged."""
     try:
         return assignment.variant(n, position)
     except CallError as error:
-        problems.append(of_error(error))
+        if error.parameters["cause"] != "number_needed":
+            problems.append(of_error(error))
         return None

@@ -118,8 +118,6 @@ _AGREES = 0.5
 _MOST = 400
 """Most variants that a drawing is compared with, the likeliest by the writing: 1.5 ms each."""
 _NAMED = 4
-_MISSING = frozenset({"n_needed", "position_needed"})
-"""Problems that a number read on the sheet solves."""
 
 
 def with_written_numbers(
@@ -129,7 +127,7 @@ def with_written_numbers(
     cache: Pages,
     run: Run,
 ) -> list[StudentSubmission]:
-    """Give submissions without a number the one on their sheets, or a problem that says why not."""
+    """Give submissions without a number the one on their sheets, and a problem that says how sure it is."""
     lacking = [index for index, student in enumerate(students) if _lacks_number(student)]
     calls = [
         (cache, students[index].pages, assignment, _possible(students[index], roster, assignment))
@@ -138,19 +136,17 @@ def with_written_numbers(
     result = list(students)
     for place, read in run(_number, calls):
         if not isinstance(read, Reason):
-            variant, problem = read
+            variant, problems = read
             student = students[lacking[place]]
-            problems = [one for one in student.problems if variant is None or one.code not in _MISSING]
-            told = replace(student, variant=variant, problems=(*problems, problem))
+            told = replace(student, variant=variant, problems=(*student.problems, *problems))
             result[lacking[place]] = told
     return result
 
 
 def _lacks_number(student: StudentSubmission) -> bool:
     """Return whether a number is missing that may stand on the student's pages, and none is disputed."""
-    codes = {problem.code for problem in student.problems}
-    disputed = any(code.endswith("_disagrees") for code in codes)
-    return student.variant is None and bool(student.pages) and bool(codes & _MISSING) and not disputed
+    disputed = any(problem.code.endswith(("_disagrees", "_range")) for problem in student.problems)
+    return student.variant is None and bool(student.pages) and not disputed
 
 
 def _possible(student: StudentSubmission, roster: Roster | None, assignment: Assignment) -> list[Variant]:
@@ -166,12 +162,14 @@ def _possible(student: StudentSubmission, roster: Roster | None, assignment: Ass
 
 def _number(
     cache: Pages, refs: Sequence[PageRef], assignment: Assignment, possible: Sequence[Variant]
-) -> tuple[Variant | None, Reason]:
-    """Apply `chosen_variant` to what is written and drawn on some pages."""
+) -> tuple[Variant | None, tuple[Reason, ...]]:
+    """Apply `chosen_variant` to what is written and drawn on those pages that were not refused."""
+    pages = [page for page in map(cache.page, refs) if page.ink is not None]
+    if not pages:
+        return None, ()
     numbers = {variant.n for variant in possible}, {variant.position for variant in possible}
     both = all(len(each) > 1 for each in numbers)
     words = NUMBER_WORDS, POSITION_WORDS if both else (*NUMBER_WORDS, *POSITION_WORDS)
-    pages = [cache.page(ref) for ref in refs]
     read = _read_numbers(pages, numbers, words)
     chances = [
         _chance(read.get(0), variant.n, numbers[0]) * _chance(read.get(1), variant.position, numbers[1])
@@ -183,7 +181,8 @@ def _number(
     similar = sum(
         (figure_similarity(ends, assignment, compared) for ends in drawn), start=np.zeros(len(compared))
     )
-    return chosen_variant(compared, chance, similar)
+    variant, problem = chosen_variant(compared, chance, similar)
+    return variant, (problem,)
 
 
 def _read_numbers(

@@ -196,7 +196,7 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
         N_("It is not clear which position this plan belongs to: %(positions)s."),
         N_("It is not clear which position this plan belongs to."),
     ),
-    "variant_unknown": (N_("Nothing says this student's number or position; add it to the roster."),),
+    "variant_unknown": (N_("This student's number or position is not known; enter it in the roster."),),
     "n_disagrees": (
         N_("Sources disagree about the student's number: %(numbers)s."),
         N_("The sheet was printed for n = %(printed)s, not for %(given)s."),
@@ -239,8 +239,6 @@ PROBLEMS: dict[str, tuple[str, ...]] = {
         ),
         N_("The number on the sheet could not be read surely; add it to the roster."),
     ),
-    "n_needed": (N_("Nothing says this student's number or position; add it to the roster."),),
-    "position_needed": (N_("Nothing says this student's number or position; add it to the roster."),),
     "does_not_assemble": (N_("The mechanism does not assemble with these data."),),
     "assembly_unclear": (N_("The mechanism does not assemble with these data."),),
     "singular": (N_("The velocities are not determined in this position of the mechanism."),),

@@ -68,7 +68,7 @@ def results(tmp_path_factory):
     except OSError:  # a file system that takes text only
         (folder / NOBODYS.encode("utf-8", "backslashreplace").decode()).write_bytes(b"junk")
     (folder / "s20.json").write_text('{"student_id": "s20", "n": 7, "segments_mm": {"v_A": 60.0}}')
-    rows = "".join(f"s{number},Student {number},7\n" for number in range(10, 26))
+    rows = "".join(f"s{number},Student {number},{'' if number == 16 else 7}\n" for number in range(10, 26))
     (folder / "roster.csv").write_text("student_id,name,n\n" + rows, encoding="utf-8")
     out = folder.parent / (folder.name + "-out")
     assert graded(folder, out).returncode == 1
@@ -81,6 +81,11 @@ def test_what_is_wrong_with_a_file_stands_in_its_owners_report(results, name, co
     assert report["status"] == "unreadable"
     assert any(problem["code"] == code and name in problem["file"] for problem in report["problems"])
     assert (results[0] / name[:3] / "feedback.html").is_file()
+
+
+def test_a_damaged_file_is_told_before_a_number_that_nothing_says(results):
+    report = next(one for one in results[1]["reports"] if one["student_id"] == "s16")
+    assert [problem["code"] for problem in report["problems"]] == ["image_damaged", "variant_unknown"]
 
 
 def test_a_file_whose_name_is_no_text_is_told_and_is_nobodys(results):

@@ -57,7 +57,7 @@ def test_a_number_on_which_two_sources_differ_is_not_guessed():
     roster = Roster("roster.csv", (RosterRow("s1", n=3),))
     found, _ = works(PUMP, roster, owners(owned("s1.jpg", "s1", n=3)), [entered("s1", n=4)])
     assert found[0].variant is None
-    assert [problem.code for problem in found[0].problems] == ["n_disagrees", "n_needed"]
+    assert [problem.code for problem in found[0].problems] == ["n_disagrees"]
 
 
 def test_measurements_of_somebody_who_is_not_on_the_roster_are_told():
