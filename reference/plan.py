@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.authored.assignment import Assignment, Scales, Variant
-from reference.construction.derive import construction_of, image_name
+from reference.construction.derive import construction_of
+from reference.construction.draft import image_name
 from reference.construction.elements import Normal, View
 from reference.construction.forces import Accelerations, reaction
 from reference.construction.graph import Construction, Vector, evaluate, parameters_of

@@ -54,7 +54,7 @@ from reference.authored.assignment import SCALE_NAMES, TRADITIONS, Assignment, V
 from reference.authored.formula import Formula
 from reference.authored.toml_file import LENGTH_UNITS_M, SideText, Text
 from reference.authored.variant_table import KEYS, LENGTHS, formulas_in
-from reference.construction.derive import image_name
+from reference.construction.draft import image_name
 from reference.construction.graph import Construction, ancestors
 from reference.errors import AuthoredFileError, Parameter
 from reference.geometry import FloatArray

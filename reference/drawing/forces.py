@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from reference.construction.derive import image_name
+from reference.construction.draft import image_name
 from reference.construction.elements import Couple
 from reference.construction.equations import moment_sums
 from reference.construction.forces import reaction
