@@ -154,7 +154,8 @@ def read_pages(
         right = None if variant is None else drawings(assignment, [variant], scales)[0]
         sure: Collection[str] = () if variant is None else understood_scales(assignment, variant, known)
         for at_drawing in (_upright, _level, partial(page_scale.at_drawn_scales, declared=sure)):
-            if (placed := at_drawing(pages, readings, right)) is not None:
+            placed = at_drawing(pages, readings, right)
+            if any(one is not page for one, page in zip(placed, pages, strict=True)):
                 pages, readings = placed, readings_of(placed)
     drawn = sum(page.ink is not None for page in pages)
     read = []
@@ -170,26 +171,25 @@ def read_pages(
 
 def _upright(
     pages: Sequence[ScannedPage], readings: Sequence[Reading], right: Drawing | None
-) -> list[ScannedPage] | None:
-    """The pages, the other way up where nothing but a drawing says so; None where none is."""
-    upright = [
+) -> list[ScannedPage]:
+    """The pages, the other way up where nothing but a drawing says so."""
+    return [
         _opened_again(page, turned(page))
         if page_scale.turn_doubts(page) and page_scale.is_upside_down(reading, right)
         else page
         for page, reading in zip(pages, readings, strict=True)
     ]
-    return upright if any(one is not page for one, page in zip(upright, pages, strict=True)) else None
 
 
 def _level(
     pages: Sequence[ScannedPage], readings: Sequence[Reading], right: Drawing | None
-) -> list[ScannedPage] | None:
-    """The pages without a frame, turned as their drawings lie; None where none is."""
+) -> list[ScannedPage]:
+    """The pages, those without a frame turned as their drawings lie."""
     tilts = [page_scale.drawn_tilt(*both, right) for both in zip(pages, readings, strict=True)]
     return [
         _opened_again(page, open_page(replace(page.ref, tilt_rad=tilt))) if tilt else page
         for page, tilt in zip(pages, tilts, strict=True)
-    ] if any(tilts) else None  # fmt: skip
+    ]
 
 
 def _opened_again(page: ScannedPage, other: ScannedPage) -> ScannedPage:

@@ -197,8 +197,8 @@ def at_drawn_scales(
     readings: Sequence[Reading],
     drawing: Drawing | None,
     declared: Collection[str],
-) -> list[ScannedPage] | None:
-    """Return the pages at the scales of their drawings, to be read again; None if nothing changes.
+) -> list[ScannedPage]:
+    """Return the pages, those at other scales by their drawings to be read again.
 
     A page of unknown scale is refused if its drawing does not determine it.
 
@@ -217,7 +217,7 @@ def at_drawn_scales(
         told = [] if drawing is None else _lengths(sheet, pages, readings, drawing, declared)
         shown = _page_scale(told, sheet.scale_se) if told else None
         result.append(_at_drawn_scale(page, sheet, shown))
-    return result if any(one is not page for one, page in zip(result, pages, strict=True)) else None
+    return result
 
 
 def _at_drawn_scale(page: ScannedPage, sheet: Sheet, shown: PageScale | None) -> ScannedPage:

@@ -78,8 +78,7 @@ def drawn(
 
 
 def answered(reading: Reading, one: ScannedPage, declared=ALL) -> ScannedPage:
-    pages = at_drawn_scales([one], [reading], RIGHT, declared)
-    return one if pages is None else pages[0]
+    return at_drawn_scales([one], [reading], RIGHT, declared)[0]
 
 
 @pytest.mark.parametrize("longer", [0.97, 0.99, 1.02, 1.04])
@@ -165,8 +164,7 @@ def sheet_of_forces(longer: float, corner_mm: float) -> ScannedPage:
     }
     reading = Reading({MECHANISM: Figure(joints, {}), "force_plan_D": Figure({}, vectors)})
     unknown = page(0.03, Reason("scale_unknown", {"detail": "no frame was found"}))
-    pages = at_drawn_scales([unknown], [reading], right, ["kL", "kF"])
-    return unknown if pages is None else pages[0]
+    return at_drawn_scales([unknown], [reading], right, ["kL", "kF"])[0]
 
 
 def test_an_unmarked_corner_between_forces_in_one_line_hides_no_scale():
