@@ -508,6 +508,10 @@ class ReadNode:
         """Root mean square of the two principal standard errors."""
         return float(np.sqrt(np.trace(self.cov) / 2.0))
 
+    def vector_to(self, head: "ReadNode") -> "ReadVector":
+        """Return the vector to another node, as sure as the less sure of them."""
+        return ReadVector.of(head.at - self.at, self.cov + head.cov, min(self.confidence, head.confidence))
+
 
 @dataclass(frozen=True, slots=True)
 class OtherReading:

@@ -342,15 +342,12 @@ def _between_parts(
 ) -> dict[str, DrawnVector]:
     """Return the sums of forces that are asked for but not drawn out: their ends on the polygon show them."""
     asked = blank & {one.name for one in task.rubric.criterion if not one.optional}
-    found = {}
-    for vector in task.construction.vectors_of(figure):
-        tail, head = (read.nodes.get(node) for node in (vector.tail, vector.head))
-        if vector.is_sum and vector.name in asked and tail is not None and head is not None:
-            span, se_mm = head.at - tail.at, math.hypot(tail.se_mm, head.se_mm)
-            se_deg = math.degrees(math.atan2(se_mm, abs(span)))
-            sure, whole = min(tail.confidence, head.confidence), turn + vector.turn_rad
-            found[vector.name] = DrawnVector(abs(span), se_mm, cmath.phase(span) - turn, se_deg, sure, whole)
-    return found
+    sums = {
+        vector.name: read.nodes[vector.tail].vector_to(read.nodes[vector.head])
+        for vector in task.construction.vectors_of(figure)
+        if vector.is_sum and vector.name in asked and read.nodes.keys() >= {vector.tail, vector.head}
+    }
+    return _vectors(task, replace(read, vectors=sums), sums, turn)
 
 
 def _own_turn(task: Task, name: str) -> float:

@@ -3,8 +3,6 @@
 Where letters were read at each other's node without certainty, a person decides the vector that would pay.
 """
 
-import cmath
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
@@ -17,7 +15,6 @@ from grader.outcomes import CREDITED, NamedMistake, Outcome
 from grader.records import Figure, Reading, ReadNode, ReadVector, Reason
 from reference.construction.graph import Vector
 from reference.construction.mistakes import Mistake
-from reference.geometry import degrees
 
 CERTAIN = 0.9
 """From this confidence on lines are judged under the right letters; below it each vector as it is named."""
@@ -91,22 +88,13 @@ def _renamed(
         if entered is not None and {one.tail, one.head} == set(ends) and one.part == vector.part:
             return entered if one.tail == ends[0] else _reversed(entered)
     if vector.tail in nodes and vector.head in nodes and vector.name in figure.vectors:
-        return _between(nodes[vector.tail], nodes[vector.head])
+        return nodes[vector.tail].vector_to(nodes[vector.head])
     return None
 
 
 def _reversed(entered: ReadVector) -> ReadVector:
     turn = None if entered.direction_deg is None else (entered.direction_deg + 180.0) % 360.0
     return replace(entered, direction_deg=turn, others=())
-
-
-def _between(tail: ReadNode, head: ReadNode) -> ReadVector:
-    drawn, se_mm = head.at - tail.at, math.hypot(tail.se_mm, head.se_mm)
-    if not drawn:
-        return ReadVector(0.0, se_mm, None, None, min(tail.confidence, head.confidence))
-    turn = degrees(cmath.phase(drawn))
-    se_deg = min(math.degrees(se_mm / abs(drawn)), 90.0)
-    return ReadVector(abs(drawn), se_mm, turn, se_deg, min(tail.confidence, head.confidence))
 
 
 def _by_its_length(

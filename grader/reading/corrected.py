@@ -19,9 +19,7 @@ from grader.records import (
     Ink,
     Reading,
     ReadNode,
-    ReadVector,
     ScannedPage,
-    Sheet,
 )
 from reference.construction.graph import Construction
 from reference.geometry import ComplexArray
@@ -198,8 +196,10 @@ def _with_nodes(
         if known is None and not _is_drawn(page.ink, tail.at, head.at):
             continue
         stays = all(abs(nodes[end].at - at[end]) < NEAR_MM for end in arrow if end in at)
-        least = known.confidence if known is not None and stays else 0.0
-        vectors[name] = _between(tail, head, page.sheet, least)
+        cov = head.cov if page.sheet is None else head.cov + page.sheet.cov_of(head.at - tail.at)
+        between = tail.vector_to(replace(head, cov=cov))
+        sure = known.confidence if known is not None and stays else 0.0
+        vectors[name] = replace(between, confidence=max(between.confidence, sure))
     if drawn:
         nodes = _in_usual_order(Figure(before.nodes, vectors, drawn), figure, construction)
     order = [step.node for step in construction.figures[figure]]
@@ -227,13 +227,6 @@ def _in_usual_order(read: Figure, figure: str, construction: Construction) -> di
         at = nodes[start].at + ends[node] - ends[start]
         nodes[node] = replace(nodes[node], at=at, confidence=sure[node])
     return nodes
-
-
-def _between(tail: ReadNode, head: ReadNode, sheet: Sheet | None, least: float) -> ReadVector:
-    """Return the vector between two nodes, as sure as the less sure of them, and no less than `least`."""
-    span = head.at - tail.at
-    cov = tail.cov + head.cov + (0.0 if sheet is None else sheet.cov_of(span))
-    return ReadVector.of(span, np.asarray(cov), max(least, min(tail.confidence, head.confidence)))
 
 
 def _is_drawn(ink: Ink | None, tail: complex, head: complex) -> bool:
