@@ -81,6 +81,22 @@ def test_crossing_lines_place_a_node_whatever_their_ends():
     assert abs(fit.at[0]) < PLACE_MM
 
 
+@pytest.mark.parametrize("off_mm", [0.0, 0.4])
+def test_where_lines_meet_exactly_nodes_lie_there_though_all_lines_end_short(off_mm):
+    corners = [0j, 40 + 5j, 33 + 40j, -6 + 28j, 14 + 62j]
+    pairs = [(first, second) for second in range(5) for first in range(second)]
+    drawn = []
+    for index, (first, second) in enumerate(pairs):
+        along = corners[second] - corners[first]
+        along /= abs(along)
+        beside = off_mm * (-1) ** index * 1j * along
+        drawn.append((corners[first] + 0.4 * along + beside, corners[second] - 0.4 * along + beside))
+    edges = tuple(Edge(f"{first}{second}", first, second) for first, second in pairs)
+    fit = fit_nodes(explanation(corners, edges, list(range(len(edges)))), lines_of(ink_of(drawn)))
+    off = np.abs(fit.at - np.array(corners))
+    assert (off.max() < 0.12) == (off_mm == 0.0)
+
+
 def test_two_vectors_on_one_stroke_meet_where_the_data_have_it():
     lines = lines_of(ink_of([(0j, 60 + 0j)]))
     edges = (Edge("v", 0, 1), Edge("w", 1, 2))
