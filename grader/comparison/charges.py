@@ -81,11 +81,7 @@ def choose(
                     chosen = Choice(better, one, is_followed=True, is_trivial=is_trivial)
         if chosen.mark.is_full:
             return chosen
-    is_known = segment.name in following.explanation.blamed
-    if group_of(charges.task.construction.figure_of(segment.head)):
-        # A force polygon is read by known mistakes: they confirm nothing that was read in doubt.
-        is_known &= all(reason.code != "doubtful" for reason in chosen.mark.reasons)
-    if not chosen.is_trivial and not chosen.mark.is_certain and is_known:
+    if not chosen.is_trivial and not chosen.mark.is_certain and charges.is_known(segment, chosen.mark):
         chosen = replace(chosen, mark=at_worst(chosen.mark))
     return replace(chosen, shown=frozenset(shown))
 
@@ -212,9 +208,20 @@ class Charges:
         shown = frozenset({first} if mark.share > NONE else ())
         return MarkRange(NONE, NONE, NONE, mark.reasons, mark.sure), shown
 
+    def is_known(self, segment: TaskSegment, mark: MarkRange) -> bool:
+        """Return whether it is nearly certain which mistake was made in a vector."""
+        # A force polygon is read by known mistakes: they confirm nothing that was read in doubt.
+        is_doubtful = self._is_force(segment) and any(reason.code == "doubtful" for reason in mark.reasons)
+        return segment.name in self.following.explanation.blamed and not is_doubtful
+
+    def _is_force(self, segment: TaskSegment) -> bool:
+        return bool(group_of(self.task.construction.figure_of(segment.head)))
+
     def opened(self, segment: TaskSegment, mark: MarkRange) -> MarkRange:
         """Return a mark; a loss on a sheet is open while one of its sources was not read for certain."""
-        unknown = () if mark.share == FULL else self._unknown_upstream(segment) + self._unread_beside(segment)
+        unknown = () if mark.share == FULL else self._unread_beside(segment)
+        if mark.share != FULL and not (self._is_force(segment) and self.is_known(segment, mark)):
+            unknown = self._unknown_upstream(segment) + unknown
         if not unknown:
             return mark
         self.charged.discard(segment.head)

@@ -303,8 +303,9 @@ def _vectors(
     return found
 
 
-MOSTLY_DOUBTED = 0.79
-"""Median confidence of a force polygon's sides below which the polygon was mostly read in doubt."""
+MOSTLY_DOUBTED, DOUBTED = 0.79, 0.6
+"""Median confidence of a force polygon's sides below which the polygon was mostly read in doubt; and that of
+one force: of 13 that seemed right one had been left out."""
 
 
 def _doubted(task: Task, figure: str, drawn: Mapping[str, DrawnVector]) -> dict[str, DrawnVector]:
@@ -334,7 +335,10 @@ def _doubted(task: Task, figure: str, drawn: Mapping[str, DrawnVector]) -> dict[
         not (is_told and is_closed)
         or statistics.median(drawn[name].confidence for name in shown) < MOSTLY_DOUBTED
     )
-    return {name: replace(one, is_doubted=is_doubtful and name in laid_off) for name, one in drawn.items()}
+    return {
+        name: replace(one, is_doubted=name in laid_off and (is_doubtful or one.confidence < DOUBTED))
+        for name, one in drawn.items()
+    }
 
 
 def _between_parts(
@@ -343,9 +347,9 @@ def _between_parts(
     """Return the sums of forces that are asked for but not drawn out: their ends on the polygon show them."""
     asked = blank & {one.name for one in task.rubric.criterion if not one.optional}
     sums = {
-        vector.name: read.nodes[vector.tail].vector_to(read.nodes[vector.head])
-        for vector in task.construction.vectors_of(figure)
-        if vector.is_sum and vector.name in asked and read.nodes.keys() >= {vector.tail, vector.head}
+        one.name: read.nodes[one.arrow[0]].vector_to(read.nodes[one.arrow[1]])
+        for one in task.construction.vectors_of(figure)
+        if one.is_sum and one.name in asked and read.nodes.keys() >= {*one.arrow}
     }
     return _vectors(task, replace(read, vectors=sums), sums, turn)
 

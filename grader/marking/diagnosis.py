@@ -151,7 +151,7 @@ def _searched_further(case: Case, scales: Sequence[Root], explanations: Sequence
         found = _by_cost(found, *(_replayed(case, further, cares, swap) for swap in (None, *swaps)))
     found = _by_cost(found, _by_triangles(case, roots, found, cares))
     found = _by_cost(found, _with_a_guess(case, roots, swaps, found[0], cares))
-    return _by_cost(found, _with_another_guess(case, roots, found[0], cares))
+    return _by_cost(found, _with_another_guess(case, roots, acting, found[0], cares))
 
 
 def _replayed(
@@ -225,11 +225,12 @@ def _with_a_guess(
 
 
 def _with_another_guess(
-    case: Case, roots: Sequence[Root], best: Replay, cares: Sequence[float]
+    case: Case, roots: Sequence[Root], acting: Sequence[Root], best: Replay, cares: Sequence[float]
 ) -> list[Replay]:
     """The explanations with a second mistake at a step without an observation, on top of the first one.
 
-    Nothing where the best explanation has no such mistake, or leaves nothing to explain.
+    Or with one in what acts, `acting`, which moments have, too. Nothing where the best explanation has no
+    such mistake, or leaves nothing to explain.
     """
     seen = {one.node for one in case.observations.entries}
     steps = {step.node for step in case.drawing.construction.steps}
@@ -242,8 +243,10 @@ def _with_another_guess(
         drawing = commit(one, drawing)
     kept &= {id(one) for one in best.made}
     start = next(root for root in roots if {id(one) for one in root.made} == kept)
-    guessed = Root(tuple(first), cost=sum(RARITY[one.code] for one in first))
-    return replay(drawing, case.observations, [_both(start, guessed)], case.skill, cares=cares, blind=True)
+    guessed = _both(start, Root(tuple(first), cost=sum(RARITY[one.code] for one in first)))
+    beside = [_both(guessed, one) for one in acting]
+    found = replay(drawing, case.observations, beside, case.skill, cares=cares) if beside else []
+    return found + replay(drawing, case.observations, [guessed], case.skill, cares=cares, blind=True)
 
 
 def _root_of(best: Replay, roots: Sequence[Root]) -> Root:

@@ -50,6 +50,8 @@ LEAST_DRAWN_MM, MOST_DRAWN_MM = 15.0, 200.0
 """Lengths of the vectors given at the start of a plan: they fit on a sheet and can be measured."""
 SAME_SCALE = 0.95
 """Ratio of the declared scale and the drawn one from which they are the same."""
+BACKWARDS = 0.1
+"""Most confidence in force polygons if all arrowheads of a sheet say the opposite, as of one sheet in 62."""
 WILD = 3.0
 """If the drawn scale differs by more than this factor, the declared one was surely not followed."""
 Nodes = dict[str, ComplexArray]
@@ -378,14 +380,19 @@ def _readings(pages: Sequence[_PageReading], drawing: Drawing, wanted: Collectio
             # Links of all positions lie across each other about the same pivots.
             sketched = Reading({MECHANISM: figure_of_sketch(page.sketch)})
             figures.update((no_surer(sketched, UNPLACED) if page.beside else sketched).figures)
+        polygons = {figure: plan for figure, plan in page.plans.items() if group_of(figure)}
+        forwards = {figure: forward_mm(plan, page.ink.where) for figure, plan in polygons.items()}
+        # Polygons of one sheet that contradict each other are merely in doubt.
+        is_opposite = sum(one or 0.0 for one in forwards.values()) < -TOLD_MM
         for figure, plan in page.plans.items():
             figures[figure], missing = figure_of_plan(plan, page.sheet, page.ink.where)
-            forward = forward_mm(plan, page.ink.where) if group_of(figure) else None
+            forward = forwards.get(figure)
             if forward is not None:
                 # Later polygons take forces over in their sense.
                 is_told, is_backwards = forward > TOLD_MM, is_backwards or forward < -TOLD_MM
             if group_of(figure) and (is_backwards or not is_told):
-                figures[figure] = no_surer(Reading({figure: figures[figure]}), MOST_OPEN).figures[figure]
+                most = BACKWARDS if is_opposite else MOST_OPEN
+                figures[figure] = no_surer(Reading({figure: figures[figure]}), most).figures[figure]
             if figure in page.apart:
                 only = Reading({figure: figures[figure]})
                 figures[figure] = no_surer(only, page.apart[figure].chance).figures[figure]

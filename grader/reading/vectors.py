@@ -2,7 +2,7 @@
 
 import cmath
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from grader.reading.arrowheads import is_double
 from grader.reading.expected import REGULAR, Edge, xy
 from grader.reading.nodes import NodeFit
-from grader.reading.plans import PlanReading
+from grader.reading.plans import SPECK_MM, PlanReading
 from grader.reading.sketch import SketchReading
 from grader.records import (
     BESIDE_PX,
@@ -51,6 +51,8 @@ SAME_LINE_MM = 0.3
 ONE_LINE_MM = 0.7
 """Two lines that are nearer to each other look like one."""
 BEYOND_MM = (0.7, 4.0)
+LEAST_OWN = 0.5
+"""A stroke that covers less of a sum's length may be another line's piece."""
 MOST_OPEN = 0.8
 """Most confidence in a line of two opposite forces with ink behind its end, of an arrowhead perhaps; and in a
 tiny force or a sum without its own stroke: many are left out."""
@@ -157,8 +159,12 @@ def _vectors(
             sure = _weighed(sure, plan, edge, span, cov, sheet)
             # What a mistake that was sought predicts is no evidence against the other explanations.
             sure = sure if plan.hypothesis.label in REGULAR else min(sure, named)
-            is_tiny = min(abs(span), abs(_predicted(plan, edge))) < LEAST_VECTOR_MM
+            predicted_mm = abs(_predicted(plan, edge))
+            # One that is known to be left out is nothing, and no tiny force that may be there.
+            is_left_out = plan.hypothesis.label not in REGULAR and predicted_mm < SPECK_MM
+            is_tiny = min(abs(span), predicted_mm) < LEAST_VECTOR_MM and not is_left_out
             is_inferred = not of_two and _is_inferred(plan, index)
+            is_inferred |= row >= 0 and _may_pass_a_tiny_side(plan, fit, edge, row)
             if is_tiny or is_inferred or (of_two and _goes_on(where, complex(fit.at[edge.tail]), span)):
                 sure = min(sure, MOST_OPEN)
         elif row < 0 and abs(span) > LEAST_VECTOR_MM and _may_lie_under(plan, fit, edge):
@@ -213,11 +219,21 @@ def _is_inferred(plan: PlanReading, index: int) -> bool:
     has_stroke, has_own = stroke >= 0, (stroke >= 0) & ~plan.assignment.shared
     if not is_sum[index]:
         return bool((~is_sum & has_stroke & (stroke == stroke[index]) & (against < LEAST_VECTOR_MM)).any())
-    if has_own[index]:
+    is_own = has_own[index] and plan.lines.length[stroke[index]] > LEAST_OWN * abs(np.diff(ends[index])[0])
+    if is_own:
         return bool((is_sum & ~has_own & (np.minimum(along, against) < LEAST_VECTOR_MM)).any())
     vectors = plan.hypothesis.drawing.construction.vectors
     parts = sum(vectors[one.name].part == "t" for one in edges)
     return parts > 1 or not (~is_sum & has_stroke & (along < SAME_LINE_MM)).any()
+
+
+def _may_pass_a_tiny_side(plan: PlanReading, fit: NodeFit, edge: Edge, row: int) -> bool:
+    """Return whether a force ends where a tiny one, which may stand at any corner, would put its end."""
+    spans = np.array([_predicted(plan, one) for one in plan.placed.edges if not one.optional])
+    along = np.abs((spans[np.abs(spans) < LEAST_VECTOR_MM] * np.conj(plan.lines.along[row])).real)
+    aside = along[along > MARKED_MM, None]
+    ends = [apart[sure > 0.0] for apart, sure in _tips(plan, fit, edge, row)]
+    return any((apart > MARKED_MM).all() and (np.abs(apart - aside) < MARKED_MM).any() for apart in ends)
 
 
 def _predicted(plan: PlanReading, edge: Edge) -> complex:
@@ -375,11 +391,14 @@ def _explanations(plan: PlanReading, fit: NodeFit) -> _Explanations:
 
 def _marked(plan: PlanReading, fit: NodeFit, edge: Edge, row: int) -> float:
     """Return how clearly tips mark a vector's two ends on its stroke."""
-    marked = []
+    ends = _tips(plan, fit, edge, row)
+    return min(float(sure[apart < MARKED_MM].max(initial=0.0)) for apart, sure in ends)
+
+
+def _tips(plan: PlanReading, fit: NodeFit, edge: Edge, row: int) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Yield how far a stroke's tips (k,) are from the tail, and the head, mm, and how sure they are."""
     along = complex(plan.lines.along[row])
     for node, other in ((edge.tail, edge.head), (edge.head, edge.tail)):
         forward = np.array([((fit.at[node] - fit.at[other]) * np.conj(along)).real > 0])
         tips, sure = plan.lines.tips_towards(np.array([row]), forward)
-        apart = np.abs(tips[0] - ((fit.at[node] - plan.lines.start[row]) * np.conj(along)).real)
-        marked.append(float(sure[0, apart < MARKED_MM].max(initial=0.0)))
-    return min(marked)
+        yield np.abs(tips[0] - ((fit.at[node] - plan.lines.start[row]) * np.conj(along)).real), sure[0]

@@ -249,7 +249,7 @@ VELOCITIES = HEAD + '[[criterion]]\nid = "v"\ntitle = { en = "x" }\npoints = 1\n
 # On scans ------------------------------------------------------------------------------------------
 
 PUMP, PRESS = task_for("pump-forces", 7), task_for("press-forces", position=4)
-UNSURE, CAPPED = 0.5, 0.8
+UNSURE, CAPPED = 0.65, 0.8
 
 
 def on_scan(task, reading, *blank):
@@ -262,6 +262,7 @@ def on_scan(task, reading, *blank):
 def test_a_force_that_may_be_laid_off_the_wrong_way_waits_where_its_polygon_was_read_in_doubt():
     read = changed(sheet(PUMP), "F_D", confidence=UNSURE)
     assert on_scan(PUMP, read)["F_D"] == "full"
+    assert on_scan(PUMP, changed(read, "F_D", confidence=0.55))["F_D"] == "review"
     for name in read.figures["force_plan_D"].vectors:
         read = changed(read, name, confidence=UNSURE)
     found = on_scan(PUMP, read)
@@ -299,6 +300,7 @@ def test_a_sum_that_is_not_drawn_out_is_measured_between_its_parts():
     read = sheet(PRESS)
     found = on_scan(PRESS, read, "R_02", "F_i2")
     assert (found["R_02"], found["F_i2"]) == ("full", "none")
+    assert on_scan(PRESS, read, "R_13")["R_13"] == "full"
     plan, end = read.figures["force_plan_B"], PRESS.construction.vectors["R_02"].tail
     nodes = {**plan.nodes, end: replace(plan.nodes[end], confidence=UNSURE)}
     unsure = replace(read, figures={**read.figures, "force_plan_B": Figure(nodes, plan.vectors)})
@@ -367,6 +369,14 @@ def test_a_force_is_not_known_to_be_missing_where_it_was_read_so_in_doubt():
     read = sheet(PUMP, mistakes=(Mistake("force_missing", head),))
     assert on_scan(PUMP, read)["F_i2"] == "none"
     assert on_scan(PUMP, changed(read, "F_i2", confidence=CAPPED))["F_i2"] == "review"
+    assert on_scan(PUMP, with_unsure(read, "F_i2"))["F_i2"] == "none"
+
+
+def with_unsure(read, name, plan="force_plan_B"):
+    """A reading in which the node where a force begins is in doubt."""
+    figure, tail = read.figures[plan], PUMP.construction.vectors[name].tail
+    nodes = {**figure.nodes, tail: replace(figure.nodes[tail], confidence=UNSURE)}
+    return replace(read, figures={**read.figures, plan: replace(figure, nodes=nodes)})
 
 
 def test_a_doubtful_force_shows_no_scale_where_the_length_in_its_cells_is_another():

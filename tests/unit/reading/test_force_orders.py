@@ -15,7 +15,8 @@ from grader.reading.expected import Edge, Expected
 from grader.reading.lines import lines_of
 from grader.reading.orders import ends_on_sheet, orders_by_ink, reordered, ring_of, to_usual
 from grader.reading.plans import ARROWS_PER_MM, MOST_BY_ARROWS, _nats_by_arrows
-from grader.reading.read import _find_forces, read_figures
+from grader.reading.read import BACKWARDS, _find_forces, _readings, read_figures
+from grader.reading.vectors import MOST_OPEN, _is_inferred, _may_pass_a_tiny_side
 from grader.records import (
     Figure,
     InkMap,
@@ -195,6 +196,42 @@ def test_arrowheads_anywhere_on_its_sides_tell_the_sense_of_a_polygon(tip, pen):
     assert forward(around) > TOLD_MM
     assert forward([(head, tail) for tail, head in around]) < -TOLD_MM
     assert forward([(0, 1), (1, 0)]) is None
+
+
+def test_a_polygon_that_its_arrowheads_contradict_is_hardly_believed(monkeypatch):
+    figure, vector = "force_plan_D", ReadVector.of(40.0 + 0.0j, np.eye(2) * 0.01, 0.9)
+    monkeypatch.setattr("grader.reading.read.figure_of_plan", lambda *_: (Figure({}, {"F_D": vector}), []))
+    drawing = SimpleNamespace(construction=SimpleNamespace(on_sketch=()), where=None)
+    page = SimpleNamespace(sketch=None, plans={figure: None}, sheet=None, ink=drawing, apart={}, beside={})
+    for forward, sure in ((40.0, 0.9), (1.0, MOST_OPEN), (-40.0, BACKWARDS)):
+        monkeypatch.setattr("grader.reading.read.forward_mm", lambda *_, told=forward, **__: told)
+        (reading,) = _readings([page], drawing, ())
+        assert reading.figures[figure].vectors["F_D"].confidence == sure
+
+
+def test_a_piece_of_a_line_is_not_the_stroke_of_a_sum():
+    edges = Edge("F_3", 0, 1), Edge("R_34", 1, 2, optional=True)
+    expected = SimpleNamespace(edges=edges)
+    drawn = SimpleNamespace(expected=expected, stroke=np.arange(2), shared=np.zeros(2, dtype=bool))
+    plan = SimpleNamespace(assignment=drawn, fit=SimpleNamespace(at=np.array([0.0, 30.0j, 80.0 + 30.0j])))
+    vectors = dict.fromkeys(("F_3", "R_34"), SimpleNamespace(part=""))
+    plan.hypothesis = SimpleNamespace(drawing=SimpleNamespace(construction=SimpleNamespace(vectors=vectors)))
+    for length_mm in (79.0, 32.0):
+        plan.lines = SimpleNamespace(length=np.array([30.0, length_mm]))
+        assert _is_inferred(plan, 1) == (length_mm < 40.0)
+
+
+@pytest.mark.parametrize(
+    ("end", "tiny", "is_open"), [(81.4, 1.4, True), (80.1, 1.4, False), (81.4, 0.1, False)]
+)
+def test_a_force_may_end_where_a_tiny_one_would_put_its_end(end, tiny, is_open):
+    edges = Edge("F_3", 0, 1), Edge("F_4", 1, 2)
+    at = 20.0 - 100.0j + np.array([0.0, 80.0, 80.0 + tiny])
+    tips = np.array([[0.0, end]]), np.ones((1, 2))
+    lines = SimpleNamespace(along=[1.0], start=at, tips_towards=lambda *_: tips)
+    plan = SimpleNamespace(lines=lines, placed=SimpleNamespace(edges=edges))
+    plan.expected, plan.pose = SimpleNamespace(at=at), SimpleNamespace(size=1.0)
+    assert _may_pass_a_tiny_side(plan, SimpleNamespace(at=at), edges[0], 0) == is_open
 
 
 @pytest.mark.slow
