@@ -51,7 +51,7 @@ EXAMPLES: Mapping[str, str] = {
     "first_direction": "perpendicular to %(link)s", "first_length": "@30.0 mm", "fixed": "O1, O2",
     "formula": "n", "from": "o", "head": "B", "high": "5.38", "joint": "D", "judged": "39",
     "least": "@3.0 mm",
-    "instead_of": "π·n/30", "length": "@48.1 mm",
+    "entered": "590", "meant": "59", "instead_of": "π·n/30", "length": "@48.1 mm",
     "line": "the line through %(tail)s and %(head)s", "link": "AB",
     "low": "0",
     "maximum": "42", "measured": "@1.91 m/s", "model": "ABC", "n": "7", "name": "v_BA", "node": "c",

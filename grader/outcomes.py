@@ -173,6 +173,10 @@ class NamedMistake:
 
 def _detail(mistake: Mistake) -> dict[str, float | str]:
     match mistake:
+        case Mistake(code="units", other=("typing", entered, meant)):
+            return {"slip": "typing", "entered": float(entered), "meant": float(meant)}
+        case Mistake(code="units", other=("entries", other)):
+            return {"slip": "entries", "other": other}
         case Mistake(code="units", other=(slip, *more), factor=factor):
             found: dict[str, float | str] = {"slip": slip}
             found |= {"axis" if slip == "axis" else "unit": one for one in more}

@@ -8,7 +8,6 @@ that, at the first criterion that shows it. Small errors that are each within th
 later node are no mistake. Verdicts are `Outcome`s with reasons as data (`grader.outcomes`).
 """
 
-import cmath
 import math
 import statistics
 from collections.abc import Iterator, Mapping
@@ -198,6 +197,8 @@ def _rank(following: FollowThrough, segment: TaskSegment) -> int:
     if line is None or own is None:
         basis = following.instead
         return int(basis is not None and not basis.blames(segment.name, head))
+    if following.starts_elsewhere(segment, own):
+        return 0
     # Whether it lies along its line, one way or the other; a very short one may.
     table, size = task.rubric.tolerance_of(segment.name), own.length_mm
     if size < table.least_mm:
@@ -611,10 +612,6 @@ def _may_be_mistyped(charges: Charges, one: TaskSegment) -> bool:
     return not fits(drawn, exact, charges.task.rubric.tolerance_of(one.name))
 
 
-LEAST_ACROSS = 0.2
-"""Least share of a vector across its link that tells which way it turns it."""
-
-
 def _own_rate(charges: Charges, rate: AngularRate, value: float) -> float | None:
     """The angular rate that the student's own vector gives; of two senses or factors, the nearer.
 
@@ -624,11 +621,9 @@ def _own_rate(charges: Charges, rate: AngularRate, value: float) -> float | None
     segment, drawn = task.segments[rate.vector], evidence.vector(rate.vector)
     own = own_rate(task, evidence, rate, following.used[segment.scale], following.nodes_instead())
     is_made_wrongly = segment.head in charges.charged | charges.doubtful
-    if own is not None and drawn is not None and is_made_wrongly:
-        direction, right = drawn.direction_rad, cmath.phase(segment.real)
-        if direction is None or abs(math.cos(direction - right)) < LEAST_ACROSS:
-            # It has no direction, or was drawn along the link: which way it turns that is not known.
-            own = math.copysign(own, value)
+    is_turned = drawn is not None and drawn.direction_rad is not None
+    if own is not None and is_made_wrongly and (not is_turned or following.turns_neither_way(rate.vector)):
+        own = math.copysign(own, value)
     factor = _common_factor(charges, segment.scale)
     if factor is None:
         return own

@@ -17,7 +17,7 @@ from typing import cast
 import numpy as np
 
 from grader.comparison.evidence import DrawnVector, Evidence
-from grader.comparison.own import Nodes, PlanBasis, known, other_mechanism, own_nodes
+from grader.comparison.own import Nodes, PlanBasis, fits, known, other_mechanism, own_nodes
 from grader.comparison.scales import Scale
 from grader.comparison.task import Made, Task, TaskSegment
 from grader.comparison.verdicts import NO_SPREAD, Expectation
@@ -44,6 +44,8 @@ from reference.geometry import ComplexArray, FloatArray
 from reference.numbers import dot
 from reference.replay.replay import Replay
 
+LEAST_ACROSS = 0.2
+"""Least share of a vector across its link that tells which way it turns it."""
 _MOST_SHARE = 1e6
 """Past this share of the right one a computed value gives no vector that fits; its square may overflow."""
 
@@ -456,6 +458,15 @@ class FollowThrough:
         vector = along * (drawn * along.conjugate()).real
         return replace(made, vector=vector, causes=frozenset({segment.head}))
 
+    def starts_elsewhere(self, segment: TaskSegment, own: DrawnVector) -> bool:
+        """Return whether a vector runs to its own head from the start of the component before it."""
+        step, nodes = self.task.construction.step(segment.tail), self.traced(self.followed).nodes
+        if not isinstance(step, Given):
+            return False
+        table, head = self.task.rubric.tolerance_of(segment.name), nodes[segment.head].at
+        whole, part = head - nodes[step.start].at, head - nodes[segment.tail].at
+        return fits(own, whole, table) and not fits(own, part, table)
+
     def between_own_nodes(self, segment: TaskSegment) -> Expectation | None:
         """The vector between the student's own nodes, for one that joins what other vectors have made."""
         construction, own = self.task.construction, self.own(self.followed)
@@ -651,13 +662,15 @@ class FollowThrough:
         if shares:
             farthest = max(shares, key=lambda one: abs(shares[one] - 1.0))
             relies_on = frozenset(vectors[one].head for one in shares)
-            size = math.prod(shares.values())
-            yield Expectation(right * size, "vector", farthest, relies_on)
-            own = self.evidence.vector(slide) if slide else None
+            sizes, own = [right * math.prod(shares.values())], self.evidence.vector(slide) if slide else None
             if slide and own and own.direction_rad is not None:
                 # Across the own sliding velocity, wherever that points.
                 turn = own.direction_rad - cmath.phase(self.task.real[slide] * shares.get(slide, 1.0))
-                yield Expectation(right * size * cmath.rect(1.0, turn), "vector", slide, relies_on)
+                sizes.append(sizes[0] * cmath.rect(1.0, turn))
+            if rate is not None and self.turns_neither_way(rate.vector):
+                sizes += [-size for size in sizes]
+            for size in sizes:
+                yield Expectation(size, "vector", farthest, relies_on)
         if rate is not None and (turned := self.own_turn(rate)) is not None:
             slid = {one: share for one, share in shares.items() if one == slide}
             relies_on = frozenset({rate.name, *(vectors[one].head for one in slid)})
@@ -672,6 +685,13 @@ class FollowThrough:
         if own.direction_rad is None:
             return share
         return math.copysign(share, math.cos(own.direction_rad - cmath.phase(right)))
+
+    def turns_neither_way(self, name: str) -> bool:
+        """Return whether a vector lies so near its link's direction that it turns that no way."""
+        own, right = self.evidence.vector(name), self.task.real[name]
+        if own is None or own.direction_rad is None:
+            return False
+        return abs(math.cos(own.direction_rad - cmath.phase(right))) < LEAST_ACROSS
 
     def own_turn(self, rate: AngularRate) -> float | None:
         """The student's own computed angular velocity as a share of the right one."""

@@ -208,7 +208,12 @@ class _LengthBranches:
         index = np.tile(np.arange(len(self.cost)), len(apart))
         every = np.concatenate(apart)
         residuals = [_nearest([one[index] for one in made], every)]
-        residuals += [np.abs(one[index] - every) for one in positions]
+        for one, place, vector in zip(ends, positions, drawn, strict=True):
+            # A vector that should follow a component may have been drawn from the start of that.
+            step = self.task.construction.step(one.vector.tail)
+            start = step.start if isinstance(step, Given) else one.vector.tail
+            elsewhere = np.abs(self.nodes[start][index] + vector - every)
+            residuals.append(np.fmin(np.abs(place[index] - every), elsewhere))
         total = self.cost[index] + self._apart(residuals)
         self._continue(node, every, total, index, np.ones(len(index), np.bool_))
         self.sources[node] = ends

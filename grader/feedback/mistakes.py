@@ -206,6 +206,16 @@ _UNITS: dict[str, Words] = {
         N_("The scales kv and ka were exchanged: each was declared as the other one."),
         N_("kv is the scale of velocities, ka that of accelerations: write each in its own place."),
     ),
+    "typing": Words(
+        N_("typing slip"),
+        N_("The entry of %(at)s looks like a typing slip."),
+        N_("Compare it with your drawing, and enter it again."),
+    ),
+    "entries": Words(
+        N_("entries exchanged"),
+        N_("The entries of %(at)s and %(other)s seem to be exchanged."),
+        N_("Write each in its own place."),
+    ),
 }  # fmt: skip
 """Words by the kind of unit slip."""
 
@@ -219,6 +229,12 @@ _CORIOLIS: dict[str, Words] = {
     "normal_reversed": Words(
         N_("Coriolis component reversed"),
         N_("At %(at)s, the Coriolis component was laid off the wrong way round."),
+        N_("Turn the sliding velocity of the guide's point relative to the block by 90° in the sense in"
+           " which the guide turns: that is its direction."),
+    ),
+    "parallel_for_perpendicular": Words(
+        N_("Coriolis component along the sliding velocity"),
+        N_("At %(at)s, the Coriolis component was laid off along the sliding velocity, not across it."),
         N_("Turn the sliding velocity of the guide's point relative to the block by 90° in the sense in"
            " which the guide turns: that is its direction."),
     ),
@@ -386,6 +402,7 @@ PRECISE: dict[str, tuple[str, ...]] = {
     ),
 }  # fmt: skip
 _PRECISE_UNITS: dict[str, tuple[str, ...]] = {
+    "typing": (N_("The entry of %(at)s looks like a typing slip: %(entered)s for %(meant)s."),),
     "radians": (
         N_("The directions were entered in radians instead of degrees: each is %(factor)s times too small."),
     ),
@@ -406,7 +423,7 @@ PRECISE_ALONG_GUIDE: dict[str, tuple[str, ...]] = {
     ),
 }  # fmt: skip
 _PRECISE_BY_TRIANGLE = (N_("The normal component %(vector)s was drawn by the right triangle on the sketch."),)
-GIVING_AWAY = frozenset({"factor", "degrees", "n", "position", "crank_deg"})
+GIVING_AWAY = frozenset({"factor", "degrees", "n", "position", "crank_deg", "meant"})
 """Details of a mistake that are shown only to those who may see the answers."""
 
 

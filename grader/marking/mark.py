@@ -19,7 +19,15 @@ from grader.marking.drawn import case_of, explain
 from grader.marking.lettering import exchanged_pair, letters_charged, with_letters_exchanged, with_turned
 from grader.marking.naming import LEAST_CONFIDENCE, Lost, drawn_instead, named, not_explained, speed_mistake
 from grader.marking.settling import at_stake, is_of, of_another, of_nothing, settled
-from grader.marking.units import EXCHANGED, Undone, slip_of_value, undone, with_scales_exchanged
+from grader.marking.units import (
+    EXCHANGED,
+    SINGLE,
+    Undone,
+    retyped,
+    slip_of_value,
+    undone,
+    with_scales_exchanged,
+)
 from grader.outcomes import CHARGED, CREDITED, Judgement, NamedMistake, Outcome, Score
 from grader.records import FloatArray, Reason
 from grader.rubric import CriterionTable, RubricFile
@@ -119,11 +127,23 @@ def _judged_as_entered(task: Task, submission: Submission) -> Judgement:
         if as_meant and meant and _is_explained_better(task, meant, comparison, as_meant):
             submission, comparison = as_meant.submission, meant
             slips += as_meant.slips
+        right = {one.name for one in comparison.outcomes if one.verdict in CREDITED}
+        as_meant = retyped(task, submission, right)
+        meant = None if as_meant is None else compare(task, as_meant.submission, explain)
+        if as_meant and meant and not _charges_more(meant, comparison):
+            submission, comparison = as_meant.submission, meant
+            slips += as_meant.slips
     if slips:
         owner = owner_of(task, comparison.evidence, submission.declared)
         comparison = comparison if owner is None else compare(task, submission, partial(explain, owner=owner))
     judgement = _with_arrows_turned(task, submission, comparison, owner)
     return with_slips_charged(task.rubric, judgement, as_entered, slips) if slips else judgement
+
+
+def _charges_more(meant: Comparison, entered: Comparison) -> bool:
+    """Return whether anything is charged in what was meant and not in what was entered."""
+    pairs = zip(meant.outcomes, entered.outcomes, strict=True)
+    return any(new.verdict in CHARGED and old.verdict not in CHARGED for new, old in pairs)
 
 
 def _with_scales_exchanged(
@@ -179,9 +199,7 @@ def _with_arrows_turned(
             continue  # All of its kind are.
         turned = with_turned(submission, one.name)
         meant = compare(task, turned, partial(explain, owner=owner))
-        pairs = zip(meant.outcomes, comparison.outcomes, strict=True)
-        is_new = any(new.verdict in CHARGED and old.verdict not in CHARGED for new, old in pairs)
-        if meant.outcomes[index].verdict in CREDITED and not is_new:
+        if meant.outcomes[index].verdict in CREDITED and not _charges_more(meant, comparison):
             submission, comparison = turned, meant
             is_alike = is_reversed and one.name.startswith("F_i")
             code = "inertia_reversed" if is_alike else "force_reversed"
@@ -384,12 +402,15 @@ def with_slips_charged(
             for index, (meant, entered) in enumerate(zip(outcomes, as_entered, strict=True))
             if meant.verdict in CREDITED and _shows(slip, entered)
         )
-        index = asked.get(slip.at, next(places, None))
+        is_single = not SINGLE.isdisjoint(slip.other[:1])
+        index = asked.get(slip.at, None if is_single else next(places, None))
         criteria = () if index is None else (outcomes[index].criterion,)
         one = NamedMistake(slip, criteria, probability)
         named_slips.append(one)
         if index is not None:
             lost = as_entered[index]
+            if is_single and lost.verdict not in CHARGED:
+                lost = replace(settled(lost, NONE, probability), reasons=())
             lost = lost if slip.at in asked else settled(lost, NONE, probability)
             outcomes[index] = replace(lost, mistake=one.code, cause=one)
     return replace(

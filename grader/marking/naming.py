@@ -13,7 +13,7 @@ from grader.marking.diagnosis import OF_THE_WHOLE, Case, Key, key_of
 from grader.outcomes import NamedMistake
 from grader.records import MECHANISM
 from reference.authored.assignment import SCALE_NAMES
-from reference.construction.elements import Along, Line
+from reference.construction.elements import Along, Line, Scaled
 from reference.construction.graph import Construction
 from reference.construction.mistakes import (
     OF_FORCES,
@@ -321,7 +321,7 @@ def _vector_of(mistake: Mistake, construction: Construction) -> str:
 
 def _line_of(step: Step, slot: int) -> dict[str, str]:
     """The parameters that describe a step's line: ``from`` a node, its ``link``, ``line`` of which kind."""
-    if isinstance(step, Given) and isinstance(step.along, Along):
+    if isinstance(step, Given) and isinstance(step.length, Scaled) and isinstance(step.along, Along):
         across = step.along.quarters % 2
         return {"line": "driving across" if across else "driving along"}
     line = (step.first, step.second)[slot] if isinstance(step, TwoLines) else None

@@ -1,4 +1,4 @@
-"""Slips of units and signs: a whole submission entered in another unit, sense or axis.
+"""Slips of entering: a whole submission in another unit, sense or axis, and single entries mistyped.
 
 Each is a transformation of everything that was entered, tried before any mistake of a single step: the
 entries as they stand, the entries undone, and entries that fit nothing are compared by their likelihood.
@@ -8,9 +8,9 @@ explained both ways, and the slip is undone where that explains it better.
 
 import cmath
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import combinations, pairwise, product
 
 import numpy as np
 
@@ -20,9 +20,10 @@ from grader.comparison.task import Task
 from grader.outcomes import UsedScale
 from grader.records import Reading, ReadVector
 from reference.construction.elements import Scaled
+from reference.construction.graph import Vector
 from reference.construction.mistakes import RPM_FACTOR, Mistake
 from reference.geometry import FloatArray, degrees
-from reference.quantities import OF_MOTION, KindName, kind_of
+from reference.quantities import OF_MOTION, KindName, group_of, kind_of
 from reference.replay.explanations import AREA_MM
 from reference.replay.nothing import NOTHING_FITS
 
@@ -397,3 +398,94 @@ def with_scales_exchanged(submission: Submission) -> Submission | None:
     if not kv or not ka or kv == ka:
         return None
     return replace(submission, declared={**submission.declared, "kv": ka, "ka": kv})
+
+
+# Single entries -----------------------------------------------------------------------------------
+
+CLOSES, CONTRADICTS = 6.0, 30.0
+"""Largest squared misfit, in standard errors, for each polygon of measured vectors if all close; and the
+least that an entry put right must remove: as rare as any wrong entry."""
+LEAST_POLYGONS = 2
+"""A single polygon is closed by some change too often by chance."""
+UNLIKE = 10.0
+"""An entry that was less likely mistyped by so much, -2 log of the odds, is no rival of the likeliest."""
+SINGLE = frozenset({"typing", "entries"})
+"""The kinds of slips in single entries."""
+
+
+def retyped(task: Task, submission: Submission, right: Collection[str]) -> Undone | None:
+    """The submission with mistyped entries put right, one in each plan of motion; None where there are none.
+
+    Only polygons of vectors show them, however wrong the drawing is: they close once a number is ten times
+    larger or smaller, has two digits or its sense exchanged, or once two entries are exchanged; and no other
+    entry explains that. Entries that are `right` are not mistyped.
+    """
+    if submission.measured is None or submission.readings:
+        return None
+    figures, slips = dict(submission.measured.figures), list[tuple[Mistake, float]]()
+    for plan in figures.keys() & task.construction.poles.keys() - {*filter(group_of, figures)}:
+        read = figures[plan].vectors
+        vectors = [one for one in task.construction.vectors_of(plan) if _is_whole(read.get(one.name))]
+        ways = [one for one in _ways_to_enter(vectors, read) if one[1].keys().isdisjoint(right)]
+        polygons = len(vectors) + 1 - len({end for one in vectors for end in (one.tail, one.head)})
+        closes = CLOSES * polygons
+        if not ways or polygons < LEAST_POLYGONS:
+            continue
+        if _misfit_and_cost(task, vectors, read)[0] <= closes + CONTRADICTS:
+            continue
+        fits = [_misfit_and_cost(task, vectors, {**read, **changed}) for _, changed in ways]
+        (misfit, cost), (slip, meant) = min(zip(fits, ways, strict=True), key=lambda one: one[0][1])
+        near = [way for (_, other), (_, way) in zip(fits, ways, strict=True) if other < cost + UNLIKE]
+        if misfit <= closes and all(way.keys() == meant.keys() for way in near):
+            figures[plan] = replace(figures[plan], vectors={**read, **meant})
+            slips.append((slip, SURE))
+    measured = replace(submission.measured, figures=figures)
+    return Undone(replace(submission, measured=measured), tuple(slips)) if slips else None
+
+
+def _is_whole(one: ReadVector | None) -> bool:
+    return one is not None and bool(one.length_mm) and one.direction_deg is not None
+
+
+def _misfit_and_cost(
+    task: Task, vectors: Sequence[Vector], entries: Mapping[str, ReadVector]
+) -> tuple[float, float]:
+    """The squared gaps in the polygons of these vectors, in standard errors of measuring, and their cost.
+
+    The cost is -2 log of the density of the entries per mm: wide errors make each entry rarer.
+    """
+    nodes, hand = {end for one in vectors for end in (one.tail, one.head)}, task.rubric.hand
+    read = [(entries[one.name], one.turn_rad) for one in vectors]
+    lengths = np.array([one.length_mm for one, _ in read], np.float64)
+    turns = np.array([math.radians(one.direction_deg or 0.0) - turn for one, turn in read])
+    sigmas = math.sqrt(2.0) * np.hypot(hand.ruler_mm, lengths * math.radians(hand.protractor_deg))
+    ends = [[float(node == one.head) - float(node == one.tail) for node in nodes] for one in vectors]
+    rows, drawn = np.array(ends) / sigmas[:, None], lengths * np.exp(1j * turns) / sigmas
+    left = drawn - rows @ np.linalg.lstsq(rows, drawn)[0]
+    misfit = float(np.vdot(left, left).real)
+    return misfit, misfit + 4.0 * float(np.log(sigmas).sum())
+
+
+def _ways_to_enter(
+    vectors: Sequence[Vector], read: Mapping[str, ReadVector]
+) -> Iterator[tuple[Mistake, dict[str, ReadVector]]]:
+    """Yield what may have been meant by one entry, or by two, with the slip."""
+    for name, one in ((vector.name, read[vector.name]) for vector in vectors):
+        size, turn = one.length_mm or 0.0, one.direction_deg or 0.0
+        meant = [(size, number, replace(one, length_mm=number)) for number in _numbers(size)]
+        turns = [number % 360.0 for number in (*_numbers(turn), turn + 180.0)]
+        meant += [(turn, number, replace(one, direction_deg=number)) for number in turns]
+        for typed, number, changed in meant:
+            other = ("typing", f"{typed:.6g}", f"{number:.6g}")
+            yield Mistake(UNITS, name, other=other), {name: changed}
+    for first, second in combinations((vector.name for vector in vectors), 2):
+        exchanged = {first: read[second], second: read[first]}
+        yield Mistake(UNITS, first, other=("entries", second)), exchanged
+
+
+def _numbers(entered: float) -> Iterator[float]:
+    """Yield the numbers that may have been meant: with another decimal point, or two digits exchanged."""
+    yield from (10.0 * entered, 0.1 * entered)
+    text = f"{entered:.6g}"
+    for i, j in pairwise(place for place, sign in enumerate(text) if sign.isdigit()):
+        yield float(text[:i] + text[j] + text[i + 1 : j] + text[i] + text[j + 1 :])

@@ -295,7 +295,7 @@ def law_of(mistake: NamedMistake) -> str:
     """Return the law that a mistake breaks, a key of the catalogues; empty for one without."""
     usual = LAWS.get(mistake.code, "")
     if mistake.at.startswith(CORIOLIS_END):
-        return _CORIOLIS.get(mistake.code, usual)
+        return _CORIOLIS.get(mistake.code.replace("parallel_for_perpendicular", "normal_reversed"), usual)
     line = line_in(mistake.detail)
     if _kind(mistake.at, "") == "laid off" and mistake.code in {SLIP, "force_reversed"}:
         return usual if mistake.code == SLIP else _LAID_OFF

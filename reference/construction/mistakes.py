@@ -373,14 +373,18 @@ def _wrong_feet(
 def rarer_mistakes_of_step(step: Step, construction: Construction) -> Iterator[Mistake]:
     """Yield rarer mistakes in one step of a plan, in addition to `mistakes_of_step`.
 
-    The driving link's vector along the link instead of across it, or across instead of along; a normal
-    component by the right triangle (a mistake only at scales that do not allow it); a line by the radius from
-    a pivot that carries no link; a line through any earlier point, or any earlier line.
+    The driving link's vector along the link instead of across it, or across instead of along; a Coriolis
+    component along the sliding velocity; a normal component by the right triangle (a mistake only at scales
+    that do not allow it); a line across a fixed guide, or by the radius from a pivot that carries no link; a
+    line through any earlier point, or any earlier line.
     """
     figure = construction.figure_of(step.node)
     if figure == "mechanism":
         return
-    if isinstance(step, Given) and isinstance(step.length, Scaled) and isinstance(step.along, Along):
+    laid_along = (
+        step.along if isinstance(step, Given) and isinstance(step.length, Scaled | Coriolis) else None
+    )
+    if isinstance(laid_along, Along):
         yield from (Mistake("parallel_for_perpendicular", step.node, quarters=one) for one in (1, 3))
     if isinstance(step, Given) and isinstance(step.length, Normal):
         yield Mistake(SLIP, step.node, other=(RIGHT_TRIANGLE,))
@@ -388,6 +392,8 @@ def rarer_mistakes_of_step(step: Step, construction: Construction) -> Iterator[M
         return
     known = {(one.code, one.slot, frozenset(one.other)) for one in mistakes_of_step(step, construction)}
     for slot, line in enumerate((step.first, step.second)):
+        if isinstance(line.along, Fixed) and line.along.quarters % 2 == 0:
+            yield Mistake("parallel_for_perpendicular", step.node, slot)
         if isinstance(line, Line) and isinstance(line.along, Along):
             for mistake in _further_lines(step, slot, line, construction):
                 if (mistake.code, slot, frozenset(mistake.other)) not in known:

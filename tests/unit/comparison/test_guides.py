@@ -99,6 +99,20 @@ def test_the_coriolis_component_stands_across_the_own_sliding_velocity(by_deg):
     assert found["a_A3A_c"] == "follow_through"
 
 
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_the_coriolis_component_has_either_sense_where_the_own_velocity_turns_the_guide_neither_way(sense):
+    reading = measured(SHAPER)
+    for name, figure, by_deg in (
+        ("v_A3", "velocity_plan", 90.0),
+        ("a_A3A_c", "acceleration_plan", 90.0 - 90.0 * sense),
+    ):
+        turned = (reading.figures[figure].vectors[name].direction_deg + by_deg) % 360.0
+        reading = changed(reading, name, direction_deg=turned)
+    found = verdicts(judge(SHAPER, Submission(measured=reading)))
+    assert found["v_A3"] == "none"
+    assert found["a_A3A_c"] in {"full", "follow_through"}
+
+
 def test_a_point_of_the_slotted_link_follows_from_the_length_of_another():
     reading = stretched(measured(SHAPER, directions=False), {"v_A3": LONGER, "v_D": LONGER})
     found = verdicts(judge(SHAPER, Submission(measured=reading)))

@@ -7,6 +7,7 @@ import pytest
 
 from grader.comparison.evidence import Submission
 from grader.comparison.task import task_of
+from grader.feedback.sentences import mistake_feedback
 from grader.marking.mark import judge
 from grader.rubric import rubric_of
 from reference.authored.assignment import library, load_assignment
@@ -157,6 +158,7 @@ def test_a_plan_started_at_another_scale_than_declared_is_one_wrong_scale(task, 
     [
         Mistake("parallel_for_perpendicular", "a", quarters=1),
         Mistake("parallel_for_perpendicular", "a'", quarters=3),
+        Mistake("parallel_for_perpendicular", "d", 1),
         Mistake("wrong_link", "b", 0, other=("O1", "B")),
         Mistake("wrong_intersection", "c'", 1, other=("n_BA",)),
         Mistake("wrong_intersection", "d", 0, other=("v_BA",)),
@@ -171,6 +173,17 @@ def test_rarer_mistakes_are_found_where_they_were_made(mistake, source):
     assert found.mistake.other == mistake.other
 
 
+@pytest.mark.parametrize("source", ["sheet", "directions"])
+@pytest.mark.parametrize("quarters", [1, 3])
+def test_a_coriolis_component_along_the_sliding_velocity_is_named(quarters, source):
+    shaper = task_for("shaper", 3)
+    mistake = Mistake("parallel_for_perpendicular", "k_A3A", quarters=quarters)
+    judgement = judge(shaper, handed_in(shaper, drawn_nodes(shaper, mistakes=(mistake,)), source))
+    (named,) = judgement.mistakes
+    assert (named.code, named.at, named.line) == (mistake.code, "k_A3A", {})
+    assert "sliding velocity" in mistake_feedback(named, "en")
+
+
 def test_an_entered_direction_that_contradicts_the_other_entries_accuses_of_nothing_else():
     # The plan is right; only what was entered for v_A points the other way.
     for task in (PUMP, PRESS):
@@ -179,7 +192,7 @@ def test_an_entered_direction_that_contradicts_the_other_entries_accuses_of_noth
         turned = (entered.direction_deg + 180.0) % 360.0
         judgement = judge(task, Submission(measured=changed(reading, "v_A", direction_deg=turned)))
         assert {one.name for one in judgement.outcomes if one.verdict == "none"} == {"v_A"}
-        assert judgement.mistakes == ()
+        assert [(one.code, one.at) for one in judgement.mistakes] == [("units", "v_A")]
 
 
 @pytest.mark.parametrize("source", SOURCES)

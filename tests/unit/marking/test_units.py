@@ -1,5 +1,6 @@
 """A submission entered in another unit, sense or axis is said to be so, and judged as it was meant."""
 
+import cmath
 import math
 from dataclasses import replace
 
@@ -13,7 +14,7 @@ from reference.construction.mistakes import RPM_FACTOR, Mistake
 from samples.simulation import CAREFUL, TYPICAL
 from samples.simulation.wording import declared_texts
 from tests.examples import slow
-from tests.hands import drawn_by, handed_in, measured, rule_scales, task_for
+from tests.hands import changed, drawn_by, handed_in, measured, rule_scales, task_for
 
 TASKS = [task_for("pump", 7), task_for("press", position=2), task_for("shaper", 3)]
 PUMP = TASKS[0]
@@ -129,3 +130,88 @@ def test_values_in_centimetres_per_second_and_revolutions_are_told_as_such():
     del rates["omega_1"]
     (named,) = slips_of(judge(PUMP, Submission(measured=measured(PUMP), values=rates)))
     assert named.detail["unit"] == "rev/min"
+
+
+# Single entries ------------------------------------------------------------------------------------
+
+
+def with_entry(submission, name, **change):
+    return replace(submission, measured=changed(submission.measured, name, **change))
+
+
+def entry_of(submission, name):
+    return next(one.vectors[name] for one in submission.measured.figures.values() if name in one.vectors)
+
+
+def lost_by(judgement):
+    return [one.name for one in judgement.outcomes if one.verdict in {"none", "partial"}]
+
+
+PARALLEL = Mistake("parallel_for_perpendicular", "b")
+
+
+@pytest.mark.parametrize("made", [(), (PARALLEL,)], ids=["right", "beside a mistake"])
+@pytest.mark.parametrize("change", ["ten times", "digits", "reversed"])
+def test_a_mistyped_entry_costs_once_and_says_what_was_meant(change, made):
+    submission = entered(PUMP, lambda one: one, *made, hand=CAREFUL)
+    meant = entry_of(submission, "v_D")
+    typed = {
+        "ten times": {"length_mm": 10.0 * meant.length_mm},
+        "digits": {"length_mm": float(f"{meant.length_mm:.1f}"[1::-1])},
+        "reversed": {"direction_deg": (meant.direction_deg + 180.0) % 360.0},
+    }[change]
+    before, after = judge(PUMP, submission), judge(PUMP, with_entry(submission, "v_D", **typed))
+    (named,) = slips_of(after)
+    assert (named.at, named.detail["slip"], named.explains) == ("v_D", "typing", ("v_D",))
+    assert sorted(lost_by(after)) == sorted([*lost_by(before), "v_D"])
+    told = mistake_feedback(named, "en")
+    assert f"{named.detail['entered']:.6g}" in told
+    assert f"{named.detail['meant']:.6g}" in told
+    shown = next(one for one in after.outcomes if one.name == "v_D").measured
+    assert shown.length_mm == typed.get("length_mm", meant.length_mm)
+
+
+def test_two_entries_exchanged_cost_one_of_them():
+    submission = entered(PUMP, lambda one: one, hand=CAREFUL)
+    first, second = (entry_of(submission, name) for name in ("v_B", "v_D"))
+    for name, one in (("v_B", second), ("v_D", first)):
+        submission = with_entry(submission, name, length_mm=one.length_mm, direction_deg=one.direction_deg)
+    judgement = judge(PUMP, submission)
+    (named,) = slips_of(judgement)
+    assert named.detail == {"slip": "entries", "other": "v_D"}
+    assert lost_by(judgement) == ["v_B"]
+
+
+def test_an_entry_that_is_wrong_by_anything_else_is_no_typing_slip():
+    submission = entered(PUMP, lambda one: one, hand=CAREFUL)
+    for name in ("v_B", "v_D", "a_C"):
+        longer = 1.37 * entry_of(submission, name).length_mm
+        assert not slips_of(judge(PUMP, with_entry(submission, name, length_mm=longer)))
+
+
+def test_one_polygon_alone_shows_no_typing_slip():
+    submission = entered(PUMP, lambda one: one, hand=CAREFUL)
+    kept = {"v_A", "v_B", "v_BA"}
+    figures = dict(submission.measured.figures)
+    figures["velocity_plan"] = replace(
+        figures["velocity_plan"],
+        vectors={name: one for name, one in figures["velocity_plan"].vectors.items() if name in kept},
+    )
+    submission = replace(submission, measured=replace(submission.measured, figures=figures))
+    longer = 10.0 * entry_of(submission, "v_B").length_mm
+    assert not slips_of(judge(PUMP, with_entry(submission, "v_B", length_mm=longer)))
+
+
+def test_a_line_from_the_start_of_its_component_costs_there_and_not_where_it_ends():
+    wrong = Mistake("wrong_intersection", "d'", other=("c'",))
+    submission = entered(PUMP, lambda one: one, wrong, hand=CAREFUL)
+    whole = sum(
+        cmath.rect(one.length_mm, math.radians(one.direction_deg))
+        for one in (entry_of(submission, "a_DC_n"), entry_of(submission, "a_DC_t"))
+    )
+    submission = with_entry(
+        submission, "a_DC_t", length_mm=abs(whole), direction_deg=math.degrees(cmath.phase(whole)) % 360.0
+    )
+    judgement = judge(PUMP, submission)
+    assert "a_DC_t" in lost_by(judgement)
+    assert "a_D" not in lost_by(judgement)
