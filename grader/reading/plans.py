@@ -106,6 +106,9 @@ LEAST_VISIBLE_MM = 2.5
 """A shorter vector may have no stroke of its own."""
 TWICE, LEAST_TWICE = 0.5, 40.0
 """A plan is drawn twice if other strokes give one of its size with this share of its score, and this much."""
+CROSSED_OUT, LONG_SHARE, BY_NODE_MM, STEEP = 4.0, 0.3, 1.5, 0.2
+"""Nats against a plan that is crossed out: by strokes of this share of its extent that cross vectors at an
+angle of a larger sine, one of them past all nodes by more."""
 RIVALS = 25
 """Number of explanations used for the confidences; the others weigh next to nothing."""
 BEAM_OF_DOUBTS = 3
@@ -334,10 +337,35 @@ def _of_several(problem: PlanProblem, plans: list[PlanReading]) -> tuple[list[Pl
     ]
     if not apart:
         return plans, 1.0
-    here, there = (_letters_nats(problem, plan) for plan in (first, apart[0]))
+    here, there = (
+        _letters_nats(problem, plan) - CROSSED_OUT * _is_crossed_out(problem, plan)
+        for plan in (first, apart[0])
+    )
     kept = (apart[0] if there > here else first).members
     chance = 1.0 / (1.0 + math.exp(-abs(there - here)))
     return [plan for plan in plans if np.isin(plan.members, kept).any()], chance
+
+
+def _is_crossed_out(problem: PlanProblem, plan: PlanReading) -> bool:
+    """Return whether strokes run a long way across a plan's vectors, one of them past all its nodes.
+
+    Lines of its construction pass through a node, as one that crosses it out from corner to corner may.
+    """
+    lines, at = problem.lines, plan.assignment.expected.at
+    tails, heads = at[[(edge.tail, edge.head) for edge in plan.placed.edges]].T
+    span = (heads - tails)[:, None]
+    is_free = (lines.members[:, 0] == lines.members[:, 1]) & ~np.isin(lines.members[:, 0], plan.members)
+    free = lines.take(is_free & (lines.length > LONG_SHARE * np.hypot(np.ptp(at.real), np.ptp(at.imag))))
+    passes_by = (np.abs((np.conj(free.along) * (at[:, None] - free.start)).imag) > BY_NODE_MM).all(axis=0)
+    turn = np.conj(free.along) * span
+    steep = np.abs(turn.imag) > STEEP * np.abs(span)
+    across = np.where(steep, turn.imag, np.inf)
+    off = free.start - tails[:, None]
+    on_vector = (np.conj(free.along) * off).imag / across
+    on_stroke = (np.conj(span) * off).imag / across / free.length
+    crosses = steep & (np.abs(on_vector - 0.5) < 0.5) & (np.abs(on_stroke - 0.5) < 0.5)
+    is_across = crosses.any(axis=0)
+    return int(is_across.sum()) > 1 and bool((is_across & passes_by).any())
 
 
 def _letters_nats(problem: PlanProblem, plan: PlanReading) -> float:

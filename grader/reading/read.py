@@ -15,7 +15,7 @@ from grader.reading.lettering import lettered, support
 from grader.reading.lines import Lines, lines_of
 from grader.reading.on_sketch import SketchPage, with_additions
 from grader.reading.page_scale import given_length, no_surer
-from grader.reading.plans import EXPLAINED, PlanProblem, PlanReading, best_plan, regular_plans
+from grader.reading.plans import EXPLAINED, NO_CHANCE, PlanProblem, PlanReading, best_plan, regular_plans
 from grader.reading.sketch import SketchReading, drawings, find_sketch
 from grader.reading.vectors import MOST_OPEN, figure_of_plan, figure_of_sketch, in_usual_order
 from grader.records import (
@@ -285,9 +285,8 @@ def _find_plan(
             break
     laid.sort(key=lambda one: -one.score)
     # If no sheet shows the right plan, a mistaken one may be on either.
-    if laid and laid[0].is_explained:
-        laid = laid[:1]
-    elif figure == VELOCITY_PLAN:
+    laid = laid[:1] if laid and laid[0].is_explained else laid
+    if figure == VELOCITY_PLAN and laid and not (laid[0].is_explained and laid[0].score > NO_CHANCE):
         laid = [_without_accelerations(one) for one in laid]
     best: tuple[_PageReading, PlanReading] | None = None
     for one in laid:
