@@ -62,7 +62,7 @@ ARROWS_PER_MM, MOST_BY_ARROWS = 1.25, 5.0
 """Nats for each millimetre of ink that arrowheads have in the sense of the forces, and most of them: of 164
 polygons 4 mm tell the sense of all but one."""
 EXPLAINED, NO_CHANCE = 0.85, 12.0
-"""A regular plan supported over more of its length is taken as drawn, and with more nats by no chance."""
+"""Support of a regular plan that is taken as drawn; nats that are no chance, with a mistake twice as many."""
 ODD_NODE_NATS = 1.5
 """Nats of letters that each such node needs: without letters, others would fit as well."""
 FOREIGN_PRIMES = 2
@@ -183,6 +183,7 @@ class PlanReading:
     score : log likelihood ratio less costs, nats
     rivals : other explanations, best first
     named : probability that its letters say the names, of one whose nodes the construction does not place
+    told : the same of nodes that are near each other, where the construction may have either
     by_ink : the nodes by strokes and ink together, of the one that is chosen
     seen : of a force polygon the same without the data, which place its nodes where nothing marks them
     """
@@ -196,6 +197,7 @@ class PlanReading:
     lines: Lines
     rivals: tuple["PlanReading", ...] = ()
     named: float = 1.0
+    told: float = 1.0
     by_ink: NodeFit | None = None
     seen: NodeFit | None = None
 
@@ -301,6 +303,9 @@ def best_plan(problem: PlanProblem, drawing: Drawing, plans: list[PlanReading]) 
     if plans:
         bases = {plan.hypothesis.label: plan.hypothesis for plan in reversed(plans)}
         everything.extend(_with_mistakes(problem, plans[0], bases.values()))
+        best = max(everything, key=lambda plan: plan.score)
+        if is_lettered and best is not plans[0] and best.score > 2.0 * NO_CHANCE and _suspects(best):
+            everything.extend(_with_mistakes(problem, best, [best.hypothesis]))
     is_open = not plans or plans[0].pose.score < EXPLAINED or bool(_suspects(plans[0]))
     # Reversed in part, other forces would leave the lines of the right polygon in the opposite sense.
     is_open |= bool(plans) and _nats_by_arrows(problem, plans[0]) <= -MOST_BY_ARROWS
@@ -372,9 +377,8 @@ def _letters_nats(problem: PlanProblem, plan: PlanReading) -> float:
     """Return the nats of the letters at the nodes of a plan."""
     expected, poles = plan.assignment.expected, plan.hypothesis.drawing.construction.poles.values()
     at = {(problem.figure, name): at for name, at in zip(expected.names, expected.at.tolist(), strict=True)}
-    writing = lettering(
-        {} if group_of(problem.figure) else at, problem.letters, frozenset(poles), problem.renamed
-    )
+    lettered = {} if group_of(problem.figure) else at
+    writing = lettering(lettered, problem.letters, frozenset(poles), problem.renamed)
     return 0.0 if writing is None else writing.log()
 
 
@@ -532,9 +536,10 @@ def _by_letters(problem: PlanProblem, base: PlanHypothesis) -> list[PlanReading]
     return _read(cases, problem.free, problem.prior)
 
 
-def _named_by(letters_nats: float, hypothesis: PlanHypothesis) -> float:
+def _named_by(letters_nats: float, hypothesis: PlanHypothesis, least: int = 0) -> float:
     """Return the probability that letters name a graph's nodes: strokes alone fit other names as well."""
-    odd = int((hypothesis.cost - COST_OF_GRAPH) / COST_OF_ODD_NODE) if hypothesis.label == BY_LETTERS else 0
+    is_graph = hypothesis.label == BY_LETTERS
+    odd = max(least, int((hypothesis.cost - COST_OF_GRAPH) / COST_OF_ODD_NODE)) if is_graph else 0
     return 1.0 / (1.0 + math.exp(ODD_NODE_NATS * odd - letters_nats)) if odd else 1.0
 
 
@@ -555,12 +560,12 @@ def _weighed(problem: PlanProblem, plans: Sequence[PlanReading]) -> list[PlanRea
     for plan in sorted(plans, key=lambda plan: -plan.score):
         if plan.score >= least and (key := (plan.strokes, is_told or plan.sense)) not in scored:
             nats = _letters_nats(problem, plan)
-            named = _named_by(nats, plan.hypothesis)
+            named, told = (_named_by(nats, plan.hypothesis, least) for least in (0, 1))
             alike = plan.hypothesis.label, plan.hypothesis.order, plan.sense
             if alike not in by_arrows:
                 by_arrows[alike] = _nats_by_arrows(problem, plan) if plan.score >= least_of_arrows else 0.0
             nats += by_arrows[alike]
-            scored[key] = replace(plan, score=plan.score + nats, named=named)
+            scored[key] = replace(plan, score=plan.score + nats, named=named, told=told)
     return sorted(scored.values(), key=lambda plan: -plan.score)
 
 

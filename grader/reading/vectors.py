@@ -9,6 +9,7 @@ import numpy as np
 
 from grader.reading.arrowheads import is_double
 from grader.reading.expected import REGULAR, Edge, xy
+from grader.reading.lettering import COMPONENTS
 from grader.reading.nodes import NodeFit
 from grader.reading.plans import SPECK_MM, PlanReading
 from grader.reading.sketch import SketchReading
@@ -59,6 +60,8 @@ tiny force or a sum without its own stroke: many are left out."""
 RUNS_ON_MM, HEADED_MM, NO_HEAD, MOST_UNDRAWN = 3.0, 1.0, 0.2, 0.45
 """A stroke that runs on farther past an end of a vector, with no clearer mark so near to its head, may be the
 line of its direction: so do 2 of 227 drawn vectors and 6 of 24 left out on a line. Most confidence in it."""
+CLOSE_MM = 5.0
+"""Nodes of a lettered graph that are nearer to each other are told apart by letters alone."""
 LEAST_VECTOR_MM = 2.0
 """A shorter vector is read from its nodes, with or without a stroke."""
 
@@ -137,6 +140,7 @@ def _vectors(
     vectors: dict[str, ReadVector] = {}
     unread: list[Unread] = []
     is_polygon = bool(group_of(plan.figure))
+    lettered = fit.at[[not name.startswith(COMPONENTS) for name in expected.names]]
     for index, edge in enumerate(expected.edges):
         if plan.hypothesis.is_side(edge.name):
             continue
@@ -155,6 +159,8 @@ def _vectors(
         (_, named), *others = explanations.of(spans, EITHER_MM if of_two else NEAR_MM)
         # A long vector is never more certain than the sheet's scale.
         most = math.erf(NEAR_MM / max(math.sqrt(2.0) * sheet.scale_se * abs(span), 1e-9))
+        if np.sum(np.abs(lettered - fit.at[[[edge.tail], [edge.head]]]) < CLOSE_MM) > 2:
+            named = min(named, plan.told)
         signs = Signs(within(cov), named, off_mm=0.0)
         if row >= 0:
             off_mm = float(np.abs(fit.residual_mm[index]).max())
@@ -391,9 +397,7 @@ def _explanations(plan: PlanReading, fit: NodeFit) -> _Explanations:
     weight, places = [1.0], [fit.at]
     # In the order of this plan's sides, whatever that of its rivals.
     own = None if plan.usual is None else np.linalg.inv(plan.usual)
-    for rival in plan.rivals:
-        if rival.score <= plan.score - RIVAL_NATS:
-            continue
+    for rival in (one for one in plan.rivals if one.score > plan.score - RIVAL_NATS):
         if rival.strokes not in nodes_by_strokes:
             there = in_usual_order(rival).at
             nodes_by_strokes[rival.strokes] = there if own is None else own @ there

@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from grader.reading.lines import lines_of
+from grader.reading.plans import PlanProblem, best_plan, regular_plans
 from grader.reading.read import read_figures
-from grader.reading.vectors import INKED, MOST_OPEN, ON_IT_PX, SHORT_MM
+from grader.reading.vectors import CLOSE_MM, INKED, MOST_OPEN, ON_IT_PX, SHORT_MM, figure_of_plan
 from grader.records import ACCELERATION_PLAN, HEAD_AHEAD, MECHANISM, VELOCITY_PLAN, InkMap, Reading, Tips
 from reference.authored.assignment import Assignment, Variant, built_in, load_assignment
 from reference.construction.elements import View
@@ -136,6 +138,30 @@ def test_a_short_vector_in_a_wrong_direction_is_not_drawn_towards_the_right_one(
     found, _ = vectors_read(read(draw(drawing, pen=pen), assignment, variant))["a_BA_n"]
     assert abs(vector) < 6.0
     assert abs(found - wrong) < NEAR_MM
+
+
+def test_two_known_mistakes_in_one_plan_leave_its_vectors_sure_without_letters():
+    assignment, variant, drawing = task("pump", Variant(n=9))
+    wrong = commit(Mistake("normal_missing", "n_B"), drawing)
+    drawn = draw(commit(Mistake("normal_reversed", "n_DC"), wrong), pen=Pen(redraw_mm=0.05))
+    reading = read(drawn, assignment, variant)
+    found = vectors_read(reading).values()
+    assert not silently_wrong(drawn, reading)
+    assert sum(confidence >= SURE for _, confidence in found) > 0.7 * len(drawn.vectors)
+
+
+def test_nodes_near_each_other_are_told_apart_by_letters_alone():
+    _, _, drawing = task("pump", Variant(n=28))
+    drawn = draw(drawing)
+    problem = PlanProblem(lines_of(drawn.ink), ACCELERATION_PLAN, drawn.nodes)
+    plan = best_plan(problem, drawing, regular_plans(problem, drawing))
+    by_strokes, by_letters = (
+        figure_of_plan(replace(plan, told=told), drawn.sheet, drawn.ink.where)[0].vectors
+        for told in (1.0, 0.2)
+    )
+    assert abs(drawn.nodes["a'"] - drawn.nodes["c'"]) < CLOSE_MM
+    assert by_letters["a_A"].confidence < by_strokes["a_A"].confidence
+    assert by_letters["a_D"].confidence == by_strokes["a_D"].confidence
 
 
 def test_another_students_variant_is_read_as_drawn():
