@@ -165,25 +165,15 @@ def _vectors(
         if row >= 0:
             off_mm = float(np.abs(fit.residual_mm[index]).max())
             least = UNMARKED if abs(span) > SHORT_MM and not is_polygon else 0.0
-            marked = min(_marked(plan, fit, edge, row))
-            signs = replace(signs, off_mm=off_mm, marked=max(marked, least))
-            is_headed = _marked(plan, fit, edge, row, HEADED_MM)[1] >= NO_HEAD
-            runs_on = max(-first_mm, last_mm - abs(span)) > RUNS_ON_MM and not plan.assignment.shared[index]
-            if runs_on and not (is_headed or is_polygon or edge.optional) and abs(span) > SHORT_MM:
-                most = min(most, MOST_UNDRAWN)
+            marked = max(min(_marked(plan, fit, edge, row)), least)
+            signs = replace(signs, off_mm=off_mm, marked=marked)
+            most = min(most, MOST_UNDRAWN) if _may_be_its_line(plan, fit, index) else most
         sure = signs.confidence()
         if is_polygon:
             sure = _weighed(sure, plan, edge, span, cov, sheet)
             # What a mistake that was sought predicts is no evidence against the other explanations.
             sure = sure if plan.hypothesis.label in REGULAR else min(sure, named)
-            predicted_mm = abs(_predicted(plan, edge))
-            # One that is known to be left out is nothing, and no tiny force that may be there.
-            is_left_out = plan.hypothesis.label not in REGULAR and predicted_mm < SPECK_MM
-            is_tiny = min(abs(span), predicted_mm) < LEAST_VECTOR_MM and not is_left_out
-            is_inferred = not of_two and _is_inferred(plan, index)
-            is_inferred |= row >= 0 and _may_pass_a_tiny_side(plan, fit, edge, row)
-            if is_tiny or is_inferred or (of_two and _goes_on(where, complex(fit.at[edge.tail]), span)):
-                sure = min(sure, MOST_OPEN)
+            sure = min(sure, MOST_OPEN) if _may_be_left_out(plan, fit, index, where) else sure
         elif row < 0 and abs(span) > LEAST_VECTOR_MM and _may_lie_under(plan, fit, edge):
             sure = min(sure, MOST_OPEN)
         read = ReadVector.of(span, cov, min(sure, most, HIGHEST))
@@ -193,6 +183,31 @@ def _vectors(
         )
         vectors[edge.name] = replace(read, others=tuple(rivals))
     return vectors, unread
+
+
+def _may_be_its_line(plan: PlanReading, fit: NodeFit, index: int) -> bool:
+    """Return whether a vector's stroke may be the line of its direction alone: it runs on without a head."""
+    edge, row = plan.assignment.expected.edges[index], int(plan.assignment.stroke[index])
+    length = abs(fit.at[edge.head] - fit.at[edge.tail])
+    first_mm, last_mm = _along(plan, fit, edge, row)
+    if group_of(plan.figure) or edge.optional or plan.assignment.shared[index] or length <= SHORT_MM:
+        return False
+    runs_on = max(-first_mm, last_mm - length) > RUNS_ON_MM
+    return runs_on and _marked(plan, fit, edge, row, HEADED_MM)[1] < NO_HEAD
+
+
+def _may_be_left_out(plan: PlanReading, fit: NodeFit, index: int, where: InkMap) -> bool:
+    """Return whether a force may be left out or end elsewhere, as a tiny one, or one in another's line."""
+    edge, row = plan.assignment.expected.edges[index], int(plan.assignment.stroke[index])
+    span, predicted_mm = complex(fit.at[edge.head] - fit.at[edge.tail]), abs(_predicted(plan, edge))
+    of_two = is_double(plan, edge)
+    # One that is known to be left out is nothing, and no tiny force that may be there.
+    is_known = plan.hypothesis.label not in REGULAR and predicted_mm < SPECK_MM
+    if (min(abs(span), predicted_mm) < LEAST_VECTOR_MM and not is_known) or (
+        row >= 0 and _may_pass_a_tiny_side(plan, fit, edge, row)
+    ):
+        return True
+    return _goes_on(where, complex(fit.at[edge.tail]), span) if of_two else _is_inferred(plan, index)
 
 
 def _gap(plan: PlanReading, edge: Edge, where: InkMap, least: float) -> Unread | None:
