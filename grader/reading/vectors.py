@@ -57,9 +57,6 @@ LEAST_OWN = 0.5
 MOST_OPEN = 0.8
 """Most confidence in a line of two opposite forces with ink behind its end, of an arrowhead perhaps; and in a
 tiny force or a sum without its own stroke: many are left out."""
-RUNS_ON_MM, HEADED_MM, NO_HEAD, MOST_UNDRAWN = 3.0, 1.0, 0.2, 0.45
-"""A stroke that runs on farther past an end of a vector, with no clearer mark so near to its head, may be the
-line of its direction: so do 2 of 227 drawn vectors and 6 of 24 left out on a line. Most confidence in it."""
 CLOSE_MM = 5.0
 """Nodes of a lettered graph that are nearer to each other are told apart by letters alone."""
 LEAST_VECTOR_MM = 2.0
@@ -146,9 +143,9 @@ def _vectors(
             continue
         span = complex(fit.at[edge.head] - fit.at[edge.tail])
         row = int(plan.assignment.stroke[index])
-        first_mm, last_mm = _along(plan, fit, edge, row) if row >= 0 else (0.0, 0.0)
+        covered_mm = plan.lines.length[row] if row >= 0 else 0.0
         may_lack = row < 0 or not (is_polygon or edge.optional)
-        is_sought = may_lack and last_mm - first_mm < DASHED * abs(span) and abs(span) > LEAST_VECTOR_MM
+        is_sought = may_lack and covered_mm < DASHED * abs(span) and abs(span) > LEAST_VECTOR_MM
         gap = _gap(plan, edge, where, INKED if row < 0 else DASHED) if is_sought else None
         if gap is not None:
             unread.append(gap)
@@ -165,9 +162,8 @@ def _vectors(
         if row >= 0:
             off_mm = float(np.abs(fit.residual_mm[index]).max())
             least = UNMARKED if abs(span) > SHORT_MM and not is_polygon else 0.0
-            marked = max(min(_marked(plan, fit, edge, row)), least)
+            marked = max(_marked(plan, fit, edge, row), least)
             signs = replace(signs, off_mm=off_mm, marked=marked)
-            most = min(most, MOST_UNDRAWN) if _may_be_its_line(plan, fit, index) else most
         sure = signs.confidence()
         if is_polygon:
             sure = _weighed(sure, plan, edge, span, cov, sheet)
@@ -183,17 +179,6 @@ def _vectors(
         )
         vectors[edge.name] = replace(read, others=tuple(rivals))
     return vectors, unread
-
-
-def _may_be_its_line(plan: PlanReading, fit: NodeFit, index: int) -> bool:
-    """Return whether a vector's stroke may be the line of its direction alone: it runs on without a head."""
-    edge, row = plan.assignment.expected.edges[index], int(plan.assignment.stroke[index])
-    length = abs(fit.at[edge.head] - fit.at[edge.tail])
-    first_mm, last_mm = _along(plan, fit, edge, row)
-    if group_of(plan.figure) or edge.optional or plan.assignment.shared[index] or length <= SHORT_MM:
-        return False
-    runs_on = max(-first_mm, last_mm - length) > RUNS_ON_MM
-    return runs_on and _marked(plan, fit, edge, row, HEADED_MM)[1] < NO_HEAD
 
 
 def _may_be_left_out(plan: PlanReading, fit: NodeFit, index: int, where: InkMap) -> bool:
@@ -422,22 +407,10 @@ def _explanations(plan: PlanReading, fit: NodeFit) -> _Explanations:
     return _Explanations(np.array(weight), np.array(places), plan.named)
 
 
-def _along(plan: PlanReading, fit: NodeFit, edge: Edge, row: int) -> tuple[float, float]:
-    """Return where a stroke begins and ends along a vector, mm from its tail."""
-    tail, out = fit.at[edge.tail], fit.at[edge.head] - fit.at[edge.tail]
-    ends = np.array([plan.lines.start[row], plan.lines.end[row]]) - tail
-    first, last = sorted(((ends * np.conj(out)).real / max(abs(out), 1e-9)).tolist())
-    return first, last
-
-
-def _marked(
-    plan: PlanReading, fit: NodeFit, edge: Edge, row: int, near_mm: float = MARKED_MM
-) -> tuple[float, float]:
-    """Return how clearly tips mark a vector's tail and its head on its stroke."""
-    at_tail, at_head = (
-        float(sure[apart < near_mm].max(initial=0.0)) for apart, sure in _tips(plan, fit, edge, row)
-    )
-    return at_tail, at_head
+def _marked(plan: PlanReading, fit: NodeFit, edge: Edge, row: int) -> float:
+    """Return how clearly tips mark a vector's two ends on its stroke."""
+    ends = _tips(plan, fit, edge, row)
+    return min(float(sure[apart < MARKED_MM].max(initial=0.0)) for apart, sure in ends)
 
 
 def _tips(plan: PlanReading, fit: NodeFit, edge: Edge, row: int) -> Iterator[tuple[FloatArray, FloatArray]]:
