@@ -175,7 +175,7 @@ def _redo(subject: Subject, mistake: NamedMistake, speaker: Tongue, level: Level
     vector = subject.plan.construction.vectors.get(mistake.at)
     is_value = mistake.code == "arithmetic" and not mistake.line
     is_arrow = mistake.code == "force_reversed" and len(mistake.explains) == 1
-    if vector and (is_value or is_arrow):
+    if vector and (is_value or is_arrow or mistake.code == "units"):
         # The drawing can stay.
         return []
     return redo(subject, speaker, vector.head if vector else mistake.at, with_numbers=level == "full")

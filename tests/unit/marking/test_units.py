@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from grader.comparison.evidence import Submission
+from grader.feedback.redo_steps import with_mistakes_explained
 from grader.feedback.sentences import mistake_feedback
 from grader.marking.mark import judge
+from grader.marking.report import report_of
+from reference.authored.assignment import load_assignment
 from reference.construction.mistakes import RPM_FACTOR, Mistake
 from samples.simulation import CAREFUL, TYPICAL
 from samples.simulation.wording import declared_texts
@@ -180,6 +183,9 @@ def test_two_entries_exchanged_cost_one_of_them():
     (named,) = slips_of(judgement)
     assert named.detail == {"slip": "entries", "other": "v_D"}
     assert lost_by(judgement) == ["v_B"]
+    report = report_of(PUMP, judgement, "s01", language="en", sentences={})
+    told = with_mistakes_explained(report, judgement, load_assignment("pump"), PUMP.variant, "en", "full")
+    assert told.mistakes[0].redo == []  # the drawing can stay
 
 
 def test_an_entry_that_is_wrong_by_anything_else_is_no_typing_slip():
