@@ -19,7 +19,8 @@ from grader.comparison.verdicts import (
     the_better,
 )
 from grader.outcomes import CHARGED, CREDITED, EVEN
-from grader.records import Reason
+from grader.records import VELOCITY_PLAN, Reason
+from reference.construction.elements import Coriolis, Normal
 from reference.construction.steps import Given
 from reference.quantities import group_of
 
@@ -219,10 +220,9 @@ class Charges:
 
     def opened(self, segment: TaskSegment, mark: MarkRange) -> MarkRange:
         """Return a mark; a loss on a sheet is open while one of its sources was not read for certain."""
-        unknown = () if mark.share == FULL else self._unread_beside(segment)
-        if mark.share != FULL and not (self._is_force(segment) and self.is_known(segment, mark)):
-            unknown = self._unknown_upstream(segment) + unknown
-        if not unknown:
+        is_known = self._is_force(segment) and self.is_known(segment, mark)
+        unknown = (() if is_known else self._unknown_upstream(segment)) + self._unread_beside(segment)
+        if mark.share == FULL or not unknown:
             return mark
         self.charged.discard(segment.head)
         self.doubtful.add(segment.head)
@@ -232,35 +232,37 @@ class Charges:
     def _unknown_upstream(self, segment: TaskSegment) -> tuple[str, ...]:
         """Return the unknown sources of a vector: its scale; nodes in doubt, of figures read, of forces.
 
-        Known are nodes that were read, those from which a vector was made that is right, and those at which
-        it is nearly certain what was done.
+        Known are nodes that were read (but not for a length computed from velocities in doubt), those from
+        which a vector was made that is right, and those at which it is nearly certain what was done.
         """
         construction, nodes = self.task.construction, self.evidence.nodes
         scale = self.settled[segment.scale].mark
         is_unseen = scale is not None and any(reason.code == "unread" for reason in scale.reasons)
         read = {construction.figure_of(node) for node in nodes}
         read |= {figure for figure in construction.figures if group_of(figure)}
+        step, explained = construction.step(segment.head), self.following.explanation.explained
         unread = [
             need
-            for need in dict.fromkeys(construction.step(segment.head).needs)
+            for need in dict.fromkeys(step.needs)
             if need not in {*nodes, *self.charged, *self.cleared}
             and (need in self.doubtful or construction.figure_of(need) in read)
         ]
         if unread:
             right = self.cleared - self.by_length - self.charged - self.doubtful
-            sure = construction.needed_for(right) | self.following.explanation.explained
+            sure = construction.needed_for(right) | explained
             unread = [need for need in unread if need not in sure]
+        if isinstance(step, Given) and isinstance(step.length, Normal | Coriolis):
+            velocities = {one for one in step.length.needs if construction.figure_of(one) == VELOCITY_PLAN}
+            unread += sorted(velocities & self.doubtful - self.either - explained - {*unread})
         return (*((segment.scale,) if is_unseen else ()), *unread)
 
     def _unread_beside(self, segment: TaskSegment) -> tuple[str, ...]:
         """Return the forces of the same polygon that were not read: one may be read as a part of another."""
         construction, following = self.task.construction, self.following
-        figure = construction.figure_of(segment.head)
-        if not group_of(figure):
-            return ()
+        polygon = construction.polygon_of(construction.figure_of(segment.head))
         return tuple(
             side.name
-            for side in construction.polygon_of(figure)
+            for side in (polygon if self._is_force(segment) else ())
             if self.evidence.vector(side.name) is None
             and side.head not in following.explanation.explained
             and abs(self.task.segments[side.name].drawn(following.used)) >= SHORT_MM

@@ -661,6 +661,16 @@ def test_a_loss_is_open_while_what_it_may_follow_from_is_not_known():
     assert outcome_of(certain, "v_D").verdict == "follow_through"
 
 
+def test_a_computed_length_is_charged_only_while_the_velocity_is_certain_that_it_is_computed_from():
+    reading = sheet(PUMP, moved={"c": 9.0 + 7j, "n_DC": 9.0 + 0j})
+    plan = reading.figures["velocity_plan"]
+    unsure = {name: replace(plan.vectors[name], confidence=0.8) for name in ("v_C", "v_CA", "v_CB", "v_DC")}
+    figures = {**reading.figures, "velocity_plan": Figure(plan.nodes, {**plan.vectors, **unsure})}
+    open_ = outcome_of(compare(PUMP, Submission(readings=(replace(reading, figures=figures),))), "a_DC_n")
+    assert (open_.verdict, open_.reasons[-1].parameters["nodes"]) == ("review", ("c", "d"))
+    assert outcome_of(compare(PUMP, Submission(readings=(reading,))), "a_DC_n").verdict == "none"
+
+
 def test_a_loss_is_open_while_nothing_of_the_plan_that_it_follows_from_was_read_for_certain():
     reading = sheet(PUMP, moved={"n_BA": 9.0 + 0j})
     assert outcome_of(compare(PUMP, Submission(readings=(reading,))), "a_BA_n").verdict == "none"
