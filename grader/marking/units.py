@@ -423,7 +423,7 @@ def retyped(task: Task, submission: Submission, right: Collection[str]) -> Undon
     if submission.measured is None or submission.readings:
         return None
     figures, slips = dict(submission.measured.figures), list[tuple[Mistake, float]]()
-    for plan in figures.keys() & task.construction.poles.keys() - {*filter(group_of, figures)}:
+    for plan in (one for one in task.construction.poles if one in figures and not group_of(one)):
         read = figures[plan].vectors
         vectors = [one for one in task.construction.vectors_of(plan) if _is_whole(read.get(one.name))]
         ways = [one for one in _ways_to_enter(vectors, read) if one[1].keys().isdisjoint(right)]
@@ -454,7 +454,7 @@ def _misfit_and_cost(
 
     The cost is -2 log of the density of the entries per mm: wide errors make each entry rarer.
     """
-    nodes, hand = {end for one in vectors for end in (one.tail, one.head)}, task.rubric.hand
+    nodes, hand = dict.fromkeys(end for one in vectors for end in (one.tail, one.head)), task.rubric.hand
     read = [(entries[one.name], one.turn_rad) for one in vectors]
     lengths = np.array([one.length_mm for one, _ in read], np.float64)
     turns = np.array([math.radians(one.direction_deg or 0.0) - turn for one, turn in read])

@@ -175,22 +175,12 @@ LAWS: dict[str, str] = {
     ),
 }
 """The law that a mistake breaks, by its code."""
+_TURNED = N_("a_c is the sliding velocity turned by 90° in the sense in which the guide turns.")
 _CORIOLIS = {
     "normal_missing": N_("Where a block slides along a guide that turns there is a_c = 2·ω·v too."),
-    "normal_reversed": N_("a_c is the sliding velocity turned by 90° in the sense in which the guide turns."),
+    "normal_reversed": _TURNED,
+    "parallel_for_perpendicular": _TURNED,
     "arithmetic": N_("a_c = 2·ω·v."),
-}
-_GUIDE = {
-    "parallel_for_perpendicular": N_("A block can only move along its guide."),
-    "wrong_link": N_("A block moves along its own guide."),
-}
-_DRIVING = {
-    DRIVING_ACROSS: {
-        "parallel_for_perpendicular": N_(
-            "A point that turns about a pivot moves across the line to the pivot."
-        )
-    },
-    DRIVING_ALONG: {"parallel_for_perpendicular": N_("a_n lies along the link, towards the pivot.")},
 }
 _BY_LINES = N_("Without friction a guide presses across itself; what moments leave acts along the link.")
 _OF_FORCES = {
@@ -200,7 +190,20 @@ _OF_FORCES = {
     "sense_reversed": _BY_MOMENTS,
     "arithmetic": _BY_MOMENTS,
 }
-_BY_TRIANGLE = {"arithmetic": N_("The right triangle gives v²/l at the scale ka only where kL·ka = kv².")}
+_ACROSS = N_("A point that turns about a pivot moves across the line to the pivot.")
+_BY_TRIANGLE = N_("The right triangle gives v²/l at the scale ka only where kL·ka = kv².")
+_OF_LINE = {
+    DRIVING_ACROSS: {"parallel_for_perpendicular": _ACROSS},
+    DRIVING_ALONG: {"parallel_for_perpendicular": N_("a_n lies along the link, towards the pivot.")},
+    ALONG_GUIDE: {
+        "parallel_for_perpendicular": N_("A block can only move along its guide."),
+        "wrong_link": N_("A block moves along its own guide."),
+    },
+    RIGHT_TRIANGLE: {"arithmetic": _BY_TRIANGLE},
+    OF_FORCE: _OF_FORCES,
+    ACROSS_GUIDE: _OF_FORCES,
+}
+"""The law that a mistake in a line of this kind breaks, by its code."""
 _SAME = N_("The same mistake as at %(name)s.")
 
 
@@ -295,10 +298,7 @@ def law_of(mistake: NamedMistake) -> str:
     """Return the law that a mistake breaks, a key of the catalogues; empty for one without."""
     usual = LAWS.get(mistake.code, "")
     if mistake.at.startswith(CORIOLIS_END):
-        return _CORIOLIS.get(mistake.code.replace("parallel_for_perpendicular", "normal_reversed"), usual)
-    line = line_in(mistake.detail)
+        return _CORIOLIS.get(mistake.code, usual)
     if _kind(mistake.at, "") == "laid off" and mistake.code in {SLIP, "force_reversed"}:
         return usual if mistake.code == SLIP else _LAID_OFF
-    known = {**_DRIVING, ALONG_GUIDE: _GUIDE, RIGHT_TRIANGLE: _BY_TRIANGLE}
-    others = {**known, OF_FORCE: _OF_FORCES, ACROSS_GUIDE: _OF_FORCES}.get(line, {})
-    return others.get(mistake.code, usual)
+    return _OF_LINE.get(line_in(mistake.detail), {}).get(mistake.code, usual)

@@ -381,13 +381,11 @@ def rarer_mistakes_of_step(step: Step, construction: Construction) -> Iterator[M
     figure = construction.figure_of(step.node)
     if figure == "mechanism":
         return
-    laid_along = (
-        step.along if isinstance(step, Given) and isinstance(step.length, Scaled | Coriolis) else None
-    )
-    if isinstance(laid_along, Along):
-        yield from (Mistake("parallel_for_perpendicular", step.node, quarters=one) for one in (1, 3))
-    if isinstance(step, Given) and isinstance(step.length, Normal):
-        yield Mistake(SLIP, step.node, other=(RIGHT_TRIANGLE,))
+    match step:
+        case Given(length=Scaled() | Coriolis(), along=Along()):
+            yield from (Mistake("parallel_for_perpendicular", step.node, quarters=one) for one in (1, 3))
+        case Given(length=Normal()):
+            yield Mistake(SLIP, step.node, other=(RIGHT_TRIANGLE,))
     if not isinstance(step, TwoLines):
         return
     known = {(one.code, one.slot, frozenset(one.other)) for one in mistakes_of_step(step, construction)}
