@@ -18,6 +18,7 @@ from types import MappingProxyType
 from grader.files import Stamp, shown_text, stamp_of, write_whole
 from grader.folder import archives
 from grader.folder.cache import PageCache, digest_of, packed, unpacked
+from grader.folder.changes import CACHE_FOLDER, RUN_NOTE
 from grader.folder.workers import ENDED, Pool
 from grader.records import PageRef, Reason, of_error
 from grader.scan.decode.limits import SUFFIXES, load
@@ -53,6 +54,7 @@ def submissions(folder: Path, roster: Path | None = None, passed_over: Iterable[
         folder's top is none either
     passed_over : files and folders that are none, such as the folder of results
 
+    Folders of results of other runs are none either: they hold a run's note, or its results and their table.
     A folder that cannot be opened counts as a file, and so do an empty folder named as one and a link to a
     folder elsewhere: they are reported.
     """
@@ -61,8 +63,11 @@ def submissions(folder: Path, roster: Path | None = None, passed_over: Iterable[
     shut: list[Path] = []
     for where, folders, files in os.walk(folder, onerror=lambda error: shut.append(Path(error.filename))):
         folders[:] = [
-            name for name in folders if not is_tool_file(name) and _real(Path(where) / name) not in none
-        ]
+            name for name in folders
+            if not is_tool_file(name)
+            and _real(Path(where) / name) not in none
+            and not _holds_results(Path(where) / name)
+        ]  # fmt: skip
         for name in files:
             path = Path(where) / name
             if not is_tool_file(name) and _real(path) not in none:
@@ -103,6 +108,12 @@ def leads_out(path: Path, folder: Path) -> bool:
 def _real(path: Path) -> Path:
     """Follow a path's links; links that lead in a circle lead nowhere, and the path stays."""
     return Path(os.path.realpath(path))
+
+
+def _holds_results(folder: Path) -> bool:
+    """Return whether a run has written its results into a folder."""
+    is_noted = (folder / CACHE_FOLDER / RUN_NOTE).is_file()
+    return is_noted or all((folder / name).is_file() for name in ("results.json", "summary.csv"))
 
 
 def _named_as_file(folder: Path) -> bool:

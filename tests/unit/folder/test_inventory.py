@@ -47,6 +47,14 @@ def test_the_roster_and_files_of_tools_are_no_submissions(tmp_path):
     ]
 
 
+def test_results_of_other_runs_are_no_submissions_and_a_students_folder_is_one(tmp_path):
+    of_results = ("a/.planmark/run.json", "a/s1/report.json", "b/results.json", "b/summary.csv")
+    for name in (*of_results, "b/s1/report.json", "s1/results.json", "s1/sheet.jpg"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(b"x")
+    assert submissions(tmp_path) == [tmp_path / "s1" / "sheet.jpg"]
+
+
 def told_of(folder):
     """An inventory's result for each file of a folder, by the file's name."""
     files = submissions(folder)
