@@ -46,11 +46,12 @@ AGREES, BY_CHANCE = 0.95, 0.03
 def judge(task: Task, submission: Submission) -> Judgement:
     """Verdicts, mistakes and points of one submission for one variant.
 
-    A wrong omega of the crank costs points once where more follows from it than from the right one.
+    A wrong omega of the crank costs points once where more follows from it than from the right one. The omega
+    of the variant whose data the drawing follows is no slip.
     """
     best = judgement = _judged_as_entered(task, submission)
     slips = _speed_slips(task, submission.values)
-    if not slips:
+    if not slips or any(one.code == "other_variant" for one in judgement.mistakes):
         return judgement
     by = {one.at.partition("_")[0]: one.factor for one in slips}
     in_rpm = any(one.code == "units" and one.at == "values" for one in judgement.mistakes)

@@ -33,6 +33,12 @@ def test_another_students_drawing_earns_nothing_without_a_person(rule, verdicts)
     assert any(reason.code == "other_variant" for one in judged for reason in one.reasons)
 
 
+def test_another_students_omega_is_that_of_the_data_and_no_slip_beside_them():
+    values = {"omega_1": OTHER.rates["omega_1"]}
+    judgement = judge(with_doubt(), Submission(measured=measured(OTHER), values=values))
+    assert [(one.code, one.mistake.n) for one in judgement.mistakes] == [("other_variant", OTHER.variant.n)]
+
+
 def test_another_students_drawing_is_marked_as_any_mistake_where_the_rubric_says_so():
     judgement = judge(with_doubt(other_variant="follow"), Submission(measured=measured(OTHER)))
     assert judgement.score.total > 0.5 * judgement.score.maximum
