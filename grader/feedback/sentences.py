@@ -23,7 +23,7 @@ from grader.language import N_, NO_NAMES, Tongue, tongue
 from grader.options import Level
 from grader.outcomes import CHARGED, CREDITED, EVEN, NamedMistake, Outcome
 from grader.records import Reason, Value
-from grader.texts.reasons import MISREAD, UNCHECKED, UNDECIDED, UNSURE, reason_sentence
+from grader.texts.reasons import LOSS_DOUBTFUL, MISREAD, UNCHECKED, UNDECIDED, UNSURE, reason_sentence
 from grader.texts.spoken import place
 
 # Criteria -----------------------------------------------------------------------------------------
@@ -135,8 +135,9 @@ def _worth_telling(outcome: Outcome, level: Level = "full") -> list[Reason]:
         needless |= {"doubtful", "near_limit"}
         reasons = [replace(one, code=UNSURE) if one.code == "unread" else one for one in reasons]
     near = next((reason for reason in reasons if reason.code == "near_limit"), None)
+    is_loss = outcome.proposed < 1.0 and outcome.probability != EVEN
     return [
-        reason
+        replace(reason, code=LOSS_DOUBTFUL) if is_loss and reason.code == "doubtful" else reason
         for reason in reasons
         # If several limits are near, the first one is enough.
         if reason.code not in needless and (reason.code != "near_limit" or reason is near)

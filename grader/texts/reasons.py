@@ -10,6 +10,8 @@ UNDECIDED = "scale_undecided"
 """Replaces `scale_assumed` and `follows` together under review: neither alone says what is in doubt."""
 UNSURE = "read_unsurely"
 """Replaces `unread` if something was read, though not surely, and `doubtful` beside it."""
+LOSS_DOUBTFUL = "loss_doubtful"
+"""Replaces `doubtful` where the vector is more probably wrong: that asks for more certainty."""
 UNCHECKED = "unchecked"
 """Used if nothing was judged and no reason is given."""
 MISREAD = "misread"
@@ -36,9 +38,10 @@ HINTS: dict[str, str] = {
     "unread": N_("It could not be read on the sheet."),
     "entry_refused": N_("It depends on an unusable entry; an instructor will check it."),
     "doubtful": N_("It was read with too little certainty."),
+    LOSS_DOUBTFUL: N_("It was read with too little certainty."),
     "found_wrong_elsewhere": N_("A verdict like this one was found wrong in this class: a person must look."),
     "near_limit": N_("It is too close to the limit of the tolerance to decide from the scan."),
-    "counted_for_you": N_("It is over the limit by less than the scan's accuracy: accepted."),
+    "counted_for_you": N_("It is over the limit by less than the scan's accuracy."),
     "not_certainly_within": N_("At the scan's accuracy it is not certain to be within the limit."),
     "at_stake": N_("The points still open are negligible: accepted."),
     "other_variant": N_("The drawing follows another student's data."),
@@ -104,15 +107,16 @@ FULL: dict[str, str] = {
     "unread": N_("It could not be read on the sheet (%(why)s)."),
     "entry_refused": N_("It depends on an unusable entry (%(entries)s); an instructor will check it."),
     "doubtful": N_("It was read with a certainty of %(confidence)s: too little to decide without a person."),
+    LOSS_DOUBTFUL: N_(
+        "It was read with a certainty of %(confidence)s: too little to take points away without a person."
+    ),
     UNSURE: N_("It was read with too little certainty (%(why)s)."),
     MISREAD: N_("It was probably misread; the dotted stroke may be the one meant."),
     "scale_seems_off": N_("%(declared)s is declared, but %(expected)s was probably used: %(factor)s."),
     "near_limit": N_(
         "It is too close to the limit of the tolerance to decide from the scan (standard error %(se)s)."
     ),
-    "counted_for_you": N_(
-        "It is %(beyond)s over the limit, less than the scan's accuracy (%(good_to)s): accepted."
-    ),
+    "counted_for_you": N_("It is %(beyond)s over the limit, less than the scan's accuracy (%(good_to)s)."),
     "not_certainly_within": N_(
         "It is %(beyond)s within the limit, less than the scan's accuracy (%(good_to)s):"
         " it counts only if it is certain."

@@ -95,8 +95,11 @@ def test_of_a_zero_vector_no_direction_is_spoken_of():
 
 
 def test_what_waits_for_a_person_says_why():
-    told = criterion_feedback(outcome("review", Reason("doubtful", {"confidence": 0.62})), "en")
+    doubt = Reason("doubtful", {"confidence": 0.62})
+    lost = outcome("review", doubt)
+    told = criterion_feedback(replace(lost, probability=0.5), "en")
     assert told == "It was read with a certainty of 62\u00a0%: too little to decide without a person."
+    assert "too little to take points away without a person" in criterion_feedback(lost, "en")
 
 
 @pytest.mark.parametrize(("confidence", "told"), [(0.8, "It was probably misread"), (1.0, "These vectors")])
