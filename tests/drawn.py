@@ -7,7 +7,7 @@ from reference.mechanism import SLIDER, named_links, points_of
 from reference.plan import exact_plan
 from tests import every_group
 
-_HEAD = """
+HEAD = """
 schema_version = 1
 id = "{name}"
 rubric = "{name}"
@@ -27,6 +27,7 @@ id = "{name}"
 title = {{ en = "{name}" }}
 length_unit = "mm"
 """
+"""An assignment and its mechanism, which ground, crank and groups complete."""
 _FOUR_BAR = """
 ground = { O1 = [0, 0], O2 = [250, 0] }
 crank = { pivot = "O1", pin = "A", length = 100, angle_deg = 60, omega = 10 }
@@ -151,7 +152,7 @@ WITH_FORCES = (*MECHANISMS, "every group", "cylinder", "light cylinder")
 @cache
 def loaded(case, folder, *, own):
     """The assignment and plan of a case whose links all have bodies; with its own accelerations or given."""
-    head, _, inner = (_HEAD + MECHANISMS.get(case, "")).partition("[mechanism]")
+    head, _, inner = (HEAD + MECHANISMS.get(case, "")).partition("[mechanism]")
     if case == "every group":
         inner = every_group.MECHANISM.replace("40 + n", "43")
     inner += CYLINDER if case.endswith("cylinder") else ""
@@ -194,6 +195,6 @@ def planned(case, folder):
         return assignment, exact_plan(assignment, [assignment.variant(n, position)])
     name = f"m{list(MECHANISMS).index(case)}"
     file = folder / f"{name}.assignment.toml"
-    file.write_text(_HEAD.format(name=name) + MECHANISMS[case], encoding="utf-8")
+    file.write_text(HEAD.format(name=name) + MECHANISMS[case], encoding="utf-8")
     assignment = load_assignment(str(file))
     return assignment, exact_plan(assignment, assignment.variants())

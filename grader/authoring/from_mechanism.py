@@ -115,7 +115,7 @@ def texts_for(mechanism: Path, name: str, start: Texts, table: Path | None) -> d
         raise failure(CallError, "table_needed", file=mechanism, names=tuple(sorted(needed)))
     first: dict[str, float | str] = {
         "kL": 0.001,
-        "kv": f"{_first_speed(file)} / {_PLANS_MM:g}",
+        "kv": f"{'speed' if file.driving_slider else 'omega * crank_m'} / {_PLANS_MM:g}",
         "ka": "kv**2 / kL",
     }
     with TemporaryDirectory() as folder:
@@ -156,10 +156,6 @@ def _too_short(assignment: Assignment, rubric: RubricFile) -> set[str]:
     plan = lint(assignment, rubric).plan
     asked = plan and asked_vectors(rubric, plan)
     return {*compress(asked.names, asked.mostly_short)} if asked else set()
-
-
-def _first_speed(file: MechanismFile) -> str:
-    return "speed" if file.driving_slider else "omega * crank_m"
 
 
 # The assignment -----------------------------------------------------------------------------------
@@ -284,18 +280,11 @@ def _labels(table: object) -> dict[Any, str]:
             return {key: f"{letter}({pivot})" for key, letter in letters.items()}
         case DrivingSliderTable():
             return {"displacement": "s", "speed": "v", "acceleration": "a"}
-        case DyadTable():
-            side = f"{table.node}, {table.pins[0]}→{table.pins[1]}"
-            return {("lengths", index): pin + table.node for index, pin in enumerate(table.pins)} | {
-                "side": side
-            }
+        case DyadTable(node=node, pins=base) | PlateTable(node=node, base=base):
+            lengths = {("lengths", index): pin + node for index, pin in enumerate(base)}
+            return {**lengths, "side": f"{node}, {base[0]}→{base[1]}"}
         case SliderTable():
             return {"length": table.pin + table.node, "side": f"{table.node}, {table.pin}"}
-        case PlateTable():
-            side = f"{table.node}, {table.base[0]}→{table.base[1]}"
-            return {("lengths", index): pin + table.node for index, pin in enumerate(table.base)} | {
-                "side": side
-            }
         case TriadTable(nodes=(d, e, f), pins=(a, b, c)):
             ends = (a + d, b + e, c + f, d + e, e + f, f + d)
             return {("lengths", index): name for index, name in enumerate(ends)} | {

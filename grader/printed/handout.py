@@ -1,6 +1,5 @@
 """Task sheets: the given data and the tables to fill in, without any of the solution."""
 
-import io
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 
@@ -8,16 +7,16 @@ import numpy as np
 from markupsafe import Markup
 from reportlab.lib.colors import grey, whitesmoke
 from reportlab.lib.pagesizes import A4
-from reportlab.lib.styles import ParagraphStyle
 from reportlab.lib.units import mm
-from reportlab.platypus import Flowable, PageBreak, Paragraph, SimpleDocTemplate, Spacer, Table
+from reportlab.platypus import Flowable, PageBreak, Spacer, Table
 
 from grader.language import N_, Tongue, symbols, tongue
 from grader.printed.answer_sheet import given_data, variants_of
-from grader.printed.pdf import BOLD, REGULAR, Drawing, embed_fonts, number, with_marks
+from grader.printed.pdf import BOLD, Drawing, a4_document, number, paragraph
 from grader.rubric import SECTIONS, RubricFile, accelerations_of, scales_asked
 from grader.tables.roster import RosterRow
 from reference.authored.assignment import Assignment, Variant
+from reference.authored.toml_file import LENGTH_UNITS_M
 from reference.construction.forces import reaction
 from reference.drawing.canvas import Piece, bounds, pieces_of, scale_pieces
 from reference.drawing.sketch import scheme
@@ -102,7 +101,6 @@ def make_handout(
     Raises AuthoredFileError with every row whose n or position the assignment does not have, and
     MechanismError if no variant assembles.
     """
-    embed_fonts()
     variants = variants_of(assignment, rows, roster)
     story: list[Flowable] = []
     for _, group in groupby(zip(rows, variants, strict=True), lambda one: (one[0].student_id, one[1].n)):
@@ -112,15 +110,10 @@ def make_handout(
         if len(own) > 1 and own[0][1].position is not None:
             positions = [str(variant.position) for _, variant in own]
             story += _every_position(assignment, rubric, own[0][0], positions, tongue(own[0][0].lang or lang))
-    buffer = io.BytesIO()
-    margin = (A4[0] - WIDE_MM * mm) / 2.0
-    document = SimpleDocTemplate(
-        buffer, pagesize=A4, title=assignment.file.title.in_language(lang), creator="planmark", invariant=1,
-        leftMargin=margin - FRAME_PT, rightMargin=margin - FRAME_PT, topMargin=12 * mm, bottomMargin=12 * mm,
-    )  # fmt: skip
+    margin = (A4[0] - WIDE_MM * mm) / 2.0 - FRAME_PT
     worked = [*example]
-    document.build([*story, *worked] if worked else story[:-1])
-    return buffer.getvalue()
+    title = assignment.file.title.in_language(lang)
+    return a4_document(title, [*story, *worked] if worked else story[:-1], margin, 12 * mm)
 
 
 def _sheet(
@@ -128,30 +121,30 @@ def _sheet(
 ) -> Iterator[Flowable]:
     """Yield everything that one student is given."""
     file = assignment.file
-    yield _text(file.title.in_language(speaker.lang), 14, BOLD)
+    yield paragraph(file.title.in_language(speaker.lang), 14, BOLD)
     yield Spacer(1, 1.5 * mm)
-    yield _text(_whose(row, variant, speaker), 10, BOLD)
+    yield paragraph(_whose(row, variant, speaker), 10, BOLD)
     yield Spacer(1, 2.5 * mm)
-    yield _markup(with_marks(symbols(file.task.in_language(speaker.lang))), 10)
+    yield paragraph(symbols(file.task.in_language(speaker.lang)), 10)
     yield Spacer(1, 2.5 * mm)
     drawn, title = _scheme(assignment, variant)
-    caption = _text(speaker.gettext(title), 8)
-    data: list[Flowable] = [_text(speaker.gettext(GIVEN), 10, BOLD)]
-    data += [_markup(_letters(datum), 10) for datum in given_data(assignment, variant, speaker)]
+    caption = paragraph(speaker.gettext(title), 8)
+    data: list[Flowable] = [paragraph(speaker.gettext(GIVEN), 10, BOLD)]
+    data += [paragraph(_letters(datum), 10) for datum in given_data(assignment, variant, speaker)]
     gravity = assignment.mechanism([variant]).gravity
     if gravity is not None:
         data.append(
-            _text(f"g = {number(float(gravity[0]), speaker.decimal_mark)} {speaker.unit('m/s²')}", 10)
+            paragraph(f"g = {number(float(gravity[0]), speaker.decimal_mark)} {speaker.unit('m/s²')}", 10)
         )
-    data += [Spacer(1, 2 * mm), _text(speaker.gettext(FIXED), 10, BOLD)]
-    data += [_markup(line, 9) for line in _fixed(assignment, variant, speaker)]
+    data += [Spacer(1, 2 * mm), paragraph(speaker.gettext(FIXED), 10, BOLD)]
+    data += [paragraph(line, 9) for line in _fixed(assignment, variant, speaker)]
     yield _side_by_side(data, [drawn, caption], WIDE_MM - SCHEME_MM[0] - GAP_MM)
     yield Spacer(1, 3 * mm)
     if accelerations_of(assignment, rubric):
         yield from _masses(assignment, rubric, variant, speaker)
     yield from _tables(assignment, rubric, speaker)
     yield Spacer(1, 2 * mm)
-    yield _text(speaker.gettext(SIGNS), 8)
+    yield paragraph(speaker.gettext(SIGNS), 8)
     yield PageBreak()
 
 
@@ -216,12 +209,10 @@ def _fitted(assignment: Assignment, variant: Variant) -> Subject:
 
 # Data ---------------------------------------------------------------------------------------------
 
-LENGTH_UNITS = {"mm": 1e3, "cm": 1e2, "m": 1.0}
-
 
 def _length_unit(assignment: Assignment) -> str:
     """Return the unit of the given lengths."""
-    return next((one.unit for one in assignment.file.given if one.unit in LENGTH_UNITS), "m")
+    return next((one.unit for one in assignment.file.given if one.unit in LENGTH_UNITS_M), "m")
 
 
 def _fixed(assignment: Assignment, variant: Variant, speaker: Tongue) -> Iterator[Markup]:
@@ -230,7 +221,7 @@ def _fixed(assignment: Assignment, variant: Variant, speaker: Tongue) -> Iterato
     unit = _length_unit(assignment)
 
     def point(at: ComplexArray) -> str:
-        place = complex(np.ravel(at)[0]) * LENGTH_UNITS[unit]
+        place = complex(np.ravel(at)[0]) / LENGTH_UNITS_M[unit]
         x, y = (number(round(part, 6) + 0.0, speaker.decimal_mark) for part in (place.real, place.imag))
         return f"({x}; {y})\N{NO-BREAK SPACE}{speaker.unit(unit)}"
 
@@ -300,17 +291,17 @@ def _masses(
         (LOADS, [*map(_, LOAD)], loads, [0.12, 0.12, 0.12, 0.2, 0.44]),
     ):
         if rows:
-            yield from (_text(_(title), 10, BOLD), Spacer(1, mm))
+            yield from (paragraph(_(title), 10, BOLD), Spacer(1, mm))
             yield _empty(heads, rows, WIDE_MM, shares=widths)
             yield Spacer(1, 2 * mm)
     if not are_given:
-        yield _text(_(OWN), 9)
+        yield paragraph(_(OWN), 9)
     hinges = plan.forces.hinges.values() if plan.forces else ()
     for one in hinges:
         by, on = short[one.by], short[one.on]
         if reaction(short, one.by, one.on) in rubric.vectors and GROUND not in (by, on):
             vector = _letters(pieces_of(reaction(short, one.by, one.on)))
-            yield _markup(Markup(_(REACTION)) % {"vector": vector, "by": by, "on": on}, 9)  # noqa: S704
+            yield paragraph(Markup(_(REACTION)) % {"vector": vector, "by": by, "on": on}, 9)  # noqa: S704
             break
     yield Spacer(1, 2 * mm)
 
@@ -323,14 +314,14 @@ def _centre(assignment: Assignment, plan: Plan, body: Body, speaker: Tongue) -> 
         return point
     at, unit = plan.motion.position, _length_unit(assignment)
     start, end = (at[joint][0] for joint in centre.base)
-    place = (at[body.centre][0] - start) * abs(end - start) / (end - start) * LENGTH_UNITS[unit]
+    place = (at[body.centre][0] - start) * abs(end - start) / (end - start) / LENGTH_UNITS_M[unit]
 
     def length(value: float) -> str:
         told = number(float(f"{round(value, 9) + 0.0:.5g}"), speaker.decimal_mark)
         return f"{told}\N{NO-BREAK SPACE}{speaker.unit(unit)}"
 
     line = Markup("").join(_letters(pieces_of(joint)) for joint in centre.base)
-    least = 1e-6 * abs(end - start) * LENGTH_UNITS[unit]
+    least = 1e-6 * abs(end - start) / LENGTH_UNITS_M[unit]
     is_on_it = abs(place.imag) < least
     known: dict[str, str] = {"along": length(abs(place.real) if is_on_it else place.real)}
     known |= {"point": point, "link": line, "tail": _letters(pieces_of(centre.base[0]))}
@@ -368,7 +359,7 @@ def _tables(assignment: Assignment, rubric: RubricFile, speaker: Tongue) -> Iter
             values = [name for name in asked[kind] if name in rubric.values] or asked[kind]
             rows = [[_letters(pieces_of(one)), "", "", "" if name in values else "–"] for name, one in shown]
         return [
-            _text(_(TABLES[kind]), 10, BOLD),
+            paragraph(_(TABLES[kind]), 10, BOLD),
             Spacer(1, mm),
             _empty(head, rows, wide_mm),
             Spacer(1, 3 * mm),
@@ -393,9 +384,9 @@ def _every_position(
     What the driving link has is the same in all positions, and left out.
     """
     names, pin, _ = assignment.file.names, assignment.mechanism_file.driver.pin, speaker.gettext
-    yield _text(assignment.file.title.in_language(speaker.lang), 14, BOLD)
-    yield _text(_whose(row, Variant(row.n), speaker), 10, BOLD)
-    yield _text(_(EVERY_POSITION), 12, BOLD)
+    yield paragraph(assignment.file.title.in_language(speaker.lang), 14, BOLD)
+    yield paragraph(_whose(row, Variant(row.n), speaker), 10, BOLD)
+    yield paragraph(_(EVERY_POSITION), 12, BOLD)
     for kind in DRAWN.values():
         drawn = [name for name in rubric.vectors if kind_of(name) is kind and name != f"{kind.letter}_{pin}"]
         values = [name for name in rubric.values if kind_of(name) is kind]
@@ -404,7 +395,7 @@ def _every_position(
             continue
         heads = [_cell(pieces_of(names.get(name, name)), unit, speaker) for name, unit in units]
         rows = [[one, *[""] * len(heads)] for one in positions]
-        yield from (Spacer(1, 4 * mm), _text(_(TABLES[SECTIONS[kind.name]]), 10, BOLD), Spacer(1, mm))
+        yield from (Spacer(1, 4 * mm), paragraph(_(TABLES[SECTIONS[kind.name]]), 10, BOLD), Spacer(1, mm))
         yield _empty([_(NUMBER["position"]), *heads], rows, WIDE_MM, WRITING_MM)
     yield PageBreak()
 
@@ -424,7 +415,10 @@ def _empty(
     first = {2: 0.4, 4: 0.16}.get(len(head), 1.0 / len(head))
     rest = (1.0 - first) / (len(head) - 1)
     widths = [share * wide_mm * mm for share in shares or (first, *[rest] * (len(head) - 1))]
-    cells = [[_text(word, 6.5) for word in head], *([_markup(cell, 10) for cell in row] for row in rows)]
+    cells = [
+        [paragraph(word, 6.5) for word in head],
+        *([paragraph(cell, 10) for cell in row] for row in rows),
+    ]
     style = [
         ("GRID", (0, 0), (-1, -1), 0.4, grey), ("BACKGROUND", (0, 0), (-1, 0), whitesmoke),
         ("VALIGN", (0, 0), (-1, -1), "MIDDLE"), ("TOPPADDING", (0, 0), (-1, -1), 0),
@@ -449,15 +443,6 @@ def _side_by_side(left: list[Flowable], right: list[Flowable], left_mm: float) -
 
 
 def _letters(pieces: Iterable[Piece]) -> Markup:
-    """Return a name with its indices, as reportlab reads it."""
-    marks = {0: "{}", -1: '<sub rise="2" size="70%">{}</sub>', 1: '<super rise="3" size="70%">{}</super>'}
+    """Return a name with its indices."""
+    marks = {0: "{}", -1: "<sub>{}</sub>", 1: "<sup>{}</sup>"}
     return Markup("").join(Markup(marks[piece.height]).format(piece.text) for piece in pieces)  # noqa: S704
-
-
-def _text(text: str, size: float, font: str = REGULAR) -> Paragraph:
-    return _markup(Markup.escape(text), size, font)
-
-
-def _markup(text: str, size: float, font: str = REGULAR) -> Paragraph:
-    style = ParagraphStyle(f"{font}{size}", fontName=font, fontSize=size, leading=1.3 * size)
-    return Paragraph(str(text), style)

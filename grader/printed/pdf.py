@@ -13,12 +13,14 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 from reportlab.lib.colors import Color, HexColor
+from reportlab.lib.pagesizes import A4
+from reportlab.lib.styles import ParagraphStyle
 from reportlab.lib.units import mm
 from reportlab.pdfbase import pdfmetrics
 from reportlab.pdfbase.ttfonts import TTFont
 from reportlab.pdfgen.canvas import Canvas
 from reportlab.pdfgen.pathobject import PDFPathObject
-from reportlab.platypus import Flowable
+from reportlab.platypus import Flowable, Paragraph, SimpleDocTemplate
 
 from grader.printed.layout import (
     FRAME_MM,
@@ -99,6 +101,24 @@ def with_marks(text: str) -> str:
     for mark, printed in PRINTED.items():
         written = written.replace(mark, printed)
     return written
+
+
+def paragraph(text: str, size: float, font: str = REGULAR, leading: float = 1.3) -> Paragraph:
+    """Return a text or markup as a paragraph of an A4 document; its size in points."""
+    embed_fonts()
+    style = ParagraphStyle(f"{font}{size}", fontName=font, fontSize=size, leading=leading * size)
+    return Paragraph(with_marks(text), style)
+
+
+def a4_document(title: str, parts: Iterable[Flowable], beside_pt: float, above_pt: float) -> bytes:
+    """Return paragraphs, tables and drawings as an A4 document with margins."""
+    buffer = io.BytesIO()
+    document = SimpleDocTemplate(
+        buffer, pagesize=A4, title=title, creator="planmark", invariant=1,
+        leftMargin=beside_pt, rightMargin=beside_pt, topMargin=above_pt, bottomMargin=above_pt,
+    )  # fmt: skip
+    document.build([*parts])
+    return buffer.getvalue()
 
 
 def number(value: float, decimal_mark: str) -> str:

@@ -10,7 +10,7 @@ covers itself. Ink that many sheets have in common (frame, title block, a printe
 out, and the usual similarity of independent drawings is estimated on the class itself.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from math import exp, log
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from grader.documents import AlikeDocument, Sign
 from grader.records import FloatArray, GreyImage
 from grader.similarity.drawings import DrawingSimilarity, compare_drawings
-from grader.similarity.numbers import NumberSimilarity, compare_numbers
+from grader.similarity.numbers import compare_numbers
 from grader.similarity.submission import ComparedSubmission
 from reference.authored.assignment import Assignment, Variant
 
@@ -97,12 +97,19 @@ def find_similar(
         return []
     pairs: dict[tuple[int, int], _Pair] = {}
     drawings = compare_drawings(assignment, submissions)
-    _add_drawings(pairs, drawings)
-    _add_numbers(pairs, compare_numbers(assignment, submissions))
+    why: dict[Sign, FloatArray] = {"hand_errors": drawings.log_errors, "same_place": drawings.log_places}
+    _add(pairs, drawings.log_chance, drawings.pairs, why, drawings.cosine, drawings.count)
+    numbers = compare_numbers(assignment, submissions)
+    equal = numbers.equal / np.maximum(numbers.compared, 1)
+    why = {"same_numbers": numbers.log_chance}
+    _add(pairs, numbers.log_chance, numbers.pairs, why, equal, numbers.compared)
     owners = [k for k, of_student in enumerate(maps) for _ in of_student]
     printed = np.array([each.printed for each in submissions])
     pictures = compare_pictures(owners, [sheet for of_student in maps for sheet in of_student], printed)
-    _add_pictures(pairs, pictures, drawings)
+    # Good drawings in one layout have the same ink: that is no rarer than their positions.
+    log_chance = np.fmax(pictures.log_chance, drawings.log_layout)
+    nothing = np.zeros_like(log_chance)
+    _add(pairs, log_chance, pictures.pairs, {"same_picture": log_chance}, pictures.overlap, nothing)
     _add_other_numbers(pairs, submissions, drawings)
     strangers = [
         (i, j, pair)
@@ -120,36 +127,23 @@ def by_chance(entry: AlikeDocument) -> tuple[bool, float, list[str]]:
     return entry.measure is None, entry.measure or 0.0, entry.students
 
 
-def _rare(log_chance: FloatArray, pairs: int) -> Iterator[tuple[int, int, float]]:
-    """Yield the pairs with evidence rarer than `FALSE_ALARMS`, and their expected number in the class."""
-    expected = log_chance + log(max(pairs, 1))
-    for i, j in np.argwhere(np.triu(expected < log(FALSE_ALARMS), 1)):
-        yield int(i), int(j), exp(max(float(expected[i, j]), -600.0))
-
-
-def _add_drawings(pairs: dict[tuple[int, int], _Pair], drawings: DrawingSimilarity) -> None:
-    for i, j, measure in _rare(drawings.log_chance, drawings.pairs):
-        why: list[Sign] = ["hand_errors"] if drawings.log_errors[i, j] < NOTED else []
-        why += ["same_place"] if drawings.log_places[i, j] < NOTED else []
-        share = float(np.clip(drawings.cosine[i, j], 0.0, 1.0))
-        pairs.setdefault((i, j), _Pair()).add(why, measure, share, int(drawings.count[i, j]))
-
-
-def _add_numbers(pairs: dict[tuple[int, int], _Pair], numbers: NumberSimilarity) -> None:
-    for i, j, measure in _rare(numbers.log_chance, numbers.pairs):
-        compared = int(numbers.compared[i, j])
-        share = min(float(numbers.equal[i, j]) / max(compared, 1), 1.0)
-        pairs.setdefault((i, j), _Pair()).add(["same_numbers"], measure, share, compared)
-
-
-def _add_pictures(
-    pairs: dict[tuple[int, int], _Pair], pictures: PictureSimilarity, drawings: DrawingSimilarity
+def _add(
+    pairs: dict[tuple[int, int], _Pair],
+    log_chance: FloatArray,
+    number: int,
+    why: Mapping[Sign, FloatArray],
+    share: FloatArray,
+    compared: FloatArray,
 ) -> None:
-    # Good drawings in one layout have the same ink: that is no rarer than their positions.
-    log_chance = np.fmax(pictures.log_chance, drawings.log_layout)
-    for i, j, measure in _rare(log_chance, pictures.pairs):
-        share = float(np.clip(pictures.overlap[i, j], 0.0, 1.0))
-        pairs.setdefault((i, j), _Pair()).add(["same_picture"], measure, share, 0)
+    """Add the pairs with evidence rarer than `FALSE_ALARMS`, measured by their expected number in the class.
+
+    Arguments: `why` gives the log chance by each sign, which is named where it is below `NOTED`.
+    """
+    expected = log_chance + log(max(number, 1))
+    for i, j in np.argwhere(np.triu(expected < log(FALSE_ALARMS), 1)):
+        signs = [sign for sign, by_sign in why.items() if by_sign[i, j] < NOTED]
+        measure, part = exp(max(float(expected[i, j]), -600.0)), float(np.clip(share[i, j], 0.0, 1.0))
+        pairs.setdefault((int(i), int(j)), _Pair()).add(signs, measure, part, int(compared[i, j]))
 
 
 def _add_other_numbers(

@@ -9,7 +9,7 @@ from typing import Any, Literal, cast
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from reference.authored.assignment import Assignment, Variant
+from reference.authored.assignment import Assignment
 from reference.construction.graph import Construction
 from reference.geometry import ComplexArray, FloatArray, degrees
 from reference.kinematics.motion import Motion
@@ -176,11 +176,6 @@ class PlanDocument(_Document):
         return {"forces"} if self.forces is None else set()
 
 
-def variant_numbers(variant: Variant) -> dict[str, int]:
-    """Return the ``variant`` of documents: n if the assignment has one."""
-    return {} if variant.n is None else {"n": variant.n}
-
-
 def plan_document(assignment: Assignment, plan: Plan) -> PlanDocument:
     """Return the plan of one variant, the first."""
     return plan_documents(assignment, plan)[0]
@@ -235,11 +230,12 @@ def _document(assignment: Assignment, plan: Plan, columns: _Columns, index: int)
     def points(figure: str) -> dict[str, tuple[float, float]]:
         return {name: (at[index].real, at[index].imag) for name, at in columns.points[figure].items()}
 
+    variant = plan.variants[index]
     value, drawn, direction = numbers("value"), numbers("drawn_mm"), numbers("direction_deg")
     return PlanDocument(
         assignment=assignment.id,
-        variant=variant_numbers(plan.variants[index]),
-        position=plan.variants[index].position,
+        variant={} if variant.n is None else {"n": variant.n},
+        position=variant.position,
         scales=numbers("scale"),
         points_m=points("mechanism"),
         vectors={

@@ -1,27 +1,16 @@
 """The reference drawing as PDF, and the solution step by step as HTML and PDF."""
 
-import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
-from reportlab.lib.pagesizes import A4
-from reportlab.lib.styles import ParagraphStyle
 from reportlab.lib.units import mm
-from reportlab.platypus import (
-    CondPageBreak,
-    Flowable,
-    KeepTogether,
-    Paragraph,
-    SimpleDocTemplate,
-    Spacer,
-    Table,
-)
+from reportlab.platypus import CondPageBreak, Flowable, KeepTogether, Spacer, Table
 
 from grader.language import N_, Tongue
-from grader.printed.pdf import REGULAR, Drawing, PdfDrawing, embed_fonts, put_shapes, with_marks
+from grader.printed.pdf import Drawing, PdfDrawing, a4_document, paragraph, put_shapes
 from grader.solution.formulas import (
     Formula,
     Grid,
@@ -35,13 +24,7 @@ from grader.solution.formulas import (
 )
 from grader.solution.steps import CENTRES, NOTES, ExplainedStep, PlanSection, explain
 from reference.drawing import sheets
-from reference.drawing.canvas import (
-    A3_MM,
-    Bounds,
-    Shape,
-    bounds,
-    picture_svg,
-)
+from reference.drawing.canvas import A3_MM, Bounds, Shape, bounds, picture_svg
 from reference.drawing.forces import LEVER, lever_of, scheme_of
 from reference.drawing.sheets import figures_of
 from reference.drawing.subject import DrawnFigure, Subject
@@ -211,6 +194,8 @@ def text_page(subject: Subject, tongue: Tongue) -> str:
 
 # As PDF -------------------------------------------------------------------------------------------
 
+_paragraph = partial(paragraph, leading=1.4)
+
 
 def _drawn(
     picture: Cutout, share: float = 1.0, tallest_mm: float = TALLEST_MM, widest_mm: float = COLUMN_MM
@@ -222,20 +207,12 @@ def _drawn(
 
 def pdf_pages(subject: Subject, tongue: Tongue) -> bytes:
     """Return the steps as an A4 document."""
-    embed_fonts()
-    buffer = io.BytesIO()
     title = subject.title
-    document = SimpleDocTemplate(
-        buffer, pagesize=A4, title=title, invariant=1,
-        leftMargin=12 * mm, rightMargin=12 * mm, topMargin=14 * mm, bottomMargin=14 * mm,
-    )  # fmt: skip
-    document.build([*printed_steps(subject, tongue, title)])
-    return buffer.getvalue()
+    return a4_document(title, printed_steps(subject, tongue, title), 12 * mm, 14 * mm)
 
 
 def printed_steps(subject: Subject, tongue: Tongue, title: str) -> Iterator[Flowable]:
     """Yield the steps as parts of an A4 document."""
-    embed_fonts()
     yield _paragraph(title, 14)
     yield Spacer(1, 2 * mm)
     yield from (_paragraph(tongue.gettext(note), 8.5) for note in NOTES)
@@ -289,9 +266,3 @@ def _formula(formula: Formula) -> Flowable:
     gap = 0.3 * FORMULA_MM
     box = (-INDENT_MM, -found.rise - gap, max(found.width, 1.0), found.fall + gap)
     return _drawn(Cutout(found.shapes, box))
-
-
-def _paragraph(text: str, size: float) -> Paragraph:
-    """Return a text or markup as a printed paragraph; its size in points."""
-    style = ParagraphStyle(f"s{size}", fontName=REGULAR, fontSize=size, leading=1.4 * size)
-    return Paragraph(with_marks(text), style)

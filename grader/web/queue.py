@@ -12,11 +12,13 @@ import os
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
-from typing import Any
+from typing import Any, TypeVar
 
 from sqlalchemy import select, update
 
@@ -25,7 +27,6 @@ from grader.folder.workers import Workers, end_with_parent, guarded, result_of
 from grader.records import Reason, as_error
 from grader.review.session import moves
 from grader.texts.spoken import failure, in_english
-from grader.web.judges import MOST_JUDGES, Judges
 from grader.web.places import batch_of, places_of
 from grader.web.settings import Settings
 from grader.web.store import UNFINISHED, Job, Store
@@ -36,6 +37,11 @@ _TELL_S = 0.5
 """Progress is written at this interval: a person cannot read faster."""
 TURN_S = 120.0
 """A class is graded for so long where others wait; the next time twice, then three times as long."""
+MOST_JUDGES = 4
+"""Processes of 110 MB each: they judge 100 values a second and more."""
+MOST_POOLS = 3
+"""Pools in which a call is tried when its pool breaks: another call may have killed the process."""
+Result = TypeVar("Result")
 Photo = Callable[..., dict[str, Any]]
 """Checks a photo: its path, the assignment, n, position, language and level."""
 
@@ -90,6 +96,47 @@ class Turns:
         with self._changed:
             self._has_ended = True
             self._changed.notify_all()
+
+
+class Judges:
+    """A pool for short calls without limits: requests that share one interpreter only take turns."""
+
+    def __init__(self, jobs: int) -> None:
+        self._jobs = jobs
+        self._renewing = threading.Lock()
+        self._pool = self._started()
+
+    def _started(self) -> ProcessPoolExecutor:
+        context = multiprocessing.get_context("spawn")
+        pool = ProcessPoolExecutor(self._jobs, context, initializer=end_with_parent)
+        for _ in range(self._jobs):  # each call lets one more process start
+            pool.submit(int)
+        return pool
+
+    def run(
+        self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]], sheets: Iterable[int] = ()
+    ) -> Iterator[tuple[int, Result | Reason]]:
+        """As `grader.folder.workers.Pool.run`."""
+        del sheets
+        for index, call in enumerate(calls):
+            yield index, self._result(function, *call)
+
+    def _result(self, function: Callable[..., Result], *call: object) -> Result | Reason:
+        """Return the result of a call; where a process was killed, which breaks the pool, from a new one."""
+        for _ in range(MOST_POOLS):
+            pool = self._pool
+            try:
+                return pool.submit(guarded, function, *call).result()
+            except BrokenProcessPool:
+                with self._renewing:  # one of all that wait
+                    if self._pool is pool:
+                        pool.shutdown(wait=False)
+                        self._pool = self._started()
+        return Reason("crashed", {"why": "killed"})
+
+    def end(self) -> None:
+        """End the processes."""
+        self._pool.shutdown(cancel_futures=True)
 
 
 @dataclass(slots=True)

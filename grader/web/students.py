@@ -271,12 +271,8 @@ def ask_again(call: Called, key: Key, request: Again) -> dict[str, str]:
     ]  # fmt: skip
     if not fitting:
         raise missing("criterion")
-    call.session.add(
-        Regrading(
-            publication_id=link.publication_id, student_id=link.student_id, position=request.position,
-            criterion=request.criterion, text=request.text,
-        )
-    )  # fmt: skip
+    own = {"publication_id": link.publication_id, "student_id": link.student_id}
+    call.session.add(Regrading(**own, **request.model_dump()))
     call.note("regrading asked", f"{key} {link.student_id} {request.criterion}")
     return {"state": "waits"}
 

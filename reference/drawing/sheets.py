@@ -140,10 +140,6 @@ def lay_out(figures: Sequence[DrawnFigure], room: Bounds, column: Bounds) -> tup
     return [(room[0] - box[0], room[1] - box[1]) for box in (figure.bounds for figure in figures)], False
 
 
-def _sizes(figures: Sequence[DrawnFigure]) -> list[tuple[float, float]]:
-    return [(box[2] - box[0], box[3] - box[1]) for box in (figure.bounds for figure in figures)]
-
-
 def _in_rows(figures: Sequence[DrawnFigure], room: Bounds) -> list[Point] | None:
     """Return shifts in rows with equal spaces, in the layout with the widest spaces; None without room."""
     layouts = [_rows(figures, breaks, room) for breaks in product((False, True), repeat=len(figures) - 1)]
@@ -154,7 +150,7 @@ def _in_rows(figures: Sequence[DrawnFigure], room: Bounds) -> list[Point] | None
 def _rows(figures: Sequence[DrawnFigure], breaks: Sequence[bool], room: Bounds) -> tuple[float, list[Point]]:
     """Return the least space, and flags for the figures after which a new row starts."""
     left, top, right, bottom = room
-    sizes, rows = _sizes(figures), [[0]]
+    sizes, rows = [figure.size for figure in figures], [[0]]
     for k, new in enumerate(breaks, start=1):
         if new:
             rows.append([])
@@ -178,7 +174,7 @@ def _packed_by_size(figures: Sequence[DrawnFigure], room: Bounds, reserved: Boun
 
     Of these layouts the one whose figures are farthest apart; None if none has room for all.
     """
-    sizes = _sizes(figures)
+    sizes = [figure.size for figure in figures]
     if any(width > room[2] - room[0] or height > room[3] - room[1] for width, height in sizes):
         return None
     layouts = [_packed(figures, room, reserved, corner) for corner in CORNERS]
@@ -195,7 +191,7 @@ def _packed(
     taken[y0 : y1 + 1, x0 : x1 + 1] = True
     moves: dict[int, Point] = {}
     least = np.inf
-    for k in sorted(range(len(figures)), key=lambda k: -float(np.prod(_sizes([figures[k]])[0]))):
+    for k in sorted(range(len(figures)), key=lambda k: -float(np.prod(figures[k].size))):
         mask, first = _mask(figures[k])
         (row, column), depth = _roomiest(taken, mask, None if moves else corner)
         if depth == 0.0:

@@ -2,28 +2,15 @@
 
 from datetime import UTC, datetime
 
-from grader.documents import (
-    CriterionDocument,
-    MistakeDocument,
-    ProblemDocument,
-    Quantity,
-    ReportDocument,
-    ResultsDocument,
-    RubricDocument,
-    Tolerance,
-)
+from grader.documents import MistakeDocument, ProblemDocument, ReportDocument, ResultsDocument, RubricDocument
 from grader.lms.export import export
 from grader.lms.grades import Options
 from grader.texts.spoken import ENGLISH, clause
+from tests.unit.feedback import works
 
 
 def criterion(name, verdict, points, feedback=""):
-    return CriterionDocument(
-        id=name, title=f"Vector {name}", vector=name, points=points, max_points=5.0, verdict=verdict,
-        measured=Quantity(length_mm=47.25, direction_deg=12.5),
-        expected=Quantity(length_mm=46.4, direction_deg=12.0, value=1.67, unit="m/s"),
-        tolerance=Tolerance(length_mm=1.0, direction_deg=1.5), confidence=0.99, feedback=feedback,
-    )  # fmt: skip
+    return works.criterion(name, verdict, points, feedback=feedback)
 
 
 def report(student_id, score=None, *, status="graded", position=None, n=None, **more):

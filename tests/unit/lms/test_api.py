@@ -107,20 +107,12 @@ def test_the_ids_that_canvas_gave_are_used_and_the_rubric_is_not_made_twice(tmp_
     _, calls, files = planned(tmp_path, "canvas-api", **PLACE, criteria=answer)
     assert [call["method"] for call in calls] == ["PUT", "PUT"]
     assert set(files["001-s01-grade.json"]["rubric_assessment"]) == {"9_77", "9_12"}
-    answer["rubric"]["data"][0]["points"] = 4.0
-    with pytest.raises(InputFileError, match="4 points there, 5 in the rubric"):
-        planned(tmp_path, "canvas-api", **PLACE, criteria=answer)
 
 
 @pytest.mark.parametrize("to", ["canvas-api", "google-classroom", "ms-education"])
 def test_the_place_of_a_rubric_must_be_told(tmp_path, to):
     with pytest.raises(CallError, match="needs --course-id, --assignment-id"):
         planned(tmp_path, to)
-
-
-def test_a_number_of_canvas_is_one(tmp_path):
-    with pytest.raises(CallError, match="--course-id: 'a/b' is not a number"):
-        planned(tmp_path, "canvas-api", course_id="a/b", assignment_id="1")
 
 
 def test_two_students_with_one_user_are_refused(tmp_path):
@@ -231,11 +223,6 @@ def test_a_classrooms_rubric_that_is_there_is_not_made_again(tmp_path):
     )
     assert [call["body"] for call in calls] == ["001-s02-grade.json"]
     assert "nobody in the platform's file has" in left_out(delivery)["s01"]
-
-
-def test_an_answer_without_submissions_is_refused(tmp_path):
-    with pytest.raises(CallError, match="no submissions are in this answer; ask for"):
-        planned(tmp_path, "google-classroom", **PLACE, submissions={"error": {"code": 403}})
 
 
 # Microsoft ----------------------------------------------------------------------------------------

@@ -432,12 +432,6 @@ def test_a_number_that_canvas_would_not_take_is_refused(tmp_path, rubric, number
         points(tmp_path, rubric, marked("s01", 5.0, 2.5), people={"s01": Person(platform_id=number)})
 
 
-def test_two_students_with_one_submission_are_refused(tmp_path, rubric):
-    people = {"s01": Person(platform_id="7"), "s02": Person(platform_id="7")}
-    with pytest.raises(InputFileError, match="appears twice"):
-        points(tmp_path, rubric, marked("s01", 5.0, 2.5), marked("s02", 5.0, 2.5), people=people)
-
-
 @pytest.mark.parametrize(
     "answer",
     [

@@ -72,14 +72,6 @@ def test_a_grade_that_moodle_holds_already_stays_as_it_is_written():
     assert delivery.notes == (Reason("updates", {"count": 0}),)
 
 
-def test_a_grade_that_moodle_holds_for_a_withheld_student_stays_and_is_told():
-    data = worksheet(line(101, grade="3.00"), line(102, "Ana Ionescu", "ana@x.ro"))
-    waiting = report("s01", None, status="needs_review"), report("s02", None, status="missing")
-    delivery = filled_in(data, *waiting)
-    assert rows(delivery.content) == []
-    assert notes(delivery)[1:] == ["withheld, and a grade is there already, which stays: s01 (3.00)"]
-
-
 def test_comments_that_moodle_holds_already_are_replaced_and_told():
     data = worksheet(line(101) + "well done", line(102, "Ana Ionescu", "ana@x.ro"))
     comments = {"s01": "<p>a</p>", "s02": "<p>b</p>"}

@@ -13,36 +13,15 @@ from reference.errors import MechanismError
 from reference.kinematics.cycle import cycle
 from reference.kinematics.motion import move
 from reference.plan import exact_plan
+from tests.drawn import HEAD
 
-FILE = """
-schema_version = 1
-id = "bars"
-rubric = "four-bar"
-title = {{ en = "Four bars" }}
-task = {{ en = "Draw." }}
+FILE = (
+    HEAD.replace("{name}", "four-bar")
+    + """
+ground = {{ O1 = [0, 0], O2 = [{ground}, 0] }}
+crank = {{ pivot = "O1", pin = "A", length = {crank}, angle_deg = "{angle}", omega = 10 }}
 [variant]
 {variant}
-[scales]
-kL = 0.002
-kv = 0.02
-ka = 0.2
-[[page]]
-kind = "all"
-figures = ["mechanism", "velocity_plan", "acceleration_plan"]
-[mechanism]
-schema_version = 1
-id = "bars"
-length_unit = "mm"
-title = {{ en = "Four bars" }}
-[mechanism.ground]
-O1 = [0, 0]
-O2 = [{ground}, 0]
-[mechanism.crank]
-pivot = "O1"
-pin = "A"
-length = {crank}
-angle_deg = "{angle}"
-omega = 10
 [[mechanism.group]]
 type = "RRR"
 node = "B"
@@ -51,6 +30,7 @@ links = ["2", "3"]
 lengths = [{coupler}, {rocker}]
 side = "{side}"
 """
+)
 PARALLELOGRAM = {"ground": 100, "crank": 40, "coupler": 100, "rocker": 40, "side": "left"}
 KITE = {"ground": 40, "crank": 40, "coupler": 100, "rocker": 100, "side": "left"}
 TWELVE = "position = { from = 0, to = 11 }"

@@ -10,8 +10,7 @@ from starlette.testclient import TestClient
 
 from grader.records import Reason
 from grader.web.app import application
-from grader.web.judges import Judges
-from grader.web.queue import Queue
+from grader.web.queue import Judges, Queue
 from grader.web.store import Job, Publication, Store
 from reference.errors import CallError, InputFileError
 from tests.inline import Inline
