@@ -303,6 +303,8 @@ def _vectors(
     return found
 
 
+EITHER = 0.5
+"""Most confidence in each of two opposite forces that make a polygon."""
 MOSTLY_DOUBTED, DOUBTED = 0.79, 0.6
 """Median confidence of a force polygon's sides below which the polygon was mostly read in doubt; and that of
 one force: of 13 that seemed right one had been left out."""
@@ -330,6 +332,10 @@ def _doubted(task: Task, figure: str, drawn: Mapping[str, DrawnVector]) -> dict[
         if name in laid_off
     ]
     is_told = len(forward) > 1 and all(forward)
+    if len({frozenset((one.tail, one.head)) for one in sides}) == 1:
+        # Two opposite forces: only their names, which are not read, tell which is which.
+        either = {name: min(one.confidence, EITHER) for name, one in drawn.items()}
+        return {name: replace(drawn[name], confidence=sure, is_doubted=True) for name, sure in either.items()}
     is_closed = all(one.name in drawn for one in sides)
     is_doubtful = (
         not (is_told and is_closed)

@@ -20,8 +20,6 @@ HALF = 0.5
 """The share of a criterion that a part of it keeps where the rubric has no band of partial points."""
 ROUNDING = 1e-9
 """Relative excess over a tolerance that still counts as within it."""
-
-
 NO_SPREAD = EndSpread(0.0, 0.0)
 
 
@@ -245,14 +243,10 @@ within the tolerance of the right vector: of simulated vectors credited with a c
 was wrong, of 900 from 0.2 to 0.9 none (other students than those of the docs). A vector that is within the
 tolerance by the reading's error alone is less certain. A misreading makes a right vector wrong much more
 often."""
-
-
 WRONG_DOUBTED = 0.2
 """The same, by the share of doubt, for what is laid off in a force polygon that may be another one:
 the reader looks for the right polygon, where one laid off the wrong way may seem right. Of 61 credited with
 less than 0.9 on 130 simulated sheets 4 were wrong; of 35 closing sides none, of 152 in other polygons one."""
-
-
 MOSTLY_MISREAD = 0.7
 """Share of misread vectors among those that are off and were read without any confidence. On simulated
 flatbed sheets 31 of 39 read with 0.3 to 0.9 were read rightly, and all of 59 from 0.9 on."""

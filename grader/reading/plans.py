@@ -48,6 +48,8 @@ from reference.quantities import group_of
 DRAFTING_ERRORS = DraftingErrors()
 FORCE_ERRORS = DraftingErrors(length_mm=0.4, relative=0.006, computed=0.03)
 """Given forces are laid off by the ruler alone, which tells their orders apart."""
+FORCE_SLACK = 0.01
+"""Error of a force polygon's size, which the declared scale gives: an arrowhead is longer than that."""
 END_PRIOR = EndPrior()
 FORCE_ENDS = EndPrior(marked_share=0.5)
 """Forces in one line, one after the other, often make one stroke."""
@@ -596,7 +598,9 @@ class _PlanCase:
         """The expected plan there, with the possible errors of the pose."""
         if self.hypothesis.label == BY_LETTERS:
             return self.expected
-        return self.expected.placed(self.pose, Slack(relative=0.03 if self.has_expected_size else 0.08))
+        of_forces = group_of(self.hypothesis.drawing.construction.figure_of(self.expected.names[0]))
+        usual = FORCE_SLACK if of_forces else 0.03
+        return self.expected.placed(self.pose, Slack(relative=usual if self.has_expected_size else 0.08))
 
 
 def _read(

@@ -153,7 +153,8 @@ def _vectors(
         cov = _difference_cov(fit.cov, edge) + sheet.cov_of(span)
         spans = explanations.at[:, edge.head] - explanations.at[:, edge.tail]
         of_two = is_polygon and is_double(plan, edge)
-        (_, named), *others = explanations.of(spans, EITHER_MM if of_two else NEAR_MM)
+        near_mm = EITHER_MM if of_two else ALIKE_MM if is_polygon else NEAR_MM
+        (_, named), *others = explanations.of(spans, near_mm)
         # A long vector is never more certain than the sheet's scale.
         most = math.erf(NEAR_MM / max(math.sqrt(2.0) * sheet.scale_se * abs(span), 1e-9))
         if np.sum(np.abs(lettered - fit.at[[[edge.tail], [edge.head]]]) < CLOSE_MM) > 2:
@@ -300,6 +301,8 @@ MARKED_MM, UNMARKED, SHORT_MM = 0.5, 0.15, 5.0
 """A tip within the first marks a node; vectors longer than the last count as marked so well without tips."""
 NEAR_MM = 0.5
 """Largest error of a right node: a pencil stroke's width."""
+ALIKE_MM = 1.0
+"""Explanations of a force polygon that differ less give the same force, though orders or tiny ones differ."""
 EITHER_MM = 1.5
 """The same of two lines side by side, for opposite forces: either is the vector as drawn."""
 RIVAL_NATS = 12.0

@@ -2,7 +2,8 @@
 
 The kinds of sheets are those that instructors get: flatbed scans of plain and printed sheets, 1-bit copies,
 photos, and sloppy hands. Half of the drawings are right, a third have one mistake, the others two. Force
-sheets, plain and printed, are a kind of their own: a third are right, the others have one mistake in forces.
+sheets, plain and printed, are a kind of their own: a third are right, the others have one mistake in forces;
+those of a further kind have two.
 """
 
 import pickle
@@ -65,6 +66,9 @@ SHEET_KINDS: Mapping[str, SheetKind] = {
     "phone": SheetKind("phone photos, answer sheet", device="phone", dpi=None, printed=True),
     "sloppy": SheetKind("flatbed 300 dpi, sloppy hands", hands=("sloppy",)),
     "forces": SheetKind("force sheets", assignments=(*WITH_FORCES, "shaper-forces"), shares=FORCE_SHARES),
+    "forces-two": SheetKind(
+        "force sheets, two mistakes", assignments=(*WITH_FORCES, "shaper-forces"), shares={"pair": 1.0}
+    ),
     "forces-printed": SheetKind(
         "force sheets, answer sheet", printed=True, assignments=WITH_FORCES, shares=FORCE_SHARES
     ),

@@ -30,8 +30,6 @@ PUMP = load_assignment("pump")
 RUBRIC = rubric_of(PUMP)
 NAME = "Ion-Popescu"
 ID = "grupa12_popescu"
-
-
 SIGNED_PX = (1775, 690)
 """The place of a signature on the scan of s02, inside its sketch."""
 

@@ -1,6 +1,8 @@
 """Entered force sheets: one mistake costs one criterion, what follows is credited, and it is named."""
 
+from cmath import phase
 from dataclasses import replace
+from math import degrees
 from types import SimpleNamespace
 
 import numpy as np
@@ -22,7 +24,16 @@ from grader.overlay.measured import measured_picture
 from grader.rubric import load_both
 from grader.tables.measurements import measurements_in, names_of
 from reference.authored.assignment import Variant
-from reference.construction.mistakes import OF_FORCES, Mistake, affected, made_at, mistakes_of_forces
+from reference.construction.graph import evaluate
+from reference.construction.mistakes import (
+    OF_FORCES,
+    Drawing,
+    Mistake,
+    affected,
+    commit,
+    made_at,
+    mistakes_of_forces,
+)
 from reference.plan import exact_plan
 from tests.bench.force_students import HANDS, ForceMistake, StudentForces, force_task
 from tests.bench.judging_forces import Tally, count, measure_forces, sheets
@@ -375,6 +386,23 @@ def test_a_couple_of_the_other_sense_is_named_beside_a_wrong_load(tmp_path):
         ("arithmetic", "F_B"),
         ("couple_reversed", "M_i2"),
     }
+
+
+def test_a_couple_left_out_is_named_beside_a_wrong_arm_whose_part_was_not_entered():
+    (assignment, rubric), variant = force_task("press"), force_task("press")[0].variants()[4]
+    drawing = exact_plan(assignment, [variant], accelerations=False).drawing
+    vectors, known = drawing.construction.vectors, {k: v.ravel()[0] for k, v in drawing.parameters.items()}
+    drawn = commit(Mistake("wrong_arm", vectors["R_13_t"].head), Drawing(drawing.construction, known))
+    couples = (one for one in mistakes_of_forces(drawn) if one.at == "M_i2")
+    drawn = commit(next(one for one in couples if one.code == "couple_missing"), drawn)
+    nodes = evaluate(drawn.construction, drawn.parameters)
+    spans = {name: complex(nodes[one.arrow[1]] - nodes[one.arrow[0]]) for name, one in vectors.items()}
+    cells = {name: str(round(abs(span), 1)) for name, span in spans.items() if name != "R_13_t"}
+    cells |= {f"{name}_deg": str(round(degrees(phase(spans[name])) % 360.0, 1)) for name in cells}
+    entered = measurements_in(cells | {"kF": f"{known['kF']} N/mm"}, names_of(assignment), "", "en")
+    handed_in = Submission(measured=entered.reading, declared=entered.scales)
+    named_too = judge(task_of(assignment, rubric, variant), handed_in).mistakes
+    assert {("couple_missing", "M_i2"), ("wrong_arm", "R_13_t")} < {(one.code, one.at) for one in named_too}
 
 
 def test_a_moment_waits_while_a_force_from_which_it_follows_cannot_be_used(tmp_path):

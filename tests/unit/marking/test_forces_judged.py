@@ -19,6 +19,7 @@ from reference.authored.assignment import Variant, library, load_assignment
 from reference.construction.mistakes import Drawing, Mistake, mistakes_of_forces
 from reference.errors import AuthoredFileError
 from reference.numbers import cross
+from tests.bench.force_students import force_task
 from tests.hands import changed, rule_scales, sheet, task_for, without
 from tests.told import tells
 
@@ -282,6 +283,13 @@ def test_a_force_that_seems_right_waits_where_the_other_sense_of_its_polygon_fit
     turned = changed(read, "F_iD", direction_deg=(inertia.direction_deg + 180.0) % 360.0)
     assert on_scan(PUMP, turned)["F_D"] == "full"
     assert on_scan(PUMP, capped(turned))["F_D"] == "review"
+
+
+def test_two_opposite_forces_wait_where_only_their_names_tell_which_is_which():
+    assignment, rubric = force_task("shaper")
+    task = task_of(assignment, rubric, assignment.variants()[4])
+    found = on_scan(task, sheet(task))
+    assert (found["R_A3"], found["R_A1"], found["R_01"]) == ("full", "review", "review")
 
 
 def test_a_force_read_in_doubt_waits_where_a_side_of_its_polygon_was_not_found():

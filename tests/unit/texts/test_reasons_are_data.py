@@ -211,8 +211,6 @@ def test_every_failure_has_its_sentence_and_every_sentence_its_failure() -> None
 
 BELOW_TEXTS = ("grader/files.py", "grader/language.py", "reference/")
 """Rooms that `texts` imports: their errors hold parameters beside their words."""
-
-
 ERRORS = {"PlanmarkError", "CallError", "InputFileError", "OutputError", "InterruptedRunError"}
 
 
