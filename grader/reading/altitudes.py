@@ -54,7 +54,7 @@ def _drawn(lines: Lines, where: InkMap, pin: complex, joint: complex) -> Iterato
     In their frame the joint is the origin, and the link comes to it along the real axis.
     """
     length = abs(joint - pin)
-    if length < LEAST_MM:
+    if not length >= LEAST_MM:  # nan where an end was not read
         return
     turn = (joint - pin) / length
     start, along = (lines.start - joint) / turn, lines.along / turn

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from grader.reading.altitudes import _drawn
 from grader.reading.lines import lines_of
 from grader.reading.plans import PlanProblem, best_plan, regular_plans
 from grader.reading.read import read_figures
@@ -450,6 +451,12 @@ def test_a_right_triangle_on_the_sketch_is_read_as_it_was_drawn(velocity, square
 def test_two_sides_are_no_triangle(left_out):
     sides, _, _ = sides_of_triangle(draw(task("pump", built_in_variant(4))[2]))
     assert not altitudes_read([side for index, side in enumerate(sides) if index != left_out])
+
+
+def test_a_link_of_which_an_end_was_not_read_has_no_triangle():
+    ink = draw(task("pump", built_in_variant(4))[2]).ink
+    with np.errstate(all="raise"):
+        assert not [*_drawn(lines_of(ink), ink.where, complex("nan+nanj"), 0j)]
 
 
 def test_sides_at_another_angle_than_a_right_one_are_no_triangle():
