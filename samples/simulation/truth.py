@@ -3,7 +3,7 @@
 Positions are sheet millimetres from the top left corner, x right, y down; directions are degrees
 counter-clockwise from +x. `nodes` are the construction's points as this hand drew them; a stroke
 may miss them by the redraw error (`line_mm`). `intended` is the drawing of a perfect hand with the
-same mistakes: follow-through should expect it.
+same mistakes: follow-through should expect it. The whole drawing is turned by `turn_deg`.
 """
 
 from collections.abc import Mapping
@@ -57,6 +57,7 @@ def drawing_truth(
         "figures": figures,
         "poles": {name: pole_text(task, name) for name in figures if name != MECHANISM},
         "scales": {"declared": _rounded(task.declared), "used": _rounded(task.used)},
+        "turn_deg": round(float(np.degrees(task.right.parameters.get("turn", 0.0))), 4),
         "mistakes": [_mistake(mistake) for mistake in task.mistakes],
         "labels": [_label(label) for label in sketch.labels],
     }

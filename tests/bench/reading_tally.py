@@ -123,7 +123,8 @@ class ReadingTally:
         seen: ScannedPage, reading: Reading,
     ) -> None:  # fmt: skip
         """Add one page with its reading."""
-        self.judged.append(list(each_vector(figures, wanted, reading.figures)))
+        turn_deg = truth.get("turn_deg", 0.0) if seen.ref.tilt_rad else 0.0
+        self.judged.append(list(each_vector(figures, wanted, reading.figures, turn_deg)))
         if seen.sheet is None or seen.image is None:
             self.refused += 1
             return

@@ -12,6 +12,9 @@ cover the whole distance (a vector on the same line as a longer one, the side of
 a construction line that was not drawn over). In that case the picture alone cannot show whether the
 vector was drawn, its value is that of the student's own nodes, and it counts neither for nor against.
 A vector that was left out and would lie on bare paper is a misread.
+
+A sheet without a frame lies as its drawing does (docs/decisions/31-turn-by-the-drawing.md). There a drawing
+that was turned as a whole is judged by directions relative to it.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -245,11 +248,11 @@ def _stands_in(ends: Segment, strokes: Sequence[Segment]) -> bool:
     return bool(covered.mean() >= _COVERED)
 
 
-def judged(true: TrueVector, found: ReadVector | None) -> Judged:
-    """Compare one vector's reading with the truth."""
+def judged(true: TrueVector, found: ReadVector | None, turn_deg: float = 0.0) -> Judged:
+    """Compare one vector's reading with the truth; directions are relative to a drawing so turned."""
     if found is None or found.length_mm is None:
         return Judged(true, counts=not true.missing)
-    read = found.length_mm * complex(np.exp(1j * np.radians(found.direction_deg or 0.0)))
+    read = found.length_mm * complex(np.exp(1j * np.radians((found.direction_deg or 0.0) + turn_deg)))
     if not true.ways:
         # The vector is not on the sheet: its whole reading is an error.
         return Judged(true, reported=True, error_mm=abs(read), se_mm=found.se_mm, confidence=found.confidence)
@@ -277,11 +280,17 @@ def _is_right(read: complex, way: complex) -> bool:
 
 
 def each_vector(
-    figures: Mapping[str, TrueFigure], wanted: Sequence[str], read: Mapping[str, Figure]
+    figures: Mapping[str, TrueFigure],
+    wanted: Sequence[str],
+    read: Mapping[str, Figure],
+    turn_deg: float = 0.0,
 ) -> Iterator[Judged]:
-    """Judge every vector asked for on a sheet; `read` has the figures of a reading by name."""
+    """Judge every vector asked for on a sheet; `read` has the figures of a reading by name.
+
+    Arguments: directions are read relative to a drawing that is turned by `turn_deg` on its paper.
+    """
     for name, figure in figures.items():
         found = read.get(name)
         for vector in figure.vectors.values():
             if vector.name in wanted:
-                yield judged(vector, found.vectors.get(vector.name) if found else None)
+                yield judged(vector, found.vectors.get(vector.name) if found else None, turn_deg)

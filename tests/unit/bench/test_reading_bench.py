@@ -71,6 +71,13 @@ def test_a_vector_is_right_by_its_nodes_or_its_stroke_and_misread_when_confident
     assert one.reported == (read_as is not None and read_as.length_mm is not None)
 
 
+def test_directions_of_a_turned_drawing_are_judged_relative_to_it():
+    read_as = found(direction_deg=92.5)
+    assert judged(DRAWN, read_as).misread
+    assert judged(DRAWN, read_as, turn_deg=-2.5).right
+    assert judged(DRAWN, found(), turn_deg=-2.5).misread
+
+
 def test_a_short_vector_may_turn_as_far_as_its_end_stays_within_the_limit_across():
     short = TrueVector("v_B", VELOCITY_PLAN, (0j, 4 + 0j), None)
     assert judged(short, found(4.0, 4.0)).right
