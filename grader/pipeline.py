@@ -184,10 +184,12 @@ def _upright(
 def _level(
     pages: Sequence[ScannedPage], readings: Sequence[Reading], right: Drawing | None
 ) -> list[ScannedPage]:
-    """The pages, those without a frame turned as their drawings lie."""
+    """The pages, those without a frame turned as their drawings lie, the way up that they were read."""
     tilts = [page_scale.drawn_tilt(*both, right) for both in zip(pages, readings, strict=True)]
     return [
-        _opened_again(page, open_page(replace(page.ref, tilt_rad=tilt))) if tilt else page
+        _opened_again(page, open_page(replace(page.ref, tilt_rad=tilt, turn_deg=page.turn_deg)))
+        if tilt
+        else page
         for page, tilt in zip(pages, tilts, strict=True)
     ]
 

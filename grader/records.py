@@ -689,6 +689,11 @@ class ScannedPage:
     backdrop: Backdrop | None = None
     flaws: tuple[Reason, ...] = ()
 
+    @property
+    def turn_deg(self) -> int | None:
+        """The turn that made it upright, as `PageRef` has it; None where it was not placed."""
+        return None if self.sheet is None else 90 * round(self.sheet.rotation_deg / 90.0) % 360
+
     def longer(self, factor: float, scale_se: float) -> "ScannedPage":
         """Return the page, before it is read, with every length scaled by a factor."""
         sheet, ink, behind = self.sheet, self.ink, self.backdrop

@@ -90,10 +90,9 @@ def _as_letters_stand(page: ScannedPage) -> ScannedPage:
 
 def turned(page: ScannedPage) -> ScannedPage:
     """A page opened the other way up, as letters are read upright only; itself where nothing is found so."""
-    if page.sheet is None:
+    if page.turn_deg is None:
         return page
-    turn_deg = (90 * round(page.sheet.rotation_deg / 90.0) + 180) % 360
-    other = open_page(replace(page.ref, turn_deg=turn_deg))
+    other = open_page(replace(page.ref, turn_deg=(page.turn_deg + 180) % 360))
     return page if other.image is None or other.sheet is None else other
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from grader import pipeline
 from grader.reading.page_scale import (
     BY_PLANS,
     UPRIGHT_UNSURE,
@@ -243,3 +244,10 @@ def test_an_empty_page_is_as_level_as_it_was_and_no_surer():
     tilt, se = drawn_tilt(frameless(), Reading({}), RIGHT)
     assert np.degrees(tilt) == pytest.approx(0.5, abs=0.05)
     assert np.degrees(se) > 0.9
+
+
+def test_a_sheet_that_is_turned_as_its_drawing_lies_stays_the_way_up_that_it_was_read(monkeypatch):
+    opened = []
+    monkeypatch.setattr(pipeline, "open_page", lambda ref: opened.append(ref) or frameless())
+    pipeline._level([frameless()], [drawn()], RIGHT)
+    assert [one.turn_deg for one in opened] == [180]
