@@ -226,6 +226,12 @@ def _check(reports: Sequence[ReportDocument]) -> None:
         raise failure(InputFileError, "results_wrong", "results_contradict", faults=faults)
 
 
+_OPEN = {
+    "needs_review": "needs_review", "unreadable": "unreadable", "missing": "missing", "graded": "no_score",
+}  # fmt: skip
+"""The reason, by status, for which a report has no grade yet."""
+
+
 def _grade(student_id: str, chosen: Sequence[tuple[ReportDocument, str]], options: Options) -> Grade:
     """The grade of a student's reports, each with its folder."""
     reports, folders = tuple(report for report, _ in chosen), tuple(folder for _, folder in chosen)
@@ -235,10 +241,7 @@ def _grade(student_id: str, chosen: Sequence[tuple[ReportDocument, str]], option
     score = sum(report.score or 0.0 for report in reports)
     parts = len(reports) if options.combine == "mean" else 1
     why = tuple(
-        Reason(
-            "no_score" if report.status == "graded" else report.status,
-            {} if report.position is None else {"position": report.position},
-        )
+        Reason(_OPEN[report.status], {} if report.position is None else {"position": report.position})
         for report in reports
         if report.status != "graded" or report.score is None
     )
