@@ -318,6 +318,10 @@ def _doubted(task: Task, figure: str, drawn: Mapping[str, DrawnVector]) -> dict[
     data have them. Sides too short to have a direction show nothing.
     """
     sides = task.construction.polygon_of(figure)
+    if len({frozenset((one.tail, one.head)) for one in sides}) == 1:
+        # Two opposite forces: only their names, which are not read, tell which is which.
+        either = {name: min(one.confidence, EITHER) for name, one in drawn.items()}
+        return {name: replace(drawn[name], confidence=sure, is_doubted=True) for name, sure in either.items()}
     laid_off = {one.name for one in sides if task.construction.laid_off(one.tail, one.head) is not None}
     shown = {
         one.name: at
@@ -332,10 +336,6 @@ def _doubted(task: Task, figure: str, drawn: Mapping[str, DrawnVector]) -> dict[
         if name in laid_off
     ]
     is_told = len(forward) > 1 and all(forward)
-    if len({frozenset((one.tail, one.head)) for one in sides}) == 1:
-        # Two opposite forces: only their names, which are not read, tell which is which.
-        either = {name: min(one.confidence, EITHER) for name, one in drawn.items()}
-        return {name: replace(drawn[name], confidence=sure, is_doubted=True) for name, sure in either.items()}
     is_closed = all(one.name in drawn for one in sides)
     is_doubtful = (
         not (is_told and is_closed)

@@ -47,11 +47,12 @@ def judge(task: Task, submission: Submission) -> Judgement:
     """Verdicts, mistakes and points of one submission for one variant.
 
     A wrong omega of the crank costs points once where more follows from it than from the right one. The omega
-    of the variant whose data the drawing follows is no slip.
+    of another variant whose data the drawing follows is no slip, unless the rubric marks that as any mistake.
     """
     best = judgement = _judged_as_entered(task, submission)
     slips = _speed_slips(task, submission.values)
-    if not slips or any(one.code == "other_variant" for one in judgement.mistakes):
+    is_anothers = any(one.code == "other_variant" for one in judgement.mistakes)
+    if not slips or (is_anothers and task.rubric.doubt.other_variant != "follow"):
         return judgement
     by = {one.at.partition("_")[0]: one.factor for one in slips}
     in_rpm = any(one.code == "units" and one.at == "values" for one in judgement.mistakes)

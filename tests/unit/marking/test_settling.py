@@ -39,6 +39,16 @@ def test_another_students_omega_is_that_of_the_data_and_no_slip_beside_them():
     assert [(one.code, one.mistake.n) for one in judgement.mistakes] == [("other_variant", OTHER.variant.n)]
 
 
+def test_another_students_omega_costs_once_where_the_rubric_marks_it_as_any_mistake():
+    scales = zip(OTHER.rule_scales.items(), ("m/mm", "(m/s)/mm", "(m/s2)/mm"), strict=True)
+    declared = {name: f"{scale!r} {unit}" for (name, scale), unit in scales}
+    both = {"measured": measured(OTHER), "declared": declared}
+    follow = with_doubt(other_variant="follow")
+    values = {"omega_1": OTHER.rates["omega_1"]}
+    judgement = judge(follow, Submission(**both, values=values))
+    assert judgement.score.total > judge(follow, Submission(**both)).score.total
+
+
 def test_another_students_drawing_is_marked_as_any_mistake_where_the_rubric_says_so():
     judgement = judge(with_doubt(other_variant="follow"), Submission(measured=measured(OTHER)))
     assert judgement.score.total > 0.5 * judgement.score.maximum
