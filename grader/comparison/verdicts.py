@@ -2,8 +2,9 @@
 
 import cmath
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import cast
 
 from grader.comparison.evidence import DrawnVector
@@ -197,22 +198,18 @@ def by_rule(first: MarkRange, rule: str) -> MarkRange:
     others = tuple(reason for reason in first.reasons if reason.code != "near_limit")
     if share == first.share:
         return MarkRange(share, share, share, others, first.sure)
-    decided = tuple(
-        _decided(reason, rule) for reason in near if (_beyond(reason) > 0.0) == (rule == "student")
-    )
+    decided = tuple(chain.from_iterable(_decided(reason, rule) for reason in near))
     losses = others if share != FULL else tuple(one for one in others if one.code == "too_short_to_judge")
     return MarkRange(share, share, share, (*decided, *losses), first.sure)
 
 
-def _beyond(near: Reason) -> float:
-    """By how much a residual is beyond its limit; negative within."""
-    off, tolerance = (cast("float", near.parameters[key]) for key in ("off", "tolerance"))
-    return off - tolerance
-
-
-def _decided(near: Reason, rule: str) -> Reason:
-    known = {key: near.parameters[key] for key in ("what", "good_to", "tolerance")}
-    return Reason(COUNTED[rule], {**known, "beyond": abs(_beyond(near))})
+def _decided(near: Reason, rule: str) -> Iterator[Reason]:
+    """Yield that the error decides, where the limit of full marks is near and not that of partial ones."""
+    off, tolerance, good_to = (cast("float", near.parameters[key]) for key in ("off", "tolerance", "good_to"))
+    beyond = off - tolerance if rule == "student" else tolerance - off
+    if 0.0 <= beyond <= good_to + ROUNDING * tolerance:
+        known = {key: near.parameters[key] for key in ("what", "good_to", "tolerance")}
+        yield Reason(COUNTED[rule], {**known, "beyond": beyond})
 
 
 def the_better(first: MarkRange, other: MarkRange, *reasons: Reason) -> MarkRange:

@@ -212,6 +212,14 @@ def test_what_straddles_a_limit_is_decided_by_the_rule_of_the_rubric(in_doubt, o
     assert rules & set(codes(outcome)) == ({said} if said else set())
 
 
+def test_what_straddles_the_limit_of_partial_marks_is_not_called_nearly_right():
+    table = BARE.rubric.tolerance_of("v_A")
+    limit_mm = 60.0 + table.all_bands[-1][0] * table.length_at(60.0)
+    longer = changed(measured(BARE), "v_A", length_mm=limit_mm + BEYOND, se_mm=0.1)
+    outcome = outcome_of(compare(BARE, Submission(measured=longer)), "v_A")
+    assert (outcome.verdict, codes(outcome)) == ("partial", ["too_long"])
+
+
 def test_an_error_that_cannot_change_the_verdict_does_not():
     longer = changed(measured(PUMP), "v_A", length_mm=61.1, se_mm=0.04)
     assert outcome_of(compare(PUMP, Submission(measured=longer)), "v_A").verdict == "full"
